@@ -1,0 +1,80 @@
+//! What generated material code and the runtime agree on: names of WGSL functions, the shape
+//! of a compiled material, and what a kernel must provide for it.
+//!
+//! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
+//! `stdlib/core/material.impasto`, and printed into every generated module.
+//!
+//! ```wgsl
+//! // Printed by the compiler (support functions and structs first):
+//! fn evaluate_material(material: u32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample
+//! fn material_emission(material: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // only if some emission varies
+//! // Provided by the runtime when a material reads textures:
+//! fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32>
+//! ```
+
+/// The WGSL function that evaluates any material of a module.
+pub const EVALUATE: &str = "evaluate_material";
+/// The WGSL function that gives the emission of any material of a module.
+pub const EMISSION: &str = "material_emission";
+/// The WGSL function the runtime provides: bilinear, wrapping lookup of texture `slot`.
+pub const TEXTURE_FETCH: &str = "texture_fetch";
+
+/// How a material emits light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Emission {
+    /// Not at all.
+    None,
+    /// The same radiance (linear RGB, W/(m^2 sr)) at every point and in every direction of
+    /// its front side, known before rendering: such surfaces are sampled as lights.
+    Uniform([f32; 3]),
+    /// Depends on the point or direction: evaluated where a path hits it, never sampled.
+    Varying,
+}
+
+/// What the color values of a texture mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TextureSpace {
+    /// 8-bit files hold sRGB, to be decoded to linear.
+    Color,
+    /// The numbers are used as they are.
+    Data,
+}
+
+/// A texture that compiled code fetches; its index in [`crate::Program::textures`] is its slot.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TextureRef {
+    /// The file, as named by the source or scene, resolved against the folder of whichever named it.
+    pub path: String,
+    /// How to read it.
+    pub space: TextureSpace,
+}
+
+/// What the runtime must know of one compiled material.
+#[derive(Clone, Debug)]
+pub struct MaterialInfo {
+    /// Unique name in the program, a WGSL identifier: the binding's name.
+    pub name: String,
+    /// Every lobe is discrete (or there is none): no light sample is worth a shadow ray.
+    pub delta_only: bool,
+    /// Some lobe may scatter to the other side: paths need the medium identifier.
+    pub transmissive: bool,
+    /// How it emits.
+    pub emission: Emission,
+    /// Which fields of `SurfacePoint` it reads.
+    pub inputs: InputSet,
+    /// Slots of the textures it reads.
+    pub textures: Vec<usize>,
+    /// Number of lobes after layering.
+    pub lobes: usize,
+}
+
+/// The fields of `SurfacePoint` that code reads, so that the others need not be computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct InputSet {
+    pub position: bool,
+    pub normal: bool,
+    pub geometric_normal: bool,
+    pub tangent: bool,
+    pub uv: bool,
+}

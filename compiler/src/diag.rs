@@ -1,0 +1,275 @@
+//! Diagnostics: what went wrong, where, what was expected, and what to try.
+//!
+//! The table [`Code::ALL`] is the one place where codes are declared; `impasto explain`,
+//! the documentation and the tests read it. Rendering as text and JSON is in [`render`].
+
+use serde::Serialize;
+
+use crate::source::Span;
+
+pub mod render;
+
+macro_rules! codes {
+    ($($name:ident = $code:literal, $severity:ident, $title:literal, $explanation:literal;)*) => {
+        /// A diagnostic's stable identity, such as `E0201`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[allow(missing_docs)]
+        pub enum Code { $($name),* }
+
+        impl Code {
+            /// Every code in order.
+            pub const ALL: &'static [Code] = &[$(Code::$name),*];
+
+            /// The code as written, such as `E0201`.
+            pub fn id(self) -> &'static str {
+                match self { $(Code::$name => $code),* }
+            }
+
+            /// Whether it stops the compilation.
+            pub fn severity(self) -> Severity {
+                match self { $(Code::$name => Severity::$severity),* }
+            }
+
+            /// The kind of problem in a few words.
+            pub fn title(self) -> &'static str {
+                match self { $(Code::$name => $title),* }
+            }
+
+            /// A paragraph for `impasto explain`.
+            pub fn explanation(self) -> &'static str {
+                match self { $(Code::$name => $explanation),* }
+            }
+        }
+    };
+}
+
+/// How bad a diagnostic is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing; compilation goes on.
+    Warning,
+    /// Nothing is generated.
+    Error,
+}
+
+codes! {
+    // E01xx: reading and syntax
+    SourceTooLarge = "E0101", Error, "source too large",
+        "A source file may have at most 1 MiB. Split it into modules and import them with `use`.";
+    InvalidUtf8 = "E0102", Error, "source is not text",
+        "Source files are UTF-8 text. The file given is binary or in another encoding.";
+    UnknownCharacter = "E0103", Error, "unknown character",
+        "The character is not part of the language. Outside comments and strings, sources are ASCII.";
+    Unterminated = "E0104", Error, "unterminated text",
+        "A string must end on the line it starts on, and a block comment `/* ... */` must be closed.";
+    InvalidNumber = "E0105", Error, "invalid number",
+        "Integers fit 32 bits (hexadecimal ones may fill them), and floats are finite in 32-bit precision.";
+    NestedTooDeep = "E0106", Error, "nested too deeply",
+        "Brackets, operators and else-if chains may nest at most 256 levels in all. Name parts of the expression with `let`.";
+    Syntax = "E0107", Error, "syntax error",
+        "The parser met something else than what the grammar allows at this place. See docs/language.md for the grammar.";
+    Unclosed = "E0108", Error, "unbalanced brackets",
+        "Every `(`, `[` and `{` needs its partner of the same kind.";
+    NoMaterial = "E0109", Error, "no material",
+        "The file defines no material (or not the one that was asked for), so there is nothing to render.";
+    // E02xx: names and modules
+    UnknownName = "E0201", Error, "unknown name",
+        "No variable, parameter, function or closure of that name is in scope. Names from other modules need a `use`.";
+    UnknownType = "E0202", Error, "unknown type",
+        "Types are bool, int, float, length, angle, vec2, vec3, vec4, color, point, vector, normal, mat3, texture, bsdf, edf and structs in scope.";
+    UnknownModule = "E0203", Error, "unknown module",
+        "A `use` names a folder of the standard library (`std::bsdf`, `std::noise`, ...) or a file beside the importing one.";
+    UnknownImport = "E0204", Error, "nothing of that name in the module",
+        "The module exists but defines no item of that name.";
+    ImportCycle = "E0205", Error, "import cycle",
+        "Modules may not import each other in a circle. Move what both need into a third module.";
+    Duplicate = "E0206", Error, "defined twice",
+        "A name may be defined once in its scope. Inner blocks may shadow outer names.";
+    Recursion = "E0207", Error, "recursion",
+        "GPUs run without a call stack: functions may not call themselves, directly or through others. Use a bounded loop.";
+    UnknownField = "E0208", Error, "unknown field",
+        "The value has no field or component of that name. Vectors have x, y, z, w; colors r, g, b; structs their fields.";
+    UnknownOutput = "E0209", Error, "unknown output",
+        "A material assigns `surface` and, when it emits light, `emission`.";
+    UnknownArgument = "E0210", Error, "unknown argument",
+        "The function has no parameter of that name.";
+    MissingArgument = "E0211", Error, "missing argument",
+        "Every parameter without a default needs an argument.";
+    TooManyArguments = "E0212", Error, "too many arguments",
+        "More arguments were given than there are parameters, or one was given twice.";
+    UnknownUnit = "E0213", Error, "unknown unit",
+        "Lengths are written in um, mm, cm, m or km, angles in deg or rad.";
+    UnknownParameter = "E0214", Error, "unknown material parameter",
+        "A scene sets a parameter that the material does not declare.";
+    // E03xx: types and values
+    TypeMismatch = "E0301", Error, "wrong type",
+        "The value has another type than this place needs. An int becomes a float, and a float a grey color, by itself; everything else is converted by calling the type: `color(v)`, `float(l)`.";
+    NoOperator = "E0302", Error, "operator does not apply",
+        "The operator is not defined for these types. Colors and directions do not mix; lengths add to lengths only.";
+    NeedsUnit = "E0303", Error, "a unit is needed",
+        "Lengths and angles are written with their unit, as in `0.5 mm` or `30 deg`.";
+    NotConstant = "E0304", Error, "not a constant",
+        "This place needs a value known before rendering: literals, constants and functions of those.";
+    OutOfRange = "E0305", Error, "value out of range",
+        "The parameter declares a range and the value is outside it.";
+    NotAssignable = "E0306", Error, "cannot be assigned",
+        "Only `var` variables, their components and a material's outputs can be assigned.";
+    MissingValue = "E0307", Error, "a value is missing",
+        "A function body ends in an expression without a semicolon, and an `if` used as a value needs an `else`.";
+    LoopBound = "E0308", Error, "loop without a usable bound",
+        "A `while` states its bound with `limit N`; a `for` has constant or bounded limits. At most 65,536 turns are allowed in nested loops together.";
+    MissingMethod = "E0309", Error, "missing method",
+        "A bsdf defines sample, eval, pdf and albedo; an edf defines emit.";
+    MissingOutput = "E0310", Error, "no surface",
+        "A material must assign `surface` or `emission` exactly once.";
+    ClosureUse = "E0311", Error, "a closure cannot be used here",
+        "Closures (bsdf, edf) are combined with layer, mix, `*` and `+`, named with `let` and assigned to outputs. They cannot be stored in `var`, structs or loops.";
+    TooManyLobes = "E0312", Error, "too many lobes",
+        "A material may have at most 64 lobes after layering.";
+    Unsupported = "E0313", Error, "not supported here",
+        "The construct is part of the language's plan but cannot be used in this place yet.";
+    NotFinite = "E0314", Error, "not a finite number",
+        "Parameters and constants must be finite numbers.";
+    // E09xx: generated code
+    InvalidWgsl = "E0901", Error, "generated code was rejected",
+        "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";
+    // W: warnings
+    EnergyGain = "W0001", Warning, "may gain energy",
+        "`a + b` of closures adds their albedos, which can exceed one. Use `layer`, `mix` or weights that sum to at most one.";
+    WeightAboveOne = "W0002", Warning, "weight above one",
+        "A closure weighted by more than one can reflect more light than it receives.";
+    Unused = "W0003", Warning, "never used",
+        "The name is defined and never used. Start it with an underscore to say that this is meant.";
+    LobesNeverSampled = "W0004", Warning, "weight is always zero",
+        "The closure's weight is the constant zero, so it never contributes.";
+}
+
+impl Code {
+    /// The code written `id`, in either case.
+    pub fn from_id(id: &str) -> Option<Code> {
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|c| c.id().eq_ignore_ascii_case(id))
+    }
+}
+
+/// A second place that belongs to a diagnostic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Label {
+    /// Where.
+    pub span: Span,
+    /// What is there.
+    pub message: String,
+}
+
+/// One problem of a source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Its identity, which also tells its severity.
+    pub code: Code,
+    /// Where; absent for problems of a whole file or input that is no text.
+    pub span: Option<Span>,
+    /// What is wrong, in one line, with the names involved.
+    pub message: String,
+    /// What would have been accepted here.
+    pub expected: Option<String>,
+    /// What to try.
+    pub hint: Option<String>,
+    /// Other places that matter.
+    pub labels: Vec<Label>,
+}
+
+impl Diagnostic {
+    /// A diagnostic at `span`.
+    pub fn new(code: Code, span: Span, message: impl Into<String>) -> Self {
+        Self {
+            span: Some(span),
+            ..Self::without_span(code, message)
+        }
+    }
+
+    /// A diagnostic without a place in a source.
+    pub fn without_span(code: Code, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self {
+            code,
+            span: None,
+            message,
+            expected: None,
+            hint: None,
+            labels: Vec::new(),
+        }
+    }
+
+    /// Says what would have been accepted.
+    pub fn expected(mut self, expected: impl Into<String>) -> Self {
+        self.expected = Some(expected.into());
+        self
+    }
+
+    /// Says what to try.
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Hints at the nearest of `candidates` to `name`, when one is near.
+    pub fn did_you_mean<'a>(
+        self,
+        name: &str,
+        candidates: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        match nearest(name, candidates) {
+            Some(best) => self.hint(format!("did you mean `{best}`?")),
+            None => self,
+        }
+    }
+
+    /// Points at a second place.
+    pub fn label(mut self, span: Span, message: impl Into<String>) -> Self {
+        self.labels.push(Label {
+            span,
+            message: message.into(),
+        });
+        self
+    }
+
+    /// Does it stop the compilation?
+    pub fn is_error(&self) -> bool {
+        self.code.severity() == Severity::Error
+    }
+}
+
+/// Does any of `diagnostics` stop the compilation?
+pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
+    diagnostics.iter().any(Diagnostic::is_error)
+}
+
+/// The candidate with the smallest edit distance to `name`, if at most a third of it differs.
+/// Equal distances are decided by the alphabet, so that output never depends on iteration order.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let limit = name.chars().count().div_ceil(3);
+    let scored = candidates.into_iter().map(|c| (edit_distance(name, c), c));
+    scored.filter(|(d, _)| *d <= limit).min().map(|(_, c)| c)
+}
+
+/// Levenshtein distance in characters, a swap of neighbours counting as one edit.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut rows = vec![(0..=b.len()).collect::<Vec<_>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let substituted = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = substituted.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(best);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
