@@ -1,2 +1,46 @@
-//! placeholder
-fn main() {}
+//! The project's own commands, run as `cargo xtask <command>`.
+//!
+//! They need nothing but Rust and a C compiler: whatever else a machine lacks (a Vulkan
+//! driver, in practice) is looked for, and installed where the platform has a standard way.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod adapter;
+mod bless;
+mod demo;
+mod shell;
+mod test;
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", about = "The project's own commands")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Build, render an example scene and say where the picture is
+    Demo(demo::DemoArgs),
+    /// Build and run every test of the workspace
+    Test(test::TestArgs),
+    /// Accept the present output as the expected one of the snapshot tests
+    Bless,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Test(args) => test::run(&args),
+        Command::Bless => bless::run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
