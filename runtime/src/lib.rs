@@ -1,1 +1,6 @@
-//! placeholder
+//! The wavefront path tracer that runs compiled Impasto materials.
+//!
+//! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it reads.
+
+pub mod scene;
+pub mod shader_part;

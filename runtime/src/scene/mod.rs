@@ -1,0 +1,166 @@
+//! A scene as its files describe it: camera, triangles, material bindings and lights.
+//!
+//! Loading knows nothing of wgpu and compiles no material; `docs/scenes.md` is the reference
+//! of the file format.
+
+use std::path::PathBuf;
+
+use glam::Vec3;
+
+mod error;
+mod mesh;
+mod parts;
+
+pub use error::SceneError;
+pub use mesh::{Mesh, NO_MATERIAL};
+pub use parts::SceneParts;
+
+/// Everything a scene file names, loaded and checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Its name, by default the name of its folder.
+    pub name: String,
+    /// Folder of the scene file, against which material and texture paths are resolved.
+    pub base: PathBuf,
+    /// Where it is seen from.
+    pub camera: Camera,
+    /// The picture.
+    pub film: FilmSettings,
+    /// How long paths get.
+    pub integrator: Integrator,
+    /// The triangles, those of quad lights included.
+    pub mesh: Mesh,
+    /// The materials that triangles use, in order of first use.
+    pub materials: Vec<MaterialBinding>,
+    /// Quad and distant lights in the order of the file.
+    pub lights: Vec<Light>,
+    /// What surrounds everything.
+    pub environment: Option<Environment>,
+    /// Oddities that do not keep it from being rendered, for people to read.
+    pub warnings: Vec<String>,
+}
+
+/// A thin-lens camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Centre of the lens, in metres.
+    pub position: Vec3,
+    /// The point in the middle of the picture.
+    pub look_at: Vec3,
+    /// A direction that points up in the picture; not along the view.
+    pub up: Vec3,
+    /// Vertical field of view in degrees, between 0 and 180.
+    pub fov: f32,
+    /// Diameter of the lens in metres; 0 is a pinhole.
+    pub aperture: f32,
+    /// Distance in metres, along the view, of the plane that is sharp.
+    pub focus: f32,
+}
+
+impl Camera {
+    /// Orthonormal right, up and forward directions of the picture.
+    pub fn basis(&self) -> [Vec3; 3] {
+        let forward = (self.look_at.as_dvec3() - self.position.as_dvec3()).normalize_or_zero();
+        let right = forward.cross(self.up.as_dvec3()).normalize_or_zero();
+        [right, right.cross(forward), forward].map(|v| v.as_vec3())
+    }
+}
+
+/// Size of the picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilmSettings {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// When paths end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integrator {
+    /// Most scattering events of a path, at least 1; 16 by default.
+    pub max_depth: u32,
+    /// Scattering events after which Russian roulette starts; 8 by default.
+    pub roulette_start: u32,
+}
+
+/// A material of the scene: fields of an `impasto_compiler::MaterialRequest`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct MaterialBinding {
+    /// The name that the scene binds, unique in it.
+    pub name: String,
+    /// The `.impasto` file as the scene names it, relative to [`Scene::base`].
+    pub file: String,
+    /// Which material of the file, when it defines several.
+    pub material: Option<String>,
+    /// Parameters with Impasto constant expressions, such as `("flake_size", "0.6 mm")`.
+    pub params: Vec<(String, String)>,
+}
+
+/// A light that is neither a surface with an emissive material nor the environment.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Light {
+    /// A parallelogram that emits and reflects nothing.
+    Quad(QuadLight),
+    /// A light so far away that it shines from one direction.
+    Distant(DistantLight),
+}
+
+/// A parallelogram that emits the same radiance in all directions of its front side.
+///
+/// Its two triangles are in the mesh with [`NO_MATERIAL`]; paths end on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuadLight {
+    /// One corner, in metres.
+    pub corner: Vec3,
+    /// Edge from the corner.
+    pub u: Vec3,
+    /// The other edge from the corner; the front side is where `u x v` points.
+    pub v: Vec3,
+    /// Emitted radiance, linear RGB, W/(m^2 sr).
+    pub radiance: Vec3,
+    /// Does the back emit as well?
+    pub two_sided: bool,
+}
+
+/// A light at infinity, of uniform radiance over a disc of directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistantLight {
+    /// Unit direction towards the light.
+    pub to_light: Vec3,
+    /// Irradiance on a surface that faces it, linear RGB, W/m^2.
+    pub irradiance: Vec3,
+    /// Angular diameter in degrees, below 180; 0 is a single direction.
+    pub angle: f32,
+}
+
+/// Radiance that comes from infinitely far away in all directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Environment {
+    /// Where the radiance comes from.
+    pub source: EnvironmentSource,
+    /// Degrees that a map is turned about the y axis, counter-clockwise seen from above.
+    pub rotate: f32,
+    /// Do light samples pick directions in it, or is it only found by chance?
+    pub sample: bool,
+}
+
+/// Radiance by direction.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EnvironmentSource {
+    /// The same in all directions, linear RGB, W/(m^2 sr).
+    Uniform(Vec3),
+    /// A lat-long picture.
+    Map(EnvironmentMap),
+}
+
+/// A lat-long picture: the top row is +y, its centre column -z, and +x is right of that.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentMap {
+    /// Texels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Radiance, scale applied, top row first.
+    pub texels: Vec<Vec3>,
+}
