@@ -6,5 +6,7 @@
 pub mod abi;
 pub mod ast;
 pub mod diag;
+pub mod lexer;
+pub mod parser;
 pub mod partition;
 pub mod source;

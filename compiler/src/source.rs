@@ -80,6 +80,24 @@ pub struct SourceFile {
     line_starts: Vec<u32>,
 }
 
+impl SourceFile {
+    /// The line, from 0, that byte `at` is in; the last one behind the end.
+    pub fn line_index(&self, at: usize) -> usize {
+        self.line_starts
+            .partition_point(|&start| start as usize <= at)
+            .saturating_sub(1)
+    }
+
+    /// The bytes of a line, counted from 0, with its line break; empty behind the last line.
+    pub fn line_range(&self, line: usize) -> Range<usize> {
+        let start = |line: usize| {
+            let start = self.line_starts.get(line);
+            start.map_or(self.text.len(), |&start| start as usize)
+        };
+        start(line)..start(line + 1)
+    }
+}
+
 /// Every source text of one compilation, in the order they were read.
 #[derive(Clone, Debug, Default)]
 pub struct SourceMap {

@@ -1,0 +1,71 @@
+//! Tokens to syntax tree.
+//!
+//! The grammar is written with chumsky, a file for each level: [`item`], [`stmt`], [`expr`].
+//! Before it runs, [`brackets`] balances brackets and bounds nesting; after it, [`report`] turns
+//! what did not match into diagnostics with the hints of [`hints`].
+
+mod brackets;
+mod common;
+mod error;
+mod expr;
+mod hints;
+mod item;
+mod print;
+mod report;
+mod stmt;
+
+use chumsky::input::Input as _;
+use chumsky::prelude::*;
+
+pub use brackets::MAX_NESTING;
+use common::{Rule, Tokens};
+pub use print::{print, print_expression};
+
+use crate::ast::{Expr, Module};
+use crate::diag::Diagnostic;
+use crate::lexer::{Token, lex};
+use crate::source::{FileId, Span};
+
+/// Syntax errors of one file that are reported.
+const MAX_ERRORS: usize = 64;
+
+/// Parses a source file. The module holds what could be understood; it is all of the file if
+/// there are no diagnostics.
+pub fn parse(file: FileId, text: &str) -> (Module, Vec<Diagnostic>) {
+    let empty = Module {
+        docs: Vec::new(),
+        uses: Vec::new(),
+        items: Vec::new(),
+    };
+    let (module, diagnostics) = run(file, text, item::module);
+    (module.unwrap_or(empty), diagnostics)
+}
+
+/// Parses one expression, such as the value a scene gives to a parameter.
+pub fn parse_expression(file: FileId, text: &str) -> (Option<Expr>, Vec<Diagnostic>) {
+    run(file, text, |_, expression| expression)
+}
+
+fn run<T>(
+    file: FileId,
+    text: &str,
+    grammar: impl for<'t> Fn(&'t str, Rule<'t, Expr>) -> Rule<'t, T>,
+) -> (Option<T>, Vec<Diagnostic>) {
+    let (tokens, mut diagnostics) = lex(file, text);
+    if let Err(diagnostic) = brackets::check_nesting(&tokens) {
+        diagnostics.push(diagnostic);
+        return (None, diagnostics);
+    }
+    let balanced = brackets::balance(file, text, tokens);
+    diagnostics.extend(balanced.diagnostics);
+    let tokens: &[(Token, Span)] = &balanced.tokens;
+    let (value, errors) = {
+        let end = Span::new(file, text.len()..text.len());
+        let input: Tokens<'_> = tokens.split_token_span(end);
+        let rule = grammar(text, expr::expression(text));
+        rule.parse(input).into_output_errors()
+    };
+    let source = report::Source { file, text, tokens };
+    report::report(&source, errors, &mut diagnostics);
+    (value, diagnostics)
+}
