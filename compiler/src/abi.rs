@@ -4,6 +4,9 @@
 //! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
 //! `stdlib/core/material.impasto`, and printed into every generated module.
 //!
+//! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
+//! `evaluate_` or `emission_`; kernels must not define such names.
+//!
 //! ```wgsl
 //! // Printed by the compiler (support functions and structs first):
 //! fn evaluate_material(material: u32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample

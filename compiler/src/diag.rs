@@ -131,6 +131,8 @@ codes! {
         "The construct is part of the language's plan but cannot be used in this place yet.";
     NotFinite = "E0314", Error, "not a finite number",
         "Parameters and constants must be finite numbers.";
+    TooLarge = "E0315", Error, "material too large",
+        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";

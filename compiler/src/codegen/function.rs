@@ -1,0 +1,625 @@
+//! One IR function as WGSL that a person can review.
+//!
+//! A value that a `let` named keeps its name; one that is used once, nearby, stands where it is
+//! used; the rest are numbered in order.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use super::helpers::Helpers;
+use super::names::unique;
+use crate::Program;
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
+use crate::ops::{Op, Shape, Wgsl};
+
+/// Operations that may stand in one expression before it gets a name.
+const MAX_INLINE: u32 = 7;
+
+/// The WGSL name of a type.
+pub fn type_name(program: &Program, ty: Type) -> String {
+    match ty {
+        Type::Bool => "bool".into(),
+        Type::Int => "i32".into(),
+        Type::Float => "f32".into(),
+        Type::Vec2 => "vec2f".into(),
+        Type::Vec3 => "vec3f".into(),
+        Type::Vec4 => "vec4f".into(),
+        Type::Mat3 => "mat3x3f".into(),
+        Type::Struct(id) => program.names.structure(id).to_owned(),
+    }
+}
+
+/// Every expression that a function evaluates.
+pub fn evaluated(f: &Function) -> Vec<ExprId> {
+    fn walk(block: &Block, out: &mut Vec<ExprId>) {
+        for stmt in block {
+            match stmt {
+                Stmt::Eval(id) => out.push(*id),
+                Stmt::If(_, a, b) => {
+                    walk(a, out);
+                    walk(b, out);
+                }
+                Stmt::For { body, .. } => walk(body, out),
+                Stmt::While { head, body, .. } => {
+                    walk(head, out);
+                    walk(body, out);
+                }
+                Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
+            }
+        }
+    }
+    let mut out = Vec::new();
+    walk(&f.body, &mut out);
+    out
+}
+
+/// The functions that a function calls.
+pub fn callees(f: &Function) -> BTreeSet<usize> {
+    let called = evaluated(f)
+        .into_iter()
+        .filter_map(|id| match f.expr(id).kind {
+            ExprKind::Call(callee, _) => Some(callee.index()),
+            _ => None,
+        });
+    called.collect()
+}
+
+/// Prints a function under a name.
+pub fn print(program: &Program, f: &Function, name: &str, helpers: &mut Helpers, out: &mut String) {
+    let mut taken = called_names(program, f);
+    let params: Vec<String> = f
+        .params
+        .iter()
+        .map(|p| unique(&mut taken, &p.name))
+        .collect();
+    let counters = counters(&f.body);
+    let locals = f
+        .locals
+        .iter()
+        .map(|l| unique(&mut taken, &l.name))
+        .collect();
+    let mut printer = Printer {
+        program,
+        f,
+        helpers,
+        out,
+        params,
+        locals,
+        names: vec![None; f.exprs.len()],
+        inline: Inliner::decide(f),
+        taken,
+        next: 0,
+    };
+    printer.function(name, &counters);
+}
+
+/// Names that the function's text refers to, which its own variables must not hide.
+fn called_names(program: &Program, f: &Function) -> BTreeMap<String, u32> {
+    let functions = callees(f).into_iter().map(|id| program.names.function(id));
+    let structs = f.exprs.iter().filter_map(|e| match e.ty {
+        Type::Struct(id) => Some(program.names.structure(id)),
+        _ => None,
+    });
+    functions
+        .chain(structs)
+        .map(|name| (name.to_owned(), 1))
+        .collect()
+}
+
+/// Variables that loops declare.
+fn counters(block: &Block) -> BTreeSet<LocalId> {
+    let mut found = BTreeSet::new();
+    for stmt in block {
+        match stmt {
+            Stmt::For { local, body, .. } => {
+                found.insert(*local);
+                found.extend(counters(body));
+            }
+            Stmt::If(_, a, b) => {
+                found.extend(counters(a));
+                found.extend(counters(b));
+            }
+            Stmt::While { body, .. } => found.extend(counters(body)),
+            _ => {}
+        }
+    }
+    found
+}
+
+struct Printer<'a> {
+    program: &'a Program,
+    f: &'a Function,
+    helpers: &'a mut Helpers,
+    out: &'a mut String,
+    params: Vec<String>,
+    locals: Vec<String>,
+    /// What each evaluated expression is called, or its text if it stands where it is used.
+    names: Vec<Option<String>>,
+    inline: Vec<bool>,
+    taken: BTreeMap<String, u32>,
+    next: u32,
+}
+
+impl Printer<'_> {
+    fn function(&mut self, name: &str, counters: &BTreeSet<LocalId>) {
+        let ty = |t| type_name(self.program, t);
+        let params: Vec<String> = self
+            .params
+            .iter()
+            .zip(&self.f.params)
+            .map(|(n, p)| format!("{n}: {}", ty(p.ty)))
+            .collect();
+        let result = ty(self.f.result);
+        let origin = self.program.origin(self.f.span);
+        let _ = writeln!(
+            self.out,
+            "// {origin}\nfn {name}({}) -> {result} {{",
+            params.join(", ")
+        );
+        let stored = stored(self.f);
+        for (i, local) in self.f.locals.iter().enumerate() {
+            let id = LocalId(i as u32);
+            if !counters.contains(&id) && stored.contains(&id) {
+                let _ = writeln!(self.out, "    var {}: {};", self.locals[i], ty(local.ty));
+            }
+        }
+        self.block(&self.f.body, 1);
+        let value = self.operand(self.f.value);
+        let _ = writeln!(self.out, "    return {value};\n}}\n");
+    }
+
+    fn block(&mut self, block: &[Stmt], depth: usize) {
+        block.iter().for_each(|stmt| self.stmt(stmt, depth));
+    }
+
+    fn line(&mut self, depth: usize, text: &str) {
+        let _ = writeln!(self.out, "{}{text}", "    ".repeat(depth));
+    }
+
+    fn stmt(&mut self, stmt: &Stmt, depth: usize) {
+        match stmt {
+            Stmt::Eval(id) => self.eval(*id, depth),
+            Stmt::Store(local, part, value) => {
+                let part = part.map_or(String::new(), |p| format!(".{}", letter(p)));
+                let text = format!(
+                    "{}{part} = {};",
+                    self.locals[local.index()],
+                    self.operand(*value)
+                );
+                self.line(depth, &text);
+            }
+            Stmt::If(cond, then, otherwise) => {
+                let cond = self.operand(*cond);
+                self.branch(&format!("if {cond} {{"), then, otherwise, depth);
+            }
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => {
+                let (name, low, high) = (
+                    self.locals[local.index()].clone(),
+                    self.operand(*low),
+                    self.operand(*high),
+                );
+                self.line(
+                    depth,
+                    &format!("for (var {name} = {low}; {name} < {high}; {name}++) {{"),
+                );
+                self.block(body, depth + 1);
+                self.line(depth, "}");
+            }
+            Stmt::While {
+                head,
+                test,
+                limit,
+                body,
+            } => {
+                let turn = unique(&mut self.taken, "turns");
+                self.line(
+                    depth,
+                    &format!("for (var {turn} = 0i; {turn} < {limit}i; {turn}++) {{"),
+                );
+                self.block(head, depth + 1);
+                let test = self.operand(*test);
+                self.line(depth + 1, &format!("if !({test}) {{ break; }}"));
+                self.block(body, depth + 1);
+                self.line(depth, "}");
+            }
+            Stmt::Break => self.line(depth, "break;"),
+            Stmt::Continue => self.line(depth, "continue;"),
+        }
+    }
+
+    fn branch(&mut self, head: &str, then: &Block, otherwise: &Block, depth: usize) {
+        self.line(depth, head);
+        self.block(then, depth + 1);
+        // A branch whose only content is another continues the chain on one level.
+        match otherwise.split_last() {
+            None => self.line(depth, "}"),
+            Some((Stmt::If(cond, a, b), before)) if self.prints_nothing(before) => {
+                self.block(before, depth);
+                let cond = self.operand(*cond);
+                self.branch(&format!("}} else if {cond} {{"), a, b, depth);
+            }
+            _ => {
+                self.line(depth, "} else {");
+                self.block(otherwise, depth + 1);
+                self.line(depth, "}");
+            }
+        }
+    }
+
+    /// Do statements only compute values that stand where they are used?
+    fn prints_nothing(&self, stmts: &[Stmt]) -> bool {
+        stmts
+            .iter()
+            .all(|s| matches!(s, Stmt::Eval(id) if self.inline[id.index()]))
+    }
+
+    fn eval(&mut self, id: ExprId, depth: usize) {
+        let text = self.expression(id);
+        if self.inline[id.index()] {
+            self.names[id.index()] = Some(text);
+            return;
+        }
+        let expr = self.f.expr(id);
+        let name = match &expr.name {
+            Some(name) => unique(&mut self.taken, name),
+            None => {
+                self.next += 1;
+                format!("v{}", self.next)
+            }
+        };
+        let comment = match &expr.name {
+            Some(_) => format!(" // {}", self.program.origin(expr.span)),
+            None => String::new(),
+        };
+        self.line(depth, &format!("let {name} = {text};{comment}"));
+        self.names[id.index()] = Some(name);
+    }
+
+    /// An expression where it is used.
+    fn operand(&self, id: ExprId) -> String {
+        match &self.f.expr(id).kind {
+            ExprKind::Const(c) => constant(c),
+            ExprKind::Param(i) => self.params[*i as usize].clone(),
+            _ => self.names[id.index()]
+                .clone()
+                .unwrap_or_else(|| "0.0".into()),
+        }
+    }
+
+    /// As `operand`, in parentheses where it is an operator or negative.
+    fn tight(&self, id: ExprId) -> String {
+        let text = self.operand(id);
+        let inline_operator = self.inline[id.index()] && self.is_operator(id);
+        if inline_operator || text.starts_with('-') {
+            format!("({text})")
+        } else {
+            text
+        }
+    }
+
+    fn is_operator(&self, id: ExprId) -> bool {
+        let ExprKind::Op(op, args) = &self.f.expr(id).kind else {
+            return false;
+        };
+        matches!(self.spelling(*op, args), Wgsl::Prefix(_) | Wgsl::Infix(_))
+    }
+
+    /// How an op is written for its operands.
+    fn spelling(&self, op: Op, args: &[ExprId]) -> Wgsl {
+        let info = op.info();
+        let ints = args.iter().all(|&a| self.f.ty(a) == Type::Int);
+        let row = info.wgsl_int.filter(|_| ints).unwrap_or(info.wgsl);
+        // A divisor that is known not to be zero needs no guard.
+        match (op, args.get(1).and_then(|&d| self.f.constant(d))) {
+            (Op::Div, Some(d)) if nonzero(d) => Wgsl::Infix("/"),
+            (Op::Rem, Some(d)) if nonzero(d) => Wgsl::Infix("%"),
+            _ => row,
+        }
+    }
+
+    fn expression(&mut self, id: ExprId) -> String {
+        let f = self.f;
+        let expr = f.expr(id);
+        match &expr.kind {
+            ExprKind::Const(_) | ExprKind::Param(_) => self.operand(id),
+            ExprKind::Uniform(_) => "0.0".into(),
+            ExprKind::Load(local) => self.locals[local.index()].clone(),
+            ExprKind::Op(op, args) => self.op(*op, args, expr.ty),
+            ExprKind::Compose(args) => {
+                format!("{}({})", type_name(self.program, expr.ty), self.list(args))
+            }
+            ExprKind::Swizzle(v, parts) => {
+                let letters: String = parts.iter().map(|&p| letter(p)).collect();
+                format!("{}.{letters}", self.tight(*v))
+            }
+            ExprKind::Call(callee, args) => format!(
+                "{}({})",
+                self.program.names.function(callee.index()),
+                self.list(args)
+            ),
+            ExprKind::Make(s, args) => {
+                format!("{}({})", self.program.names.structure(*s), self.list(args))
+            }
+            ExprKind::Field(v, i) => match f.ty(*v) {
+                Type::Struct(s) => {
+                    let name = &self.program.module.structs[s.index()].fields[*i as usize].0;
+                    format!("{}.{}", self.tight(*v), super::names::identifier(name))
+                }
+                _ => self.operand(*v),
+            },
+        }
+    }
+
+    fn list(&self, args: &[ExprId]) -> String {
+        args.iter()
+            .map(|&a| self.operand(a))
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+
+    fn op(&mut self, op: Op, args: &[ExprId], ty: Type) -> String {
+        if matches!(op, Op::Image | Op::ImageData) {
+            return self.texture(op, args);
+        }
+        match self.spelling(op, args) {
+            Wgsl::Prefix(symbol) => format!("{symbol}{}", self.tight(args[0])),
+            Wgsl::Infix(symbol) => {
+                format!("{} {symbol} {}", self.tight(args[0]), self.tight(args[1]))
+            }
+            Wgsl::Builtin("select") => format!(
+                "select({}, {}, {})",
+                self.operand(args[2]),
+                self.operand(args[1]),
+                self.operand(args[0])
+            ),
+            Wgsl::Builtin(name) => format!("{name}({})", self.widened(op, args, ty)),
+            Wgsl::Helper(text, _) => {
+                let operand_ty = if matches!(op.info().shape, Shape::Float(_) | Shape::Number(_)) {
+                    ty
+                } else {
+                    self.f.ty(args[0])
+                };
+                let name = self.helpers.name(op, operand_ty, text);
+                format!("{name}({})", self.widened(op, args, ty))
+            }
+        }
+    }
+
+    /// Operands of a function, scalars widened to the vectors they combine with.
+    fn widened(&self, op: Op, args: &[ExprId], ty: Type) -> String {
+        let by_component = matches!(op.info().shape, Shape::Float(_) | Shape::Number(_));
+        let widen = |&a: &ExprId| {
+            let text = self.operand(a);
+            let narrow = by_component && self.f.ty(a) == Type::Float && ty != Type::Float;
+            if narrow {
+                format!("{}({text})", type_name(self.program, ty))
+            } else {
+                text
+            }
+        };
+        args.iter().map(widen).collect::<Vec<_>>().join(", ")
+    }
+
+    fn texture(&mut self, op: Op, args: &[ExprId]) -> String {
+        let offset = self.program.slot_offset(op);
+        let slot = match self.f.constant(args[0]) {
+            Some(Const::Int(t)) => format!("{}u", self.program.first_slot(*t as usize) + offset),
+            _ => {
+                self.helpers.texture_slot = true;
+                let slot = format!("op_texture_slot({})", self.operand(args[0]));
+                if offset > 0 {
+                    format!("{slot} + {offset}u")
+                } else {
+                    slot
+                }
+            }
+        };
+        let fetch = format!(
+            "{}({slot}, {})",
+            crate::abi::TEXTURE_FETCH,
+            self.operand(args[1])
+        );
+        if op == Op::Image {
+            format!("{fetch}.xyz")
+        } else {
+            fetch
+        }
+    }
+}
+
+/// Variables that are ever loaded or stored.
+fn stored(f: &Function) -> BTreeSet<LocalId> {
+    fn walk(block: &Block, out: &mut BTreeSet<LocalId>) {
+        for stmt in block {
+            match stmt {
+                Stmt::Store(local, ..) => drop(out.insert(*local)),
+                Stmt::If(_, a, b) => {
+                    walk(a, out);
+                    walk(b, out);
+                }
+                Stmt::For { body, .. } | Stmt::While { body, .. } => walk(body, out),
+                _ => {}
+            }
+        }
+    }
+    let mut out = BTreeSet::new();
+    walk(&f.body, &mut out);
+    for id in evaluated(f) {
+        if let ExprKind::Load(local) = f.expr(id).kind {
+            out.insert(local);
+        }
+    }
+    out
+}
+
+fn letter(component: u8) -> char {
+    ['x', 'y', 'z', 'w'][usize::from(component) & 3]
+}
+
+fn nonzero(c: &Const) -> bool {
+    match c {
+        Const::Float(v) => v.iter().all(|&x| x as f32 != 0.0),
+        // i32::MIN / -1 overflows, which WGSL leaves to the implementation only in constants.
+        Const::Int(i) => *i != 0 && *i != -1,
+        Const::Bool(_) => false,
+    }
+}
+
+/// A constant as a WGSL literal.
+fn constant(c: &Const) -> String {
+    match c {
+        Const::Bool(b) => b.to_string(),
+        Const::Int(i32::MIN) => "i32(-2147483648)".into(),
+        Const::Int(i) => format!("{i}i"),
+        Const::Float(v) => {
+            let parts: Vec<String> = v.iter().map(|&x| float(x)).collect();
+            match parts.as_slice() {
+                [x] => x.clone(),
+                [first, rest @ ..] if rest.iter().all(|p| p == first) => {
+                    format!("vec{}f({first})", parts.len())
+                }
+                _ => format!("vec{}f({})", parts.len(), parts.join(", ")),
+            }
+        }
+    }
+}
+
+/// The shortest text that reads back as the same f32.
+fn float(x: f64) -> String {
+    let x = x as f32;
+    if x.is_finite() {
+        format!("{x:?}")
+    } else {
+        format!("{:?}", f32::MAX.copysign(x))
+    }
+}
+
+/// Decides which values stand where they are used.
+struct Inliner<'a> {
+    f: &'a Function,
+    uses: Vec<u32>,
+    inline: Vec<bool>,
+    size: Vec<u32>,
+    loads: Vec<bool>,
+}
+
+impl<'a> Inliner<'a> {
+    fn decide(f: &'a Function) -> Vec<bool> {
+        let n = f.exprs.len();
+        let mut this = Self {
+            f,
+            uses: vec![0; n],
+            inline: vec![false; n],
+            size: vec![1; n],
+            loads: vec![false; n],
+        };
+        this.count(&f.body);
+        this.uses[f.value.index()] += 1;
+        let mut pending = this.block(&f.body);
+        this.consume(f.value, &mut pending);
+        this.inline
+    }
+
+    fn count(&mut self, block: &Block) {
+        for stmt in block {
+            match stmt {
+                Stmt::Eval(id) => self
+                    .f
+                    .expr(*id)
+                    .kind
+                    .operands()
+                    .iter()
+                    .for_each(|a| self.uses[a.index()] += 1),
+                Stmt::Store(_, _, value) => self.uses[value.index()] += 1,
+                Stmt::If(cond, a, b) => {
+                    self.uses[cond.index()] += 1;
+                    self.count(a);
+                    self.count(b);
+                }
+                Stmt::For {
+                    low, high, body, ..
+                } => {
+                    self.uses[low.index()] += 1;
+                    // The bound stands in the loop's condition: never move work into it.
+                    self.uses[high.index()] += 2;
+                    self.count(body);
+                }
+                Stmt::While {
+                    head, test, body, ..
+                } => {
+                    self.count(head);
+                    self.uses[test.index()] += 1;
+                    self.count(body);
+                }
+                Stmt::Break | Stmt::Continue => {}
+            }
+        }
+    }
+
+    /// Walks a block; gives the values that could still move to a use right after it.
+    fn block(&mut self, block: &Block) -> Vec<ExprId> {
+        let mut pending: Vec<ExprId> = Vec::new();
+        for stmt in block {
+            match stmt {
+                Stmt::Eval(id) => {
+                    for operand in self.f.expr(*id).kind.operands() {
+                        self.consume(*operand, &mut pending);
+                    }
+                    self.measure(*id);
+                    pending.push(*id);
+                }
+                Stmt::Store(_, _, value) => {
+                    self.consume(*value, &mut pending);
+                    pending.retain(|p| !self.loads[p.index()]);
+                }
+                Stmt::If(cond, a, b) => {
+                    self.consume(*cond, &mut pending);
+                    self.block(a);
+                    self.block(b);
+                    pending.retain(|p| !self.loads[p.index()]);
+                }
+                Stmt::For { low, body, .. } => {
+                    self.consume(*low, &mut pending);
+                    self.block(body);
+                    pending.retain(|p| !self.loads[p.index()]);
+                }
+                Stmt::While {
+                    head, test, body, ..
+                } => {
+                    let mut inner = self.block(head);
+                    self.consume(*test, &mut inner);
+                    self.block(body);
+                    pending.retain(|p| !self.loads[p.index()]);
+                }
+                Stmt::Break | Stmt::Continue => {}
+            }
+        }
+        pending
+    }
+
+    fn consume(&mut self, id: ExprId, pending: &mut Vec<ExprId>) {
+        let movable = self.uses[id.index()] == 1
+            && self.f.expr(id).name.is_none()
+            && self.size[id.index()] <= MAX_INLINE;
+        if let Some(at) = pending.iter().position(|p| *p == id)
+            && movable
+        {
+            self.inline[id.index()] = true;
+            pending.remove(at);
+        }
+    }
+
+    fn measure(&mut self, id: ExprId) {
+        let kind = &self.f.expr(id).kind;
+        let inlined = kind.operands().iter().filter(|a| self.inline[a.index()]);
+        let size: u32 = inlined.clone().map(|a| self.size[a.index()]).sum();
+        self.size[id.index()] = size + 1;
+        self.loads[id.index()] =
+            matches!(kind, ExprKind::Load(_)) || inlined.clone().any(|a| self.loads[a.index()]);
+    }
+}

@@ -1,0 +1,106 @@
+//! The functions behind ops that WGSL leaves undefined somewhere: written only if used.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use super::function::type_name;
+use crate::Program;
+use crate::ir::Type;
+use crate::ops::{Op, Wgsl};
+
+/// The helpers that a module uses.
+#[derive(Default)]
+pub struct Helpers {
+    used: BTreeSet<(Op, Type)>,
+    /// Is a texture chosen at run time?
+    pub texture_slot: bool,
+}
+
+impl Helpers {
+    /// The name of the helper of `op` on operands of type `ty`; it will be printed.
+    pub fn name(&mut self, op: Op, ty: Type, text: &str) -> String {
+        if matches!(op, Op::Hash2 | Op::Hash3) {
+            self.used.insert((Op::Hash1, Type::Int));
+        }
+        self.used.insert((op, ty));
+        helper_name(text, ty)
+    }
+
+    /// Prints the helpers used.
+    pub fn print(&self, program: &Program, out: &mut String) {
+        for &(op, ty) in &self.used {
+            let info = op.info();
+            let row = info
+                .wgsl_int
+                .filter(|_| ty == Type::Int)
+                .unwrap_or(info.wgsl);
+            let Wgsl::Helper(text, body) = row else {
+                continue;
+            };
+            let name = helper_name(text, ty);
+            match op {
+                Op::MaxComponent => reduction(out, &name, "max", ty),
+                Op::MinComponent => reduction(out, &name, "min", ty),
+                _ => {
+                    let _ = writeln!(
+                        out,
+                        "fn {name}{}\n",
+                        with_type(body, &type_name(program, ty))
+                    );
+                }
+            }
+        }
+        if self.texture_slot {
+            let slots: Vec<String> = (0..program.module.textures.len())
+                .map(|t| format!("{}u", program.first_slot(t)))
+                .collect();
+            let n = slots.len().max(1);
+            let _ = writeln!(
+                out,
+                "fn op_texture_slot(texture: i32) -> u32 {{\n    var slots = array<u32, {n}>({});\n    return slots[clamp(texture, 0, {})];\n}}\n",
+                slots.join(", "),
+                n - 1
+            );
+        }
+    }
+}
+
+/// `op_safe_div_3`: prefixed like all generated names, with the width of vectors.
+fn helper_name(text: &str, ty: Type) -> String {
+    match ty.width() {
+        Some(w) if w > 1 => format!("op_{text}_{w}"),
+        _ => format!("op_{text}"),
+    }
+}
+
+/// The largest or smallest component of a vector.
+fn reduction(out: &mut String, name: &str, op: &str, ty: Type) {
+    let letters = &["x", "y", "z", "w"][..ty.width().unwrap_or(1)];
+    let nested = letters[1..]
+        .iter()
+        .fold(format!("v.{}", letters[0]), |acc, l| {
+            format!("{op}({acc}, v.{l})")
+        });
+    let width = letters.len();
+    let _ = writeln!(
+        out,
+        "fn {name}(v: vec{width}f) -> f32 {{ return {nested}; }}\n"
+    );
+}
+
+/// A helper's body with its operand type in place of the word `T`.
+fn with_type(body: &str, ty: &str) -> String {
+    let mut out = String::with_capacity(body.len() + 16);
+    let mut word = String::new();
+    for c in body.chars().chain([' ']) {
+        if c.is_ascii_alphanumeric() || c == '_' || c == '.' {
+            word.push(c);
+            continue;
+        }
+        out.push_str(if word == "T" { ty } else { &word });
+        word.clear();
+        out.push(c);
+    }
+    out.pop();
+    out
+}

@@ -1,0 +1,375 @@
+//! The typed intermediate representation: what checking produces and everything after reads.
+//!
+//! A [`Module`] holds structs, functions and closure definitions. A [`Function`] is an arena of
+//! pure expressions plus structured statements that say in which order they are evaluated:
+//! every expression that is not a constant, a parameter or a uniform stands in exactly one
+//! [`Stmt::Eval`], which dominates its uses. Surface types (color, point, length, ...) are gone;
+//! what is left are the machine's types.
+//!
+//! A [`Material`] is a function that computes patterns, plus a tree of [`Closure`]s over its
+//! expressions; [`crate::closure`] turns it into ordinary functions.
+
+use crate::ops::Op;
+use crate::source::Span;
+
+pub mod build;
+pub mod interp;
+pub mod print;
+pub mod value;
+pub mod verify;
+
+/// A machine type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum Type {
+    Bool,
+    /// 32 bits, two's complement, wrapping.
+    Int,
+    Float,
+    Vec2,
+    Vec3,
+    Vec4,
+    /// Three columns of three floats.
+    Mat3,
+    Struct(StructId),
+}
+
+impl Type {
+    /// Number of float components, for `Float` and vectors.
+    pub fn width(self) -> Option<usize> {
+        match self {
+            Type::Float => Some(1),
+            Type::Vec2 => Some(2),
+            Type::Vec3 => Some(3),
+            Type::Vec4 => Some(4),
+            _ => None,
+        }
+    }
+
+    /// The float or vector of `width` components.
+    pub fn of_width(width: usize) -> Type {
+        match width {
+            1 => Type::Float,
+            2 => Type::Vec2,
+            3 => Type::Vec3,
+            _ => Type::Vec4,
+        }
+    }
+}
+
+macro_rules! ids {
+    ($($(#[$doc:meta])* $name:ident),*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// The position in its arena.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    )*};
+}
+
+ids! {
+    /// A struct of a module.
+    StructId,
+    /// A function of a module.
+    FunctionId,
+    /// A bsdf or edf definition of a module.
+    ClosureDefId,
+    /// An expression of a function.
+    ExprId,
+    /// A variable of a function.
+    LocalId,
+    /// A closure of a material.
+    ClosureId
+}
+
+/// Everything the materials of a compilation are made of.
+#[derive(Clone, Debug, Default)]
+pub struct Module {
+    /// Struct types.
+    pub structs: Vec<Struct>,
+    /// Functions, callees before callers.
+    pub functions: Vec<Function>,
+    /// Bsdfs and edfs.
+    pub closures: Vec<ClosureDef>,
+    /// Paths of image files; a texture value is an index into these.
+    pub textures: Vec<String>,
+}
+
+/// A struct type.
+#[derive(Clone, Debug)]
+pub struct Struct {
+    /// Name in the source.
+    pub name: String,
+    /// Names and types of its fields.
+    pub fields: Vec<(String, Type)>,
+    /// Where it is defined.
+    pub span: Span,
+}
+
+/// A parameter or variable.
+#[derive(Clone, Debug)]
+pub struct Local {
+    /// Name in the source.
+    pub name: String,
+    /// Its type.
+    pub ty: Type,
+}
+
+/// A function without side effects.
+#[derive(Clone, Debug)]
+pub struct Function {
+    /// Name in the source, or `bsdf_method`.
+    pub name: String,
+    /// Parameters.
+    pub params: Vec<Local>,
+    /// Type of the value.
+    pub result: Type,
+    /// Variables.
+    pub locals: Vec<Local>,
+    /// Expressions.
+    pub exprs: Vec<Expr>,
+    /// What is done.
+    pub body: Block,
+    /// The value returned after the body.
+    pub value: ExprId,
+    /// Most turns that nested loops can take together, callees included.
+    pub turns: u64,
+    /// Where it is defined.
+    pub span: Span,
+}
+
+impl Function {
+    /// The expression `id`.
+    pub fn expr(&self, id: ExprId) -> &Expr {
+        &self.exprs[id.index()]
+    }
+
+    /// The type of the expression `id`.
+    pub fn ty(&self, id: ExprId) -> Type {
+        self.exprs[id.index()].ty
+    }
+
+    /// The constant that `id` is, if it is one.
+    pub fn constant(&self, id: ExprId) -> Option<&Const> {
+        match &self.expr(id).kind {
+            ExprKind::Const(c) => Some(c),
+            _ => None,
+        }
+    }
+}
+
+/// An expression with its type and origin.
+#[derive(Clone, Debug)]
+pub struct Expr {
+    /// What it computes.
+    pub kind: ExprKind,
+    /// Its type.
+    pub ty: Type,
+    /// Where it was written.
+    pub span: Span,
+    /// The `let` that names it.
+    pub name: Option<String>,
+}
+
+/// A constant value. Floats are kept in f64, so that the f64 interpreter sees what was written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Const {
+    /// A bool.
+    Bool(bool),
+    /// An int.
+    Int(i32),
+    /// A float or vector: as many components as its type has.
+    Float(Vec<f64>),
+}
+
+/// What an expression computes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExprKind {
+    /// A constant.
+    Const(Const),
+    /// Parameter of the function.
+    Param(u32),
+    /// Parameter of the material: the same for a whole render.
+    Uniform(u32),
+    /// The present value of a variable.
+    Load(LocalId),
+    /// An operation of the op table.
+    Op(Op, Vec<ExprId>),
+    /// A vector or matrix from parts; one float fills all components.
+    Compose(Vec<ExprId>),
+    /// Components of a vector, by index.
+    Swizzle(ExprId, Vec<u8>),
+    /// A call.
+    Call(FunctionId, Vec<ExprId>),
+    /// A struct from its fields.
+    Make(StructId, Vec<ExprId>),
+    /// A field of a struct.
+    Field(ExprId, u32),
+}
+
+impl ExprKind {
+    /// The expressions it reads, in order.
+    pub fn operands(&self) -> &[ExprId] {
+        use ExprKind::*;
+        match self {
+            Const(_) | Param(_) | Uniform(_) | Load(_) => &[],
+            Op(_, args) | Compose(args) | Call(_, args) | Make(_, args) => args,
+            Swizzle(arg, _) | Field(arg, _) => std::slice::from_ref(arg),
+        }
+    }
+
+    /// Is its value available without being evaluated by a statement?
+    pub fn is_free(&self) -> bool {
+        matches!(
+            self,
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_)
+        )
+    }
+}
+
+/// Statements in order.
+pub type Block = Vec<Stmt>;
+
+/// A statement.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stmt {
+    /// Evaluates an expression here.
+    Eval(ExprId),
+    /// Assigns a variable, or one component of it.
+    Store(LocalId, Option<u8>, ExprId),
+    /// A branch.
+    If(ExprId, Block, Block),
+    /// Sets the int `local` to `low`, `low + 1`, ... below `high`.
+    For {
+        /// The loop variable.
+        local: LocalId,
+        /// First value.
+        low: ExprId,
+        /// One past the last value.
+        high: ExprId,
+        /// What is repeated.
+        body: Block,
+    },
+    /// Repeats `body` while `test` (evaluated anew by `head`) holds, at most `limit` times.
+    While {
+        /// Evaluates the test.
+        head: Block,
+        /// Goes on while it holds.
+        test: ExprId,
+        /// Most turns.
+        limit: u32,
+        /// What is repeated.
+        body: Block,
+    },
+    /// Leaves the innermost loop.
+    Break,
+    /// Goes to the next turn of the innermost loop.
+    Continue,
+}
+
+/// A bsdf or edf: its methods as functions over (parameters..., directions...).
+#[derive(Clone, Debug)]
+pub struct ClosureDef {
+    /// Name in the source.
+    pub name: String,
+    /// Discrete directions only.
+    pub delta: bool,
+    /// Parameters.
+    pub params: Vec<Local>,
+    /// What it defines.
+    pub methods: Methods,
+    /// Where it is defined.
+    pub span: Span,
+}
+
+/// The methods of a closure.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub enum Methods {
+    Bsdf {
+        sample: FunctionId,
+        eval: FunctionId,
+        pdf: FunctionId,
+        albedo: FunctionId,
+    },
+    Edf {
+        emit: FunctionId,
+    },
+}
+
+/// A node of a material's closure tree; expressions belong to the material's body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Closure {
+    /// A bsdf or edf with its arguments.
+    Lobe(Lobe),
+    /// The first over the second: `f_a + (1 - E_a) f_b`.
+    Layer(ClosureId, ClosureId),
+    /// `(1 - t) a + t b`, t a float.
+    Mix(ClosureId, ClosureId, ExprId),
+    /// Weighted by a float or three floats.
+    Weight(ExprId, ClosureId),
+    /// The sum.
+    Add(ClosureId, ClosureId),
+    /// The first where the bool holds, else the second.
+    Select(ExprId, ClosureId, ClosureId),
+}
+
+/// An instance of a bsdf or edf.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lobe {
+    /// Which.
+    pub def: ClosureDefId,
+    /// Its arguments.
+    pub args: Vec<ExprId>,
+    /// The normal of its frame; the surface's when absent.
+    pub normal: Option<ExprId>,
+    /// The tangent of its frame; the surface's when absent.
+    pub tangent: Option<ExprId>,
+    /// Where it was written.
+    pub span: Span,
+}
+
+/// A parameter of a material.
+#[derive(Clone, Debug)]
+pub struct MaterialParam {
+    /// Its name.
+    pub name: String,
+    /// Its documentation.
+    pub docs: Vec<String>,
+    /// Its type as written.
+    pub surface_type: &'static str,
+    /// Its machine type; a texture is an `Int`.
+    pub ty: Type,
+    /// Its default.
+    pub default: Const,
+    /// Least and greatest allowed value (by component).
+    pub range: Option<(f64, f64)>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A checked material, before its closures are lowered.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name in the source.
+    pub name: String,
+    /// Its documentation.
+    pub docs: Vec<String>,
+    /// Its parameters, in the order of [`ExprKind::Uniform`].
+    pub params: Vec<MaterialParam>,
+    /// Computes the patterns. Its parameters are `point: SurfacePoint`; its value is not used.
+    pub body: Function,
+    /// The closures.
+    pub closures: Vec<Closure>,
+    /// What scatters light.
+    pub surface: Option<ClosureId>,
+    /// What emits light.
+    pub emission: Option<ClosureId>,
+    /// Where it is defined.
+    pub span: Span,
+}

@@ -1,0 +1,142 @@
+//! Removes what nothing reads: values, stores to variables that are never loaded, empty branches.
+//!
+//! All functions are pure, so an unused call goes as well.
+
+use crate::ir::{Block, ExprId, ExprKind, Function, Stmt};
+
+/// Removes dead code in place.
+pub fn remove(f: &mut Function) {
+    let mut live = Live {
+        exprs: vec![false; f.exprs.len()],
+        locals: vec![false; f.locals.len()],
+    };
+    live.mark(f, f.value);
+    // A store matters once its variable is loaded by something live, and makes its operand live;
+    // repeat until nothing changes.
+    let body = std::mem::take(&mut f.body);
+    while live.block(f, &body) {}
+    f.body = sweep(body, &live);
+}
+
+struct Live {
+    exprs: Vec<bool>,
+    locals: Vec<bool>,
+}
+
+impl Live {
+    /// Marks an expression and what it reads; true if that is new.
+    fn mark(&mut self, f: &Function, id: ExprId) -> bool {
+        if std::mem::replace(&mut self.exprs[id.index()], true) {
+            return false;
+        }
+        let mut pending = vec![id];
+        while let Some(id) = pending.pop() {
+            let kind = &f.expr(id).kind;
+            if let ExprKind::Load(local) = kind {
+                self.locals[local.index()] = true;
+            }
+            for &operand in kind.operands() {
+                if !std::mem::replace(&mut self.exprs[operand.index()], true) {
+                    pending.push(operand);
+                }
+            }
+        }
+        true
+    }
+
+    /// Marks what live stores and control flow read; true if anything was new.
+    fn block(&mut self, f: &Function, block: &Block) -> bool {
+        block
+            .iter()
+            .fold(false, |changed, stmt| self.stmt(f, stmt) || changed)
+    }
+
+    fn stmt(&mut self, f: &Function, stmt: &Stmt) -> bool {
+        if !self.needed(stmt) {
+            return false;
+        }
+        match stmt {
+            Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
+            Stmt::Store(_, _, value) => self.mark(f, *value),
+            Stmt::If(cond, then, otherwise) => {
+                self.block(f, then) | self.block(f, otherwise) | self.mark(f, *cond)
+            }
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => {
+                let counter = !std::mem::replace(&mut self.locals[local.index()], true);
+                let bounds = self.mark(f, *low) | self.mark(f, *high);
+                self.block(f, body) | counter | bounds
+            }
+            Stmt::While {
+                head, test, body, ..
+            } => self.block(f, body) | self.block(f, head) | self.mark(f, *test),
+        }
+    }
+
+    /// Is a statement seen from outside? Jumps are, as long as their loop is there at all.
+    fn needed(&self, stmt: &Stmt) -> bool {
+        match stmt {
+            Stmt::Eval(id) => self.exprs[id.index()],
+            Stmt::Store(local, ..) => self.locals[local.index()],
+            Stmt::If(_, a, b) => a
+                .iter()
+                .chain(b)
+                .any(|s| self.needed(s) && !matches!(s, Stmt::Eval(_))),
+            Stmt::For { body, .. } | Stmt::While { body, .. } => self.has_effect(body),
+            Stmt::Break | Stmt::Continue => true,
+        }
+    }
+
+    /// Does a block change a variable that matters?
+    fn has_effect(&self, block: &Block) -> bool {
+        block.iter().any(|stmt| match stmt {
+            Stmt::Store(local, ..) => self.locals[local.index()],
+            Stmt::If(_, a, b) => self.has_effect(a) || self.has_effect(b),
+            Stmt::For { body, .. } | Stmt::While { body, .. } => self.has_effect(body),
+            Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
+        })
+    }
+}
+
+/// Keeps what is needed. Statements of a loop that is dropped are dropped with it.
+fn sweep(block: Block, live: &Live) -> Block {
+    let mut out = Vec::with_capacity(block.len());
+    for stmt in block {
+        if !live.needed(&stmt) {
+            continue;
+        }
+        out.push(match stmt {
+            Stmt::If(cond, then, otherwise) => {
+                Stmt::If(cond, sweep(then, live), sweep(otherwise, live))
+            }
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => Stmt::For {
+                local,
+                low,
+                high,
+                body: sweep(body, live),
+            },
+            Stmt::While {
+                head,
+                test,
+                limit,
+                body,
+            } => Stmt::While {
+                head: sweep(head, live),
+                test,
+                limit,
+                body: sweep(body, live),
+            },
+            other => other,
+        });
+    }
+    out
+}

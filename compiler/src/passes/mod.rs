@@ -1,0 +1,58 @@
+//! Passes over functions: each makes a function simpler and keeps its meaning.
+//!
+//! A pass is one file and one row of [`PIPELINE`]. In debug builds the verifier runs after each.
+
+use crate::ir::{self, Function, Module};
+
+mod bake;
+mod dead_code;
+mod fold;
+
+pub use bake::bake;
+
+/// A pass with its name.
+pub struct Pass {
+    /// Its name in messages.
+    pub name: &'static str,
+    /// What it does to a function; must not change what the function computes.
+    pub run: fn(&mut Function),
+}
+
+/// The passes in the order they run, over every function that reaches code generation.
+pub const PIPELINE: &[Pass] = &[
+    Pass {
+        name: "fold",
+        run: fold::fold,
+    },
+    Pass {
+        name: "dead_code",
+        run: dead_code::remove,
+    },
+];
+
+/// Runs all passes on a function.
+///
+/// # Panics
+/// In debug builds, if a pass breaks the function: a defect of the pass.
+pub fn run(module: &Module, function: &mut Function) {
+    verify(module, function, "lowering");
+    for pass in PIPELINE {
+        (pass.run)(function);
+        verify(module, function, pass.name);
+    }
+}
+
+/// Folds the constants of a material's body; dead code stays, since closures refer to it.
+pub fn fold_body(module: &Module, body: &mut Function) {
+    fold::fold(body);
+    verify(module, body, "fold");
+}
+
+fn verify(module: &Module, function: &Function, after: &str) {
+    if cfg!(debug_assertions)
+        && let Err(problem) = ir::verify::function(module, function)
+    {
+        let text = ir::print::function(module, function);
+        panic!("after {after}: {problem}\n{text}");
+    }
+}

@@ -1,0 +1,400 @@
+//! The state of checking one function, closure method or material: scopes, and the IR builder.
+
+use crate::ast::{self, Name};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::build::Builder;
+use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
+use crate::source::Span;
+
+use super::modules::ModuleId;
+use super::types::Ty;
+use super::{Checker, Param, Signature};
+
+/// What an expression turned out to be.
+#[derive(Clone, Copy, Debug)]
+pub enum Operand {
+    /// A value.
+    Value(ExprId, Ty),
+    /// A closure of a material.
+    Closure(ClosureId, Ty),
+}
+
+impl Operand {
+    /// Its type.
+    pub fn ty(self) -> Ty {
+        match self {
+            Operand::Value(_, ty) | Operand::Closure(_, ty) => ty,
+        }
+    }
+}
+
+/// What a name in scope stands for.
+#[derive(Clone, Copy, Debug)]
+pub enum Binding {
+    /// A value or closure that never changes.
+    Fixed(Operand),
+    /// A `var`.
+    Variable(LocalId, Ty),
+    /// A loop variable.
+    Counter(LocalId),
+    /// The name's definition was wrong; uses of it are not reported again.
+    Broken,
+}
+
+/// A name in scope.
+pub struct Entry {
+    /// The name.
+    pub name: String,
+    /// What it stands for.
+    pub binding: Binding,
+    /// Where it was defined.
+    pub span: Span,
+    /// Was it read?
+    pub used: bool,
+    /// Should it be reported when it is not read?
+    pub watched: bool,
+}
+
+/// A function, method or material being checked.
+pub struct Body<'c, 'l> {
+    /// The compilation.
+    pub cx: &'c mut Checker<'l>,
+    /// The file it stands in.
+    pub module: ModuleId,
+    /// Its IR.
+    pub builder: Builder,
+    /// Names, innermost scope last.
+    pub scopes: Vec<Vec<Entry>>,
+    /// Turns of the enclosing loops together.
+    pub turns: u64,
+    /// Enclosing loops.
+    pub loops: usize,
+    /// Closures; only a material has any.
+    pub closures: Vec<ir::Closure>,
+    /// Present in a material.
+    pub material: Option<MaterialState>,
+}
+
+/// What only a material has.
+#[derive(Default)]
+pub struct MaterialState {
+    /// The outputs assigned so far.
+    pub outputs: Vec<(&'static str, ClosureId, Span)>,
+}
+
+impl<'c, 'l> Body<'c, 'l> {
+    /// Starts checking a body.
+    pub fn new(cx: &'c mut Checker<'l>, module: ModuleId, builder: Builder) -> Self {
+        let scopes = vec![Vec::new()];
+        Self {
+            cx,
+            module,
+            builder,
+            scopes,
+            turns: 1,
+            loops: 0,
+            closures: Vec::new(),
+            material: None,
+        }
+    }
+
+    /// Notes a problem; gives `None` so that a caller can return it.
+    pub fn report<T>(&mut self, diagnostic: Diagnostic) -> Option<T> {
+        self.cx.report(diagnostic);
+        None
+    }
+
+    /// Runs `f` in a scope of its own.
+    pub fn scoped<T>(&mut self, f: impl FnOnce(&mut Self) -> T) -> T {
+        self.scopes.push(Vec::new());
+        let result = f(self);
+        let scope = self.scopes.pop().unwrap_or_default();
+        self.report_unused(scope);
+        result
+    }
+
+    /// Warns of names that were never read.
+    pub fn report_unused(&mut self, scope: Vec<Entry>) {
+        let quiet = self.cx.modules[self.module.0].is_std;
+        for entry in scope {
+            if entry.used || !entry.watched || quiet || entry.name.starts_with('_') {
+                continue;
+            }
+            let message = format!("`{}` is never used", entry.name);
+            let unused = Diagnostic::new(Code::Unused, entry.span, message)
+                .hint(format!("remove it, or call it `_{}`", entry.name));
+            self.cx.report(unused);
+        }
+    }
+
+    /// Brings a name into the innermost scope.
+    pub fn bind(&mut self, name: &Name, binding: Binding, watched: bool) {
+        let entry = Entry {
+            name: name.node.clone(),
+            binding,
+            span: name.span,
+            used: false,
+            watched,
+        };
+        if let Some(scope) = self.scopes.last_mut() {
+            let clash = scope.iter().find(|e| e.name == entry.name).map(|e| e.span);
+            scope.push(entry);
+            if let Some(first) = clash {
+                let message = format!("`{}` is defined twice in this block", name.node);
+                let duplicate = Diagnostic::new(Code::Duplicate, name.span, message)
+                    .expected("one definition a name")
+                    .label(first, "first defined here")
+                    .hint("rename it, or use `var` and assign it anew");
+                self.cx.report(duplicate);
+            }
+        }
+    }
+
+    /// What a local name stands for.
+    pub fn local(&mut self, name: &str) -> Option<Binding> {
+        let entries = self
+            .scopes
+            .iter_mut()
+            .rev()
+            .flat_map(|s| s.iter_mut().rev());
+        let entry = entries.into_iter().find(|e| e.name == name)?;
+        entry.used = true;
+        Some(entry.binding)
+    }
+
+    /// Names in scope, for hints.
+    pub fn local_names(&self) -> Vec<String> {
+        self.scopes
+            .iter()
+            .flatten()
+            .map(|e| e.name.clone())
+            .collect()
+    }
+
+    /// Gives a value the type that a place needs; what does not convert is reported.
+    pub fn coerce(&mut self, operand: Operand, to: Ty, span: Span, place: &str) -> Option<Operand> {
+        let from = operand.ty();
+        if !from.converts_to(to) {
+            return self.mismatch(from, to, span, place);
+        }
+        let Operand::Value(id, _) = operand else {
+            return Some(operand);
+        };
+        let id = match (from, to) {
+            (Ty::Int, Ty::Float) => self.to_float(id, span),
+            (Ty::Int, Ty::Color) => {
+                let float = self.to_float(id, span);
+                self.builder.compose(ir::Type::Vec3, &[float], span)
+            }
+            (Ty::Float, Ty::Color) => self.builder.compose(ir::Type::Vec3, &[id], span),
+            _ => id,
+        };
+        Some(Operand::Value(id, to))
+    }
+
+    /// An int as a float.
+    pub fn to_float(&mut self, id: ExprId, span: Span) -> ExprId {
+        self.builder.op(crate::ops::Op::ToFloat, &[id], span)
+    }
+
+    fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: &str) -> Option<T> {
+        let (found, wanted) = (self.cx.type_text(from), self.cx.type_text(to));
+        let number = matches!(from, Ty::Int | Ty::Float);
+        let code = match to {
+            _ if to.is_dimension() && number => Code::NeedsUnit,
+            _ if from.is_closure() && !to.is_closure() => Code::ClosureUse,
+            _ => Code::TypeMismatch,
+        };
+        let wrong = Diagnostic::new(code, span, format!("{place} is a {found}, not a {wanted}"))
+            .expected(format!("a {wanted}"));
+        let wrong = match (from, to) {
+            (_, Ty::Length) if number => wrong.hint(
+                "write a length with its unit, as in `0.5 mm`, or multiply by one: `x * 1 m`",
+            ),
+            (_, Ty::Angle) if number => wrong.hint(
+                "write an angle with its unit, as in `30 deg`, or multiply by one: `x * 1 rad`",
+            ),
+            (d, Ty::Float) if d.is_dimension() => wrong.hint(format!(
+                "`float({found})` gives {}",
+                if d == Ty::Length { "metres" } else { "radians" }
+            )),
+            (v, Ty::Float) if v.is_vector() => {
+                wrong.hint("take a component, as in `.x`, or `luminance(...)` of a color")
+            }
+            (Ty::Float, Ty::Int) => wrong.hint("`int(...)` drops the fraction"),
+            (Ty::Bsdf, Ty::Edf) => wrong.hint("assign a bsdf to `surface`"),
+            (Ty::Edf, Ty::Bsdf) => wrong.hint("assign an edf to `emission`"),
+            (f, t) if f.ir().is_some() && t.ir().is_some() && f.ir() == t.ir() => {
+                wrong.hint(format!("convert it: `{wanted}(...)`"))
+            }
+            (Ty::Float | Ty::Int, t) if t.is_vector() => {
+                wrong.hint(format!("`{wanted}(x)` fills all components with x"))
+            }
+            _ => wrong,
+        };
+        self.report(wrong)
+    }
+}
+
+impl Checker<'_> {
+    /// Checks a function and adds it to the module.
+    pub(super) fn function(
+        &mut self,
+        module: ModuleId,
+        item: &ast::Item,
+        f: &ast::Function,
+    ) -> Option<FunctionId> {
+        let params = self.params(module, &f.params)?;
+        let result = self.type_name(module, &f.result)?;
+        if result.is_closure() || params.iter().any(|p| p.ty.is_closure()) {
+            self.closure_in_data(f.result.span);
+            return None;
+        }
+        let names = f
+            .params
+            .iter()
+            .map(|p| &p.name)
+            .zip(params.iter().map(|p| p.ty));
+        let args: Vec<(Name, Ty)> = names.map(|(n, t)| (n.clone(), t)).collect();
+        let id = self.lower_function(
+            module,
+            &item.name.node,
+            item.span,
+            &args,
+            result,
+            |_| Some(()),
+            &f.body,
+        )?;
+        self.signatures.insert(id, Signature { params, result });
+        Some(id)
+    }
+
+    /// Types and defaults of parameters.
+    pub(super) fn params(&mut self, module: ModuleId, params: &[ast::Param]) -> Option<Vec<Param>> {
+        let mut typed: Vec<Param> = Vec::new();
+        for p in params {
+            let ty = self.type_name(module, &p.ty)?;
+            let default = match &p.default {
+                Some(expr) => Some(self.constant(module, expr, ty, "the default")?),
+                None => None,
+            };
+            if typed.iter().any(|t| t.name == p.name.node) {
+                let message = format!("two parameters are called `{}`", p.name.node);
+                self.report(
+                    Diagnostic::new(Code::Duplicate, p.name.span, message)
+                        .expected("parameters of different names"),
+                );
+                return None;
+            }
+            typed.push(Param {
+                name: p.name.node.clone(),
+                ty,
+                default,
+            });
+        }
+        Some(typed)
+    }
+
+    /// Lowers a body with parameters `args`, after `prologue`, to a new function.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn lower_function(
+        &mut self,
+        module: ModuleId,
+        name: &str,
+        span: Span,
+        args: &[(Name, Ty)],
+        result: Ty,
+        prologue: impl FnOnce(&mut Body) -> Option<()>,
+        body: &ast::Body,
+    ) -> Option<FunctionId> {
+        let params = args.iter().filter_map(|(n, ty)| {
+            Some(ir::Local {
+                name: n.node.clone(),
+                ty: ty.ir()?,
+            })
+        });
+        let builder = Builder::new(name, params.collect(), span);
+        let mut cx = Body::new(self, module, builder);
+        for (i, (name, ty)) in args.iter().enumerate() {
+            let id = cx.builder.param(i, name.span);
+            cx.bind(name, Binding::Fixed(Operand::Value(id, *ty)), false);
+        }
+        let value = prologue(&mut cx).and_then(|()| cx.scoped(|cx| cx.body(body, result, span)));
+        let scope = cx.scopes.pop().unwrap_or_default();
+        cx.report_unused(scope);
+        let function = cx.builder.finish(value?);
+        Some(self.add_function(function))
+    }
+
+    /// Adds a finished function to the module.
+    pub(super) fn add_function(&mut self, function: ir::Function) -> FunctionId {
+        self.ir.functions.push(function);
+        FunctionId(self.ir.functions.len() as u32 - 1)
+    }
+}
+
+impl Body<'_, '_> {
+    /// Checks a function body and gives its value as a `result`.
+    pub fn body(&mut self, body: &ast::Body, result: Ty, span: Span) -> Option<ExprId> {
+        let value = match body {
+            ast::Body::Expr { value, when: None } => self.expr_as(value, result, "the value")?,
+            ast::Body::Expr {
+                value,
+                when: Some(cond),
+            } => return self.when(value, cond, result),
+            ast::Body::Block(block) => {
+                let (value, at) = self.block_value(block, span)?;
+                self.coerce(value, result, at, "the value")?
+            }
+        };
+        match value {
+            Operand::Value(id, _) => Some(id),
+            Operand::Closure(..) => None,
+        }
+    }
+
+    /// `value when cond`: zero where the condition does not hold.
+    fn when(&mut self, value: &ast::Expr, cond: &ast::Expr, result: Ty) -> Option<ExprId> {
+        let cond_id = self.value_as(cond, Ty::Bool, "the condition")?;
+        let ty = result.ir()?;
+        let local = self.builder.local("value", ty);
+        self.builder.open();
+        let then = self.value_as(value, result, "the value");
+        if let Some(then) = then {
+            self.builder.store(local, then);
+        }
+        let block = self.builder.close();
+        then?;
+        // Variables start at zero, so there is nothing to do otherwise.
+        self.builder.stmt(ir::Stmt::If(cond_id, block, Vec::new()));
+        Some(self.builder.load(local, value.span))
+    }
+
+    /// A block as a value: its statements, then its last expression; with the latter's place.
+    pub fn block_value(&mut self, block: &ast::Block, span: Span) -> Option<(Operand, Span)> {
+        let ok = self.statements(&block.stmts);
+        let Some(value) = &block.value else {
+            if !ok {
+                return None;
+            }
+            let missing = Diagnostic::new(
+                Code::MissingValue,
+                Span {
+                    start: block.span.end.saturating_sub(1),
+                    ..block.span
+                },
+                "this block has no value",
+            )
+            .expected("an expression without a semicolon at the end of the block")
+            .label(span, "a value is needed here");
+            return self.report(missing);
+        };
+        let value_op = self.expr(value)?;
+        ok.then_some((value_op, value.span))
+    }
+
+    /// A constant as an expression.
+    pub fn constant(&mut self, value: Const, span: Span) -> ExprId {
+        self.builder.constant(value, span)
+    }
+}

@@ -1,0 +1,520 @@
+//! Checking calls: built-in functions, type conversions, functions, structs and closures.
+
+use crate::ast::{Arg, ExprKind, ItemKind, Name};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{self, Const, ExprId};
+use crate::ops::{Op, Shape};
+use crate::source::Span;
+
+use super::body::{Body, Operand};
+use super::types::{NAMED, Ty};
+use super::{Checked, Param};
+
+impl Body<'_, '_> {
+    /// A call of anything.
+    pub fn call(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
+        if let Some(item) = self.cx.lookup(self.module, &callee.node) {
+            return match self.cx.demand(item, Some(callee.span)) {
+                Some(Checked::Function(id)) => {
+                    let signature = self.cx.signatures[&id].clone();
+                    let args = self.arguments(callee, args, &signature.params)?;
+                    let turns = self
+                        .turns
+                        .saturating_mul(self.cx.ir.functions[id.index()].turns);
+                    self.check_turns(turns, span)?;
+                    Some(Operand::Value(
+                        self.builder.call(&self.cx.ir, id, &args, span),
+                        signature.result,
+                    ))
+                }
+                Some(Checked::Struct(id)) => {
+                    let fields = self.cx.fields[id.index()].clone();
+                    let args = self.arguments(callee, args, &fields)?;
+                    Some(Operand::Value(
+                        self.builder.make(id, &args, span),
+                        Ty::Struct(id),
+                    ))
+                }
+                Some(Checked::Closure(id, ty)) => self.lobe(callee, args, id, ty, span),
+                Some(Checked::Const(..)) => self.not_callable(callee, "a constant"),
+                _ if matches!(self.cx.item(item).kind, ItemKind::Material(_)) => {
+                    self.not_callable(callee, "a material")
+                }
+                // What it calls is wrong and reported; check the arguments all the same.
+                _ => self.discard(args),
+            };
+        }
+        if self.local(&callee.node).is_some() {
+            return self.not_callable(callee, "a value");
+        }
+        match callee.node.as_str() {
+            "layer" => self.layer(args, span),
+            "mix" if args.iter().any(|a| self.is_closure(&a.value)) => {
+                self.mix_closures(args, span)
+            }
+            "srgb" => self.srgb(args, span),
+            name => match NAMED.iter().find(|(n, _)| *n == name) {
+                // `length(v)` is the function; lengths are made with units.
+                Some((_, ty)) if *ty != Ty::Length => self.convert(*ty, args, span),
+                _ => self.built_in(callee, args, span),
+            },
+        }
+    }
+
+    fn discard(&mut self, args: &[Arg]) -> Option<Operand> {
+        for arg in args {
+            self.expr(&arg.value);
+        }
+        None
+    }
+
+    fn not_callable<T>(&mut self, callee: &Name, what: &str) -> Option<T> {
+        let message = format!("`{}` is {what} and cannot be called", callee.node);
+        let wrong = Diagnostic::new(Code::TypeMismatch, callee.span, message)
+            .expected("a function or closure");
+        self.report(wrong)
+    }
+
+    /// Matches arguments with parameters: by position, then by name; defaults fill the rest.
+    pub fn arguments(
+        &mut self,
+        callee: &Name,
+        args: &[Arg],
+        params: &[Param],
+    ) -> Option<Vec<ExprId>> {
+        let mut given: Vec<Option<ExprId>> = vec![None; params.len()];
+        let mut filled: Vec<bool> = vec![false; params.len()];
+        let mut ok = true;
+        for (position, arg) in args.iter().enumerate() {
+            let index = match &arg.name {
+                Some(name) => match params.iter().position(|p| p.name == name.node) {
+                    Some(index) => index,
+                    None => {
+                        self.unknown_argument(callee, name, params);
+                        self.expr(&arg.value);
+                        ok = false;
+                        continue;
+                    }
+                },
+                None => position,
+            };
+            if index >= params.len() || filled[index] {
+                self.too_many(callee, arg, params);
+                ok = false;
+                continue;
+            }
+            filled[index] = true;
+            let what = format!("`{}` of `{}`", params[index].name, callee.node);
+            given[index] = self.value_as(&arg.value, params[index].ty, &what);
+            ok &= given[index].is_some();
+        }
+        self.fill_defaults(callee, &mut given, &filled, params);
+        let complete: Option<Vec<ExprId>> = given.into_iter().collect();
+        complete.filter(|_| ok)
+    }
+
+    fn fill_defaults(
+        &mut self,
+        callee: &Name,
+        given: &mut [Option<ExprId>],
+        filled: &[bool],
+        params: &[Param],
+    ) {
+        let mut missing = Vec::new();
+        for (i, param) in params.iter().enumerate().filter(|(i, _)| !filled[*i]) {
+            match &param.default {
+                Some(default) => given[i] = Some(self.constant(default.clone(), callee.span)),
+                None => missing.push(param),
+            }
+        }
+        if missing.is_empty() {
+            return;
+        }
+        let names: Vec<&str> = missing.iter().map(|p| p.name.as_str()).collect();
+        let shown: Vec<String> = missing
+            .iter()
+            .map(|p| format!("{}: {}", p.name, self.cx.type_text(p.ty)))
+            .collect();
+        let message = format!("`{}` needs {}", callee.node, super::modules::list(names));
+        let lacking = Diagnostic::new(Code::MissingArgument, callee.span, message)
+            .expected(format!("arguments for {}", shown.join(", ")));
+        self.report::<()>(lacking);
+    }
+
+    fn unknown_argument(&mut self, callee: &Name, name: &Name, params: &[Param]) {
+        let names: Vec<&str> = params.iter().map(|p| p.name.as_str()).collect();
+        let message = format!("`{}` has no parameter `{}`", callee.node, name.node);
+        let unknown = Diagnostic::new(Code::UnknownArgument, name.span, message)
+            .expected(format!(
+                "one of {}",
+                super::modules::list(names.iter().copied())
+            ))
+            .did_you_mean(&name.node, names);
+        self.report::<()>(unknown);
+    }
+
+    fn too_many(&mut self, callee: &Name, arg: &Arg, params: &[Param]) {
+        let twice = arg
+            .name
+            .as_ref()
+            .map(|n| format!("`{}` is given twice", n.node));
+        let message =
+            twice.unwrap_or_else(|| format!("`{}` takes {} arguments", callee.node, params.len()));
+        let names: Vec<&str> = params.iter().map(|p| p.name.as_str()).collect();
+        let extra = Diagnostic::new(Code::TooManyArguments, arg.value.span, message).expected(
+            format!("at most {}: {}", params.len(), super::modules::list(names)),
+        );
+        self.report::<()>(extra);
+    }
+
+    /// Values of arguments that take no names.
+    fn positional(&mut self, callee: &str, args: &[Arg]) -> Option<Vec<(ExprId, Ty, Span)>> {
+        let mut values = Vec::new();
+        let mut ok = true;
+        for arg in args {
+            if let Some(name) = &arg.name {
+                let message = format!("`{callee}` takes its arguments by position");
+                let named = Diagnostic::new(Code::UnknownArgument, name.span, message)
+                    .expected("arguments without names")
+                    .hint(format!("remove `{}:`", name.node));
+                self.report::<()>(named);
+                ok = false;
+            }
+            match self.expr(&arg.value) {
+                Some(Operand::Value(id, ty)) => values.push((id, ty, arg.value.span)),
+                Some(Operand::Closure(..)) => {
+                    let message = format!("`{callee}` does not work on closures");
+                    let wrong = Diagnostic::new(Code::ClosureUse, arg.value.span, message)
+                        .expected("a value")
+                        .hint("closures are combined by layer, mix, `*` and `+`");
+                    self.report::<()>(wrong);
+                    ok = false;
+                }
+                None => ok = false,
+            }
+        }
+        ok.then_some(values)
+    }
+
+    /// A call of a function of the op table.
+    fn built_in(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
+        let candidates: Vec<Op> = Op::by_name(&callee.node).collect();
+        let Some(&first) = candidates.first() else {
+            return self.unknown_function(callee, args);
+        };
+        if let (Some(Op::Image | Op::ImageData), [texture, uv]) = (candidates.first(), args) {
+            let texture_id = self.value_as(&texture.value, Ty::Texture, "the texture")?;
+            let uv_id = self.value_as(&uv.value, Ty::Vec2, "the texture coordinate")?;
+            let ty = if first == Op::Image {
+                Ty::Color
+            } else {
+                Ty::Vec4
+            };
+            return Some(Operand::Value(
+                self.builder.op(first, &[texture_id, uv_id], span),
+                ty,
+            ));
+        }
+        let values = self.positional(&callee.node, args)?;
+        let Some(op) = candidates
+            .iter()
+            .copied()
+            .find(|op| op.arity() == values.len())
+        else {
+            let counts: Vec<String> = candidates.iter().map(|op| op.arity().to_string()).collect();
+            let message = format!(
+                "`{}` takes {} arguments, not {}",
+                callee.node,
+                counts.join(" or "),
+                values.len()
+            );
+            let code = if values.len() < first.arity() {
+                Code::MissingArgument
+            } else {
+                Code::TooManyArguments
+            };
+            return self.report(
+                Diagnostic::new(code, span, message)
+                    .expected(format!("{} arguments", counts.join(" or "))),
+            );
+        };
+        self.apply(op, &values, span)
+    }
+
+    fn apply(&mut self, op: Op, values: &[(ExprId, Ty, Span)], span: Span) -> Option<Operand> {
+        let all_ints = values.iter().all(|v| v.1 == Ty::Int);
+        let wants_floats = !matches!(op.info().shape, Shape::Int(_) | Shape::IntToFloat)
+            && !(all_ints && matches!(op.info().shape, Shape::Number(_) | Shape::Select));
+        let mut ids = Vec::new();
+        let mut types = Vec::new();
+        for &(id, ty, at) in values {
+            let promote = wants_floats && ty == Ty::Int;
+            ids.push(if promote { self.to_float(id, at) } else { id });
+            types.push(if promote { Ty::Float } else { ty });
+        }
+        let machine: Vec<ir::Type> = ids.iter().map(|&id| self.builder.ty(id)).collect();
+        match (op.result(&machine), result_type(op, &types)) {
+            (Some(_), Some(ty)) => Some(Operand::Value(self.builder.op(op, &ids, span), ty)),
+            _ => self.no_overload(op, &types, span),
+        }
+    }
+
+    fn no_overload<T>(&mut self, op: Op, types: &[Ty], span: Span) -> Option<T> {
+        let shown: Vec<String> = types.iter().map(|&t| self.cx.type_text(t)).collect();
+        let name = op.info().text;
+        let message = format!("`{name}` does not apply to {}", shown.join(", "));
+        let wrong =
+            Diagnostic::new(Code::NoOperator, span, message).expected(expected_operands(op));
+        let wrong = if types.iter().any(|t| t.is_dimension()) {
+            wrong.hint("`float(...)` gives the plain number in metres or radians")
+        } else if types.contains(&Ty::Color) && types.iter().any(|t| t.is_geometric()) {
+            wrong.hint("convert one of them: `color(...)` or `vec3(...)`")
+        } else {
+            wrong
+        };
+        self.report(wrong)
+    }
+
+    fn unknown_function<T>(&mut self, callee: &Name, args: &[Arg]) -> Option<T> {
+        self.discard(args);
+        let mut names = self.cx.visible(self.module, |k| {
+            !matches!(k, ItemKind::Const(_) | ItemKind::Material(_))
+        });
+        names.extend(
+            Op::ALL
+                .iter()
+                .filter(|op| op.info().callable)
+                .map(|op| op.info().text.to_owned()),
+        );
+        names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
+        names.extend(["layer", "srgb"].map(String::from));
+        let unknown = Diagnostic::new(
+            Code::UnknownName,
+            callee.span,
+            format!("unknown function `{}`", callee.node),
+        )
+        .expected("a built-in function, or one defined or imported in this file");
+        let unknown = match self.cx.importable(&callee.node) {
+            Some(import) => unknown.hint(format!("import it: `{import}`")),
+            None => match foreign_function(&callee.node) {
+                Some(own) => unknown.hint(format!("here this is `{own}`")),
+                None => unknown.did_you_mean(&callee.node, names.iter().map(String::as_str)),
+            },
+        };
+        self.report(unknown)
+    }
+
+    /// `srgb(0xRRGGBB)` or `srgb(r, g, b)`: a linear color.
+    fn srgb(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
+        let values = self.positional("srgb", args)?;
+        let encoded = match values.as_slice() {
+            [(id, Ty::Int, _)] => match self.builder.function().constant(*id) {
+                Some(Const::Int(rgb)) if (0..=0xff_ffff).contains(rgb) => {
+                    let byte = |shift: u32| f64::from((rgb >> shift) & 0xff) / 255.0;
+                    let components = vec![byte(16), byte(8), byte(0)];
+                    self.constant(Const::Float(components), span)
+                }
+                _ => return self.wrong_srgb(span),
+            },
+            [(r, rt, _), (g, gt, _), (b, bt, _)]
+                if [rt, gt, bt]
+                    .iter()
+                    .all(|t| matches!(t, Ty::Int | Ty::Float)) =>
+            {
+                let parts = [(*r, *rt), (*g, *gt), (*b, *bt)].map(|(id, ty)| {
+                    if ty == Ty::Int {
+                        self.to_float(id, span)
+                    } else {
+                        id
+                    }
+                });
+                self.builder.compose(ir::Type::Vec3, &parts, span)
+            }
+            _ => return self.wrong_srgb(span),
+        };
+        Some(Operand::Value(
+            self.builder.op(Op::SrgbDecode, &[encoded], span),
+            Ty::Color,
+        ))
+    }
+
+    fn wrong_srgb<T>(&mut self, span: Span) -> Option<T> {
+        let wrong = Diagnostic::new(Code::TypeMismatch, span, "`srgb` does not take this")
+            .expected("a constant such as `srgb(0xff8800)`, or three floats from 0 to 1");
+        self.report(wrong)
+    }
+
+    /// A call of a type: conversion and composition.
+    fn convert(&mut self, to: Ty, args: &[Arg], span: Span) -> Option<Operand> {
+        let name = self.cx.type_text(to);
+        let values = self.positional(&name, args)?;
+        let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
+        let id = match (to, values.as_slice()) {
+            (_, &[(id, ty, _)]) if ty == to => Some(id),
+            (Ty::Float, &[(id, Ty::Int, _)]) => Some(self.to_float(id, span)),
+            (Ty::Float, &[(id, ty, _)]) if ty.is_dimension() => Some(id),
+            (Ty::Float, &[(id, Ty::Bool, _)]) => {
+                let (one, zero) = (self.builder.float(1.0, span), self.builder.float(0.0, span));
+                Some(self.builder.op(Op::Select, &[id, one, zero], span))
+            }
+            (Ty::Int, &[(id, Ty::Float, _)]) => Some(self.builder.op(Op::ToInt, &[id], span)),
+            (Ty::Int, &[(id, Ty::Bool, _)]) => {
+                let (one, zero) = (
+                    self.constant(Const::Int(1), span),
+                    self.constant(Const::Int(0), span),
+                );
+                Some(self.builder.op(Op::Select, &[id, one, zero], span))
+            }
+            (Ty::Mat3, &[(x, a, _), (y, b, _), (z, c, _)])
+                if [a, b, c].iter().all(|t| t.is_geometric()) =>
+            {
+                Some(self.builder.compose(ir::Type::Mat3, &[x, y, z], span))
+            }
+            (_, &[(id, ty, _)])
+                if to.ir() == Some(ir::Type::Vec3) && ty.ir() == Some(ir::Type::Vec3) =>
+            {
+                Some(id)
+            }
+            _ if to.is_vector() => self.compose_vector(to, &values, span),
+            _ => None,
+        };
+        match id {
+            Some(id) => Some(Operand::Value(id, to)),
+            None => {
+                let shown: Vec<String> = types.iter().map(|&t| self.cx.type_text(t)).collect();
+                let message = format!(
+                    "a {name} cannot be made from {}",
+                    if shown.is_empty() {
+                        "nothing".into()
+                    } else {
+                        shown.join(", ")
+                    }
+                );
+                let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
+                    .expected(conversion_help(to));
+                self.report(wrong)
+            }
+        }
+    }
+
+    /// A vector from one float for all components, or from parts that fill it exactly.
+    fn compose_vector(
+        &mut self,
+        to: Ty,
+        values: &[(ExprId, Ty, Span)],
+        span: Span,
+    ) -> Option<ExprId> {
+        let machine = to.ir()?;
+        let mut parts = Vec::new();
+        let mut width = 0;
+        for &(id, ty, at) in values {
+            let id = if ty == Ty::Int {
+                self.to_float(id, at)
+            } else {
+                id
+            };
+            width += if ty.is_vector() || ty == Ty::Int || ty == Ty::Float {
+                self.builder.ty(id).width()?
+            } else {
+                return None;
+            };
+            parts.push(id);
+        }
+        let fills = Some(width) == machine.width() || (width == 1 && parts.len() == 1);
+        fills.then(|| self.builder.compose(machine, &parts, span))
+    }
+}
+
+/// The surface type of an op's result; `None` where the kinds of vectors do not mix.
+fn result_type(op: Op, types: &[Ty]) -> Option<Ty> {
+    use Op::*;
+    if types.contains(&Ty::Error) {
+        return Some(Ty::Error);
+    }
+    match op.info().shape {
+        Shape::Int(_) | Shape::FloatToInt => return Some(Ty::Int),
+        Shape::Select => return types[1].unify(types[2]),
+        Shape::Reduce(_) => {
+            let mixed = types.len() == 2 && types[0].unify(types[1]).is_none();
+            return (!mixed).then_some(Ty::Float);
+        }
+        Shape::IntToFloat => return Some(Ty::Float),
+        Shape::Cross => return types.iter().all(|t| t.is_geometric()).then_some(Ty::Vector),
+        _ => {}
+    }
+    if let (Sin | Cos | Tan, [Ty::Angle]) = (op, types) {
+        return Some(Ty::Float);
+    }
+    if types.iter().any(|t| t.is_dimension()) {
+        // Ops that commute with scaling keep a dimension; the weight of mix has none.
+        let keeps = matches!(op, Min | Max | Clamp | Abs | Mix | Mod);
+        let operands = if op == Mix { &types[..2] } else { types };
+        return (keeps && operands.iter().all(|t| *t == types[0])).then_some(types[0]);
+    }
+    let mut vectors = types.iter().copied().filter(|t| t.is_vector());
+    let Some(first) = vectors.next() else {
+        return Some(types[0]);
+    };
+    vectors.all(|t| t.unify(first).is_some()).then_some(first)
+}
+
+fn expected_operands(op: Op) -> &'static str {
+    match op.info().shape {
+        Shape::Number(_) => "ints, floats or vectors of one kind",
+        Shape::Int(_) | Shape::IntToFloat => "ints",
+        Shape::Reduce(_) | Shape::Vector(_) => "vectors of one kind",
+        Shape::Cross => "two directions",
+        Shape::Select => "a bool and two values of one type",
+        _ => "floats or vectors of one kind",
+    }
+}
+
+fn conversion_help(to: Ty) -> &'static str {
+    match to {
+        Ty::Float => "an int, a bool, a length (in metres) or an angle (in radians)",
+        Ty::Int => "a float or a bool",
+        Ty::Vec2 => "one float for both components, or two",
+        Ty::Vec4 => "one float, or parts with four components together",
+        Ty::Mat3 => "three columns",
+        Ty::Angle => "a number with a unit, as in `30 deg`",
+        Ty::Texture => "a file name where a texture parameter is declared",
+        Ty::Bool => "a comparison",
+        _ => "one float, another three-component value, or parts with three components together",
+    }
+}
+
+/// What a function of another shading language is called here.
+fn foreign_function(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "lerp" => "mix(a, b, t)",
+        "frac" => "fract(x)",
+        "rsqrt" | "inverseSqrt" | "inversesqrt" => "inverse_sqrt(x)",
+        "fmod" => "mod(x, y)",
+        "texture" | "tex2D" | "textureSample" | "sample" => "image(texture, uv)",
+        "rgb" => "color(r, g, b)",
+        "noise" => "perlin(p), after `use std::noise::perlin;`",
+        _ => return None,
+    })
+}
+
+/// Is the callee a closure-making function of the language itself?
+pub fn makes_closure(
+    callee: &str,
+    args: &[Arg],
+    is_closure: impl Fn(&crate::ast::Expr) -> bool,
+) -> bool {
+    match callee {
+        "layer" => true,
+        "mix" => args.iter().any(|a| is_closure(&a.value)),
+        _ => false,
+    }
+}
+
+/// The last expression of a block, through nested blocks.
+pub fn tail(block: &crate::ast::Block) -> Option<&crate::ast::Expr> {
+    let value = block.value.as_deref()?;
+    match &value.kind {
+        ExprKind::Block(inner) => tail(inner),
+        _ => Some(value),
+    }
+}

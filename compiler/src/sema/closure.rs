@@ -1,0 +1,518 @@
+//! Checking closures: their definitions, and the tree that a material builds from them.
+
+use crate::ast::{self, Arg, BinaryOp, ClosureKind, Expr, ExprKind, ItemKind, Name};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{self, Closure, ClosureDefId, ClosureId, Const, ExprId, FunctionId, Lobe, Methods};
+use crate::ops::Op;
+use crate::source::Span;
+
+use super::body::{Binding, Body, Operand};
+use super::call::{makes_closure, tail};
+use super::modules::ModuleId;
+use super::types::Ty;
+use super::{Checked, Checker, Param};
+
+/// Methods of closures: name, types of the arguments, type of the value.
+const BSDF_METHODS: [(&str, &[Ty], Ty); 4] = [
+    ("sample", &[Ty::Vector, Ty::Vec3], Ty::Vector),
+    ("eval", &[Ty::Vector, Ty::Vector], Ty::Color),
+    ("pdf", &[Ty::Vector, Ty::Vector], Ty::Float),
+    ("albedo", &[Ty::Vector], Ty::Color),
+];
+const EDF_METHODS: [(&str, &[Ty], Ty); 1] = [("emit", &[Ty::Vector], Ty::Color)];
+
+impl Checker<'_> {
+    /// Checks a bsdf or edf.
+    pub(super) fn closure_def(
+        &mut self,
+        module: ModuleId,
+        item: &ast::Item,
+        def: &ast::ClosureDef,
+    ) -> Option<Checked> {
+        let params = self.params(module, &def.params)?;
+        let methods = match def.kind {
+            ClosureKind::Bsdf | ClosureKind::DeltaBsdf => &BSDF_METHODS[..],
+            ClosureKind::Edf => &EDF_METHODS[..],
+        };
+        let known = self.known_methods(item, def, methods);
+        let mut ids = Vec::new();
+        for (name, types, result) in methods {
+            let Some(method) = def.methods.iter().find(|m| m.name.node == *name) else {
+                self.missing_method(item, name, types.len());
+                continue;
+            };
+            ids.extend(self.method(module, item, def, &params, method, types, *result));
+        }
+        if !known || ids.len() != methods.len() {
+            return None;
+        }
+        let (ty, methods) = match ids.as_slice() {
+            [sample, eval, pdf, albedo] => (
+                Ty::Bsdf,
+                Methods::Bsdf {
+                    sample: *sample,
+                    eval: *eval,
+                    pdf: *pdf,
+                    albedo: *albedo,
+                },
+            ),
+            [emit] => (Ty::Edf, Methods::Edf { emit: *emit }),
+            _ => return None,
+        };
+        let id = ClosureDefId(self.ir.closures.len() as u32);
+        let locals = params.iter().filter_map(|p| {
+            Some(ir::Local {
+                name: p.name.clone(),
+                ty: p.ty.ir()?,
+            })
+        });
+        self.ir.closures.push(ir::ClosureDef {
+            name: item.name.node.clone(),
+            delta: def.kind == ClosureKind::DeltaBsdf,
+            params: locals.collect(),
+            methods,
+            span: item.span,
+        });
+        self.closure_params.push(params);
+        Some(Checked::Closure(id, ty))
+    }
+
+    fn known_methods(
+        &mut self,
+        item: &ast::Item,
+        def: &ast::ClosureDef,
+        known: &[(&str, &[Ty], Ty)],
+    ) -> bool {
+        let mut ok = true;
+        let mut seen: Vec<&str> = Vec::new();
+        for method in &def.methods {
+            let name = method.name.node.as_str();
+            let problem = if !known.iter().any(|(n, ..)| *n == name) {
+                let names = known.iter().map(|(n, ..)| *n);
+                let message = format!("`{}` cannot define `{name}`", item.name.node);
+                Diagnostic::new(Code::UnknownName, method.name.span, message)
+                    .expected(format!("one of {}", super::modules::list(names.clone())))
+                    .did_you_mean(name, names)
+            } else if seen.contains(&name) {
+                let message = format!("`{}` defines `{name}` twice", item.name.node);
+                Diagnostic::new(Code::Duplicate, method.name.span, message)
+                    .expected("one definition a method")
+            } else {
+                seen.push(name);
+                continue;
+            };
+            self.report(problem);
+            ok = false;
+        }
+        ok
+    }
+
+    fn missing_method(&mut self, item: &ast::Item, name: &str, args: usize) {
+        let signature = match (name, args) {
+            ("sample", _) => "sample(wo, u) = ...;".to_owned(),
+            (name, 2) => format!("{name}(wo, wi) = ...;"),
+            (name, _) => format!("{name}(wo) = ...;"),
+        };
+        let message = format!("`{}` does not define `{name}`", item.name.node);
+        let missing = Diagnostic::new(Code::MissingMethod, item.name.span, message)
+            .expected(format!("`{signature}`"));
+        self.report(missing);
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn method(
+        &mut self,
+        module: ModuleId,
+        item: &ast::Item,
+        def: &ast::ClosureDef,
+        params: &[Param],
+        method: &ast::Method,
+        types: &[Ty],
+        result: Ty,
+    ) -> Option<FunctionId> {
+        if method.args.len() != types.len() {
+            let message = format!(
+                "`{}` takes {} arguments, not {}",
+                method.name.node,
+                types.len(),
+                method.args.len()
+            );
+            let code = if method.args.len() < types.len() {
+                Code::MissingArgument
+            } else {
+                Code::TooManyArguments
+            };
+            self.report(
+                Diagnostic::new(code, method.name.span, message)
+                    .expected(format!("{} arguments", types.len())),
+            );
+            return None;
+        }
+        let own = def
+            .params
+            .iter()
+            .zip(params)
+            .map(|(p, typed)| (p.name.clone(), typed.ty));
+        let directions = method.args.iter().cloned().zip(types.iter().copied());
+        let args: Vec<(Name, Ty)> = own.chain(directions).collect();
+        let name = format!("{}_{}", item.name.node, method.name.node);
+        let lets = |cx: &mut Body| {
+            let ok = cx.statements(&def.lets);
+            // A `let` that one method needs another may leave alone.
+            cx.scopes
+                .iter_mut()
+                .flatten()
+                .for_each(|e| e.watched = false);
+            ok.then_some(())
+        };
+        self.lower_function(
+            module,
+            &name,
+            method.span,
+            &args,
+            result,
+            lets,
+            &method.body,
+        )
+    }
+}
+
+impl Body<'_, '_> {
+    fn add_closure(&mut self, closure: Closure, ty: Ty) -> Operand {
+        self.closures.push(closure);
+        Operand::Closure(ClosureId(self.closures.len() as u32 - 1), ty)
+    }
+
+    /// A call of a bsdf or edf.
+    pub fn lobe(
+        &mut self,
+        callee: &Name,
+        args: &[Arg],
+        def: ClosureDefId,
+        ty: Ty,
+        span: Span,
+    ) -> Option<Operand> {
+        if self.material.is_none() {
+            let wrong = Diagnostic::new(
+                Code::ClosureUse,
+                span,
+                format!(
+                    "`{}` makes a closure, and functions have values",
+                    callee.node
+                ),
+            )
+            .expected("closures only in materials");
+            return self.report(wrong);
+        }
+        let params = self.cx.closure_params[def.index()].clone();
+        let framed = |name: &str| ty == Ty::Bsdf && !params.iter().any(|p| p.name == name);
+        let (mut normal, mut tangent) = (None, None);
+        let mut own = Vec::new();
+        for arg in args {
+            match arg.name.as_ref().map(|n| n.node.as_str()) {
+                Some("normal") if framed("normal") => {
+                    normal = Some(self.value_as(&arg.value, Ty::Normal, "`normal`")?)
+                }
+                Some("tangent") if framed("tangent") => {
+                    tangent = Some(self.value_as(&arg.value, Ty::Vector, "`tangent`")?)
+                }
+                _ => own.push(arg.clone()),
+            }
+        }
+        let args = self.arguments(callee, &own, &params)?;
+        Some(self.add_closure(
+            Closure::Lobe(Lobe {
+                def,
+                args,
+                normal,
+                tangent,
+                span,
+            }),
+            ty,
+        ))
+    }
+
+    /// Closures of arguments without names, all of one type.
+    fn closures_of(&mut self, what: &str, args: &[Arg]) -> Option<Vec<(ClosureId, Ty, Span)>> {
+        let mut all = Vec::new();
+        let mut ok = true;
+        for arg in args {
+            let at = arg.value.span;
+            match self.expr(&arg.value) {
+                _ if arg.name.is_some() => {
+                    let named = Diagnostic::new(
+                        Code::UnknownArgument,
+                        at,
+                        format!("`{what}` takes its closures by position"),
+                    )
+                    .expected("closures without names");
+                    self.report::<()>(named);
+                    ok = false;
+                }
+                Some(Operand::Closure(id, ty)) => all.push((id, ty, at)),
+                Some(Operand::Value(_, ty)) => {
+                    let message = format!(
+                        "`{what}` combines closures, and this is a {}",
+                        self.cx.type_text(ty)
+                    );
+                    let wrong = Diagnostic::new(Code::TypeMismatch, at, message)
+                        .expected("a bsdf")
+                        .hint("a weight is multiplied: `w * diffuse(...)`");
+                    self.report::<()>(wrong);
+                    ok = false;
+                }
+                None => ok = false,
+            }
+        }
+        ok.then_some(all)
+    }
+
+    /// `layer(a, b, ...)`, top first.
+    pub fn layer(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
+        self.require_material("layer", span)?;
+        let closures = self.closures_of("layer", args)?;
+        if let Some((_, _, at)) = closures.iter().find(|c| c.1 == Ty::Edf) {
+            let wrong = Diagnostic::new(
+                Code::TypeMismatch,
+                *at,
+                "`layer` stacks bsdfs, and this is an edf",
+            )
+            .expected("a bsdf")
+            .hint("emission is assigned to `emission`");
+            return self.report(wrong);
+        }
+        let Some((&(bottom, ..), above)) =
+            closures.split_last().filter(|(_, above)| !above.is_empty())
+        else {
+            let few = Diagnostic::new(
+                Code::MissingArgument,
+                span,
+                "`layer` needs two closures at least",
+            )
+            .expected("`layer(top, ..., bottom)`");
+            return self.report(few);
+        };
+        let mut stack = bottom;
+        for &(top, ..) in above.iter().rev() {
+            if let Operand::Closure(id, _) = self.add_closure(Closure::Layer(top, stack), Ty::Bsdf)
+            {
+                stack = id;
+            }
+        }
+        Some(Operand::Closure(stack, Ty::Bsdf))
+    }
+
+    /// `mix(a, b, t)` of closures.
+    pub fn mix_closures(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
+        self.require_material("mix", span)?;
+        let named_weight = args
+            .iter()
+            .position(|a| a.name.as_ref().is_some_and(|n| n.node == "t"));
+        let [a, b, t] = args else {
+            let wrong = Diagnostic::new(
+                Code::MissingArgument,
+                span,
+                format!("`mix` takes 3 arguments, not {}", args.len()),
+            )
+            .expected("`mix(a, b, t)`");
+            return self.report(wrong);
+        };
+        if named_weight.is_some_and(|i| i != 2) {
+            let wrong = Diagnostic::new(Code::UnknownArgument, span, "the weight comes last")
+                .expected("`mix(a, b, t)`");
+            return self.report(wrong);
+        }
+        let closures = self.closures_of("mix", &[a.clone(), b.clone()]);
+        let weight = self.value_as(&t.value, Ty::Float, "the weight of `mix`");
+        let (closures, weight) = (closures?, weight?);
+        let [(x, xt, _), (y, yt, at)] = closures.as_slice() else {
+            return None;
+        };
+        self.same_kind(*xt, *yt, *at)?;
+        let weight = self.builder.op(Op::Saturate, &[weight], t.value.span);
+        Some(self.add_closure(Closure::Mix(*x, *y, weight), *xt))
+    }
+
+    fn require_material(&mut self, what: &str, span: Span) -> Option<()> {
+        if self.material.is_some() {
+            return Some(());
+        }
+        let wrong = Diagnostic::new(
+            Code::ClosureUse,
+            span,
+            format!("`{what}` combines closures, and only materials have them"),
+        )
+        .expected("a value");
+        self.report(wrong)
+    }
+
+    fn same_kind(&mut self, a: Ty, b: Ty, span: Span) -> Option<()> {
+        if a == b {
+            return Some(());
+        }
+        let (a, b) = (self.cx.type_text(a), self.cx.type_text(b));
+        let wrong = Diagnostic::new(
+            Code::TypeMismatch,
+            span,
+            format!("a {a} and a {b} do not combine"),
+        )
+        .expected(format!("a {a}"));
+        self.report(wrong)
+    }
+
+    /// `w * a` and `a + b` where a closure takes part.
+    pub fn closure_operator(
+        &mut self,
+        op: BinaryOp,
+        a: Operand,
+        b: Operand,
+        span: Span,
+    ) -> Option<Operand> {
+        match (op, a, b) {
+            (BinaryOp::Mul, Operand::Value(w, wt), Operand::Closure(c, ty))
+            | (BinaryOp::Mul, Operand::Closure(c, ty), Operand::Value(w, wt)) => {
+                self.weight(w, wt, c, ty, span)
+            }
+            (BinaryOp::Add, Operand::Closure(x, xt), Operand::Closure(y, yt)) => {
+                self.same_kind(xt, yt, span)?;
+                if xt == Ty::Bsdf {
+                    let gain = Diagnostic::new(Code::EnergyGain, span, "this sum of closures can reflect more light than it receives")
+                        .hint("use `layer(top, bottom)` or `mix(a, b, t)`, or weights that sum to at most one");
+                    self.report::<()>(gain);
+                }
+                Some(self.add_closure(Closure::Add(x, y), xt))
+            }
+            _ => {
+                let message = format!("`{}` does not combine closures this way", op.symbol());
+                let wrong = Diagnostic::new(Code::ClosureUse, span, message)
+                    .expected("`weight * closure` or `closure + closure`")
+                    .hint("to take light away, multiply by a weight below one");
+                self.report(wrong)
+            }
+        }
+    }
+
+    fn weight(&mut self, w: ExprId, wt: Ty, c: ClosureId, ty: Ty, span: Span) -> Option<Operand> {
+        let w = match wt {
+            Ty::Int => self.to_float(w, span),
+            Ty::Float | Ty::Color => w,
+            _ => {
+                let message = format!(
+                    "a closure cannot be weighted by a {}",
+                    self.cx.type_text(wt)
+                );
+                return self.report(
+                    Diagnostic::new(Code::TypeMismatch, span, message)
+                        .expected("a float or a color"),
+                );
+            }
+        };
+        if let (Ty::Bsdf, Some(Const::Float(v))) = (ty, self.builder.function().constant(w)) {
+            let (most, least) = v
+                .iter()
+                .fold((f64::MIN, f64::MAX), |(a, b), &x| (a.max(x), b.min(x)));
+            let warning = if most > 1.0 {
+                Some(
+                    Diagnostic::new(
+                        Code::WeightAboveOne,
+                        span,
+                        format!("a weight of {most} can create light"),
+                    )
+                    .expected("a weight from 0 to 1"),
+                )
+            } else if most <= 0.0 && least <= 0.0 {
+                Some(
+                    Diagnostic::new(
+                        Code::LobesNeverSampled,
+                        span,
+                        "the weight is zero, so the closure never shows",
+                    )
+                    .expected("a weight above 0"),
+                )
+            } else {
+                None
+            };
+            if let Some(warning) = warning {
+                self.report::<()>(warning);
+            }
+        }
+        // Light cannot be negative; emission may be as strong as it likes.
+        let zero = self.builder.float(0.0, span);
+        let w = self.builder.op(Op::Max, &[w, zero], span);
+        Some(self.add_closure(Closure::Weight(w, c), ty))
+    }
+
+    /// An `if` between closures. Both sides' patterns are computed: they are pure.
+    pub fn if_closure(
+        &mut self,
+        cond: ExprId,
+        then: &ast::Block,
+        otherwise: &ast::Block,
+        span: Span,
+    ) -> Option<Operand> {
+        let a = self.scoped(|cx| cx.block_value(then, span));
+        let b = self.scoped(|cx| cx.block_value(otherwise, span));
+        match (a?.0, b?) {
+            (Operand::Closure(x, xt), (Operand::Closure(y, yt), at)) => {
+                self.same_kind(xt, yt, at)?;
+                Some(self.add_closure(Closure::Select(cond, x, y), xt))
+            }
+            (_, (_, at)) => {
+                let wrong = Diagnostic::new(
+                    Code::TypeMismatch,
+                    at,
+                    "one branch is a closure and the other is not",
+                )
+                .expected("closures in both branches")
+                .hint("`0.0 * diffuse(0.0)` is a closure that does nothing");
+                self.report(wrong)
+            }
+        }
+    }
+
+    /// Does a block end in a closure? Seen from the syntax, before anything is checked.
+    pub fn is_closure_block(&self, block: &ast::Block) -> bool {
+        let in_block = |name: &str| {
+            block.stmts.iter().any(|s| match &s.kind {
+                ast::StmtKind::Let { name: n, value, .. } => {
+                    n.node == name && self.is_closure(value)
+                }
+                _ => false,
+            })
+        };
+        tail(block).is_some_and(|e| match &e.kind {
+            ExprKind::Name(name) if in_block(name) => true,
+            _ => self.is_closure(e),
+        })
+    }
+
+    /// Will an expression be a closure?
+    pub fn is_closure(&self, expr: &Expr) -> bool {
+        match &expr.kind {
+            ExprKind::Name(name) => {
+                let mut entries = self.scopes.iter().rev().flat_map(|s| s.iter().rev());
+                let entry = entries.find(|e| e.name == *name);
+                matches!(
+                    entry.map(|e| e.binding),
+                    Some(Binding::Fixed(Operand::Closure(..)))
+                )
+            }
+            ExprKind::Call { callee, args } => match self.cx.lookup(self.module, &callee.node) {
+                Some(item) => matches!(self.cx.item(item).kind, ItemKind::Closure(_)),
+                None => makes_closure(&callee.node, args, |e| self.is_closure(e)),
+            },
+            ExprKind::Binary(BinaryOp::Mul | BinaryOp::Add | BinaryOp::Sub, a, b) => {
+                self.is_closure(a) || self.is_closure(b)
+            }
+            ExprKind::If(branch) => {
+                self.is_closure_block(&branch.then)
+                    || branch
+                        .otherwise
+                        .as_ref()
+                        .is_some_and(|b| self.is_closure_block(b))
+            }
+            ExprKind::Block(block) => self.is_closure_block(block),
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Values known before rendering: defaults, ranges, `const` items, and what a scene sets.
+
+use crate::ast;
+use crate::diag::{Code, Diagnostic};
+use crate::ir::Const;
+use crate::ir::build::Builder;
+use crate::ir::interp::Interpreter;
+
+use super::body::{Body, Operand};
+use super::modules::ModuleId;
+use super::types::Ty;
+use super::{Checked, Checker};
+
+/// Expressions that evaluating one constant may take.
+const FUEL: u64 = 1 << 20;
+
+impl Checker<'_> {
+    /// The value of a constant expression as a `ty`; `what` names it in messages.
+    pub fn constant(
+        &mut self,
+        module: ModuleId,
+        expr: &ast::Expr,
+        ty: Ty,
+        what: &str,
+    ) -> Option<Const> {
+        let builder = Builder::new("constant", Vec::new(), expr.span);
+        let mut body = Body::new(self, module, builder);
+        let Operand::Value(id, _) = body.expr_as(expr, ty, what)? else {
+            return body.report(not_constant(expr, "closures are not constants"));
+        };
+        let function = body.builder.finish(id);
+        let value = match function.constant(id) {
+            Some(value) => Some(value.clone()),
+            None => {
+                let mut run = Interpreter::<f64>::new(&self.ir, FUEL);
+                run.run(&function, Vec::new())
+                    .ok()
+                    .and_then(|v| v.to_const())
+            }
+        };
+        match value {
+            Some(value) if is_finite(&value) => Some(value),
+            Some(_) => {
+                let message = format!("{what} is not a finite number");
+                self.report(
+                    Diagnostic::new(Code::NotFinite, expr.span, message)
+                        .expected("a finite number"),
+                );
+                None
+            }
+            None => {
+                self.report(not_constant(
+                    expr,
+                    "the value takes too long to compute, or is not a plain value",
+                ));
+                None
+            }
+        }
+    }
+
+    /// Checks a `const` item.
+    pub(super) fn constant_item(&mut self, module: ModuleId, c: &ast::Const) -> Option<Checked> {
+        let ty = self.type_name(module, &c.ty)?;
+        let value = self.constant(module, &c.value, ty, "the constant")?;
+        Some(Checked::Const(value, ty))
+    }
+}
+
+fn not_constant(expr: &ast::Expr, message: &str) -> Diagnostic {
+    Diagnostic::new(Code::NotConstant, expr.span, message)
+        .expected("literals, constants, and functions of those")
+}
+
+fn is_finite(value: &Const) -> bool {
+    match value {
+        Const::Float(v) => v.iter().all(|&x| (x as f32).is_finite()),
+        Const::Bool(_) | Const::Int(_) => true,
+    }
+}

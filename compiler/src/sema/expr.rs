@@ -1,0 +1,357 @@
+//! Checking expressions.
+
+use crate::ast::{self, Expr, ExprKind, UnaryOp};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{self, Const, ExprId};
+use crate::ops::Op;
+use crate::source::Span;
+
+use super::Checked;
+use super::body::{Binding, Body, Operand};
+use super::stmt::component;
+use super::types::Ty;
+
+/// What a parameter's default is called; its texture is read only if no scene sets another.
+pub const DEFAULT_OF_PARAMETER: &str = "the default";
+
+/// Fields of `SurfacePoint` that a material sees as names.
+pub const INPUTS: [&str; 5] = ["position", "normal", "geometric_normal", "tangent", "uv"];
+
+impl Body<'_, '_> {
+    /// Checks an expression that must be a `ty`.
+    pub fn expr_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<Operand> {
+        if let (ExprKind::Str(path), Ty::Texture) = (&expr.kind, ty) {
+            let texture = self.texture(path);
+            if what != DEFAULT_OF_PARAMETER {
+                self.cx.literal_textures.extend(usize::try_from(texture));
+            }
+            return Some(Operand::Value(
+                self.constant(Const::Int(texture), expr.span),
+                Ty::Texture,
+            ));
+        }
+        let operand = self.expr(expr)?;
+        self.coerce(operand, ty, expr.span, what)
+    }
+
+    /// Checks an expression that must be a value of type `ty`.
+    pub fn value_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<ExprId> {
+        match self.expr_as(expr, ty, what)? {
+            Operand::Value(id, _) => Some(id),
+            Operand::Closure(..) => None,
+        }
+    }
+
+    /// Checks an expression.
+    pub fn expr(&mut self, expr: &Expr) -> Option<Operand> {
+        stacker::maybe_grow(128 << 10, 1 << 20, || self.expr_inner(expr))
+    }
+
+    fn expr_inner(&mut self, expr: &Expr) -> Option<Operand> {
+        let span = expr.span;
+        let value = |id, ty| Some(Operand::Value(id, ty));
+        match &expr.kind {
+            ExprKind::Error => None,
+            ExprKind::Bool(b) => value(self.constant(Const::Bool(*b), span), Ty::Bool),
+            ExprKind::Int(i) => value(self.int(*i, span)?, Ty::Int),
+            ExprKind::Float(x) => value(self.finite(*x, span)?, Ty::Float),
+            ExprKind::Quantity(x, unit) => {
+                let ty = if unit.node.is_angle() {
+                    Ty::Angle
+                } else {
+                    Ty::Length
+                };
+                value(self.finite(x * unit.node.scale(), span)?, ty)
+            }
+            ExprKind::Str(_) => {
+                let stray = Diagnostic::new(Code::TypeMismatch, span, "a text is not a value")
+                    .expected("a text only where a texture is needed")
+                    .hint("declare `param name: texture = \"file.png\";` and look it up with `image(name, uv)`");
+                self.report(stray)
+            }
+            ExprKind::Name(name) => self.name(name, span),
+            ExprKind::Call { callee, args } => self.call(callee, args, span),
+            ExprKind::Field(base, part) => {
+                let base = self.expr(base)?;
+                self.field(base, part, span)
+            }
+            ExprKind::Unary(op, operand) => {
+                let operand = self.expr(operand)?;
+                self.unary(*op, operand, span)
+            }
+            ExprKind::Binary(op, a, b) => {
+                // Both sides are checked even if the first is wrong, so that both are reported.
+                let (a, b) = (self.expr(a), self.expr(b));
+                self.binary(*op, a?, b?, span)
+            }
+            ExprKind::If(branch) => self.if_value(branch, span),
+            ExprKind::Block(block) => self.scoped(|cx| Some(cx.block_value(block, span)?.0)),
+        }
+    }
+
+    fn int(&mut self, i: i64, span: Span) -> Option<ExprId> {
+        // Hexadecimal literals may fill all 32 bits.
+        match i32::try_from(i)
+            .ok()
+            .or_else(|| u32::try_from(i).ok().map(|u| u as i32))
+        {
+            Some(i) => Some(self.constant(Const::Int(i), span)),
+            None => {
+                let wide =
+                    Diagnostic::new(Code::InvalidNumber, span, "the int does not fit 32 bits")
+                        .expected("at most 4294967295");
+                self.report(wide)
+            }
+        }
+    }
+
+    fn finite(&mut self, x: f64, span: Span) -> Option<ExprId> {
+        if (x as f32).is_finite() {
+            return Some(self.builder.float(x, span));
+        }
+        let wide = Diagnostic::new(
+            Code::InvalidNumber,
+            span,
+            "the number does not fit 32-bit precision",
+        )
+        .expected("a magnitude of at most 3.4e38");
+        self.report(wide)
+    }
+
+    /// The index of the image file at `path`, named by this module.
+    fn texture(&mut self, path: &str) -> i32 {
+        let folder = super::modules::parent(&self.cx.modules[self.module.0].path).to_owned();
+        self.cx.texture(&folder, path)
+    }
+
+    fn name(&mut self, name: &str, span: Span) -> Option<Operand> {
+        match self.local(name) {
+            Some(Binding::Fixed(operand)) => return Some(operand),
+            Some(Binding::Variable(local, ty)) => {
+                return Some(Operand::Value(self.builder.load(local, span), ty));
+            }
+            Some(Binding::Counter(local)) => {
+                return Some(Operand::Value(self.builder.load(local, span), Ty::Int));
+            }
+            Some(Binding::Broken) => return None,
+            None => {}
+        }
+        if self.material.is_some() && INPUTS.contains(&name) {
+            return self.input(name, span);
+        }
+        let Some(item) = self.cx.lookup(self.module, name) else {
+            return self.unknown_name(name, span);
+        };
+        match self.cx.demand(item, Some(span))? {
+            Checked::Const(value, ty) => Some(Operand::Value(self.constant(value, span), ty)),
+            _ => {
+                let message = format!("`{name}` is not a value");
+                let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
+                    .expected("a value")
+                    .hint(format!("call it: `{name}(...)`"));
+                self.report(wrong)
+            }
+        }
+    }
+
+    /// A field of the surface point, the only parameter of a material's body.
+    fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
+        let point = self.builder.param(0, span);
+        let ir::Type::Struct(id) = self.builder.ty(point) else {
+            return None;
+        };
+        let fields = &self.cx.fields[id.index()];
+        let index = fields.iter().position(|f| f.name == name)?;
+        let ty = fields[index].ty;
+        Some(Operand::Value(
+            self.builder.field(&self.cx.ir, point, index, span),
+            ty,
+        ))
+    }
+
+    fn unknown_name<T>(&mut self, name: &str, span: Span) -> Option<T> {
+        let unknown = Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"));
+        if self.material.is_none() && INPUTS.contains(&name) {
+            let unknown = unknown
+                .expected("a parameter, variable or constant")
+                .hint(format!(
+                    "functions see no surface: make `{name}` a parameter and pass it"
+                ));
+            return self.report(unknown);
+        }
+        let mut names = self.local_names();
+        names.extend(
+            self.cx
+                .visible(self.module, |k| matches!(k, ast::ItemKind::Const(_))),
+        );
+        if self.material.is_some() {
+            names.extend(INPUTS.map(String::from));
+        }
+        let unknown = unknown
+            .expected("a name in scope")
+            .did_you_mean(name, names.iter().map(String::as_str));
+        self.report(unknown)
+    }
+
+    fn field(&mut self, base: Operand, part: &ast::Name, span: Span) -> Option<Operand> {
+        let Operand::Value(id, ty) = base else {
+            let wrong = Diagnostic::new(Code::ClosureUse, span, "a closure has no fields")
+                .expected("a value");
+            return self.report(wrong);
+        };
+        if let Ty::Struct(s) = ty {
+            let fields = &self.cx.fields[s.index()];
+            if let Some(index) = fields.iter().position(|f| f.name == part.node) {
+                let ty = fields[index].ty;
+                return Some(Operand::Value(
+                    self.builder.field(&self.cx.ir, id, index, span),
+                    ty,
+                ));
+            }
+            let names: Vec<String> = fields.iter().map(|f| f.name.clone()).collect();
+            let message = format!("`{}` has no field `{}`", self.cx.type_text(ty), part.node);
+            let unknown = Diagnostic::new(Code::UnknownField, part.span, message)
+                .expected(format!(
+                    "one of {}",
+                    super::modules::list(names.iter().map(String::as_str))
+                ))
+                .did_you_mean(&part.node, names.iter().map(String::as_str));
+            return self.report(unknown);
+        }
+        let letters: Option<Vec<u8>> = part
+            .node
+            .chars()
+            .map(|c| component(ty, c.encode_utf8(&mut [0; 4])))
+            .collect();
+        match letters.filter(|l| (1..=4).contains(&l.len())) {
+            Some(letters) => {
+                let ty = swizzled(ty, letters.len());
+                Some(Operand::Value(self.builder.swizzle(id, &letters, span), ty))
+            }
+            None => {
+                let (ty_text, letters) = (
+                    self.cx.type_text(ty),
+                    if ty == Ty::Color { "rgb" } else { "xyzw" },
+                );
+                let unknown = Diagnostic::new(
+                    Code::UnknownField,
+                    part.span,
+                    format!("a {ty_text} has no `.{}`", part.node),
+                );
+                let width = ty.ir().and_then(ir::Type::width).unwrap_or(0);
+                let unknown = if width > 1 {
+                    unknown.expected(format!(
+                        "one to four of the letters {}",
+                        &letters[..width.min(letters.len())]
+                    ))
+                } else {
+                    unknown.expected("a vector, color or struct before the dot")
+                };
+                self.report(unknown)
+            }
+        }
+    }
+
+    fn unary(&mut self, op: UnaryOp, operand: Operand, span: Span) -> Option<Operand> {
+        let Operand::Value(id, ty) = operand else {
+            let wrong = Diagnostic::new(
+                Code::ClosureUse,
+                span,
+                "the operator does not apply to closures",
+            )
+            .expected("a value");
+            return self.report(wrong);
+        };
+        match op {
+            UnaryOp::Not if ty == Ty::Bool => {
+                Some(Operand::Value(self.builder.op(Op::Not, &[id], span), ty))
+            }
+            UnaryOp::Neg
+                if matches!(ty, Ty::Int | Ty::Float) || ty.is_dimension() || ty.is_vector() =>
+            {
+                Some(Operand::Value(self.builder.op(Op::Neg, &[id], span), ty))
+            }
+            _ => {
+                let (symbol, wanted) = if op == UnaryOp::Not {
+                    ("!", "a bool")
+                } else {
+                    ("-", "a number or vector")
+                };
+                let message = format!("`{symbol}` does not apply to {}", self.cx.type_text(ty));
+                self.report(Diagnostic::new(Code::NoOperator, span, message).expected(wanted))
+            }
+        }
+    }
+
+    /// An `if` used as a value.
+    fn if_value(&mut self, branch: &ast::IfExpr, span: Span) -> Option<Operand> {
+        let cond = self.value_as(&branch.cond, Ty::Bool, "the condition");
+        let Some(otherwise) = &branch.otherwise else {
+            let missing = Diagnostic::new(
+                Code::MissingValue,
+                span,
+                "an `if` without `else` has no value",
+            )
+            .expected("`if condition { a } else { b }`");
+            return self.report(missing);
+        };
+        if self.material.is_some()
+            && (self.is_closure_block(&branch.then) || self.is_closure_block(otherwise))
+        {
+            return self.if_closure(cond?, &branch.then, otherwise, span);
+        }
+        let (then, then_block) = self.arm(&branch.then, span);
+        let (other, other_block) = self.arm(otherwise, span);
+        let ((a, a_span), (b, b_span)) = (then?, other?);
+        let Some(ty) = a.ty().unify(b.ty()) else {
+            let (a_text, b_text) = (self.cx.type_text(a.ty()), self.cx.type_text(b.ty()));
+            let differ = Diagnostic::new(
+                Code::TypeMismatch,
+                b_span,
+                format!("the branches differ: {a_text} and {b_text}"),
+            )
+            .expected(format!("a {a_text}"))
+            .label(a_span, format!("this is a {a_text}"));
+            return self.report(differ);
+        };
+        let local = self.builder.local("choice", ty.ir()?);
+        let then = self.end_arm(then_block, a, ty, local, a_span)?;
+        let otherwise = self.end_arm(other_block, b, ty, local, b_span)?;
+        self.builder.stmt(ir::Stmt::If(cond?, then, otherwise));
+        Some(Operand::Value(self.builder.load(local, span), ty))
+    }
+
+    fn arm(&mut self, block: &ast::Block, span: Span) -> (Option<(Operand, Span)>, ir::Block) {
+        self.builder.open();
+        let value = self.scoped(|cx| cx.block_value(block, span));
+        (value, self.builder.close())
+    }
+
+    fn end_arm(
+        &mut self,
+        block: ir::Block,
+        value: Operand,
+        ty: Ty,
+        local: ir::LocalId,
+        span: Span,
+    ) -> Option<ir::Block> {
+        self.builder.reopen(block);
+        let value = self.coerce(value, ty, span, "the branch");
+        if let Some(Operand::Value(id, _)) = value {
+            self.builder.store(local, id);
+        }
+        let block = self.builder.close();
+        value.map(|_| block)
+    }
+}
+
+/// The type of `n` components of a `ty`.
+fn swizzled(ty: Ty, n: usize) -> Ty {
+    match (ty, n) {
+        (_, 1) => Ty::Float,
+        (_, 2) => Ty::Vec2,
+        (Ty::Color, 3) => Ty::Color,
+        (_, 3) => Ty::Vec3,
+        _ => Ty::Vec4,
+    }
+}

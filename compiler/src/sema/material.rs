@@ -1,0 +1,365 @@
+//! Checking materials: parameters, patterns and outputs.
+
+use crate::ast::{self, Expr, ItemKind};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::build::{Builder, const_type};
+use crate::ir::{self, Const, ExprKind, Material, MaterialParam, Type};
+use crate::parser;
+use crate::source::Span;
+
+use super::body::{Binding, Body, MaterialState, Operand};
+use super::modules::{ModuleId, list};
+use super::types::{NAMED, Ty};
+use super::{Checker, expr};
+
+/// The outputs of a material with their types.
+const OUTPUTS: [(&str, Ty); 2] = [("surface", Ty::Bsdf), ("emission", Ty::Edf)];
+
+impl Checker<'_> {
+    /// The material called `name` in a file, or its only one.
+    pub fn find_material(&mut self, module: ModuleId, name: Option<&str>) -> Option<usize> {
+        let ast = self.ast(module);
+        let is_material = |i: &&ast::Item| matches!(i.kind, ItemKind::Material(_));
+        let names: Vec<&str> = ast
+            .items
+            .iter()
+            .filter(is_material)
+            .map(|i| i.name.node.as_str())
+            .collect();
+        let wanted = match (name, names.as_slice()) {
+            (Some(name), names) if names.contains(&name) => name,
+            (None, [only]) => only,
+            (asked, names) => {
+                let path = self.modules[module.0].path.clone();
+                let message = match asked {
+                    Some(name) => format!("`{path}` has no material `{name}`"),
+                    None if names.is_empty() => format!("`{path}` defines no material"),
+                    None => format!("`{path}` defines several materials"),
+                };
+                let missing = Diagnostic::without_span(Code::NoMaterial, message);
+                let missing = if names.is_empty() {
+                    missing.expected("`material name { ... }`")
+                } else {
+                    missing.expected(format!("one of {}", list(names.iter().copied())))
+                };
+                self.report(missing.did_you_mean(asked.unwrap_or(""), names.iter().copied()));
+                return None;
+            }
+        };
+        ast.items
+            .iter()
+            .position(|i| i.name.node == wanted && is_material(&i))
+    }
+
+    /// Checks the material at `index` of a file.
+    pub fn material(&mut self, module: ModuleId, index: usize) -> Option<Material> {
+        let ast = self.ast(module);
+        let item = &ast.items[index];
+        let ItemKind::Material(material) = &item.kind else {
+            return None;
+        };
+        let point = self.core_struct("SurfacePoint")?;
+        let params: Vec<Option<MaterialParam>> = material
+            .params
+            .iter()
+            .map(|p| self.material_param(module, p))
+            .collect();
+        let input = ir::Local {
+            name: "point".into(),
+            ty: Type::Struct(point),
+        };
+        let mut body = Body::new(
+            self,
+            module,
+            Builder::new(item.name.node.as_str(), vec![input], item.span),
+        );
+        body.material = Some(MaterialState::default());
+        body.bind_params(&material.params, &params);
+        let ok = body.scoped(|cx| cx.statements(&material.body));
+        let scope = body.scopes.pop().unwrap_or_default();
+        body.report_unused(scope);
+        let outputs = body.material.take().unwrap_or_default().outputs;
+        if outputs.is_empty() && ok {
+            let missing = Diagnostic::new(
+                Code::MissingOutput,
+                item.name.span,
+                format!("`{}` assigns no output", item.name.node),
+            )
+            .expected("`surface = ...;` or `emission = ...;`");
+            body.report::<()>(missing);
+        }
+        if !ok || outputs.is_empty() {
+            return None;
+        }
+        let closures = std::mem::take(&mut body.closures);
+        let value = body.builder.float(0.0, item.span);
+        let function = body.builder.finish(value);
+        let output = |name: &str| outputs.iter().find(|o| o.0 == name).map(|o| o.1);
+        Some(Material {
+            name: item.name.node.clone(),
+            docs: item.docs.clone(),
+            params: params.into_iter().collect::<Option<Vec<_>>>()?,
+            body: function,
+            closures,
+            surface: output("surface"),
+            emission: output("emission"),
+            span: item.span,
+        })
+    }
+
+    fn material_param(
+        &mut self,
+        module: ModuleId,
+        p: &ast::MaterialParam,
+    ) -> Option<MaterialParam> {
+        let ty = self.type_name(module, &p.ty)?;
+        let Some((surface_type, _)) = NAMED
+            .iter()
+            .find(|(_, t)| *t == ty && !ty.is_closure() && ty != Ty::Mat3)
+        else {
+            let wrong = Diagnostic::new(
+                Code::Unsupported,
+                p.ty.span,
+                format!("a parameter cannot be a {}", self.type_text(ty)),
+            )
+            .expected("a bool, number, vector, color, length, angle or texture");
+            self.report(wrong);
+            return None;
+        };
+        let default = self.constant(module, &p.default, ty, expr::DEFAULT_OF_PARAMETER)?;
+        let range = match &p.range {
+            Some((low, high)) => Some(self.range(module, low, high, ty)?),
+            None => None,
+        };
+        let param = MaterialParam {
+            name: p.name.node.clone(),
+            docs: p.docs.clone(),
+            surface_type,
+            ty: ty.ir()?,
+            default,
+            range,
+            span: p.span,
+        };
+        self.in_range(&param, &param.default, p.default.span, "the default")
+            .then_some(param)
+    }
+
+    fn range(&mut self, module: ModuleId, low: &Expr, high: &Expr, ty: Ty) -> Option<(f64, f64)> {
+        // Colors and vectors are limited by component.
+        let scalar = if ty.is_vector() { Ty::Float } else { ty };
+        let low_value = scalar_of(&self.constant(module, low, scalar, "the lower limit")?);
+        let high_value = scalar_of(&self.constant(module, high, scalar, "the upper limit")?);
+        match (low_value, high_value) {
+            (Some(a), Some(b)) if a <= b => Some((a, b)),
+            _ => {
+                let wrong = Diagnostic::new(
+                    Code::OutOfRange,
+                    low.span.to(high.span),
+                    "the range is empty or not of numbers",
+                )
+                .expected("`in least .. greatest`");
+                self.report(wrong);
+                None
+            }
+        }
+    }
+
+    /// Is a value within a parameter's range? Reports it if not.
+    fn in_range(&mut self, param: &MaterialParam, value: &Const, span: Span, what: &str) -> bool {
+        let Some((low, high)) = param.range else {
+            return true;
+        };
+        let components: Vec<f64> = match value {
+            Const::Float(v) => v.clone(),
+            Const::Int(i) => vec![f64::from(*i)],
+            Const::Bool(_) => return true,
+        };
+        let Some(&bad) = components.iter().find(|x| !(low..=high).contains(*x)) else {
+            return true;
+        };
+        let unit = match param.surface_type {
+            "length" => " m",
+            "angle" => " rad",
+            _ => "",
+        };
+        let message = format!(
+            "{what} of `{}` is {}{unit}, outside its range",
+            param.name, bad as f32
+        );
+        let outside = Diagnostic::new(Code::OutOfRange, span, message)
+            .expected(format!("{}{unit} to {}{unit}", low as f32, high as f32));
+        let outside = if span == param.span {
+            outside
+        } else {
+            outside.label(param.span, "declared here")
+        };
+        self.report(outside);
+        false
+    }
+
+    /// The values of a material's parameters: defaults, and what a scene sets as source text.
+    /// `origin` names the scene's setting in diagnostics.
+    pub fn parameter_values(
+        &mut self,
+        module: ModuleId,
+        material: &Material,
+        given: &[(String, String)],
+        origin: &str,
+    ) -> Option<Vec<Const>> {
+        let mut values: Vec<Const> = material.params.iter().map(|p| p.default.clone()).collect();
+        let mut ok = true;
+        for (name, text) in given {
+            let Some(index) = material.params.iter().position(|p| p.name == *name) else {
+                let names: Vec<&str> = material.params.iter().map(|p| p.name.as_str()).collect();
+                let message = format!(
+                    "{origin}: material `{}` has no parameter `{name}`",
+                    material.name
+                );
+                let unknown = Diagnostic::without_span(Code::UnknownParameter, message)
+                    .expected(if names.is_empty() {
+                        "no parameters".into()
+                    } else {
+                        format!("one of {}", list(names.iter().copied()))
+                    })
+                    .did_you_mean(name, names);
+                self.report(unknown);
+                ok = false;
+                continue;
+            };
+            match self.parameter_value(module, &material.params[index], text, origin) {
+                Some(value) => values[index] = value,
+                None => ok = false,
+            }
+        }
+        ok.then_some(values)
+    }
+
+    fn parameter_value(
+        &mut self,
+        module: ModuleId,
+        param: &MaterialParam,
+        text: &str,
+        origin: &str,
+    ) -> Option<Const> {
+        let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
+        let file = self
+            .sources
+            .add(format!("{origin}, parameter {}", param.name), text);
+        let (expr, diagnostics) = parser::parse_expression(file, text);
+        diagnostics.into_iter().for_each(|d| self.report(d));
+        let expr = expr?;
+        if let (ast::ExprKind::Str(path), Ty::Texture) = (&expr.kind, ty) {
+            // A scene names files relative to itself; the runtime resolves them.
+            return Some(Const::Int(self.texture("", path)));
+        }
+        let expr = retyped(expr, param.surface_type);
+        let value = self.constant(module, &expr, *ty, &format!("`{}`", param.name))?;
+        debug_assert_eq!(const_type(&value), param.ty);
+        self.in_range(param, &value, expr.span, "the value")
+            .then_some(value)
+    }
+
+    /// The index of the image file `path`, relative to `folder`.
+    pub(super) fn texture(&mut self, folder: &str, path: &str) -> i32 {
+        let path = if path.starts_with('/') {
+            path.to_owned()
+        } else {
+            format!("{folder}{path}")
+        };
+        let known = self.ir.textures.iter().position(|t| *t == path);
+        let index = known.unwrap_or_else(|| {
+            self.ir.textures.push(path);
+            self.ir.textures.len() - 1
+        });
+        index as i32
+    }
+}
+
+/// A scene writes any three numbers as `color(...)`: call it what the parameter is.
+fn retyped(mut expr: Expr, ty: &str) -> Expr {
+    if let ast::ExprKind::Call { callee, .. } = &mut expr.kind
+        && callee.node == "color"
+        && matches!(ty, "vec3" | "point" | "vector" | "normal")
+    {
+        callee.node = ty.to_owned();
+    }
+    expr
+}
+
+fn scalar_of(value: &Const) -> Option<f64> {
+    match value {
+        Const::Float(v) if v.len() == 1 => Some(v[0]),
+        Const::Int(i) => Some(f64::from(*i)),
+        _ => None,
+    }
+}
+
+impl Body<'_, '_> {
+    fn bind_params(&mut self, declared: &[ast::MaterialParam], checked: &[Option<MaterialParam>]) {
+        for (index, (p, param)) in declared.iter().zip(checked).enumerate() {
+            if expr::INPUTS.contains(&p.name.node.as_str()) {
+                let message = format!("`{}` is an input of every material", p.name.node);
+                self.report::<()>(
+                    Diagnostic::new(Code::Duplicate, p.name.span, message).expected("another name"),
+                );
+            }
+            let binding = param.as_ref().and_then(|param| {
+                let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
+                let id = self
+                    .builder
+                    .add(ExprKind::Uniform(index as u32), param.ty, p.name.span);
+                self.builder.name(id, &p.name.node);
+                Some(Binding::Fixed(Operand::Value(id, *ty)))
+            });
+            let watched = binding.is_some();
+            self.bind(&p.name, binding.unwrap_or(Binding::Broken), watched);
+        }
+    }
+
+    /// `surface = ...;` or `emission = ...;`
+    pub(super) fn output(
+        &mut self,
+        name: &str,
+        at: Span,
+        op: Option<ast::BinaryOp>,
+        value: &Expr,
+    ) -> Option<()> {
+        let Some((name, ty)) = OUTPUTS.iter().find(|(n, _)| *n == name) else {
+            let names = OUTPUTS.map(|(n, _)| n);
+            let mut known = self.local_names();
+            known.extend(names.map(String::from));
+            let unknown = Diagnostic::new(
+                Code::UnknownOutput,
+                at,
+                format!("`{name}` is neither a variable nor an output"),
+            )
+            .expected(format!("one of {}, or a `var`", list(names)))
+            .did_you_mean(name, known.iter().map(String::as_str));
+            self.expr(value);
+            return self.report(unknown);
+        };
+        if op.is_some() || self.scopes.len() > 2 {
+            let wrong = Diagnostic::new(
+                Code::NotAssignable,
+                at,
+                format!("`{name}` is assigned once, outside branches and loops"),
+            )
+            .expected(format!("`{name} = ...;` directly in the material"))
+            .hint("choose between closures with `if c { a } else { b }` or `mix(a, b, t)`");
+            return self.report(wrong);
+        }
+        let operand = self.expr_as(value, *ty, &format!("`{name}`"))?;
+        let Operand::Closure(id, _) = operand else {
+            return None;
+        };
+        let outputs = &mut self.material.as_mut()?.outputs;
+        if let Some((_, _, first)) = outputs.iter().find(|o| o.0 == *name) {
+            let twice = Diagnostic::new(Code::Duplicate, at, format!("`{name}` is assigned twice"))
+                .expected("one assignment")
+                .label(*first, "first assigned here");
+            return self.report(twice);
+        }
+        outputs.push((name, id, at));
+        Some(())
+    }
+}

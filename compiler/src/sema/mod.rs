@@ -1,0 +1,289 @@
+//! Checking: names and types of a syntax tree, and its lowering to IR in the same walk.
+//!
+//! Definitions are checked when something asks for them, callees before callers, so what a
+//! material does not reach never exists after this stage. [`Checker`] owns the modules and the
+//! IR under construction; [`body::Body`] checks one function or material.
+
+use std::collections::BTreeMap;
+
+use crate::Loader;
+use crate::ast::{self, ItemKind, TypeName};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
+use crate::source::{SourceMap, Span};
+
+mod body;
+mod call;
+mod closure;
+mod constant;
+mod expr;
+mod material;
+mod modules;
+mod stmt;
+pub mod types;
+
+pub use modules::{ItemRef, ModuleId, std_path};
+use modules::{Loading, ModuleData};
+use types::Ty;
+
+/// Everything known while a compilation's sources are checked.
+pub struct Checker<'a> {
+    /// Texts read so far.
+    pub sources: SourceMap,
+    /// What was found wrong.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What was lowered so far.
+    pub ir: ir::Module,
+    /// Textures that sources name outside parameters.
+    pub literal_textures: std::collections::BTreeSet<usize>,
+    loader: &'a mut dyn Loader,
+    modules: Vec<ModuleData>,
+    loading: BTreeMap<String, Loading>,
+    core: BTreeMap<String, ItemRef>,
+    checked: BTreeMap<ItemRef, Checked>,
+    /// Signatures of `ir.functions` that a call can name.
+    signatures: BTreeMap<FunctionId, Signature>,
+    /// Surface types of the fields of `ir.structs`.
+    fields: Vec<Vec<Param>>,
+    /// Signatures of `ir.closures`.
+    closure_params: Vec<Vec<Param>>,
+}
+
+/// How far an item is checked.
+#[derive(Clone, Debug)]
+enum Checked {
+    InProgress,
+    Failed,
+    Function(FunctionId),
+    Struct(StructId),
+    Closure(ClosureDefId, Ty),
+    Const(Const, Ty),
+}
+
+/// A parameter or field with its type as seen by authors.
+#[derive(Clone, Debug)]
+struct Param {
+    name: String,
+    ty: Ty,
+    default: Option<Const>,
+}
+
+/// How a function is called.
+#[derive(Clone, Debug)]
+struct Signature {
+    params: Vec<Param>,
+    result: Ty,
+}
+
+impl<'a> Checker<'a> {
+    /// A checker that reads files through `loader`.
+    pub fn new(loader: &'a mut dyn Loader) -> Self {
+        let mut checker = Self {
+            sources: SourceMap::default(),
+            diagnostics: Vec::new(),
+            ir: ir::Module::default(),
+            literal_textures: Default::default(),
+            loader,
+            modules: Vec::new(),
+            loading: BTreeMap::new(),
+            core: BTreeMap::new(),
+            checked: BTreeMap::new(),
+            signatures: BTreeMap::new(),
+            fields: Vec::new(),
+            closure_params: Vec::new(),
+        };
+        checker.load_core();
+        checker
+    }
+
+    /// Loads the file at `path`, with everything it imports.
+    pub fn load(&mut self, path: &str) -> Option<ModuleId> {
+        self.load_module(path, None)
+    }
+
+    /// The syntax tree of a loaded file.
+    pub fn ast(&self, module: ModuleId) -> std::rc::Rc<ast::Module> {
+        self.modules[module.0].ast.clone()
+    }
+
+    /// Checks every definition of a file but its materials, used or not.
+    pub fn check_items(&mut self, module: ModuleId) {
+        for index in 0..self.ast(module).items.len() {
+            self.demand(ItemRef { module, index }, None);
+        }
+    }
+
+    /// The struct of `std::core` called `name`.
+    pub fn core_struct(&mut self, name: &str) -> Option<StructId> {
+        let item = self.core.get(name).copied()?;
+        match self.demand(item, None)? {
+            Checked::Struct(id) => Some(id),
+            _ => None,
+        }
+    }
+
+    /// The function of `std::core` called `name`.
+    pub fn core_function(&mut self, name: &str) -> Option<FunctionId> {
+        let item = self.core.get(name).copied()?;
+        match self.demand(item, None)? {
+            Checked::Function(id) => Some(id),
+            _ => None,
+        }
+    }
+
+    /// Notes a problem.
+    fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    /// Checks an item if that has not happened; `None` if it does not check or is a material.
+    fn demand(&mut self, item: ItemRef, asked: Option<Span>) -> Option<Checked> {
+        match self.checked.get(&item) {
+            Some(Checked::InProgress) => {
+                self.recursion(item, asked);
+                return None;
+            }
+            Some(Checked::Failed) => return None,
+            Some(done) => return Some(done.clone()),
+            None => {}
+        }
+        self.checked.insert(item, Checked::InProgress);
+        let ast = self.ast(item.module);
+        let definition = &ast.items[item.index];
+        // Definitions may ask for each other in a long chain.
+        let checked = stacker::maybe_grow(256 << 10, 2 << 20, || match &definition.kind {
+            ItemKind::Function(f) => self
+                .function(item.module, definition, f)
+                .map(Checked::Function),
+            ItemKind::Struct(fields) => self.structure(item.module, definition, fields),
+            ItemKind::Closure(c) => self.closure_def(item.module, definition, c),
+            ItemKind::Const(c) => self.constant_item(item.module, c),
+            ItemKind::Material(_) => None,
+        });
+        self.checked
+            .insert(item, checked.clone().unwrap_or(Checked::Failed));
+        checked
+    }
+
+    fn recursion(&mut self, item: ItemRef, asked: Option<Span>) {
+        let name = self.item(item).name.clone();
+        let message = format!("`{}` is defined in terms of itself", name.node);
+        let recursion = Diagnostic::new(Code::Recursion, asked.unwrap_or(name.span), message)
+            .expected("definitions that do not lead back to themselves")
+            .hint("use a bounded loop: `for i in 0..n { ... }`")
+            .label(name.span, "defined here");
+        self.report(recursion);
+    }
+
+    fn structure(
+        &mut self,
+        module: ModuleId,
+        item: &ast::Item,
+        fields: &[ast::Field],
+    ) -> Option<Checked> {
+        let mut typed: Vec<Param> = Vec::new();
+        for field in fields {
+            let ty = self.type_name(module, &field.ty)?;
+            if ty.is_closure() {
+                self.closure_in_data(field.ty.span);
+                return None;
+            }
+            if typed.iter().any(|p| p.name == field.name.node) {
+                let message = format!("`{}` has two fields `{}`", item.name.node, field.name.node);
+                self.report(
+                    Diagnostic::new(Code::Duplicate, field.name.span, message)
+                        .expected("fields of different names"),
+                );
+                return None;
+            }
+            typed.push(Param {
+                name: field.name.node.clone(),
+                ty,
+                default: None,
+            });
+        }
+        let id = StructId(self.ir.structs.len() as u32);
+        let fields = typed
+            .iter()
+            .filter_map(|p| Some((p.name.clone(), p.ty.ir()?)))
+            .collect();
+        self.ir.structs.push(ir::Struct {
+            name: item.name.node.clone(),
+            fields,
+            span: item.span,
+        });
+        self.fields.push(typed);
+        Some(Checked::Struct(id))
+    }
+
+    /// The type that `name` means in `module`; an unknown one is reported.
+    fn type_name(&mut self, module: ModuleId, name: &TypeName) -> Option<Ty> {
+        if let Some((_, ty)) = types::NAMED.iter().find(|(n, _)| *n == name.node) {
+            return Some(*ty);
+        }
+        if let Some(item) = self.lookup(module, &name.node)
+            && let ItemKind::Struct(_) = self.item(item).kind
+        {
+            return match self.demand(item, Some(name.span))? {
+                Checked::Struct(id) => Some(Ty::Struct(id)),
+                _ => None,
+            };
+        }
+        let structs = self.visible(module, |k| matches!(k, ItemKind::Struct(_)));
+        let known = types::NAMED
+            .iter()
+            .map(|(n, _)| *n)
+            .chain(structs.iter().map(String::as_str));
+        let unknown = Diagnostic::new(
+            Code::UnknownType,
+            name.span,
+            format!("unknown type `{}`", name.node),
+        )
+        .expected("a type such as float, color, vec3, length or a struct");
+        let unknown = match foreign_type(&name.node) {
+            Some(own) => unknown.hint(format!("the type is called `{own}` here")),
+            None => unknown.did_you_mean(&name.node, known),
+        };
+        self.report(unknown);
+        None
+    }
+
+    fn closure_in_data(&mut self, span: Span) {
+        let wrong = Diagnostic::new(
+            Code::ClosureUse,
+            span,
+            "closures cannot be stored or passed",
+        )
+        .expected("a value type")
+        .hint("combine closures in the material, with `let`, `layer` and `mix`");
+        self.report(wrong);
+    }
+
+    /// How authors see a type.
+    fn type_text(&self, ty: Ty) -> String {
+        match ty {
+            Ty::Struct(id) => self.ir.structs[id.index()].name.clone(),
+            Ty::Error => "unknown".into(),
+            named => types::NAMED
+                .iter()
+                .find(|(_, t)| *t == named)
+                .map_or(String::new(), |(n, _)| (*n).into()),
+        }
+    }
+}
+
+/// What a type of another shading language is called here.
+fn foreign_type(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "f32" | "f64" | "double" | "half" | "real" => "float",
+        "i32" | "u32" | "uint" | "integer" => "int",
+        "vec3f" | "float3" | "Vec3" => "vec3",
+        "vec2f" | "float2" | "Vec2" => "vec2",
+        "vec4f" | "float4" | "Vec4" => "vec4",
+        "rgb" | "spectrum" | "Color" | "colour" | "color3" => "color",
+        "boolean" => "bool",
+        "closure" | "BSDF" | "brdf" => "bsdf",
+        "sampler2D" | "texture_2d" | "texture2D" => "texture",
+        _ => return None,
+    })
+}

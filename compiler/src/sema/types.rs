@@ -1,0 +1,147 @@
+//! The types an author sees, how they convert, and how they combine.
+//!
+//! The IR knows only machine types; everything that keeps a color from being added to a
+//! direction, or a length to a number, is decided here.
+
+use crate::ast::BinaryOp;
+use crate::ir::{self, StructId};
+
+/// A type of the language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Ty {
+    Bool,
+    Int,
+    Float,
+    Length,
+    Angle,
+    Vec2,
+    Vec3,
+    Vec4,
+    Color,
+    Point,
+    Vector,
+    Normal,
+    Mat3,
+    Texture,
+    Struct(StructId),
+    Bsdf,
+    Edf,
+    /// The type of what did not check; it fits everywhere, so that one mistake is reported once.
+    Error,
+}
+
+/// The types that can be named, with their names.
+pub const NAMED: [(&str, Ty); 16] = [
+    ("bool", Ty::Bool),
+    ("int", Ty::Int),
+    ("float", Ty::Float),
+    ("length", Ty::Length),
+    ("angle", Ty::Angle),
+    ("vec2", Ty::Vec2),
+    ("vec3", Ty::Vec3),
+    ("vec4", Ty::Vec4),
+    ("color", Ty::Color),
+    ("point", Ty::Point),
+    ("vector", Ty::Vector),
+    ("normal", Ty::Normal),
+    ("mat3", Ty::Mat3),
+    ("texture", Ty::Texture),
+    ("bsdf", Ty::Bsdf),
+    ("edf", Ty::Edf),
+];
+
+impl Ty {
+    /// The machine type of values of this type; closures have none.
+    pub fn ir(self) -> Option<ir::Type> {
+        Some(match self {
+            Ty::Bool => ir::Type::Bool,
+            Ty::Int | Ty::Texture => ir::Type::Int,
+            Ty::Float | Ty::Length | Ty::Angle => ir::Type::Float,
+            Ty::Vec2 => ir::Type::Vec2,
+            Ty::Vec3 | Ty::Color | Ty::Point | Ty::Vector | Ty::Normal => ir::Type::Vec3,
+            Ty::Vec4 => ir::Type::Vec4,
+            Ty::Mat3 => ir::Type::Mat3,
+            Ty::Struct(id) => ir::Type::Struct(id),
+            Ty::Bsdf | Ty::Edf | Ty::Error => return None,
+        })
+    }
+
+    /// Three floats with a geometric meaning; these stand for each other.
+    pub fn is_geometric(self) -> bool {
+        matches!(self, Ty::Vec3 | Ty::Point | Ty::Vector | Ty::Normal)
+    }
+
+    /// A float with a dimension.
+    pub fn is_dimension(self) -> bool {
+        matches!(self, Ty::Length | Ty::Angle)
+    }
+
+    /// Vectors of any kind, colors included.
+    pub fn is_vector(self) -> bool {
+        self.is_geometric() || matches!(self, Ty::Vec2 | Ty::Vec4 | Ty::Color)
+    }
+
+    /// A closure type.
+    pub fn is_closure(self) -> bool {
+        matches!(self, Ty::Bsdf | Ty::Edf)
+    }
+
+    /// Can a value of this type be given where `to` is needed?
+    pub fn converts_to(self, to: Ty) -> bool {
+        self == to
+            || self == Ty::Error
+            || to == Ty::Error
+            || (self == Ty::Int && matches!(to, Ty::Float | Ty::Color))
+            || (self == Ty::Float && to == Ty::Color)
+            || (self.is_geometric() && to.is_geometric())
+    }
+
+    /// The type that values of both types convert to, for the branches of an `if`.
+    pub fn unify(self, other: Ty) -> Option<Ty> {
+        if self.is_geometric() && other.is_geometric() && self != other {
+            Some(Ty::Vec3)
+        } else if self.converts_to(other) {
+            Some(if other == Ty::Error { self } else { other })
+        } else if other.converts_to(self) {
+            Some(self)
+        } else {
+            None
+        }
+    }
+}
+
+/// The type of `a op b` for arithmetic operators on values; ints beside floats are floats already.
+pub fn arithmetic(op: BinaryOp, a: Ty, b: Ty) -> Option<Ty> {
+    use BinaryOp::*;
+    let product = matches!(op, Mul | Div);
+    match (a, b) {
+        (Ty::Error, _) | (_, Ty::Error) => Some(Ty::Error),
+        (Ty::Int, Ty::Int) | (Ty::Float, Ty::Float) => Some(a),
+        (Ty::Mat3, v) if op == Mul && v.is_geometric() => Some(v),
+        // A dimension scales and divides; it adds to its own kind only.
+        (d, e) if d.is_dimension() && d == e => match op {
+            Add | Sub | Rem => Some(d),
+            Div => Some(Ty::Float),
+            _ => None,
+        },
+        (d, Ty::Float) if d.is_dimension() && product => Some(d),
+        (Ty::Float, d) if d.is_dimension() && op == Mul => Some(d),
+        (v, Ty::Length) if v.is_geometric() => match op {
+            Mul => Some(v),
+            Div | Rem => Some(Ty::Vec3),
+            _ => None,
+        },
+        (Ty::Vec2, Ty::Length) if product => Some(Ty::Vec2),
+        (Ty::Length, v) if op == Mul && v.is_geometric() => Some(v),
+        (Ty::Float, v) | (v, Ty::Float) if v.is_vector() => Some(v),
+        (Ty::Point, Ty::Point) if op == Sub => Some(Ty::Vector),
+        (v, w) if v == w && v.is_vector() => Some(v),
+        (v, w) if v.is_geometric() && w.is_geometric() => Some(match op {
+            Add | Sub if v == Ty::Point || w == Ty::Point => Ty::Point,
+            Add | Sub => Ty::Vector,
+            _ => Ty::Vec3,
+        }),
+        _ => None,
+    }
+}
