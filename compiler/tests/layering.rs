@@ -4,9 +4,11 @@
 //! a closed form. A lobe that is lost, chosen with another probability than its density says, or
 //! weighted wrongly fails here.
 
+mod common;
+
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile};
+use impasto_compiler::Program;
 
 /// A compiled material, asked as a kernel asks it.
 struct Asked {
@@ -27,12 +29,7 @@ struct Answer {
 impl Asked {
     /// Compiles `uses` and a material whose surface is `surface`.
     fn new(uses: &str, surface: &str) -> Self {
-        let text = format!("{uses}\nmaterial m {{ surface = {surface}; }}");
-        let mut files = MemoryLoader::default();
-        files.add("m.impasto", text.as_str());
-        let compiled = compile(&[MaterialRequest::new("m", "m.impasto")], &mut files);
-        let problems = impasto_compiler::diag::render::text(&compiled.sources, &compiled.diagnostics, false);
-        Self { program: compiled.program.unwrap_or_else(|| panic!("{text}\n{problems}")) }
+        Self { program: common::program(&format!("{uses}\nmaterial m {{ surface = {surface}; }}")) }
     }
 
     fn ask(&self, wo: [f64; 3], wl: [f64; 3], u: [f64; 4]) -> Answer {
@@ -72,7 +69,7 @@ fn near(a: f64, b: f64, tolerance: f64, what: &str) {
     assert!((a - b).abs() <= tolerance, "{what}: {a} is not {b} (within {tolerance})");
 }
 
-const USES: &str = "use std::bsdf::{diffuse, specular, blinn_phong, mirror};";
+const USES: &str = "use std::bsdf::{diffuse, specular, mirror};";
 
 #[test]
 fn diffuse_gives_its_reflectance() {
