@@ -2,5 +2,7 @@
 //!
 //! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it reads.
 
+pub mod bvh;
 pub mod scene;
 pub mod shader_part;
+mod wgsl;

@@ -10,6 +10,7 @@ use glam::Vec3;
 mod error;
 mod mesh;
 mod parts;
+pub mod surface;
 
 pub use error::SceneError;
 pub use mesh::{Mesh, NO_MATERIAL};

@@ -1,0 +1,48 @@
+// The scene's triangles, in the order of the BVH's leaves: a primitive is an index into it.
+// triangles[3p + k] is corner k in .xyz; .w of corner 0 is the material, of corner 1 the light.
+
+// Material of the triangles of quad lights.
+const NO_MATERIAL: u32 = 0xffffffffu;
+
+struct Triangle {
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>
+}
+
+fn triangle_vertices(primitive: u32) -> Triangle {
+    return Triangle(
+        bitcast<vec3<f32>>(triangles[3u * primitive].xyz),
+        bitcast<vec3<f32>>(triangles[3u * primitive + 1u].xyz),
+        bitcast<vec3<f32>>(triangles[3u * primitive + 2u].xyz)
+    );
+}
+
+fn primitive_material(primitive: u32) -> u32 {
+    return triangles[3u * primitive].w;
+}
+
+// Index into the light table; beyond it for primitives that are no sampled light.
+fn primitive_light(primitive: u32) -> u32 {
+    return triangles[3u * primitive + 1u].w;
+}
+
+// The vector area b - a cross c - a, scaled to unit length. Scaling the edges first keeps the
+// squares of very small and very large triangles in range.
+fn triangle_normal(triangle: Triangle) -> vec3<f32> {
+    let e1 = triangle.b - triangle.a;
+    let e2 = triangle.c - triangle.a;
+    let longest = max(max_abs_component(e1), max_abs_component(e2));
+    return normalize(cross(e1 / longest, e2 / longest));
+}
+
+fn triangle_area(triangle: Triangle) -> f32 {
+    let e1 = triangle.b - triangle.a;
+    let e2 = triangle.c - triangle.a;
+    let longest = max(max_abs_component(e1), max_abs_component(e2));
+    return 0.5 * length(cross(e1 / longest, e2 / longest)) * longest * longest;
+}
+
+fn max_abs_component(v: vec3<f32>) -> f32 {
+    return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}

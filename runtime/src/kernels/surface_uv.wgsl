@@ -1,0 +1,24 @@
+// Texture coordinates, three pairs a primitive in vertex_uvs.
+
+fn hit_uv(primitive: u32, uv: vec2<f32>) -> vec2<f32> {
+    let a = vertex_uvs[3u * primitive];
+    let b = vertex_uvs[3u * primitive + 1u];
+    let c = vertex_uvs[3u * primitive + 2u];
+    return a + uv.x * (b - a) + uv.y * (c - a);
+}
+
+// Unit direction in which the first texture coordinate grows; zero where there is none.
+fn hit_tangent(primitive: u32) -> vec3<f32> {
+    let triangle = triangle_vertices(primitive);
+    let a = vertex_uvs[3u * primitive];
+    let duv1 = vertex_uvs[3u * primitive + 1u] - a;
+    let duv2 = vertex_uvs[3u * primitive + 2u] - a;
+    let determinant = duv1.x * duv2.y - duv1.y * duv2.x;
+    let tangent = ((triangle.b - triangle.a) * duv2.y - (triangle.c - triangle.a) * duv1.y)
+        * sign(determinant);
+    let longest = max_abs_component(tangent);
+    if !(longest > 1e-37) {
+        return vec3<f32>(0.0);
+    }
+    return normalize(tangent / longest);
+}

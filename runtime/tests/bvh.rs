@@ -1,0 +1,464 @@
+//! Ray casts on the GPU against brute force in f64 on the CPU.
+
+mod support;
+
+use glam::{DVec3, EulerRot, Quat, Vec3};
+use impasto_runtime::bvh::Bvh;
+use impasto_runtime::scene::surface::{geometry_part, surface_part};
+use impasto_runtime::scene::{Mesh, NO_MATERIAL};
+use support::{Random, Row, floats, row, run};
+
+const MISS: u32 = u32::MAX;
+
+#[derive(Clone, Copy)]
+struct Ray {
+    origin: Vec3,
+    direction: Vec3,
+    t_max: f32,
+    skip: u32,
+}
+
+impl Ray {
+    fn new(origin: Vec3, direction: Vec3) -> Ray {
+        let direction = direction.as_dvec3().normalize().as_vec3();
+        Ray {
+            origin,
+            direction,
+            t_max: 3e38,
+            skip: MISS,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Hit {
+    t: f32,
+    u: f32,
+    v: f32,
+    primitive: u32,
+    any: bool,
+}
+
+/// A mesh as kernels see it: `positions[p]` are the corners of primitive p.
+struct Built {
+    positions: Vec<[Vec3; 3]>,
+    bvh: Bvh,
+    mesh: Mesh,
+}
+
+fn mesh(positions: Vec<[Vec3; 3]>) -> Mesh {
+    let count = positions.len();
+    Mesh {
+        positions,
+        materials: vec![NO_MATERIAL; count],
+        lights: vec![None; count],
+        ..Mesh::default()
+    }
+}
+
+fn build(positions: Vec<[Vec3; 3]>) -> Built {
+    let mesh = mesh(positions);
+    let bvh = Bvh::build(&mesh);
+    let mut order = bvh.order().to_vec();
+    let positions = order.iter().map(|&i| mesh.positions[i as usize]).collect();
+    order.sort_unstable();
+    let all: Vec<u32> = (0..mesh.len() as u32).collect();
+    assert_eq!(order, all, "each triangle is in one leaf");
+    Built {
+        positions,
+        bvh,
+        mesh,
+    }
+}
+
+fn cast(built: &Built, rays: &[Ray]) -> Vec<Hit> {
+    let no_lights = vec![u32::MAX; built.mesh.len()];
+    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights);
+    let input: Vec<Row> = rays
+        .iter()
+        .flat_map(|r| {
+            let [x, y, z] = r.direction.to_array().map(f32::to_bits);
+            [row(r.origin.extend(r.t_max).to_array()), [x, y, z, r.skip]]
+        })
+        .collect();
+    let body = "
+        let o = bitcast<vec4<f32>>(input[2u * i]);
+        let d = input[2u * i + 1u];
+        let direction = bitcast<vec3<f32>>(d.xyz);
+        let hit = trace_closest(o.xyz, direction, o.w, d.w);
+        let any = trace_any(o.xyz, direction, o.w, d.w);
+        result[2u * i] = vec4<u32>(bitcast<u32>(hit.t), bitcast<u32>(hit.u), bitcast<u32>(hit.v), hit.primitive);
+        result[2u * i + 1u] = vec4<u32>(select(0u, 1u, any));";
+    let parts = [&geometry, &built.bvh.part()];
+    let rows = run(&parts, body, &input, rays.len(), 2 * rays.len());
+    rows.chunks(2)
+        .map(|pair| {
+            let [t, u, v, _] = floats(pair[0]);
+            Hit {
+                t,
+                u,
+                v,
+                primitive: pair[0][3],
+                any: pair[1][0] == 1,
+            }
+        })
+        .collect()
+}
+
+/// Nearest hit by testing every triangle in f64, and whether a boundary is so near that f32 may
+/// decide otherwise.
+fn brute_force(positions: &[[Vec3; 3]], ray: &Ray) -> (Option<(f64, u32)>, bool) {
+    let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let (mut best, mut doubtful) = (None::<(f64, u32)>, false);
+    for (primitive, corners) in positions.iter().enumerate() {
+        if primitive as u32 == ray.skip {
+            continue;
+        }
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let p = d.cross(e2);
+        let det = e1.dot(p);
+        let grazing = det.abs() < 1e-5 * e1.length() * e2.length();
+        let s = o - a;
+        let u = s.dot(p) / det;
+        let q = s.cross(e1);
+        let v = d.dot(q) / det;
+        let t = e2.dot(q) / det;
+        let margin = u.min(v).min(1.0 - u - v);
+        let near_edge = margin.abs() < 1e-4 * (1.0 + (s.length() / e1.length().min(e2.length())));
+        let reach = 1e-5 * (s.length() + o.length());
+        let hits = det != 0.0 && margin >= 0.0 && t > 0.0 && t < ray.t_max as f64;
+        let at_limit = t.abs() < reach || (t - ray.t_max as f64).abs() < reach;
+        doubtful |= (grazing || near_edge || at_limit)
+            && t > -reach
+            && t < best.map_or(f64::MAX, |b| b.0 + reach);
+        if hits && best.is_none_or(|b| t < b.0) {
+            best = Some((t, primitive as u32));
+        }
+    }
+    (best, doubtful)
+}
+
+/// Casts the rays both ways; returns how many were clear-cut.
+fn compare(built: &Built, rays: &[Ray]) -> usize {
+    let mut clear = 0;
+    for (ray, hit) in rays.iter().zip(cast(built, rays)) {
+        let (expected, doubtful) = brute_force(&built.positions, ray);
+        assert_eq!(
+            hit.any,
+            hit.primitive != MISS,
+            "closest and any hit disagree: {hit:?}"
+        );
+        if doubtful {
+            continue;
+        }
+        clear += 1;
+        let Some((t, primitive)) = expected else {
+            assert_eq!(hit.primitive, MISS, "hit what brute force misses: {hit:?}");
+            continue;
+        };
+        assert_ne!(hit.primitive, MISS, "missed primitive {primitive} at {t}");
+        let tolerance = 1e-5 * (t + ray.origin.length() as f64);
+        assert!(
+            (hit.t as f64 - t).abs() <= tolerance,
+            "t {} instead of {t}",
+            hit.t
+        );
+        let [a, b, c] = built.positions[hit.primitive as usize].map(|p| p.as_dvec3());
+        let point = a + hit.u as f64 * (b - a) + hit.v as f64 * (c - a);
+        let on_ray = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
+        assert!(
+            point.distance(on_ray) <= 4.0 * tolerance,
+            "wrong barycentrics: {hit:?}"
+        );
+    }
+    clear
+}
+
+fn soup(random: &mut Random, count: usize, size: f32) -> Vec<[Vec3; 3]> {
+    let triangle = |random: &mut Random| {
+        let center = random.point(-1.0, 1.0);
+        [(); 3].map(|_| center + size * random.direction())
+    };
+    (0..count).map(|_| triangle(random)).collect()
+}
+
+/// A closed sphere of `2 * n * n` triangles or so, counter-clockwise from outside.
+fn sphere(center: Vec3, radius: f32, n: usize) -> Vec<[Vec3; 3]> {
+    let at = |i: usize, j: usize| {
+        let theta = std::f64::consts::PI * j as f64 / n as f64;
+        let phi = std::f64::consts::TAU * (i % n) as f64 / n as f64;
+        let ring = if j == 0 || j == n { 0.0 } else { theta.sin() };
+        let p = DVec3::new(ring * phi.cos(), theta.cos(), -ring * phi.sin());
+        center + radius * p.as_vec3()
+    };
+    let mut triangles = Vec::new();
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        if j > 0 {
+            triangles.push([a, c, d]);
+        }
+        if j + 1 < n {
+            triangles.push([a, b, c]);
+        }
+    }
+    triangles
+}
+
+/// The cube [-1, 1]^3, each side cut in n by n squares, counter-clockwise from outside.
+fn cube(n: usize) -> Vec<[Vec3; 3]> {
+    let mut triangles = Vec::new();
+    let grid = |i: usize| 2.0 * i as f32 / n as f32 - 1.0;
+    for (axis, side) in [0, 1, 2].into_iter().flat_map(|a| [(a, -1.0), (a, 1.0)]) {
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let at = |i: usize, j: usize| {
+                let mut p = [side; 3];
+                (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side * grid(i), grid(j));
+                Vec3::from(p)
+            };
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    triangles
+}
+
+fn random_rays(random: &mut Random, count: usize, spread: f32) -> Vec<Ray> {
+    let ray = |random: &mut Random| {
+        let origin = random.point(-spread, spread);
+        let target = random.point(-1.0, 1.0);
+        let mut ray = Ray::new(origin, target - origin);
+        if random.uniform() < 0.25 {
+            ray.t_max = random.range(0.0, 2.0);
+        }
+        ray
+    };
+    (0..count).map(|_| ray(random)).collect()
+}
+
+#[test]
+fn triangle_soups_agree_with_brute_force() {
+    let mut random = Random::new(1);
+    for (count, size) in [
+        (1, 1.0),
+        (2, 0.5),
+        (3, 1.0),
+        (9, 0.5),
+        (200, 0.3),
+        (3000, 0.05),
+    ] {
+        let built = build(soup(&mut random, count, size));
+        let rays = random_rays(&mut random, 1500, 3.0);
+        let clear = compare(&built, &rays);
+        assert!(
+            clear > 1000,
+            "{clear} clear rays among {} for {count} triangles",
+            rays.len()
+        );
+    }
+}
+
+#[test]
+fn rays_along_the_axes_see_walls_that_are_flat_along_an_axis() {
+    let built = build(cube(5));
+    let mut rays = Vec::new();
+    for axis in 0..3 {
+        for sign in [-1.0, 1.0f32] {
+            for distance in [0.0, -4.0f32] {
+                for (u, v) in [
+                    (0.1, 0.3),
+                    (0.0, 0.0),
+                    (0.2, 0.2),
+                    (-0.6, 0.6),
+                    (0.99, -0.99),
+                ] {
+                    let (mut o, mut d) = ([0.0; 3], [0.0f32; 3]);
+                    (o[axis], o[(axis + 1) % 3], o[(axis + 2) % 3]) = (sign * distance, u, v);
+                    d[axis] = sign;
+                    // Both zeros, since the sign of zero must not matter.
+                    for zero in [0.0, -0.0] {
+                        let d = d.map(|x| if x == 0.0 { zero } else { x });
+                        rays.push(Ray {
+                            direction: d.into(),
+                            ..Ray::new(o.into(), Vec3::X)
+                        });
+                    }
+                }
+            }
+        }
+    }
+    for (ray, hit) in rays.iter().zip(cast(&built, &rays)) {
+        let expected = if ray.origin.dot(ray.direction) == 0.0 {
+            1.0
+        } else {
+            3.0
+        };
+        assert_ne!(hit.primitive, MISS, "{} -> {}", ray.origin, ray.direction);
+        assert!(
+            (hit.t - expected).abs() < 1e-6,
+            "{} instead of {expected}",
+            hit.t
+        );
+    }
+}
+
+#[test]
+fn no_ray_passes_between_triangles_of_a_closed_mesh() {
+    // From inside, through every vertex, every edge's midpoint and random points of edges.
+    let mut random = Random::new(2);
+    for (center, radius) in [
+        (Vec3::ZERO, 1.0),
+        (Vec3::new(300.0, -20.0, 7.0), 2.0),
+        (Vec3::ZERO, 1e-4),
+    ] {
+        let built = build(sphere(center, radius, 24));
+        let origin = center + 0.3 * radius * random.direction();
+        let mut rays = Vec::new();
+        for corners in &built.positions {
+            for k in 0..3 {
+                let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                for s in [0.0, 0.5, random.uniform(), random.uniform()] {
+                    rays.push(Ray::new(origin, p + s * (q - p) - origin));
+                }
+            }
+        }
+        let leaks = cast(&built, &rays)
+            .iter()
+            .filter(|h| h.primitive == MISS)
+            .count();
+        assert_eq!(leaks, 0, "of {} rays, radius {radius}", rays.len());
+    }
+}
+
+#[test]
+fn scale_does_not_change_what_is_hit() {
+    let mut random = Random::new(3);
+    let unit = soup(&mut random, 500, 0.2);
+    let rays = random_rays(&mut random, 1000, 2.0);
+    for scale in [1e-4, 1e4, 1e9] {
+        let built = build(unit.iter().map(|t| t.map(|p| p * scale)).collect());
+        let scaled: Vec<Ray> = rays
+            .iter()
+            .map(|r| Ray {
+                origin: r.origin * scale,
+                t_max: (r.t_max * scale).min(3e38),
+                ..*r
+            })
+            .collect();
+        let clear = compare(&built, &scaled);
+        assert!(clear > 600, "{clear} clear rays at scale {scale}");
+    }
+}
+
+#[test]
+fn flat_and_repeated_triangles_build() {
+    // All in one plane, all the same, and a chain of sizes from 1e-6 to 1e6.
+    let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let shift = |v: Vec3| one.map(|p| p + v);
+    let plane: Vec<_> = (0..64)
+        .map(|i| shift(Vec3::new(i as f32, 0.0, 0.0)))
+        .collect();
+    let chain: Vec<_> = (-20..20)
+        .map(|e| shift(Vec3::Z).map(|p| p * 2f32.powi(e)))
+        .collect();
+    for triangles in [vec![one], plane, vec![one; 50], chain] {
+        let built = build(triangles);
+        let rays: Vec<Ray> = (0..50)
+            .map(|i| {
+                Ray::new(
+                    Vec3::new(0.3 + i as f32, 0.3, -1.0),
+                    Vec3::new(0.001, 0.002, 1.0),
+                )
+            })
+            .collect();
+        assert!(compare(&built, &rays) > 30);
+    }
+}
+
+#[test]
+fn rays_that_leave_a_surface_do_not_hit_it_again() {
+    // Row 19 of the numerics list: convex meshes of several scales and places; a ray that leaves
+    // to the outside hits nothing, one that leaves to the inside hits another side.
+    let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.1, 2.3);
+    let mut random = Random::new(4);
+    let places = [
+        (Vec3::ZERO, 1.0),
+        (Vec3::ZERO, 1e-4),
+        (Vec3::ZERO, 1e4),
+        (Vec3::new(1e5, 0.0, 0.0), 1e4),
+        (Vec3::new(-30.0, 40.0, 1.0), 1.0),
+        // A side of the cube through the origin, where coordinates are small and triangles not.
+        (turn * Vec3::Z, 1.0),
+    ];
+    for (center, radius) in places {
+        // Flat sides have neighbours in the same plane, the hardest to avoid at grazing angles.
+        let turned = cube(8)
+            .iter()
+            .map(|t| t.map(|p| center + radius * (turn * p)))
+            .collect();
+        for triangles in [turned, sphere(center, radius, 16)] {
+            let built = build(triangles);
+            let leaving = leaving_rays(&built, &mut random, 20_000);
+            let rays: Vec<Ray> = leaving.iter().map(|l| l.0).collect();
+            let hits = cast(&built, &rays);
+            let wrong = leaving
+                .iter()
+                .zip(&hits)
+                .filter(|((_, outward), hit)| (hit.primitive == MISS) != *outward);
+            assert_eq!(
+                wrong.count(),
+                0,
+                "of {} rays, radius {radius} at {center}",
+                rays.len()
+            );
+        }
+    }
+}
+
+/// Rays from random points of a convex mesh, offset and with their primitive skipped, and whether
+/// they leave to the outside. Most directions are close to the surface.
+fn leaving_rays(built: &Built, random: &mut Random, count: usize) -> Vec<(Ray, bool)> {
+    let primitives = built.positions.len() as u32;
+    let input: Vec<Row> = (0..count)
+        .map(|_| {
+            let (p, s, t) = (
+                random.bits() % primitives,
+                random.uniform(),
+                random.uniform(),
+            );
+            let (u, v) = if s + t > 1.0 {
+                (1.0 - s, 1.0 - t)
+            } else {
+                (s, t)
+            };
+            let outward = u32::from(random.uniform() < 0.5);
+            [p, u.to_bits(), v.to_bits(), outward]
+        })
+        .collect();
+    let no_lights = vec![u32::MAX; built.mesh.len()];
+    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights);
+    let surface = surface_part(&built.mesh, built.bvh.order(), false);
+    let body = "
+        let at = input[i];
+        let normal = hit_geometric_normal(at.x);
+        let side = select(-normal, normal, at.w == 1u);
+        let position = hit_position(at.x, bitcast<vec2<f32>>(at.yz));
+        result[2u * i] = bitcast<vec4<u32>>(vec4<f32>(offset_origin(position, side), 0.0));
+        result[2u * i + 1u] = bitcast<vec4<u32>>(vec4<f32>(side, 0.0));";
+    let rows = run(&[&geometry, &surface], body, &input, count, 2 * count);
+    let ray = |(at, pair): (&Row, &[Row])| {
+        let origin = Vec3::from_slice(&floats(pair[0]));
+        let side = Vec3::from_slice(&floats(pair[1]));
+        let tilt = random.direction();
+        let along = (tilt - tilt.dot(side) * side).normalize();
+        let direction = along + 2.0 * random.uniform().powi(3) * side;
+        (
+            Ray {
+                skip: at[0],
+                ..Ray::new(origin, direction)
+            },
+            at[3] == 1,
+        )
+    };
+    input.iter().zip(rows.chunks(2)).map(ray).collect()
+}
