@@ -38,7 +38,7 @@ fn trace_any(origin: vec3<f32>, direction: vec3<f32>, t_max: f32, skip: u32) -> 
 
 fn traverse(origin: vec3<f32>, direction: vec3<f32>, t_max: f32, skip: u32, any_hit: bool) -> Hit {
     var ray = SlabRay(origin, safe_inverse(direction), t_max);
-    let frame = ray_frame(origin, direction);
+    let frame = RayFrame(origin, across(direction), direction);
     let octant = traversal_octant(direction);
     var hit = Hit(t_max, 0.0, 0.0, NO_PRIMITIVE);
     var stack: array<vec2<u32>, BVH_STACK_SIZE>;
@@ -154,22 +154,11 @@ fn bytes(word: u32) -> vec4<f32> {
     return vec4<f32>((vec4<u32>(word) >> vec4<u32>(0u, 8u, 16u, 24u)) & vec4<u32>(0xffu));
 }
 
-// The frame of a ray: unit vectors x and y across it, its direction as z.
+// The frame of a ray: two unit vectors across it, its direction as z.
 struct RayFrame {
     origin: vec3<f32>,
-    x: vec3<f32>,
-    y: vec3<f32>,
+    across: Across,
     z: vec3<f32>
-}
-
-// Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
-fn ray_frame(origin: vec3<f32>, z: vec3<f32>) -> RayFrame {
-    let side = select(-1.0, 1.0, z.z >= 0.0);
-    let a = -1.0 / (side + z.z);
-    let b = z.x * z.y * a;
-    let x = vec3<f32>(1.0 + side * z.x * z.x * a, side * b, -side * z.x);
-    let y = vec3<f32>(b, side + z.y * z.y * a, -z.y);
-    return RayFrame(origin, x, y, z);
 }
 
 // t and the barycentric coordinates of b and c; t = -1 on a miss. As in Woop, Benthin and Wald,
@@ -191,7 +180,7 @@ fn intersect_triangle(triangle: Triangle, frame: RayFrame) -> vec3<f32> {
 
 fn to_frame(point: vec3<f32>, frame: RayFrame) -> vec3<f32> {
     let p = point - frame.origin;
-    return vec3<f32>(dot(frame.x, p), dot(frame.y, p), dot(frame.z, p));
+    return vec3<f32>(dot(frame.across.x, p), dot(frame.across.y, p), dot(frame.z, p));
 }
 
 // On which side of the edge from p to q is the ray, times twice the area they span? It is

@@ -46,3 +46,20 @@ fn triangle_area(triangle: Triangle) -> f32 {
 fn max_abs_component(v: vec3<f32>) -> f32 {
     return max(abs(v.x), max(abs(v.y), abs(v.z)));
 }
+
+struct Across {
+    x: vec3<f32>,
+    y: vec3<f32>
+}
+
+// Two unit vectors at right angles to z and to each other: Duff et al., "Building an Orthonormal
+// Basis, Revisited" (2017).
+fn across(z: vec3<f32>) -> Across {
+    let side = select(-1.0, 1.0, z.z >= 0.0);
+    let a = -1.0 / (side + z.z);
+    let b = z.x * z.y * a;
+    return Across(
+        vec3<f32>(1.0 + side * z.x * z.x * a, side * b, -side * z.x),
+        vec3<f32>(b, side + z.y * z.y * a, -z.y)
+    );
+}

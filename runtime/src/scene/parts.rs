@@ -8,7 +8,14 @@
 //! | `lights` | `sample_light`, `light_hit`, `light_escape`, `power_heuristic` | `surface` |
 //! | `texture` | `texture_fetch` | |
 
+use impasto_compiler::abi::{MaterialInfo, TextureRef};
+
+use super::surface::{geometry_part, surface_part};
+use super::{Scene, SceneError};
+use crate::bvh::Bvh;
+use crate::lights::Lights;
 use crate::shader_part::ShaderPart;
+use crate::texture;
 
 /// Everything a kernel may include to read the scene.
 #[derive(Clone, Debug)]
@@ -19,11 +26,35 @@ pub struct SceneParts {
     pub bvh: ShaderPart,
     /// Positions, normals and coordinates of hits.
     pub surface: ShaderPart,
-    /// Light samples and the emission that paths run into.
+    /// Light samples and the emission that paths run into. `light_hit` is the emission of
+    /// materials with `Emission::Uniform` (and of quad lights); that of `Emission::Varying` is
+    /// left to `material_emission`.
     pub lights: ShaderPart,
     /// Texture lookups; absent if no material reads a texture.
     pub texture: Option<ShaderPart>,
     /// Can any light be sampled? If not, no shadow ray is worth casting
     /// (`HAS_SAMPLED_LIGHTS` in WGSL).
     pub has_sampled_lights: bool,
+}
+
+impl SceneParts {
+    /// The parts of `scene`, whose materials compiled to `materials`, which read `textures`.
+    pub fn build(
+        scene: &Scene,
+        materials: &[MaterialInfo],
+        textures: &[TextureRef],
+    ) -> Result<SceneParts, SceneError> {
+        let texture = texture::part(textures, &scene.base)?;
+        let bvh = Bvh::build(&scene.mesh);
+        let lights = Lights::build(scene, bvh.order(), materials);
+        let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
+        Ok(SceneParts {
+            geometry: geometry_part(&scene.mesh, bvh.order(), &lights.of_triangle),
+            bvh: bvh.part(),
+            surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
+            lights: lights.part,
+            texture,
+            has_sampled_lights: lights.has_sampled,
+        })
+    }
 }

@@ -1,0 +1,38 @@
+// Lights with a surface: density by solid angle of a point chosen uniformly on it, and the
+// emission a path runs into.
+
+// Light from `point` on a surface of the given area and unit normal on the emitting side.
+fn sample_area(pick: LightPick, position: vec3<f32>, point: vec3<f32>, normal: vec3<f32>, area: f32) -> LightSample {
+    let to_light = point - position;
+    let scale = max_abs_component(to_light);
+    if !(scale > 1e-30) {
+        return no_light_sample();
+    }
+    let scaled = to_light / scale;
+    let distance = scale * length(scaled);
+    let wi = normalize(scaled);
+    let pdf = pick.probability * area_density(distance, -dot(wi, normal), area);
+    if !(pdf > 0.0) {
+        return no_light_sample();
+    }
+    // Up to a point just off the surface, on the side that is lit; and at grazing angles, where
+    // that point is hardly nearer, shorter by some units in the last place.
+    let reach = dot(offset_origin(point, normal) - position, wi) * 0.999995;
+    return LightSample(wi, reach, light_radiance(pick.light) / pdf, pdf);
+}
+
+// Weighted emission of a surface that a ray of length t meets at the given cosine.
+fn area_hit(light: u32, t: f32, cosine: f32, area: f32, bsdf_pdf: f32) -> vec3<f32> {
+    if !(cosine > 0.0) {
+        return vec3<f32>(0.0);
+    }
+    let pdf = light_probability(light) * area_density(t, cosine, area);
+    return scattering_weight(bsdf_pdf, pdf) * light_radiance(light);
+}
+
+// Density by solid angle; 0 behind the surface and where it would not be finite.
+fn area_density(distance: f32, cosine: f32, area: f32) -> f32 {
+    // Multiplied in an order that neither tiny nor huge scenes overflow.
+    let seen = cosine * (area / distance);
+    return select(0.0, distance / max(seen, 1e-30), seen > 1e-30);
+}

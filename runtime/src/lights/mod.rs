@@ -1,0 +1,261 @@
+//! Every kind of light as one shader part: a table to choose a light from, and what each kind
+//! contributes to a light sample, a hit and an escaping ray.
+//!
+//! A kind is a file here, a file in `kernels/lights` and a row in [`KINDS`]. Kinds that a scene
+//! lacks leave no trace in its WGSL.
+
+use glam::Vec3;
+use impasto_compiler::abi::{Emission, MaterialInfo};
+
+use crate::scene::{Mesh, Scene, SceneError};
+use crate::shader_part::{BufferData, ShaderPart};
+use crate::wgsl;
+
+mod alias;
+mod distant;
+mod environment;
+mod mesh;
+mod quad;
+
+use alias::AliasTable;
+
+/// Index in the light table of triangles that are no sampled light: beyond any table.
+pub const NO_LIGHT: u32 = u32::MAX;
+
+/// Every kind of light, in the order of the light table.
+const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
+    [mesh::kind, quad::kind, distant::kind, environment::kind];
+
+/// The lights of a scene.
+#[derive(Clone, Debug)]
+pub struct Lights {
+    /// `sample_light`, `light_hit` and `light_escape`; needs the surface part.
+    pub part: ShaderPart,
+    /// For each triangle of the mesh its index in the light table, or [`NO_LIGHT`].
+    pub of_triangle: Vec<u32>,
+    /// Can any light be sampled?
+    pub has_sampled: bool,
+}
+
+impl Lights {
+    /// The lights of `scene`, whose triangles are stored in `order` and whose materials compiled
+    /// to `materials`.
+    pub fn build(scene: &Scene, order: &[u32], materials: &[MaterialInfo]) -> Lights {
+        let context = Context::new(scene, order, materials);
+        let mut kinds = Vec::new();
+        let mut count = 0;
+        for kind in KINDS {
+            kinds.extend(kind(&context, count));
+            count = kinds.iter().map(|k| k.lights.len() as u32).sum();
+        }
+        let mut of_triangle = vec![NO_LIGHT; scene.mesh.len()];
+        for (index, light) in kinds.iter().flat_map(|k| &k.lights).enumerate() {
+            for &triangle in &light.triangles {
+                of_triangle[triangle as usize] = index as u32;
+            }
+        }
+        Lights {
+            part: part(&kinds, count),
+            of_triangle,
+            has_sampled: count > 0,
+        }
+    }
+}
+
+/// Is there anything in the scene that could give light? An all-black picture is hardly meant.
+pub fn check(scene: &Scene, materials: &[MaterialInfo]) -> Result<(), SceneError> {
+    let emissive = materials.iter().any(|m| m.emission != Emission::None);
+    if emissive || !scene.lights.is_empty() || scene.environment.is_some() {
+        return Ok(());
+    }
+    let error = SceneError::new(format!("the scene `{}` has no light", scene.name));
+    Err(error.hint(
+        "add [environment], a [[lights]] entry, or a material that assigns `emission` \
+         to some of the geometry",
+    ))
+}
+
+/// What the kinds read.
+struct Context<'a> {
+    scene: &'a Scene,
+    materials: &'a [MaterialInfo],
+    /// Triangle of the mesh to primitive.
+    primitives: Vec<u32>,
+    /// Radius of a sphere around the mesh: what a light at infinity shines on.
+    radius: f64,
+}
+
+impl<'a> Context<'a> {
+    fn new(scene: &'a Scene, order: &[u32], materials: &'a [MaterialInfo]) -> Self {
+        let mut primitives = vec![0; order.len()];
+        for (primitive, &triangle) in order.iter().enumerate() {
+            primitives[triangle as usize] = primitive as u32;
+        }
+        Context {
+            scene,
+            materials,
+            primitives,
+            radius: bounding_radius(&scene.mesh),
+        }
+    }
+
+    /// Watts that a light at infinity sends through the scene, per W/m^2 facing it.
+    fn cross_section(&self) -> f64 {
+        std::f64::consts::PI * self.radius * self.radius
+    }
+}
+
+/// One kind of light as a scene has it.
+struct Kind {
+    /// Those that can be sampled.
+    lights: Vec<Sampled>,
+    /// The kind's functions and constants.
+    wgsl: String,
+    buffers: Vec<BufferData>,
+    /// `fn NAME(pick: LightPick, position: vec3<f32>) -> LightSample`
+    sample: &'static str,
+    /// `fn NAME(light: u32, primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`,
+    /// for lights with a surface.
+    hit: Option<&'static str>,
+    /// `fn NAME(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`, for lights at infinity.
+    escape: Option<&'static str>,
+}
+
+/// A row of the light table.
+#[derive(Default)]
+struct Sampled {
+    /// Emitted power in W (by luminance), more than 0.
+    power: f64,
+    /// Radiance of lights with a surface.
+    radiance: Vec3,
+    /// The primitive that light samples read, of lights with a surface.
+    primitive: u32,
+    /// The kind's own use.
+    flag: u32,
+    /// Triangles of the mesh that belong to it.
+    triangles: Vec<u32>,
+}
+
+fn part(kinds: &[Kind], count: u32) -> ShaderPart {
+    let mut part = ShaderPart {
+        wgsl: include_str!("../kernels/lights/common.wgsl").to_owned(),
+        buffers: Vec::new(),
+    };
+    part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {};\n", count > 0);
+    if count > 0 {
+        part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count);
+        part.wgsl += include_str!("../kernels/lights/select.wgsl");
+        part.buffers.push(light_table(kinds));
+    }
+    if kinds.iter().any(|k| k.hit.is_some()) {
+        part.wgsl += include_str!("../kernels/lights/area.wgsl");
+    }
+    for kind in kinds {
+        part.wgsl += &kind.wgsl;
+        part.buffers.extend(kind.buffers.iter().cloned());
+    }
+    part.wgsl += &sample_function(kinds);
+    part.wgsl += &hit_function(kinds);
+    part.wgsl += &escape_function(kinds);
+    part
+}
+
+/// Two words a light; see `kernels/lights/select.wgsl`.
+fn light_table(kinds: &[Kind]) -> BufferData {
+    let weights = selection_weights(kinds);
+    let total: f64 = weights.iter().sum();
+    let alias = AliasTable::new(&weights);
+    let rows: Vec<[[u32; 4]; 2]> = kinds
+        .iter()
+        .flat_map(|k| &k.lights)
+        .enumerate()
+        .map(|(i, light)| {
+            let threshold = (alias.thresholds[i] as f32).to_bits();
+            let probability = ((weights[i] / total) as f32).to_bits();
+            let [r, g, b] = light.radiance.to_array().map(f32::to_bits);
+            [
+                [threshold, alias.aliases[i], probability, light.primitive],
+                [r, g, b, light.flag],
+            ]
+        })
+        .collect();
+    BufferData::new("light_table", "array<vec4<u32>>", &rows)
+}
+
+/// Half of the choice goes by power over all lights. The other half goes in equal parts to the
+/// kinds, so that a bright sky over a large ground plane leaves samples for a lamp, and then by
+/// power within the kind.
+fn selection_weights(kinds: &[Kind]) -> Vec<f64> {
+    let power = |k: &Kind| k.lights.iter().map(|l| l.power).sum::<f64>();
+    let total: f64 = kinds.iter().map(power).sum();
+    let present = kinds.iter().filter(|k| !k.lights.is_empty()).count() as f64;
+    let weights = kinds.iter().flat_map(|kind| {
+        let share = power(kind) * present;
+        let lights = kind.lights.iter();
+        lights.map(move |l| l.power / total + l.power / share)
+    });
+    weights.collect()
+}
+
+fn sample_function(kinds: &[Kind]) -> String {
+    let mut text =
+        String::from("fn sample_light(position: vec3<f32>, u: vec4<f32>) -> LightSample {\n");
+    let sampled: Vec<&Kind> = kinds.iter().filter(|k| !k.lights.is_empty()).collect();
+    let Some((last, others)) = sampled.split_last() else {
+        return text + "    return no_light_sample();\n}\n";
+    };
+    text += "    let pick = pick_light(u);\n";
+    let mut end = 0;
+    for kind in others {
+        end += kind.lights.len();
+        let name = kind.sample;
+        text += &format!("    if pick.light < {end}u {{ return {name}(pick, position); }}\n");
+    }
+    text + &format!("    return {}(pick, position);\n}}\n", last.sample)
+}
+
+fn hit_function(kinds: &[Kind]) -> String {
+    let mut text = String::from(
+        "fn light_hit(primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {\n",
+    );
+    if kinds.iter().any(|k| k.hit.is_some()) {
+        text += "    let light = primitive_light(primitive);\n";
+    }
+    let mut end = 0;
+    for kind in kinds {
+        end += kind.lights.len();
+        if let Some(name) = kind.hit {
+            let call = format!("{name}(light, primitive, t, direction, bsdf_pdf)");
+            text += &format!("    if light < {end}u {{ return {call}; }}\n");
+        }
+    }
+    text + "    return vec3<f32>(0.0);\n}\n"
+}
+
+fn escape_function(kinds: &[Kind]) -> String {
+    let calls = kinds.iter().filter_map(|k| k.escape);
+    let terms: String = calls
+        .map(|n| format!(" + {n}(direction, bsdf_pdf)"))
+        .collect();
+    format!(
+        "fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {{\n    \
+         return vec3<f32>(0.0){terms};\n}}\n"
+    )
+}
+
+/// Luminance of linear RGB with Rec. 709 primaries.
+fn luminance(rgb: Vec3) -> f64 {
+    rgb.as_dvec3().dot(glam::dvec3(0.2126, 0.7152, 0.0722))
+}
+
+fn area([a, b, c]: [Vec3; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+    0.5 * (b - a).cross(c - a).length()
+}
+
+fn bounding_radius(mesh: &Mesh) -> f64 {
+    let mut points = mesh.positions.iter().flatten();
+    let first = points.next().copied().unwrap_or_default();
+    let (low, high) = points.fold((first, first), |(l, h), p| (l.min(*p), h.max(*p)));
+    (0.5 * (high.as_dvec3() - low.as_dvec3()).length()).max(f64::MIN_POSITIVE)
+}
