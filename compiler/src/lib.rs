@@ -156,6 +156,7 @@ pub fn compile(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compila
     let mut checker = Checker::new(loader);
     let program = compile_all(&mut checker, requests);
     let program = program.filter(|_| !diag::has_errors(&checker.diagnostics));
+    drop_unsure(&mut checker.diagnostics);
     Compilation {
         program,
         sources: checker.sources,
@@ -183,6 +184,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);
     }
+    drop_unsure(&mut checker.diagnostics);
     let Checker {
         sources,
         diagnostics,
@@ -195,6 +197,13 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
         materials,
         ir,
         checked,
+    }
+}
+
+/// Drops the warnings that an error may be the cause of: what did not check uses nothing.
+fn drop_unsure(diagnostics: &mut Vec<Diagnostic>) {
+    if diag::has_errors(diagnostics) {
+        diagnostics.retain(|d| d.code != Code::Unused);
     }
 }
 

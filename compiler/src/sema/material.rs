@@ -8,7 +8,7 @@ use crate::parser;
 use crate::source::Span;
 
 use super::body::{Binding, Body, MaterialState, Operand};
-use super::modules::{ModuleId, list};
+use super::modules::{ItemRef, ModuleId, list};
 use super::types::{NAMED, Ty};
 use super::{Checker, expr};
 
@@ -58,6 +58,9 @@ impl Checker<'_> {
         let ItemKind::Material(material) = &item.kind else {
             return None;
         };
+        if self.broken.contains(&ItemRef { module, index }) {
+            return None;
+        }
         let point = self.core_struct("SurfacePoint")?;
         let params: Vec<Option<MaterialParam>> = material
             .params

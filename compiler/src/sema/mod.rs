@@ -4,7 +4,7 @@
 //! material does not reach never exists after this stage. [`Checker`] owns the modules and the
 //! IR under construction; [`body::Body`] checks one function or material.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Loader;
 use crate::ast::{self, ItemKind, TypeName};
@@ -35,12 +35,14 @@ pub struct Checker<'a> {
     /// What was lowered so far.
     pub ir: ir::Module,
     /// Textures that sources name outside parameters.
-    pub literal_textures: std::collections::BTreeSet<usize>,
+    pub literal_textures: BTreeSet<usize>,
     loader: &'a mut dyn Loader,
     modules: Vec<ModuleData>,
     loading: BTreeMap<String, Loading>,
     core: BTreeMap<String, ItemRef>,
     checked: BTreeMap<ItemRef, Checked>,
+    /// Definitions with errors of syntax, which are not checked.
+    broken: BTreeSet<ItemRef>,
     /// Signatures of `ir.functions` that a call can name.
     signatures: BTreeMap<FunctionId, Signature>,
     /// Surface types of the fields of `ir.structs`.
@@ -88,6 +90,7 @@ impl<'a> Checker<'a> {
             loading: BTreeMap::new(),
             core: BTreeMap::new(),
             checked: BTreeMap::new(),
+            broken: BTreeSet::new(),
             signatures: BTreeMap::new(),
             fields: Vec::new(),
             closure_params: Vec::new(),
@@ -138,6 +141,9 @@ impl<'a> Checker<'a> {
 
     /// Checks an item if that has not happened; `None` if it does not check or is a material.
     fn demand(&mut self, item: ItemRef, asked: Option<Span>) -> Option<Checked> {
+        if self.broken.contains(&item) {
+            return None;
+        }
         match self.checked.get(&item) {
             Some(Checked::InProgress) => {
                 self.recursion(item, asked);

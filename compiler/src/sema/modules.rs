@@ -103,8 +103,9 @@ impl Checker<'_> {
     fn add_module(&mut self, path: &str, text: &str, is_std: bool) -> ModuleId {
         let file = self.sources.add(path, text);
         let (ast, diagnostics) = parser::parse(file, text);
-        diagnostics.into_iter().for_each(|d| self.report(d));
         let id = ModuleId(self.modules.len());
+        self.leave_out_broken(id, &ast, &diagnostics);
+        diagnostics.into_iter().for_each(|d| self.report(d));
         let ast = std::rc::Rc::new(ast);
         self.modules.push(ModuleData {
             ast: ast.clone(),
@@ -120,6 +121,21 @@ impl Checker<'_> {
         }
         self.loading.insert(path.to_owned(), Loading::Done(id));
         id
+    }
+
+    /// Definitions with an error of syntax are not checked: what the parser left of them would
+    /// only give errors that follow from the first.
+    fn leave_out_broken(&mut self, module: ModuleId, ast: &ast::Module, found: &[Diagnostic]) {
+        let syntax = found
+            .iter()
+            .filter(|d| matches!(d.code, Code::Syntax | Code::Unclosed));
+        let places: Vec<Span> = syntax.filter_map(|d| d.span).collect();
+        for (index, item) in ast.items.iter().enumerate() {
+            let inside = |p: &Span| item.span.start <= p.start && p.start < item.span.end;
+            if places.iter().any(inside) {
+                self.broken.insert(ItemRef { module, index });
+            }
+        }
     }
 
     fn define_items(&mut self, module: ModuleId, ast: &ast::Module) {
