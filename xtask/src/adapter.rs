@@ -20,8 +20,8 @@ pub(crate) fn prepare() -> Result {
     if !cfg!(target_os = "linux") || !registered_drivers().is_empty() {
         return Ok(());
     }
-    shell::section("No Vulkan driver is registered on this machine");
-    install()
+    shell::section("Preparing an adapter");
+    install("no Vulkan driver is registered on this machine")
 }
 
 /// Checks by running `impasto info` that there is a usable adapter; where there is none,
@@ -33,7 +33,7 @@ pub(crate) fn require(impasto: &Path) -> Result {
         Ok(adapter) => adapter,
         Err(reason) => {
             eprintln!("{reason}");
-            install()?;
+            install("this machine has no usable adapter")?;
             info().map_err(|reason| format!("there is still no usable adapter\n{reason}"))?
         }
     };
@@ -44,7 +44,7 @@ pub(crate) fn require(impasto: &Path) -> Result {
 }
 
 /// Installs Mesa's software Vulkan through apt, or says what to install elsewhere.
-fn install() -> Result {
+fn install(reason: &str) -> Result {
     if let Some(name) = driver_override() {
         return Err(format!(
             "the environment variable {name} hides every driver that is installed\n\
@@ -52,12 +52,10 @@ fn install() -> Result {
         ));
     }
     if !cfg!(target_os = "linux") || !shell::exists("apt-get") {
-        return Err(format!("no usable adapter: {}", advice()));
+        return Err(format!("{reason}\nhint: {}", advice()));
     }
-    eprintln!(
-        "No usable adapter: installing Mesa's software Vulkan with apt ({}).",
-        PACKAGES.join(", ")
-    );
+    let packages = PACKAGES.join(" and ");
+    eprintln!("{reason}: installing Mesa's software Vulkan with apt ({packages})");
     shell::run(apt().arg("update"))?;
     shell::run(
         apt()

@@ -1,0 +1,138 @@
+//! `impasto emit`: what the compiler makes of a file, at any stage.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use impasto::compiler::source::SourceMap;
+use impasto::compiler::{self, Loader, MaterialRequest, diag, lexer, parser};
+use impasto::files;
+use impasto::{FileLoader, Program};
+
+use super::{Failure, Global, Outcome, print};
+
+#[derive(Args)]
+pub(super) struct EmitArgs {
+    /// A material file; `-` is standard input
+    file: String,
+    /// Which stage to print
+    #[arg(long, default_value = "wgsl")]
+    what: What,
+    /// Which material of the file; needed for IR and WGSL where it has several
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    /// Where to write it; `-` is standard output
+    #[arg(short, long, value_name = "FILE", default_value = "-")]
+    out: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// The tokens, one a line with its place
+    Tokens,
+    /// The syntax tree
+    Ast,
+    /// The typed intermediate representation
+    Ir,
+    /// The generated WGSL
+    Wgsl,
+}
+
+pub(super) fn run(args: &EmitArgs, global: &Global) -> Outcome {
+    let to_stdout = args.out == files::STDIN;
+    if !to_stdout {
+        files::check_writable(Path::new(&args.out))?;
+    }
+    let text = emitted(args, global)?;
+    match to_stdout {
+        true => print(&text),
+        false => Ok(files::write_whole(Path::new(&args.out), text.as_bytes())?),
+    }
+}
+
+/// The text of the stage that was asked for.
+fn emitted(args: &EmitArgs, global: &Global) -> Result<String, Failure> {
+    let mut loader = FileLoader::new("");
+    let bytes = loader
+        .load(&args.file)
+        .map_err(|message| format!("cannot read `{}`: {message}", args.file))?;
+    match args.what {
+        What::Tokens | What::Ast => syntax(args, &bytes, global),
+        What::Ir => ir(args, &mut loader, global),
+        What::Wgsl => wgsl(args, &mut loader, global),
+    }
+}
+
+/// Tokens or tree, which need nothing but the text.
+fn syntax(args: &EmitArgs, bytes: &[u8], global: &Global) -> Result<String, Failure> {
+    let mut sources = SourceMap::default();
+    let text = match lexer::decode(&args.file, bytes) {
+        Ok(text) => text,
+        Err(diagnostic) => {
+            global.report(&sources, &[diagnostic]);
+            return Err(Failure::Diagnostics);
+        }
+    };
+    let file = sources.add(&args.file, text.as_str());
+    let (shown, diagnostics) = match args.what {
+        What::Tokens => {
+            let (tokens, diagnostics) = lexer::lex(file, &text);
+            (lexer::listing(&text, &tokens), diagnostics)
+        }
+        _ => {
+            let (module, diagnostics) = parser::parse(file, &text);
+            (parser::print(&module), diagnostics)
+        }
+    };
+    global.report(&sources, &diagnostics);
+    match diag::has_errors(&diagnostics) {
+        true => Err(Failure::Diagnostics),
+        false => Ok(shown),
+    }
+}
+
+/// The IR of what the file defines and of what that reaches.
+fn ir(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<String, Failure> {
+    let only = args.material.as_deref();
+    if only.is_some() {
+        compiled(args, loader, global)?;
+    }
+    let checked = compiler::check(&args.file, loader);
+    if only.is_none() {
+        global.report(&checked.sources, &checked.diagnostics);
+    }
+    match diag::has_errors(&checked.diagnostics) {
+        true => Err(Failure::Diagnostics),
+        false => Ok(impasto::ir_text(&checked, &args.file, only)),
+    }
+}
+
+/// The WGSL of one material, or of all that the file defines, with default parameters.
+fn wgsl(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<String, Failure> {
+    let program = compiled(args, loader, global)?;
+    let all: Vec<usize> = (0..program.materials().len()).collect();
+    Ok(program.wgsl(&all))
+}
+
+fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Program, Failure> {
+    let requests = requests(args, loader);
+    let compiled = compiler::compile(&requests, loader);
+    global.report(&compiled.sources, &compiled.diagnostics);
+    compiled.program.ok_or(Failure::Diagnostics)
+}
+
+/// A request for each material to print. A file without any is asked for its material all the
+/// same: the compiler knows what to say.
+fn requests(args: &EmitArgs, loader: &mut FileLoader) -> Vec<MaterialRequest> {
+    let request = |name: &str, material| MaterialRequest {
+        material,
+        ..MaterialRequest::new(name, &args.file)
+    };
+    if let Some(name) = &args.material {
+        return vec![request(name, Some(name.clone()))];
+    }
+    let names = compiler::check(&args.file, loader).materials;
+    match names.is_empty() {
+        true => vec![request("material", None)],
+        false => names.iter().map(|n| request(n, Some(n.clone()))).collect(),
+    }
+}

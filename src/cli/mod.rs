@@ -1,0 +1,174 @@
+//! The command line: options, exit codes, and what goes to which stream.
+//!
+//! Results and what programs read go to standard output; diagnostics for people, progress and
+//! notes go to standard error. A command fails in one of three ways, see [`Failure`].
+
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+
+use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
+use impasto::compiler::diag::{self, Diagnostic};
+use impasto::compiler::source::SourceMap;
+
+mod check;
+mod completions;
+mod emit;
+mod explain;
+
+/// A material language, and the wavefront path tracer its compiler feeds.
+#[derive(Parser)]
+#[command(
+    name = "impasto",
+    version,
+    after_help = "Exit codes: 0 fine; 1 diagnostics; 2 usage, input or output."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    global: Global,
+}
+
+/// Options of every command.
+#[derive(clap::Args)]
+struct Global {
+    /// Color diagnostics
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    color: ColorChoice,
+    /// Form of diagnostics and results: text for people, JSON on standard output for programs
+    #[arg(long, global = true, default_value = "text")]
+    format: Format,
+    /// Say more
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    /// Say nothing but errors and results
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Text,
+    Json,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Check material files and report every problem
+    Check(check::CheckArgs),
+    /// Print what the compiler makes of a material file
+    Emit(emit::EmitArgs),
+    /// Explain a diagnostic code, such as E0201; without one, list all
+    Explain(explain::ExplainArgs),
+    /// Print a completion script for a shell
+    Completions(completions::CompletionsArgs),
+}
+
+/// Why a command did not do what it was asked for.
+enum Failure {
+    /// The sources have errors, which were reported: exit code 1.
+    Diagnostics,
+    /// A usage, input or output error, still to be reported: exit code 2.
+    Error(String),
+}
+
+impl From<String> for Failure {
+    fn from(message: String) -> Self {
+        Failure::Error(message)
+    }
+}
+
+type Outcome = Result<(), Failure>;
+
+/// Reads the arguments, runs the command, reports its failure.
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let global = cli.global;
+    let outcome = match cli.command {
+        Command::Check(args) => check::run(&args, &global),
+        Command::Emit(args) => emit::run(&args, &global),
+        Command::Explain(args) => explain::run(&args, &global),
+        Command::Completions(args) => completions::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Diagnostics) => ExitCode::from(1),
+        Err(Failure::Error(message)) => {
+            say(&format!("{}: {message}", global.error_word()));
+            ExitCode::from(2)
+        }
+    }
+}
+
+impl Global {
+    /// Whether standard error takes colors.
+    fn colored(&self) -> bool {
+        match self.color {
+            ColorChoice::Always => true,
+            ColorChoice::Never => false,
+            ColorChoice::Auto => {
+                let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+                let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+                io::stderr().is_terminal() && !set("NO_COLOR") && !dumb
+            }
+        }
+    }
+
+    fn json(&self) -> bool {
+        self.format == Format::Json
+    }
+
+    fn error_word(&self) -> &'static str {
+        if self.colored() {
+            "\x1b[1;31merror\x1b[0m"
+        } else {
+            "error"
+        }
+    }
+
+    /// A note on standard error, unless `--quiet`.
+    fn note(&self, message: &str) {
+        if !self.quiet {
+            say(message);
+        }
+    }
+
+    /// Diagnostics as text on standard error; with `--quiet`, errors only.
+    fn report(&self, sources: &SourceMap, diagnostics: &[Diagnostic]) {
+        let wanted = |d: &&Diagnostic| d.is_error() || !self.quiet;
+        let shown: Vec<Diagnostic> = diagnostics.iter().filter(wanted).cloned().collect();
+        if !shown.is_empty() {
+            let text = diag::render::text(sources, &shown, self.colored());
+            say(text.trim_end());
+        }
+    }
+}
+
+/// Diagnostics as JSON values, to be part of a larger result.
+fn json(sources: &SourceMap, diagnostics: &[Diagnostic]) -> Vec<serde_json::Value> {
+    let text = diag::render::json(sources, diagnostics);
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+/// Writes a line to standard error; there is nobody left to tell when that fails.
+fn say(message: &str) {
+    let _ = writeln!(io::stderr().lock(), "{message}");
+}
+
+/// Writes to standard output. A reader that has gone away (`impasto ... | head`) is no error.
+fn print(text: &str) -> Outcome {
+    let mut out = io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Error(format!(
+            "cannot write to standard output: {}",
+            impasto::files::reason(&error)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// `1 error`, `2 errors`.
+fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}

@@ -1,0 +1,5 @@
+//! The command as its users meet it: exit codes, streams, files, and input that is not what it
+//! should be. Every test runs the built program.
+
+mod common;
+mod emit_check;
