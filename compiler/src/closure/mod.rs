@@ -146,7 +146,7 @@ fn may_transmit(module: &Module, sample: FunctionId) -> bool {
     f.exprs.iter().any(|e| match e.kind {
         ExprKind::Call(callee, _) => {
             let name = module.functions[callee.index()].name.as_str();
-            name == "refract" || may_transmit(module, callee)
+            name.starts_with("refract") || may_transmit(module, callee)
         }
         _ => false,
     })
