@@ -1,0 +1,3 @@
+//! What every generated scene keeps to.
+
+use super::*;
