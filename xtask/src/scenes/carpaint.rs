@@ -10,7 +10,12 @@ use super::mesh::Mesh;
 use super::obj::MtlEntry;
 use super::shapes::{Topology, grid_unshaded, signed_power};
 
-const MATERIALS: &[MtlEntry] = &[MtlEntry::glossy("car_paint", [0.26, 0.005, 0.005], 0.04, 600.0)];
+const MATERIALS: &[MtlEntry] = &[MtlEntry::glossy(
+    "car_paint",
+    [0.26, 0.005, 0.005],
+    0.04,
+    600.0,
+)];
 
 /// 50 columns and 96 rows, fans at the tips: 9,500 triangles.
 const COLUMNS: usize = 50;

@@ -7,7 +7,9 @@ mod building;
 mod car;
 mod facade;
 mod furniture;
+mod shop;
 mod street;
+mod window;
 
 use glam::{DVec3, dvec3};
 
@@ -56,7 +58,12 @@ const FACADES: f64 = 12.5;
 /// Height of the pavement.
 const PAVEMENT: f64 = 0.15;
 /// The blocks between the cross streets, from their near to their far end.
-const BLOCKS: [(f64, f64); 4] = [(44.0, 4.0), (-10.0, -84.0), (-98.0, -166.0), (-180.0, -246.0)];
+const BLOCKS: [(f64, f64); 4] = [
+    (44.0, 4.0),
+    (-10.0, -84.0),
+    (-98.0, -166.0),
+    (-180.0, -246.0),
+];
 /// Where the avenue ends.
 const END: f64 = -262.0;
 
@@ -93,12 +100,22 @@ fn along_kerbs(spacing: f64, first: f64) -> Vec<(f64, f64)> {
 /// Cars at the kerbs, with gaps, and a few that drive.
 fn park_cars(mesh: &mut Mesh, random: &mut Random) {
     let car = car::build();
-    let paints = ["paint_white", "paint_red", "paint_blue", "paint_grey", "paint_grey"];
+    let paints = [
+        "paint_white",
+        "paint_red",
+        "paint_blue",
+        "paint_grey",
+        "paint_grey",
+    ];
     let mut put = |paint: &'static str, position: DVec3, degrees: f64| {
-        mesh.place_as(&car, &placed(position, degrees), |material| match material {
-            "paint" => paint,
-            other => other,
-        });
+        mesh.place_as(
+            &car,
+            &placed(position, degrees),
+            |material| match material {
+                "paint" => paint,
+                other => other,
+            },
+        );
     };
     for (side, z) in along_kerbs(6.1, 6.5) {
         if z > -2.0 || !random.chance(0.62) {
@@ -107,7 +124,11 @@ fn park_cars(mesh: &mut Mesh, random: &mut Random) {
         let x = side * (ROAD - 1.15 + random.range(-0.06, 0.06));
         let heading = if side > 0.0 { 90.0 } else { -90.0 };
         let position = dvec3(x, 0.0, z + random.range(-0.3, 0.3));
-        put(random.pick(&paints), position, heading + random.range(-1.2, 1.2));
+        put(
+            random.pick(&paints),
+            position,
+            heading + random.range(-1.2, 1.2),
+        );
     }
     put("paint_yellow", dvec3(2.2, 0.0, -31.0), 90.0);
     put("paint_white", dvec3(-2.3, 0.0, -52.0), -90.0);

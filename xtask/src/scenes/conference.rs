@@ -88,7 +88,10 @@ fn grow(mesh: &mut Mesh, random: &mut Random) {
             .collect();
         for (half, material) in ["leaf", "leaf_light"].into_iter().enumerate() {
             let radii = dvec3(0.20, 0.20, 0.20);
-            mesh.add(material, foliage(random, &clumps, radii, 0.085, (count + half) / 2));
+            mesh.add(
+                material,
+                foliage(random, &clumps, radii, 0.085, (count + half) / 2),
+            );
         }
     }
 }

@@ -108,6 +108,30 @@ impl Surface {
         (next - at).angle_between(last - at)
     }
 
+    /// Merges positions that coincide and drops the triangles that this makes empty; to be called
+    /// before [`Surface::shaded`].
+    pub(crate) fn welded(mut self) -> Self {
+        let key = |p: &DVec3| (*p * 1e8).round().to_array().map(|c| c as i64);
+        let mut order: Vec<u32> = (0..self.positions.len() as u32).collect();
+        order.sort_by_key(|&i| (key(&self.positions[i as usize]), i));
+        let mut target: Vec<u32> = order.clone();
+        for pair in 0..order.len() {
+            let same = pair > 0
+                && key(&self.positions[order[pair] as usize])
+                    == key(&self.positions[order[pair - 1] as usize]);
+            let first = if same {
+                target[order[pair - 1] as usize]
+            } else {
+                order[pair]
+            };
+            target[order[pair] as usize] = first;
+        }
+        for triangle in std::mem::take(&mut self.triangles) {
+            self.triangle(triangle.map(|corner| (target[corner.position as usize], corner.uv)));
+        }
+        self
+    }
+
     /// The same surface with its texture coordinates multiplied by `scale`.
     pub(crate) fn scale_uv(mut self, scale: DVec2) -> Self {
         self.uvs.iter_mut().for_each(|uv| *uv *= scale);
@@ -127,16 +151,6 @@ impl Surface {
             self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
         self
-    }
-
-    /// Appends `other`.
-    pub(crate) fn append(&mut self, other: Surface) {
-        let offset = Offsets::of(&self.positions, &self.normals, &self.uvs);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| offset.shift(t)));
-        self.positions.extend(other.positions);
-        self.normals.extend(other.normals);
-        self.uvs.extend(other.uvs);
     }
 }
 

@@ -23,8 +23,9 @@ mod tests;
 mod textures;
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::shell;
 use mesh::Mesh;
 use obj::MtlEntry;
 
@@ -54,7 +55,13 @@ struct Recipe {
 const RECIPES: [Recipe; 6] = [
     Recipe {
         name: "cornell",
-        generate: || Ok(model_files("examples/cornell", "cornell", &cornell::build())),
+        generate: || {
+            Ok(model_files(
+                "examples/cornell",
+                "cornell",
+                &cornell::build(),
+            ))
+        },
     },
     Recipe {
         name: "carpaint",
@@ -98,15 +105,15 @@ struct Model {
 ///
 /// # Errors
 /// A message for people when a name is unknown or a file cannot be written.
-pub(crate) fn run(args: &ScenesArgs) -> Result<(), String> {
-    let root = match &args.out {
-        Some(folder) => folder.clone(),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join(".."),
-    };
+pub(crate) fn run(args: &ScenesArgs) -> shell::Result {
+    let root = args.out.as_deref().unwrap_or(shell::root());
     for name in &args.names {
         if !RECIPES.iter().any(|recipe| recipe.name == name) {
             let known: Vec<&str> = RECIPES.iter().map(|recipe| recipe.name).collect();
-            return Err(format!("there is no scene `{name}`; known are {}", known.join(", ")));
+            return Err(format!(
+                "there is no scene `{name}`; known are {}",
+                known.join(", ")
+            ));
         }
     }
     let is_chosen = |recipe: &&Recipe| {

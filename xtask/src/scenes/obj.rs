@@ -159,7 +159,7 @@ fn fixed(out: &mut Vec<u8>, value: f64, decimals: usize) {
     }
     let magnitude = rounded.unsigned_abs();
     unsigned(out, magnitude / scale, 1);
-    if magnitude % scale != 0 {
+    if !magnitude.is_multiple_of(scale) {
         out.push(b'.');
         unsigned(out, magnitude % scale, decimals);
         while out.last() == Some(&b'0') {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec3, dvec2, dvec3};
+use glam::{DVec2, DVec3, dvec3};
 
 use super::mesh::{Mesh, Surface};
 use super::random::Random;
@@ -25,7 +25,12 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// The tree with its foot at the origin: wood of `bark`, leaves of the two materials.
-    pub(crate) fn build(self, random: &mut Random, bark: &'static str, leaf: [&'static str; 2]) -> Mesh {
+    pub(crate) fn build(
+        self,
+        random: &mut Random,
+        bark: &'static str,
+        leaf: [&'static str; 2],
+    ) -> Mesh {
         let mut mesh = Mesh::default();
         let middle = dvec3(0.0, (self.clear + self.height) * 0.5, 0.0);
         let radii = dvec3(self.spread, (self.height - self.clear) * 0.5, self.spread);
@@ -42,10 +47,15 @@ impl Tree {
             let path = curve(&[fork, bend, tip], 3);
             mesh.add(bark, bar(&path, |t| thick * (0.45 - 0.35 * t), 6));
         }
-        let clumps: Vec<DVec3> = (0..14).map(|_| middle + radii * 0.72 * inside_ball(random)).collect();
+        let clumps: Vec<DVec3> = (0..14)
+            .map(|_| middle + radii * 0.72 * inside_ball(random))
+            .collect();
         for (half, material) in leaf.into_iter().enumerate() {
             let count = (self.leaves + half) / 2;
-            mesh.add(material, foliage(random, &clumps, radii * 0.42, 0.16, count));
+            mesh.add(
+                material,
+                foliage(random, &clumps, radii * 0.42, 0.24, count),
+            );
         }
         mesh
     }
@@ -60,8 +70,12 @@ pub(crate) fn foliage(
     size: f64,
     count: usize,
 ) -> Surface {
-    let mut surface = Surface::default();
-    surface.uvs = vec![dvec2(0., 0.), dvec2(1., 0.), dvec2(1., 1.), dvec2(0., 1.)];
+    let mut surface = Surface {
+        uvs: [(0., 0.), (1., 0.), (1., 1.), (0., 1.)]
+            .map(DVec2::from)
+            .to_vec(),
+        ..Surface::default()
+    };
     for _ in 0..count {
         let out = unit_vector(random);
         let depth = 1.0 - 0.6 * random.unit().powi(2);
@@ -74,27 +88,16 @@ pub(crate) fn foliage(
         let wide = normal.cross(long) * 0.42;
         let start = surface.positions.len() as u32;
         let droop = normal * (size * -0.12);
-        let corners = [center - long * 0.5 + droop, center + wide * 0.5, center + long * 0.5 + droop];
+        let corners = [
+            center - long * 0.5 + droop,
+            center + wide * 0.5,
+            center + long * 0.5 + droop,
+        ];
         surface.positions.extend(corners);
         surface.positions.push(center - wide * 0.5);
         surface.quad([0, 1, 2, 3].map(|k| (start + k, k)));
     }
     surface.shaded(50.0)
-}
-
-/// A long arching leaf that grows from `root` in the direction of `azimuth`; two triangles a
-/// step of `steps` and side.
-pub(crate) fn blade(root: DVec3, azimuth: f64, length: f64, rise: f64, steps: usize) -> Surface {
-    use super::shapes::{Topology, grid};
-    let turn = DMat3::from_rotation_y(azimuth);
-    grid(2, steps, Topology::Sheet, |u, v| {
-        // Grows along +z; its width is along x, its tip a short edge.
-        let along = length * v * (1.0 - 0.25 * v);
-        let height = rise * v * (1.6 - v * 1.25);
-        let half = 0.11 * length * (1.05 - v) * (0.35 + 1.6 * v).min(1.0);
-        let x = (u - 0.5) * -2.0 * half;
-        root + turn * dvec3(x, height + 0.35 * x.abs(), along)
-    })
 }
 
 /// A random direction.

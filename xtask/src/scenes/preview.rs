@@ -21,7 +21,10 @@ pub(crate) fn build() -> Model {
     let mut mesh = Mesh::default();
     // Texture coordinates are metres, twice around the equator.
     let ball = sphere(RADIUS, 64, 32).scale_uv(dvec2(0.5, 0.25));
-    mesh.add("sample", ball.transformed(&placed(dvec3(0.0, 0.098, 0.0), 90.0)));
+    mesh.add(
+        "sample",
+        ball.transformed(&placed(dvec3(0.0, 0.098, 0.0), 90.0)),
+    );
     let profile = [
         (0.0, 0.0),
         (0.052, 0.0),

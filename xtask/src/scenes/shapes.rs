@@ -1,7 +1,7 @@
 //! The shapes that scenes are built of. Every function gives a shaded [`Surface`] whose front
 //! faces outward; closed shapes are closed in the sense of shared positions.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, dvec2, dvec3};
 
@@ -95,6 +95,11 @@ pub(crate) fn block(low: DVec3, high: DVec3) -> Surface {
     faces(low, high, &[0, 1, 2, 3, 4])
 }
 
+/// A box without its back (-z), to be set on a wall.
+pub(crate) fn relief(low: DVec3, high: DVec3) -> Surface {
+    faces(low, high, &[0, 1, 2, 4, 5])
+}
+
 /// An axis-aligned box; texture coordinates are metres.
 pub(crate) fn cuboid(low: DVec3, high: DVec3) -> Surface {
     faces(low, high, &[0, 1, 2, 3, 4, 5])
@@ -134,35 +139,35 @@ fn faces(low: DVec3, high: DVec3, chosen: &[usize]) -> Surface {
 }
 
 /// A box around the origin with edges rounded by `radius`, in `n` segments an edge.
+///
+/// It is a sphere whose octants are pulled apart: each quarter of a circle has `n + 1` columns or
+/// rows of its own.
 pub(crate) fn rounded_box(size: DVec3, radius: f64, n: usize) -> Surface {
     let core = (size * 0.5 - radius).max(DVec3::ZERO);
-    // Corners of a sphere, pulled apart by the core box: rows 0..=n are below, the rest above.
-    let split = |t: f64, count: usize| {
-        let index = (t * (2 * count + 1) as f64).round() as usize;
-        let (side, step) = if index <= count {
-            (-1.0, index)
-        } else {
-            (1.0, index - 1)
-        };
-        (side, step as f64 / (2 * count) as f64)
-    };
-    grid(4 * (n + 1), 2 * n + 3, Topology::Ball, move |u, v| {
-        let index = (u * (4 * (n + 1)) as f64).round() as usize % (4 * (n + 1));
-        let (quadrant, step) = (index / (n + 1), index % (n + 1));
-        let azimuth = (quadrant as f64 + step as f64 / n as f64) * PI / 2.0;
-        let sign_x = if quadrant == 0 || quadrant == 3 { 1.0 } else { -1.0 };
-        let sign_z = if quadrant < 2 { -1.0 } else { 1.0 };
-        let row = (v * (2 * n + 3) as f64).round() as usize;
-        if row == 0 || row == 2 * n + 3 {
-            let side = if row == 0 { -1.0 } else { 1.0 };
-            return dvec3(0.0, side * (core.y + radius), 0.0);
+    let (columns, rows) = (4 * (n + 1), 2 * (n + 1) + 1);
+    let arc = |index: usize| (index / (n + 1), (index % (n + 1)) as f64 / n as f64);
+    let surface = grid_unshaded(columns, rows, Topology::Ball, |u, v| {
+        let row = (v * rows as f64).round() as usize;
+        if row == 0 || row == rows {
+            return dvec3(0.0, (core.y + radius).copysign(v - 0.5), 0.0);
         }
-        let (side, t) = split((row - 1) as f64 / (2 * n + 1) as f64, n);
-        let latitude = (t - 0.5) * PI;
-        let (sin, cos) = latitude.sin_cos();
-        let on_sphere = dvec3(cos * azimuth.cos(), sin, -cos * azimuth.sin());
-        on_sphere * radius + core * dvec3(sign_x, side, sign_z)
-    })
+        let (quadrant, along) = arc((u * columns as f64).round() as usize % columns);
+        let (sin_u, cos_u) = ((quadrant as f64 + along) * FRAC_PI_2).sin_cos();
+        let (half, up) = arc(row - 1);
+        let (sin_v, cos_v) = ((half as f64 + up - 1.0) * FRAC_PI_2).sin_cos();
+        let octant = dvec3(
+            if quadrant == 0 || quadrant == 3 {
+                1.0
+            } else {
+                -1.0
+            },
+            if half == 0 { -1.0 } else { 1.0 },
+            if quadrant < 2 { -1.0 } else { 1.0 },
+        );
+        dvec3(cos_v * cos_u, sin_v, -cos_v * sin_u) * radius + core * octant
+    });
+    // Columns meet above and below, and edges of zero length where the core has no extent.
+    surface.welded().shaded(CREASE)
 }
 
 /// A sphere around the origin.
@@ -206,7 +211,11 @@ pub(crate) fn signed_power(x: f64, e: f64) -> f64 {
 pub(crate) fn lathe(profile: &[DVec2], columns: usize) -> Surface {
     let rows = profile.len() - 1;
     let on_axis = profile[0].x == 0.0 && profile[rows].x == 0.0;
-    let topology = if on_axis { Topology::Ball } else { Topology::Tube };
+    let topology = if on_axis {
+        Topology::Ball
+    } else {
+        Topology::Tube
+    };
     grid(columns, rows, topology, |u, v| {
         let p = profile[(v * rows as f64).round() as usize];
         let (sin, cos) = (u * TAU).sin_cos();
@@ -228,7 +237,11 @@ pub(crate) fn bar(path: &[DVec3], radius: impl Fn(f64) -> f64, columns: usize) -
         let row = (v * (last + 2) as f64).round() as usize;
         let station = row.saturating_sub(1).min(last);
         let is_end = row == 0 || row == last + 2;
-        let r = if is_end { 0.0 } else { radius(station as f64 / last as f64) };
+        let r = if is_end {
+            0.0
+        } else {
+            radius(station as f64 / last as f64)
+        };
         let (sin, cos) = (u * TAU).sin_cos();
         path[station] + frames[station] * dvec3(r * cos, r * sin, 0.0)
     })
@@ -297,14 +310,20 @@ mod tests {
         let shapes = [
             ("cuboid", cuboid(DVec3::ZERO, DVec3::ONE)),
             ("sphere", sphere(1.0, 24, 12)),
-            ("superellipsoid", superellipsoid(dvec3(1., 2., 3.), 0.4, 0.6, 24, 12)),
+            (
+                "superellipsoid",
+                superellipsoid(dvec3(1., 2., 3.), 0.4, 0.6, 24, 12),
+            ),
             ("rounded box", rounded_box(dvec3(1., 2., 3.), 0.2, 4)),
             ("cylinder", cylinder(1.0, 0.0, 2.0, 24)),
             ("bar", bar(&arc, |t| 0.1 + 0.1 * t, 12)),
         ];
         for (name, shape) in shapes {
             assert!(is_closed(&shape.triangles), "{name} is open");
-            assert!(signed_volume(&shape.positions, &shape.triangles) > 0.0, "{name} is inside out");
+            assert!(
+                signed_volume(&shape.positions, &shape.triangles) > 0.0,
+                "{name} is inside out"
+            );
         }
     }
 

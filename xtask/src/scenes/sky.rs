@@ -198,7 +198,9 @@ const SOFTBOXES: [Softbox; 6] = [
 /// A dark studio with soft and hard lamps.
 pub(crate) fn studio() -> Result<Vec<u8>, String> {
     environment(WIDTH, |direction| {
-        let lamps = SOFTBOXES.iter().map(|lamp| lamp.radiance * lamp.weight(direction));
+        let lamps = SOFTBOXES
+            .iter()
+            .map(|lamp| lamp.radiance * lamp.weight(direction));
         backdrop(direction) + lamps.sum::<DVec3>()
     })
 }

@@ -19,7 +19,11 @@ pub(crate) fn brick() -> Result<Vec<u8>, String> {
         }
         let tone = lattice(brick as i64, course as i64, 0, 21);
         let fired = dvec3(0.56, 0.27, 0.19).lerp(dvec3(0.44, 0.20, 0.16), tone);
-        let fired = if tone > 0.93 { dvec3(0.34, 0.19, 0.17) } else { fired };
+        let fired = if tone > 0.93 {
+            dvec3(0.34, 0.19, 0.17)
+        } else {
+            fired
+        };
         fired * (0.86 + 0.28 * grain)
     })
 }
@@ -30,14 +34,23 @@ pub(crate) fn concrete() -> Result<Vec<u8>, String> {
         let blotches = tiled_noise(uv, 4, 5, 31);
         let pores = tiled_noise(uv, 64, 2, 32);
         let streaks = tiled_noise(dvec2(uv.x, 0.5 + 0.06 * uv.y), 24, 2, 33);
-        let mut tone = 0.60 + 0.16 * (blotches - 0.5) + 0.07 * (pores - 0.5) + 0.06 * (streaks - 0.5);
+        let mut tone =
+            0.60 + 0.16 * (blotches - 0.5) + 0.07 * (pores - 0.5) + 0.06 * (streaks - 0.5);
         let panel = dvec2((uv.x * 2.0).fract(), uv.y);
         if panel.x < 0.008 || panel.y < 0.006 {
             tone *= 0.72;
         }
-        let holes = [dvec2(0.25, 0.2), dvec2(0.75, 0.2), dvec2(0.25, 0.8), dvec2(0.75, 0.8)];
+        let holes = [
+            dvec2(0.25, 0.2),
+            dvec2(0.75, 0.2),
+            dvec2(0.25, 0.8),
+            dvec2(0.75, 0.8),
+        ];
         let scale = dvec2(1.5, 3.0);
-        if holes.iter().any(|hole| ((panel - *hole) * scale).length() < 0.03) {
+        if holes
+            .iter()
+            .any(|hole| ((panel - *hole) * scale).length() < 0.03)
+        {
             tone *= 0.55;
         }
         dvec3(1.0, 0.985, 0.955) * tone
@@ -109,7 +122,10 @@ mod tests {
             let far = tiled_noise(dvec2(1.0 - 1e-9, y), 8, 4, 3);
             assert!((near - far).abs() < 1e-6, "{near} and {far}");
         }
-        assert_ne!(tiled_noise(dvec2(0.1, 0.1), 8, 4, 3), tiled_noise(dvec2(0.6, 0.1), 8, 4, 3));
+        assert_ne!(
+            tiled_noise(dvec2(0.1, 0.1), 8, 4, 3),
+            tiled_noise(dvec2(0.6, 0.1), 8, 4, 3)
+        );
     }
 
     #[test]
@@ -120,7 +136,10 @@ mod tests {
             let tones: Vec<f64> = picture.pixels().map(|p| f64::from(p.0[1])).collect();
             let mean = tones.iter().sum::<f64>() / tones.len() as f64;
             let spread = tones.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / tones.len() as f64;
-            assert!((60.0..220.0).contains(&mean) && spread > 20.0, "{mean} {spread}");
+            assert!(
+                (60.0..220.0).contains(&mean) && spread > 20.0,
+                "{mean} {spread}"
+            );
         }
     }
 }

@@ -35,7 +35,11 @@ fn row(mesh: &mut Mesh, random: &mut Random, side: f64, near: f64, far: f64) {
     let mut last = Style::Curtain;
     while z > far + 1.0 {
         let wished = random.range(13.0, 21.0);
-        let width = if z - wished < far + 11.0 { z - far } else { wished };
+        let width = if z - wished < far + 11.0 {
+            z - far
+        } else {
+            wished
+        };
         let style = next_style(random, last);
         last = style;
         let depth = random.range(13.0, 17.0);
@@ -46,8 +50,22 @@ fn row(mesh: &mut Mesh, random: &mut Random, side: f64, near: f64, far: f64) {
         };
         let (ends_near, ends_far) = (z == near, z - width <= far + 0.01);
         let house = House {
-            low: [if side > 0.0 { FACADES } else { -FACADES - depth }, z - width],
-            high: [if side > 0.0 { FACADES + depth } else { -FACADES }, z],
+            low: [
+                if side > 0.0 {
+                    FACADES
+                } else {
+                    -FACADES - depth
+                },
+                z - width,
+            ],
+            high: [
+                if side > 0.0 {
+                    FACADES + depth
+                } else {
+                    -FACADES
+                },
+                z,
+            ],
             floors,
             style,
             on_street: [side < 0.0, side > 0.0, ends_near, ends_far],
@@ -67,7 +85,10 @@ fn behind(random: &mut Random, front: &House, side: f64) -> House {
     let (near_x, far_x) = (FACADES + 17.0 + gap, FACADES + 31.0 + gap);
     House {
         low: [if side > 0.0 { near_x } else { -far_x }, front.low[1] + 1.0],
-        high: [if side > 0.0 { far_x } else { -near_x }, front.high[1] - 1.0],
+        high: [
+            if side > 0.0 { far_x } else { -near_x },
+            front.high[1] - 1.0,
+        ],
         floors: front.floors + random.range(4.0, 10.0) as usize,
         style: random.pick(&[Style::Curtain, Style::Concrete, Style::Brick]),
         on_street: [side < 0.0, side > 0.0, false, false],
@@ -92,6 +113,7 @@ impl House {
             style: self.style,
             floors: self.floors,
             shops: self.shops,
+            distant: !self.shops,
             seed: u64::from(random.next()),
         };
         let ([x0, z0], [x1, z1]) = (self.low, self.high);
@@ -127,7 +149,10 @@ impl House {
         ];
         for (low, high) in sides {
             let low = dvec3(low[0], top - 0.7, low[1]);
-            mesh.add(self.style.trim(), block(low, dvec3(high[0], top + 0.04, high[1])));
+            mesh.add(
+                self.style.trim(),
+                block(low, dvec3(high[0], top + 0.04, high[1])),
+            );
         }
         let spot = |random: &mut Random| {
             let x = random.range(x0 + 2.5, x1 - 2.5);
@@ -135,17 +160,27 @@ impl House {
         };
         for _ in 0..3 {
             let at = spot(random);
-            let size = dvec3(random.range(0.8, 1.6), random.range(0.7, 1.2), random.range(0.8, 2.2));
+            let size = dvec3(
+                random.range(0.8, 1.6),
+                random.range(0.7, 1.2),
+                random.range(0.8, 2.2),
+            );
             mesh.add("metal", block(at, at + size));
         }
         let at = spot(random);
         if random.chance(0.45) {
             mesh.place(&tank(), &placed(at, 0.0));
         } else {
-            mesh.add(self.style.wall(), block(at - dvec3(1.5, 0., 1.5), at + dvec3(1.5, 2.6, 1.5)));
+            mesh.add(
+                self.style.wall(),
+                block(at - dvec3(1.5, 0., 1.5), at + dvec3(1.5, 2.6, 1.5)),
+            );
         }
         let mast = spot(random);
-        mesh.add("metal", rod(mast, mast + DVec3::Y * random.range(2.0, 5.0), 0.03, 5));
+        mesh.add(
+            "metal",
+            rod(mast, mast + DVec3::Y * random.range(2.0, 5.0), 0.03, 5),
+        );
     }
 }
 
@@ -153,9 +188,19 @@ impl House {
 fn tank() -> Mesh {
     let mut mesh = Mesh::default();
     for (x, z) in [(0.8, 0.8), (-0.8, 0.8), (0.8, -0.8), (-0.8, -0.8)] {
-        mesh.add("metal", rod(dvec3(x, 0.0, z), dvec3(x * 0.9, 2.1, z * 0.9), 0.07, 6));
+        mesh.add(
+            "metal",
+            rod(dvec3(x, 0.0, z), dvec3(x * 0.9, 2.1, z * 0.9), 0.07, 6),
+        );
     }
-    let profile = [(0.0, 2.1), (1.3, 2.1), (1.35, 2.2), (1.25, 4.4), (1.42, 4.45), (0.0, 5.5)];
+    let profile = [
+        (0.0, 2.1),
+        (1.3, 2.1),
+        (1.35, 2.2),
+        (1.25, 4.4),
+        (1.42, 4.45),
+        (0.0, 5.5),
+    ];
     mesh.add("bark", lathe(&profile.map(|(r, y)| dvec2(r, y)), 24));
     mesh
 }
@@ -170,16 +215,24 @@ pub(super) fn build_landmark(mesh: &mut Mesh) {
             style: Style::Limestone,
             floors,
             shops: base == PAVEMENT,
+            distant: false,
             seed: floors as u64,
         };
-        let turns = [(0.0, [-half, half]), (90.0, [half, half]), (-90.0, [-half, -half])];
+        let turns = [
+            (0.0, [-half, half]),
+            (90.0, [half, half]),
+            (-90.0, [-half, -half]),
+        ];
         for (degrees, [x, z]) in turns {
             let stand = placed(center + dvec3(x, base, z), degrees);
             mesh.place(&facade.build(2.0 * half), &stand);
         }
         top = base + facade.height();
         let low = center + dvec3(-half, top - 0.5, -half);
-        mesh.add("limestone", block(low, center + dvec3(half, top + 0.02, half)));
+        mesh.add(
+            "limestone",
+            block(low, center + dvec3(half, top + 0.02, half)),
+        );
     }
     let spire = [
         (6.2, 0.0),
@@ -192,6 +245,12 @@ pub(super) fn build_landmark(mesh: &mut Mesh) {
         (0.06, 26.0),
     ];
     let spire = lathe(&spire.map(|(r, y)| dvec2(r, y)), 40);
-    mesh.add("awning_green", spire.transformed(&placed(center + DVec3::Y * top, 0.0)));
-    mesh.add("limestone", cylinder(6.6, top, top + 0.6, 40).transformed(&placed(center, 0.0)));
+    mesh.add(
+        "awning_green",
+        spire.transformed(&placed(center + DVec3::Y * top, 0.0)),
+    );
+    mesh.add(
+        "limestone",
+        cylinder(6.6, top, top + 0.6, 40).transformed(&placed(center, 0.0)),
+    );
 }

@@ -26,7 +26,12 @@ pub(super) fn build(mesh: &mut Mesh) {
             for z in [near, far] {
                 let inward = if z == near { -1.0 } else { 1.0 };
                 for i in 0..4 {
-                    put(&bollard, side, 0.45, z + inward * (0.6 + 1.3 * f64::from(i)));
+                    put(
+                        &bollard,
+                        side,
+                        0.45,
+                        z + inward * (0.6 + 1.3 * f64::from(i)),
+                    );
                 }
             }
         }
@@ -37,7 +42,14 @@ pub(super) fn build(mesh: &mut Mesh) {
 /// A mast with an arm over the road.
 fn lamp() -> Mesh {
     let mut mesh = Mesh::default();
-    let foot = [(0.0, 0.0), (0.16, 0.0), (0.14, 0.25), (0.09, 0.75), (0.075, 0.8), (0.0, 0.8)];
+    let foot = [
+        (0.0, 0.0),
+        (0.16, 0.0),
+        (0.14, 0.25),
+        (0.09, 0.75),
+        (0.075, 0.8),
+        (0.0, 0.8),
+    ];
     mesh.add("metal", lathe(&foot.map(|(r, y)| dvec2(r, y)), 16));
     let mast = [
         dvec3(0.0, 0.75, 0.0),
@@ -48,9 +60,15 @@ fn lamp() -> Mesh {
     ];
     mesh.add("metal", bar(&curve(&mast, 6), |t| 0.07 - 0.035 * t, 12));
     let head = superellipsoid(dvec3(0.32, 0.06, 0.12), 0.8, 0.8, 20, 10);
-    mesh.add("metal", head.transformed(&DAffine3::from_translation(dvec3(2.0, 6.13, 0.0))));
+    mesh.add(
+        "metal",
+        head.transformed(&DAffine3::from_translation(dvec3(2.0, 6.13, 0.0))),
+    );
     let glass = superellipsoid(dvec3(0.25, 0.05, 0.09), 0.8, 0.8, 20, 8);
-    mesh.add("lamp", glass.transformed(&DAffine3::from_translation(dvec3(2.02, 6.09, 0.0))));
+    mesh.add(
+        "lamp",
+        glass.transformed(&DAffine3::from_translation(dvec3(2.02, 6.09, 0.0))),
+    );
     mesh
 }
 
@@ -58,7 +76,11 @@ fn lamp() -> Mesh {
 fn bench() -> Mesh {
     let mut mesh = Mesh::default();
     let mut slat = |x: f64, y: f64, tall: bool| {
-        let half = if tall { dvec3(0.015, 0.045, 0.9) } else { dvec3(0.045, 0.015, 0.9) };
+        let half = if tall {
+            dvec3(0.015, 0.045, 0.9)
+        } else {
+            dvec3(0.045, 0.015, 0.9)
+        };
         let center = dvec3(x, y, 0.0);
         mesh.add("bark", cuboid(center - half, center + half));
     };
@@ -69,11 +91,19 @@ fn bench() -> Mesh {
         slat(0.26, 0.58 + 0.12 * f64::from(i), true);
     }
     for z in [-0.7, 0.7] {
-        let leg = [dvec3(-0.18, 0.0, z), dvec3(-0.16, 0.43, z), dvec3(0.2, 0.43, z), dvec3(0.24, 0.88, z)];
+        let leg = [
+            dvec3(-0.18, 0.0, z),
+            dvec3(-0.16, 0.43, z),
+            dvec3(0.2, 0.43, z),
+            dvec3(0.24, 0.88, z),
+        ];
         for pair in leg.windows(2) {
             mesh.add("metal", rod(pair[0], pair[1], 0.02, 8));
         }
-        mesh.add("metal", rod(dvec3(0.2, 0.43, z), dvec3(0.22, 0.0, z), 0.02, 8));
+        mesh.add(
+            "metal",
+            rod(dvec3(0.2, 0.43, z), dvec3(0.22, 0.0, z), 0.02, 8),
+        );
     }
     mesh
 }
@@ -89,7 +119,10 @@ fn bin() -> Mesh {
         (0.22, 0.88),
         (0.0, 0.80),
     ];
-    mesh.add("awning_green", lathe(&profile.map(|(r, y)| dvec2(r, y)), 24));
+    mesh.add(
+        "awning_green",
+        lathe(&profile.map(|(r, y)| dvec2(r, y)), 24),
+    );
     mesh
 }
 
@@ -120,11 +153,17 @@ fn signals(mesh: &mut Mesh) {
                 let center = arm - dvec3(side * reach, 0.55, -0.12 * facing);
                 let half = dvec3(0.15, 0.45, 0.09);
                 mesh.add("metal", cuboid(center - half, center + half));
-                for (i, glass) in ["awning_red", "paint_yellow", "awning_green"].into_iter().enumerate() {
+                for (i, glass) in ["awning_red", "paint_yellow", "awning_green"]
+                    .into_iter()
+                    .enumerate()
+                {
                     let lens = cylinder(0.09, 0.0, 0.03, 16);
                     let turn = glam::DQuat::from_rotation_x(facing * std::f64::consts::FRAC_PI_2);
                     let at = center + dvec3(0.0, 0.28 - 0.28 * i as f64, 0.088 * facing);
-                    mesh.add(glass, lens.transformed(&DAffine3::from_rotation_translation(turn, at)));
+                    mesh.add(
+                        glass,
+                        lens.transformed(&DAffine3::from_rotation_translation(turn, at)),
+                    );
                 }
             }
         }

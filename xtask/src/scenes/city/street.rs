@@ -38,20 +38,43 @@ fn pavement(mesh: &mut Mesh, side: f64, near: f64, far: f64) {
         mesh.add(material, block(low, dvec3(a.max(b), top, z[1])));
     };
     let outer = FACADES + 26.0;
-    slab("sidewalk", [ROAD + kerb, outer], [far + kerb, near - kerb], PAVEMENT);
+    slab(
+        "sidewalk",
+        [ROAD + kerb, outer],
+        [far + kerb, near - kerb],
+        PAVEMENT,
+    );
     // Kerbstones of a metre, with joints.
     let mut z = near;
     while z - 1.0 >= far {
-        slab("kerb", [ROAD, ROAD + kerb], [z - 0.994, z], PAVEMENT + 0.006);
+        slab(
+            "kerb",
+            [ROAD, ROAD + kerb],
+            [z - 0.994, z],
+            PAVEMENT + 0.006,
+        );
         z -= 1.0;
     }
-    slab("kerb", [ROAD + kerb, outer], [far, far + kerb], PAVEMENT + 0.006);
-    slab("kerb", [ROAD + kerb, outer], [near - kerb, near], PAVEMENT + 0.006);
+    slab(
+        "kerb",
+        [ROAD + kerb, outer],
+        [far, far + kerb],
+        PAVEMENT + 0.006,
+    );
+    slab(
+        "kerb",
+        [ROAD + kerb, outer],
+        [near - kerb, near],
+        PAVEMENT + 0.006,
+    );
 }
 
 /// A zebra crossing and a stop line at both ends of a block.
 fn crossings(mesh: &mut Mesh, near: f64, far: f64) {
-    for (from, to, stop) in [(far + 1.0, far + 4.2, far + 5.0), (near - 4.2, near - 1.0, near - 5.6)] {
+    for (from, to, stop) in [
+        (far + 1.0, far + 4.2, far + 5.0),
+        (near - 4.2, near - 1.0, near - 5.6),
+    ] {
         let mut x = -ROAD + 0.45;
         while x < ROAD - 0.6 {
             stripe(mesh, dvec3(x, MARKING, to), 0.5, to - from);

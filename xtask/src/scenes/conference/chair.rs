@@ -8,8 +8,8 @@ use super::super::mesh::{Mesh, Surface};
 use super::super::shapes::{Topology, bar, curve, grid_unshaded, lathe, signed_power};
 
 /// Columns around the shell's section and rows along its profile.
-const COLUMNS: usize = 88;
-const ROWS: usize = 76;
+const COLUMNS: usize = 76;
+const ROWS: usize = 66;
 /// Half of the shell's thickness in metres.
 const HALF_THICKNESS: f64 = 0.0055;
 
@@ -19,10 +19,10 @@ const PROFILE: [DVec2; 11] = [
     dvec2(0.205, 0.432),
     dvec2(0.120, 0.446),
     dvec2(0.000, 0.438),
-    dvec2(-0.105, 0.428),
-    dvec2(-0.175, 0.440),
-    dvec2(-0.215, 0.492),
-    dvec2(-0.238, 0.580),
+    dvec2(-0.095, 0.431),
+    dvec2(-0.165, 0.452),
+    dvec2(-0.213, 0.504),
+    dvec2(-0.238, 0.585),
     dvec2(-0.258, 0.680),
     dvec2(-0.280, 0.770),
     dvec2(-0.305, 0.845),
@@ -33,7 +33,7 @@ const WIDTH: [f64; 11] = [
 ];
 /// How far the edges curl towards the sitter at each point, metres.
 const CURL: [f64; 11] = [
-    0.004, 0.010, 0.026, 0.050, 0.080, 0.110, 0.120, 0.100, 0.074, 0.054, 0.040,
+    0.002, 0.006, 0.016, 0.030, 0.046, 0.058, 0.062, 0.062, 0.056, 0.048, 0.038,
 ];
 
 /// The chair with its column on the origin, facing +x.
@@ -55,7 +55,9 @@ fn shell() -> Surface {
         let t = 0.5 - 0.5 * (PI * (0.5 + (v - 0.5) * 0.98 + 0.01 * (2.0 * v - 1.0))).cos();
         let (center, along) = on_curve(&spine, t);
         let toward_sitter = dvec3(-along.y, along.x, 0.0) * -1.0;
-        let corner = (1.0 - (2.0 * t - 1.0).abs().powi(9)).max(0.0).powf(1.0 / 3.0);
+        let corner = (1.0 - (2.0 * t - 1.0).abs().powi(9))
+            .max(0.0)
+            .powf(1.0 / 3.0);
         let (sin, cos) = (u * TAU).sin_cos();
         let across = signed_power(cos, 0.75);
         let lift = curl(t) * (0.35 * across.powi(2) + 0.65 * across.powi(4)) * corner.powi(2);
@@ -101,7 +103,13 @@ fn base(mesh: &mut Mesh) {
         let out = |r: f64, y: f64| dvec3(r * cos, y, r * sin);
         let path = curve(&[out(0.01, 0.112), out(0.12, 0.092), out(0.29, 0.032)], 8);
         mesh.add("chrome", bar(&path, |t| 0.014 - 0.005 * t, 12));
-        let glide = [(0.0, 0.0), (0.018, 0.0), (0.020, 0.004), (0.012, 0.026), (0.0, 0.026)];
+        let glide = [
+            (0.0, 0.0),
+            (0.018, 0.0),
+            (0.020, 0.004),
+            (0.012, 0.026),
+            (0.0, 0.026),
+        ];
         let glide = lathe(&glide.map(|(r, y)| dvec2(r, y)), 16);
         let stand = super::super::shapes::placed(out(0.285, 0.0), 0.0);
         mesh.add("black", glide.transformed(&stand));

@@ -26,26 +26,45 @@ pub(super) fn build(mesh: &mut Mesh) {
 
 /// Six faces that look inward.
 fn shell(mesh: &mut Mesh) {
-    let (x, y, z) = (dvec3(2.0 * HALF_X, 0., 0.), dvec3(0., HEIGHT, 0.), dvec3(0., 0., 2.0 * HALF_Z));
+    let (x, y, z) = (
+        dvec3(2.0 * HALF_X, 0., 0.),
+        dvec3(0., HEIGHT, 0.),
+        dvec3(0., 0., 2.0 * HALF_Z),
+    );
     let corner = |sx: f64, y: f64, sz: f64| dvec3(sx * HALF_X, y, sz * HALF_Z);
     mesh.add("floor", rectangle(corner(-1., 0., 1.), x, -z));
     mesh.add("ceiling", rectangle(corner(-1., HEIGHT, -1.), x, z));
-    mesh.add("wall", rectangle(corner(-1., 0., -1.), x, y));
+    mesh.add("black", rectangle(corner(-1., 0., -1.), x, y));
     mesh.add("wall", rectangle(corner(1., 0., 1.), -x, y));
     mesh.add("wall", rectangle(corner(-1., 0., 1.), -z, y));
     // Texture coordinates from 0 to 1, for the fractal.
     let wall = rectangle(corner(1., 0., -1.), z, y);
-    mesh.add("mandelbrot", wall.scale_uv(dvec2(1.0 / z.length(), 1.0 / y.length())));
+    mesh.add(
+        "mandelbrot",
+        wall.scale_uv(dvec2(1.0 / z.length(), 1.0 / y.length())),
+    );
 }
 
 /// A dark strip where walls meet the floor.
 fn skirting(mesh: &mut Mesh) {
     let (depth, height) = (0.016, 0.09);
     let mut strip = |low: DVec3, high: DVec3| mesh.add("black", block(low, high));
-    strip(dvec3(-HALF_X, 0., -HALF_Z), dvec3(HALF_X, height, depth - HALF_Z));
-    strip(dvec3(-HALF_X, 0., HALF_Z - depth), dvec3(HALF_X, height, HALF_Z));
-    strip(dvec3(-HALF_X, 0., -HALF_Z), dvec3(depth - HALF_X, height, HALF_Z));
-    strip(dvec3(HALF_X - depth, 0., -HALF_Z), dvec3(HALF_X, height, HALF_Z));
+    strip(
+        dvec3(-HALF_X, 0., -HALF_Z),
+        dvec3(HALF_X, height, depth - HALF_Z),
+    );
+    strip(
+        dvec3(-HALF_X, 0., HALF_Z - depth),
+        dvec3(HALF_X, height, HALF_Z),
+    );
+    strip(
+        dvec3(-HALF_X, 0., -HALF_Z),
+        dvec3(depth - HALF_X, height, HALF_Z),
+    );
+    strip(
+        dvec3(HALF_X - depth, 0., -HALF_Z),
+        dvec3(HALF_X, height, HALF_Z),
+    );
 }
 
 /// Frames that hang around the light panels, and shallow coffers over the whole ceiling.
@@ -55,7 +74,10 @@ fn panels(mesh: &mut Mesh) {
     for x in PANELS {
         let mut side = |low: [f64; 2], high: [f64; 2]| {
             let low = dvec3(x + low[0], HEIGHT - drop, low[1]);
-            mesh.add("aluminium", cuboid(low, dvec3(x + high[0], HEIGHT - 0.001, high[1])));
+            mesh.add(
+                "aluminium",
+                cuboid(low, dvec3(x + high[0], HEIGHT - 0.001, high[1])),
+            );
         };
         side([-a - wide, -b - wide], [a + wide, -b]);
         side([-a - wide, b], [a + wide, b + wide]);
@@ -65,15 +87,21 @@ fn panels(mesh: &mut Mesh) {
     for i in -4..=4 {
         let x = 1.33 * f64::from(i);
         let low = dvec3(x - 0.02, HEIGHT - 0.035, -HALF_Z);
-        if PANELS.iter().all(|panel| (x - panel).abs() > a + wide + 0.02) {
-            mesh.add("ceiling", cuboid(low, dvec3(x + 0.02, HEIGHT - 0.001, HALF_Z)));
+        if PANELS
+            .iter()
+            .all(|panel| (x - panel).abs() > a + wide + 0.02)
+        {
+            mesh.add(
+                "ceiling",
+                cuboid(low, dvec3(x + 0.02, HEIGHT - 0.001, HALF_Z)),
+            );
         }
     }
 }
 
-/// Upright timber slats on the long wall at -z.
+/// Upright timber slats on the long wall at -z, which is dark behind them.
 fn slats(mesh: &mut Mesh) {
-    let slat = rounded_box(dvec3(0.045, HEIGHT - 0.12, 0.032), 0.004, 2);
+    let slat = rounded_box(dvec3(0.045, HEIGHT - 0.12, 0.032), 0.004, 1);
     for i in 0..126 {
         let x = -5.9 + 0.094 * f64::from(i);
         let at = dvec3(x, 0.5 * HEIGHT + 0.045, 0.018 - HALF_Z);
@@ -111,7 +139,10 @@ fn sideboard(mesh: &mut Mesh) {
         mesh.add("ceramic", vase.transformed(&stand));
     }
     for feet in [-1.6, 1.6] {
-        mesh.add("black", block(dvec3(5.56, 0.0, feet - 0.02), dvec3(5.9, 0.12, feet + 0.02)));
+        mesh.add(
+            "black",
+            block(dvec3(5.56, 0.0, feet - 0.02), dvec3(5.9, 0.12, feet + 0.02)),
+        );
     }
 }
 
@@ -138,7 +169,10 @@ pub(super) fn pot() -> Mesh {
             dvec3(dx * 3.5, 1.35, dz * 3.5),
         ];
         let stem = super::super::shapes::curve(&stem, 4);
-        mesh.add("timber", super::super::shapes::bar(&stem, |t| 0.014 - 0.008 * t, 8));
+        mesh.add(
+            "timber",
+            super::super::shapes::bar(&stem, |t| 0.014 - 0.008 * t, 8),
+        );
     }
     mesh
 }

@@ -7,8 +7,7 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 use super::super::mesh::{Mesh, Surface};
 use super::super::random::Random;
 use super::super::shapes::{
-    Topology, curve, cuboid, cylinder, grid, lathe, placed, rod, rounded_box, bar,
-    signed_power,
+    Topology, bar, cuboid, curve, cylinder, grid, lathe, placed, rod, rounded_box, signed_power,
 };
 
 /// Height of the table's top, half of its length and width, and its thickness, in metres.
@@ -53,7 +52,13 @@ fn slab() -> Surface {
 /// faces coincide.
 fn pedestal() -> Mesh {
     let mut mesh = Mesh::default();
-    let disc = [(0.0, 0.0), (0.30, 0.0), (0.305, 0.005), (0.30, 0.014), (0.0, 0.018)];
+    let disc = [
+        (0.0, 0.0),
+        (0.30, 0.0),
+        (0.305, 0.005),
+        (0.30, 0.014),
+        (0.0, 0.018),
+    ];
     mesh.add("black", lathe(&disc.map(|(r, y)| dvec2(r, y)), 64));
     let plate = TOP - THICKNESS - 0.001;
     mesh.add("chrome", cylinder(0.16, plate - 0.008, plate, 48));
@@ -61,7 +66,7 @@ fn pedestal() -> Mesh {
     for slat in 0..36 {
         let angle = f64::from(slat) * 10.0;
         let (sin, cos) = angle.to_radians().sin_cos();
-        let bar = rounded_box(dvec3(0.022, plate - 0.05, 0.016), 0.003, 2);
+        let bar = rounded_box(dvec3(0.022, plate - 0.05, 0.016), 0.003, 1);
         let at = dvec3(0.172 * cos, 0.5 * (plate - 0.008), -0.172 * sin);
         mesh.add("timber", bar.transformed(&placed(at, angle)));
     }
@@ -100,7 +105,10 @@ fn lay(mesh: &mut Mesh, random: &mut Random) {
 fn laptop() -> Mesh {
     let mut mesh = Mesh::default();
     let deck = rounded_box(dvec3(0.215, 0.012, 0.305), 0.005, 3);
-    mesh.add("aluminium", deck.transformed(&placed(dvec3(0.0, 0.006, 0.0), 0.0)));
+    mesh.add(
+        "aluminium",
+        deck.transformed(&placed(dvec3(0.0, 0.006, 0.0), 0.0)),
+    );
     for row in 0..5 {
         for column in 0..14 {
             let x = 0.085 - 0.019 * f64::from(row);
@@ -110,7 +118,13 @@ fn laptop() -> Mesh {
         }
     }
     let pad = dvec3(-0.055, 0.0124, 0.0);
-    mesh.add("black", cuboid(pad - dvec3(0.03, 0.0002, 0.05), pad + dvec3(0.03, 0.0002, 0.05)));
+    mesh.add(
+        "black",
+        cuboid(
+            pad - dvec3(0.03, 0.0002, 0.05),
+            pad + dvec3(0.03, 0.0002, 0.05),
+        ),
+    );
     let lean = glam::DQuat::from_rotation_z(-20f64.to_radians());
     let hinge = dvec3(0.108, 0.012, 0.0);
     let stand = glam::DAffine3::from_rotation_translation(lean, hinge);
@@ -126,9 +140,15 @@ fn laptop() -> Mesh {
 fn notebook() -> Mesh {
     let mut mesh = Mesh::default();
     let pages = rounded_box(dvec3(0.148, 0.010, 0.21), 0.002, 2);
-    mesh.add("paper", pages.transformed(&placed(dvec3(0.0, 0.0065, 0.0), 0.0)));
+    mesh.add(
+        "paper",
+        pages.transformed(&placed(dvec3(0.0, 0.0065, 0.0), 0.0)),
+    );
     let cover = rounded_box(dvec3(0.154, 0.0015, 0.216), 0.0006, 2);
-    mesh.add("black", cover.transformed(&placed(dvec3(0.0, 0.00075, 0.0), 0.0)));
+    mesh.add(
+        "black",
+        cover.transformed(&placed(dvec3(0.0, 0.00075, 0.0), 0.0)),
+    );
     let (from, to) = (dvec3(0.03, 0.0157, -0.06), dvec3(-0.02, 0.0157, 0.07));
     mesh.add("chrome", rod(from, to, 0.004, 16));
     mesh
@@ -146,7 +166,7 @@ fn cup() -> Mesh {
         (0.042, 0.004),
         (0.0, 0.0035),
     ];
-    mesh.add("ceramic", lathe(&smooth_profile(&saucer), 40));
+    mesh.add("ceramic", lathe(&smooth_profile(&saucer), 30));
     let wall = [
         (0.0, 0.006),
         (0.022, 0.006),
@@ -158,9 +178,16 @@ fn cup() -> Mesh {
         (0.020, 0.010),
         (0.0, 0.010),
     ];
-    mesh.add("ceramic", lathe(&smooth_profile(&wall), 40));
-    let handle = [dvec3(0.036, 0.054, 0.0), dvec3(0.058, 0.050, 0.0), dvec3(0.054, 0.026, 0.0)];
-    let handle = curve(&[handle[0], handle[1], handle[2], dvec3(0.033, 0.022, 0.0)], 6);
+    mesh.add("ceramic", lathe(&smooth_profile(&wall), 30));
+    let handle = [
+        dvec3(0.036, 0.054, 0.0),
+        dvec3(0.058, 0.050, 0.0),
+        dvec3(0.054, 0.026, 0.0),
+    ];
+    let handle = curve(
+        &[handle[0], handle[1], handle[2], dvec3(0.033, 0.022, 0.0)],
+        6,
+    );
     mesh.add("ceramic", bar(&handle, |_| 0.0035, 12));
     mesh
 }
@@ -179,7 +206,7 @@ fn tumbler() -> Mesh {
         (0.0, 0.008),
     ];
     let mut mesh = Mesh::default();
-    mesh.add("glass", lathe(&smooth_profile(&wall), 40));
+    mesh.add("glass", lathe(&smooth_profile(&wall), 30));
     mesh
 }
 
@@ -202,17 +229,23 @@ fn carafe() -> Mesh {
         (0.0, 0.008),
     ];
     let mut mesh = Mesh::default();
-    mesh.add("glass", lathe(&smooth_profile(&wall), 48));
+    mesh.add("glass", lathe(&smooth_profile(&wall), 40));
     mesh
 }
 
-/// A lathe's profile with four steps between its points, still on the axis at its ends.
+/// A lathe's profile with three steps between its points, still on the axis at its ends.
 fn smooth_profile(points: &[(f64, f64)]) -> Vec<DVec2> {
     let points: Vec<DVec3> = points.iter().map(|(r, y)| dvec3(*r, *y, 0.0)).collect();
-    let path = curve(&points, 4);
+    let path = curve(&points, 3);
     let last = path.len() - 1;
     path.iter()
         .enumerate()
-        .map(|(i, p)| if i == 0 || i == last { dvec2(0.0, p.y) } else { dvec2(p.x.max(1e-4), p.y) })
+        .map(|(i, p)| {
+            if i == 0 || i == last {
+                dvec2(0.0, p.y)
+            } else {
+                dvec2(p.x.max(1e-4), p.y)
+            }
+        })
         .collect()
 }
