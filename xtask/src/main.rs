@@ -10,6 +10,7 @@ use clap::{Parser, Subcommand};
 mod adapter;
 mod bless;
 mod demo;
+mod scenes;
 mod shell;
 mod test;
 
@@ -28,6 +29,8 @@ enum Command {
     Test(test::TestArgs),
     /// Accept the present output as the expected one of the snapshot tests
     Bless,
+    /// Generate the geometry, environment maps and textures of the example scenes
+    Scenes(scenes::ScenesArgs),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +38,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
         Command::Bless => bless::run(),
+        Command::Scenes(args) => scenes::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
