@@ -252,6 +252,10 @@ pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
 /// The candidate with the smallest edit distance to `name`, if at most a third of it differs.
 /// Equal distances are decided by the alphabet, so that output never depends on iteration order.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // Comparing takes time by the product of the lengths; no one misspells a name this long.
+    if name.len() > 80 {
+        return None;
+    }
     let limit = name.chars().count().div_ceil(3);
     let scored = candidates.into_iter().map(|c| (edit_distance(name, c), c));
     scored.filter(|(d, _)| *d <= limit).min().map(|(_, c)| c)

@@ -34,13 +34,18 @@ pub fn text(sources: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> Str
     let files = View(sources);
     let mut out = String::new();
     for diagnostic in ordered(diagnostics) {
+        let display_style = style(sources, diagnostic);
+        let short = matches!(display_style, DisplayStyle::Medium);
         let config = Config {
-            display_style: style(sources, diagnostic),
+            display_style,
             ..Config::default()
         };
         let rendered = render(&config, &files, &to_codespan(sources, diagnostic), color);
         // The files are at hand, so only the message itself can be shown if that fails.
         out.push_str(&rendered.unwrap_or_else(|_| plain(diagnostic)));
+        if short {
+            out.push('\n');
+        }
     }
     out
 }

@@ -28,12 +28,23 @@ pub(crate) fn read(
     }
 }
 
+/// The text as messages show it.
+fn shown(text: &str) -> String {
+    match text.char_indices().nth(40) {
+        Some((end, _)) => format!("`{}...`", &text[..end]),
+        None => format!("`{text}`"),
+    }
+}
+
 fn read_int(text: &str, negated: bool) -> Result<i64, (String, &'static str)> {
     let largest = i64::from(i32::MAX) + i64::from(negated);
     match text.parse::<i64>() {
         Ok(value) if value <= largest => Ok(value),
         _ => Err((
-            format!("`{text}` does not fit a 32-bit int, whose largest value is 2147483647"),
+            format!(
+                "{} does not fit a 32-bit int, whose largest value is 2147483647",
+                shown(text)
+            ),
             "write a float, as in `4e9`, or the bits in hexadecimal",
         )),
     }
@@ -43,13 +54,13 @@ fn read_hex(text: &str) -> Result<i64, (String, &'static str)> {
     let digits = &text[2..];
     if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
         return Err((
-            format!("`{text}` is not a hexadecimal number"),
+            format!("{} is not a hexadecimal number", shown(text)),
             "hexadecimal digits are 0 to 9 and a to f",
         ));
     }
     u32::from_str_radix(digits, 16).map(i64::from).map_err(|_| {
         (
-            format!("`{text}` has more than 32 bits"),
+            format!("{} has more than 32 bits", shown(text)),
             "a hexadecimal int has at most 8 digits",
         )
     })
@@ -59,7 +70,7 @@ fn read_float(text: &str) -> Result<f64, (String, &'static str)> {
     match text.parse::<f64>() {
         Ok(value) if (value as f32).is_finite() => Ok(value),
         _ => Err((
-            format!("`{text}` is not finite in 32-bit precision"),
+            format!("{} is not finite in 32-bit precision", shown(text)),
             "the largest float is about 3.4e38",
         )),
     }

@@ -89,8 +89,8 @@ tokens! {
         When "when" True "true" False "false"
     }
     punctuation {
-        LeftParen "(" RightParen ")" LeftBracket "[" RightBracket "]" LeftBrace "{" RightBrace "}"
         Comma "," Semicolon ";" Colon ":" PathSeparator "::" Dot "." Range ".." Arrow "->"
+        LeftParen "(" RightParen ")" LeftBracket "[" RightBracket "]" LeftBrace "{" RightBrace "}"
         Assign "=" AddAssign "+=" SubAssign "-=" MulAssign "*=" DivAssign "/="
         OrOr "||" AndAnd "&&" EqEq "==" NotEq "!=" Less "<" LessEq "<=" Greater ">" GreaterEq ">="
         Pipe "|" Caret "^" Ampersand "&" ShiftLeft "<<" ShiftRight ">>"

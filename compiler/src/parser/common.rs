@@ -213,6 +213,6 @@ pub(super) fn skip_one(inp: &mut Input<'_, '_>) {
 }
 
 /// The error of a recovery that does not apply; the first error is the one reported.
-fn nothing(span: Span) -> SyntaxError {
+pub(super) fn nothing(span: Span) -> SyntaxError {
     SyntaxError::new(span, None, Expected::default())
 }

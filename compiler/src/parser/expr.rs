@@ -7,7 +7,7 @@ use super::common::{Extra, Input, Parse, Rule, Tokens, before, close, list, name
 use super::error::{Expected, SyntaxError, Want};
 use super::stmt;
 use crate::ast::{Arg, BinaryOp, Block, Expr, ExprKind, IfExpr, Name, UnaryOp, Unit};
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{Code, Diagnostic, nearest};
 use crate::lexer::{Number, Token, read_number};
 use crate::source::{Span, Spanned};
 
@@ -275,7 +275,10 @@ fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic 
         "micron" | "microns" | "micrometer" | "micrometre" => Some("um"),
         "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some("mm"),
         "meter" | "meters" | "metre" | "metres" => Some("m"),
-        _ if name.len() > 1 => crate::diag::nearest(name, units),
+        _ if name.len() > 1 => {
+            let as_long = units.clone().filter(|unit| unit.len() == name.len());
+            nearest(name, as_long).or_else(|| nearest(name, units))
+        }
         _ => None,
     };
     match known {

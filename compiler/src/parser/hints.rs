@@ -17,8 +17,8 @@ pub(super) fn hint(source: &Source<'_>, at: usize, error: &SyntaxError) -> Optio
         Slip::definition,
         Slip::foreign_word,
         Slip::foreign_operator,
-        Slip::foreign_statement,
         Slip::declaration,
+        Slip::foreign_statement,
         Slip::module_path,
         Slip::loop_range,
         Slip::assignment,
@@ -69,7 +69,8 @@ impl<'t> Slip<'_, 't> {
                 RightParen | RightBracket => depth += 1,
                 LeftParen | LeftBracket if depth == 0 => break,
                 LeftParen | LeftBracket => depth -= 1,
-                Semicolon | LeftBrace | RightBrace if depth == 0 => break,
+                Semicolon | LeftBrace | RightBrace | DocOuter | DocInner if depth == 0 => break,
+                Use | Let | Var | For | While | Param if depth == 0 => return start - 1,
                 _ => {}
             }
             start -= 1;
@@ -81,6 +82,9 @@ impl<'t> Slip<'_, 't> {
     fn definition(&self) -> Option<String> {
         if !(self.expects(Token::Material) && self.expects(Token::Struct)) {
             return None;
+        }
+        if self.found == Token::Semicolon {
+            return Some("no `;` follows a definition in braces; remove it".to_owned());
         }
         let keywords = [
             "material", "bsdf", "delta", "edf", "fn", "struct", "const", "use",
@@ -143,9 +147,10 @@ impl<'t> Slip<'_, 't> {
             (Token::Range, Token::Assign) => {
                 Some("a range leaves its upper bound out; write `low .. high + 1`".to_owned())
             }
-            (Token::Assign, Token::Greater | Token::Less) if joined => {
-                Some(format!("did you mean `{}=`?", self.text()))
+            (Token::Assign, Token::Greater) if joined => {
+                Some("a value follows `=`, and to compare, write `>=`".to_owned())
             }
+            (Token::Assign, Token::Less) if joined => Some("did you mean `<=`?".to_owned()),
             (op, Token::Assign) if joined && self.wants(Want::Expression) => {
                 let op = op.spelling()?;
                 let place = self.text_before(2);
@@ -175,6 +180,9 @@ impl<'t> Slip<'_, 't> {
                 "there is no such statement"
             }
             "const" | "auto" | "val" | "mut" | "local" => "values are named by `let name = value;`",
+            output @ ("surface" | "emission") if start + 1 == self.at => {
+                return Some(format!("write `{output} = ...;`"));
+            }
             ty if is_type(ty) && start + 1 == self.at && self.found == Token::Ident => {
                 let name = self.text();
                 return Some(format!("write `let {name}: {ty} = ...;`"));
@@ -194,6 +202,10 @@ impl<'t> Slip<'_, 't> {
         if self.expects(Token::Colon) && self.found == Token::Ident && is_type(self.text_before(1))
         {
             let hint = format!("write `{}: {}`", self.text(), self.text_before(1));
+            return Some(hint);
+        }
+        if self.expects(Token::Colon) && is_type(self.text()) {
+            let hint = format!("write `{}: {}`", self.text_before(1), self.text());
             return Some(hint);
         }
         if self.expects(Token::Colon) && matches!(keyword, "param" | "const") {

@@ -3,9 +3,10 @@
 use chumsky::prelude::*;
 
 use super::common::{
-    Input, Parse, Rule, broken_statement, close, list, name, semicolon, skip_one, spell, type_name,
+    Input, Parse, Rule, broken_statement, close, list, name, nothing, one, semicolon, skip_one,
+    spell, type_name,
 };
-use super::error::{Expected, SyntaxError};
+use super::error::{Expected, SyntaxError, Want};
 use super::expr::required;
 use super::stmt::{self, Piece, misplaced_docs, piece, stray_docs};
 use crate::ast::{
@@ -22,7 +23,8 @@ pub(super) fn module<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, 
         .map_with(move |_, e| doc_line(text, e.span()))
         .repeated()
         .collect::<Vec<_>>();
-    let entry = entry(text, expression).recover_with(via_parser(broken_entry().to(Entry::Broken)));
+    let entry =
+        entry(text, expression).recover_with(via_parser(broken_entry(text).to(Entry::Broken)));
     docs.then(entry.repeated().collect::<Vec<_>>())
         .map_with(|(docs, entries), e| {
             let mut module = Module {
@@ -81,17 +83,32 @@ fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry>
                 span,
             }))
         });
-    let inner = custom(|inp: &mut Input<'t, '_>| {
+    choice((
+        item,
+        use_declaration(text).map(Entry::Use),
+        undocumented().to(Entry::Broken),
+    ))
+    .boxed()
+}
+
+/// Documentation at the top level that belongs to no definition.
+fn undocumented<'t>() -> impl Parse<'t, ()> + Copy {
+    custom(|inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
-        let found = inp.next();
-        let span = inp.span_since(&start);
-        if found != Some(Token::DocInner) {
-            return Err(SyntaxError::new(span, None, Expected::default()));
+        let mut marker = None;
+        while let Some(token @ (Token::DocOuter | Token::DocInner)) = inp.peek() {
+            inp.skip();
+            marker = marker.max(Some(token));
         }
-        inp.emit(SyntaxError::special(span, misplaced_docs(found, span)));
-        Ok(Entry::Broken)
-    });
-    choice((item, use_declaration(text).map(Entry::Use), inner)).boxed()
+        let span = inp.span_since(&start);
+        match (marker, inp.peek()) {
+            (Some(Token::DocInner), _) | (Some(_), None | Some(Token::Use)) => {
+                inp.emit(SyntaxError::special(span, misplaced_docs(marker, span)));
+                Ok(())
+            }
+            _ => Err(nothing(span)),
+        }
+    })
 }
 
 /// `///` lines.
@@ -108,45 +125,50 @@ fn doc_line(text: &str, span: Span) -> String {
 }
 
 /// Skips a broken definition, at least its first token, to the next one.
-fn broken_entry<'t>() -> impl Parse<'t, ()> + Copy {
-    custom(|inp: &mut Input<'t, '_>| {
+fn broken_entry<'t>(text: &'t str) -> impl Parse<'t, ()> + Copy {
+    custom(move |inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
         if inp.peek().is_none() {
-            return Err(SyntaxError::new(
-                inp.span_since(&start),
-                None,
-                Expected::default(),
-            ));
+            return Err(nothing(inp.span_since(&start)));
         }
-        skip_one(inp);
-        while !at_entry(inp) {
+        while matches!(inp.peek(), Some(Token::DocOuter)) {
+            inp.skip();
+        }
+        loop {
+            let first = inp.peek();
             skip_one(inp);
+            let ended = matches!(first, Some(Token::Semicolon | Token::LeftBrace));
+            if ended || at_entry(text, inp) {
+                return Ok(());
+            }
         }
-        Ok(())
     })
 }
 
-/// Is the input at its end or before a definition?
-fn at_entry(inp: &mut Input<'_, '_>) -> bool {
+/// Is the input at its end, before a definition or at a word that starts a line without blanks?
+fn at_entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
     use Token::*;
-    match inp.peek() {
+    let before = inp.save();
+    let first = inp.next();
+    let span: Span = inp.span_since(before.cursor());
+    let second = inp.peek();
+    inp.rewind(before);
+    let line_starts = text
+        .get(..span.start as usize)
+        .unwrap_or("")
+        .ends_with('\n');
+    match first {
         None | Some(Material | Fn | Struct | Const | Use | Delta | DocOuter) => true,
         // These two are also types.
-        Some(Bsdf | Edf) => {
-            let before = inp.save();
-            inp.skip();
-            let next = inp.peek();
-            inp.rewind(before);
-            next == Some(Ident)
-        }
-        Some(_) => false,
+        Some(Bsdf | Edf) => line_starts || second == Some(Ident),
+        Some(token) => line_starts && (token == Ident || token.is_keyword()),
     }
 }
 
 /// `use std::noise::{flakes, perlin as noise};`
 fn use_declaration<'t>(text: &'t str) -> impl Parse<'t, Use> {
     // Folders of the standard library are named like the closures they hold.
-    let segment = super::common::one(Expected::want(super::error::Want::Name), |t| {
+    let segment = one(Expected::want(Want::Name), |t| {
         matches!(t, Token::Ident | Token::Bsdf | Token::Edf)
     })
     .map(move |span| spell(text, span));
@@ -229,7 +251,7 @@ fn lost_value(value: &Expr) -> Diagnostic {
 /// `param name: type = default in low .. high;`
 fn material_param<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, MaterialParam> {
     let range = just(Token::In)
-        .ignore_then(required(expression.clone()))
+        .ignore_then(expression.clone())
         .then_ignore(just(Token::Range))
         .then(required(expression.clone()))
         .or_not();
@@ -339,7 +361,7 @@ fn members<'t>(
     expression: Rule<'t, Expr>,
     body: Rule<'t, Body>,
 ) -> impl Parse<'t, Vec<Member>> {
-    let shared = stmt::binding(text, expression).map_with(|kind, e| {
+    let shared = stmt::binding(text, false, expression).map_with(|kind, e| {
         let span = e.span();
         Member::Let(Stmt { kind, span })
     });

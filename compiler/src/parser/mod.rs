@@ -1,8 +1,9 @@
 //! Tokens to syntax tree.
 //!
 //! The grammar is written with chumsky, a file for each level: [`item`], [`stmt`], [`expr`].
-//! Before it runs, [`brackets`] balances brackets and bounds nesting; after it, [`report`] turns
-//! what did not match into diagnostics with the hints of [`hints`].
+//! Before it runs, [`nesting`] bounds how deep the source nests and [`brackets`] balances its
+//! brackets; after it, [`report`] turns what did not match into diagnostics with the hints of
+//! [`hints`].
 
 mod brackets;
 mod common;
@@ -10,6 +11,7 @@ mod error;
 mod expr;
 mod hints;
 mod item;
+mod nesting;
 mod print;
 mod report;
 mod stmt;
@@ -17,8 +19,8 @@ mod stmt;
 use chumsky::input::Input as _;
 use chumsky::prelude::*;
 
-pub use brackets::MAX_NESTING;
 use common::{Rule, Tokens};
+pub use nesting::MAX_NESTING;
 pub use print::{print, print_expression};
 
 use crate::ast::{Expr, Module};
@@ -52,11 +54,11 @@ fn run<T>(
     grammar: impl for<'t> Fn(&'t str, Rule<'t, Expr>) -> Rule<'t, T>,
 ) -> (Option<T>, Vec<Diagnostic>) {
     let (tokens, mut diagnostics) = lex(file, text);
-    if let Err(diagnostic) = brackets::check_nesting(&tokens) {
+    if let Err(diagnostic) = nesting::check_nesting(&tokens) {
         diagnostics.push(diagnostic);
         return (None, diagnostics);
     }
-    let balanced = brackets::balance(file, text, tokens);
+    let balanced = brackets::balance(file, text, &tokens);
     diagnostics.extend(balanced.diagnostics);
     let tokens: &[(Token, Span)] = &balanced.tokens;
     let (value, errors) = {
@@ -65,7 +67,7 @@ fn run<T>(
         let rule = grammar(text, expr::expression(text));
         rule.parse(input).into_output_errors()
     };
-    let source = report::Source { file, text, tokens };
+    let source = report::Source::new(file, text, tokens);
     report::report(&source, errors, &mut diagnostics);
     (value, diagnostics)
 }

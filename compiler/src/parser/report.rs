@@ -1,7 +1,8 @@
 //! Syntax errors to diagnostics, in people's words.
 //!
-//! One slip often makes the grammar stumble several times. Reported is the first error at a
-//! place, and none on a line where a character or string was already reported.
+//! One slip often makes the grammar stumble several times. So an error is not reported that
+//! follows another at the same or next token, that is about an expression with an error inside,
+//! or that is on a line where a character or string was already reported.
 
 use std::collections::BTreeSet;
 
@@ -17,12 +18,30 @@ pub(super) struct Source<'t> {
     pub(super) file: FileId,
     pub(super) text: &'t str,
     pub(super) tokens: &'t [(Token, Span)],
+    newlines: Vec<u32>,
 }
 
 impl<'t> Source<'t> {
+    pub(super) fn new(file: FileId, text: &'t str, tokens: &'t [(Token, Span)]) -> Self {
+        let newlines = text.bytes().zip(0_u32..).filter(|(byte, _)| *byte == b'\n');
+        Self {
+            file,
+            text,
+            tokens,
+            newlines: newlines.map(|(_, at)| at).collect(),
+        }
+    }
+
     /// The number of the first token at or after `place`.
     fn index_at(&self, place: u32) -> usize {
         self.tokens.partition_point(|(_, span)| span.start < place)
+    }
+
+    /// The end of the last token before `place`.
+    fn end_before(&self, place: u32) -> u32 {
+        let index = self.index_at(place).checked_sub(1);
+        let token = index.and_then(|index| self.tokens.get(index));
+        token.map_or(0, |(_, span)| span.end)
     }
 
     /// The kind of a token.
@@ -44,50 +63,60 @@ impl<'t> Source<'t> {
         }
     }
 
-    /// Is there a line break between two places?
-    fn breaks(&self, from: u32, to: u32) -> bool {
-        let between = self.text.get(from as usize..to as usize);
-        between.is_some_and(|text| text.contains('\n'))
-    }
-
-    /// The start of the line of `place`.
-    fn line_start(&self, place: u32) -> usize {
-        let before = self.text.get(..place as usize).unwrap_or("");
-        before.rfind('\n').map_or(0, |newline| newline + 1)
+    /// The number of the line of `place`, from 0.
+    fn line(&self, place: u32) -> usize {
+        self.newlines.partition_point(|newline| *newline < place)
     }
 }
 
 /// Appends the diagnostics of `errors` to those of the tokens.
 pub(super) fn report(source: &Source<'_>, errors: Vec<SyntaxError>, out: &mut Vec<Diagnostic>) {
-    let mut places: BTreeSet<u32> = BTreeSet::new();
     let garbled: BTreeSet<usize> = out
         .iter()
         .filter(|d| matches!(d.code, Code::UnknownCharacter | Code::Unterminated))
         .filter_map(|d| d.span)
-        .map(|span| source.line_start(span.start))
+        .map(|span| source.line(span.start))
         .collect();
-    let is_garbled = |span: Span| garbled.contains(&source.line_start(span.start));
-    out.retain(|d| d.code != Code::Unclosed || !d.span.is_some_and(is_garbled));
-    let mut reported = 0;
+    let is_garbled = |place: u32| garbled.contains(&source.line(place));
+    out.retain(|d| d.code != Code::Unclosed || !d.span.is_some_and(|s| is_garbled(s.start)));
+    let mut reported: Vec<Span> = Vec::new();
     for error in errors {
-        let put_in =
-            error.found.is_some_and(Token::is_closer) && error.span.start == error.span.end;
-        if put_in || !places.insert(error.span.start) {
+        let previous = source.end_before(error.span.start);
+        let garbled = is_garbled(error.span.start) || is_garbled(previous);
+        if garbled
+            || is_put_in(&error)
+            || reported.last().is_some_and(|r| follows(source, *r, &error))
+        {
             continue;
         }
-        let diagnostic = diagnose(source, error);
-        if diagnostic.span.is_some_and(is_garbled) {
-            continue;
-        }
-        if reported == MAX_ERRORS {
+        if reported.len() == MAX_ERRORS {
             let end = Span::new(source.file, source.text.len()..source.text.len());
             let message = "more syntax errors follow that are not shown";
             out.push(Diagnostic::new(Code::Syntax, end, message));
             return;
         }
-        reported += 1;
-        out.push(diagnostic);
+        reported.push(error.span);
+        out.push(diagnose(source, error));
     }
+}
+
+/// Is `error` a consequence of the one at `reported`, which the grammar met before?
+fn follows(source: &Source<'_>, reported: Span, error: &SyntaxError) -> bool {
+    let (first, second) = (reported.start, error.span.start);
+    if second <= first {
+        return first <= error.span.end;
+    }
+    if error.special.is_some() {
+        return false;
+    }
+    let at = source.index_at(first);
+    let ends = matches!(source.token(at), Some(Token::Semicolon | Token::RightBrace));
+    !ends && source.index_at(second) - at <= 1
+}
+
+/// Is the token found one that was put in because brackets are not balanced?
+fn is_put_in(error: &SyntaxError) -> bool {
+    error.found.is_some_and(Token::is_closer) && error.span.start == error.span.end
 }
 
 fn diagnose(source: &Source<'_>, error: SyntaxError) -> Diagnostic {
@@ -95,29 +124,44 @@ fn diagnose(source: &Source<'_>, error: SyntaxError) -> Diagnostic {
         return *special;
     }
     let index = source.index_at(error.span.start);
-    let previous_end = index.checked_sub(1).and_then(|i| source.tokens.get(i));
-    let previous_end = previous_end.map_or(0, |(_, span)| span.end);
+    let previous = source.end_before(error.span.start);
     let hint = hints::hint(source, index, &error);
-    let misses_semicolon = error.expected.has(Expected::token(Token::Semicolon));
-    let ended = match error.found {
-        None | Some(Token::RightBrace) => true,
-        Some(_) => source.breaks(previous_end, error.span.start),
-    };
-    let diagnostic = if misses_semicolon && ended && hint.is_none() {
-        let end = previous_end as usize..previous_end as usize;
-        let after = Span::new(source.file, end);
-        Diagnostic::new(Code::Syntax, after, "a `;` is missing here").expected("`;`")
-    } else {
-        let message = format!("unexpected {}", found(source, error.found, index));
-        let diagnostic = Diagnostic::new(Code::Syntax, error.span, message);
-        match either(&words(error.expected)) {
-            Some(words) => diagnostic.expected(words),
-            None => diagnostic,
+    let diagnostic = match missing(source, previous, &error) {
+        Some(missing) if hint.is_none() => {
+            let end = previous as usize;
+            let after = Span::new(source.file, end..end);
+            let message = format!("{missing} is missing here");
+            Diagnostic::new(Code::Syntax, after, message).expected(missing)
+        }
+        _ => {
+            let message = format!("unexpected {}", found(source, error.found, index));
+            let diagnostic = Diagnostic::new(Code::Syntax, error.span, message);
+            match either(&words(error.expected)) {
+                Some(words) => diagnostic.expected(words),
+                None => diagnostic,
+            }
         }
     };
     match hint {
         Some(hint) => diagnostic.hint(hint),
         None => diagnostic,
+    }
+}
+
+/// What is to be put in at the end of a line, where another line or a `}` comes too early.
+fn missing(source: &Source<'_>, previous: u32, error: &SyntaxError) -> Option<&'static str> {
+    let ended = match error.found {
+        None | Some(Token::RightBrace) => true,
+        Some(_) => source.line(previous) < source.line(error.span.start),
+    };
+    let expects = |token| error.expected.has(Expected::token(token));
+    let only_block =
+        expects(Token::LeftBrace) && !error.expected.has(Expected::want(Want::Expression));
+    match () {
+        () if !ended => None,
+        () if expects(Token::Semicolon) => Some("`;`"),
+        () if only_block && !expects(Token::Assign) => Some("a block `{ ... }`"),
+        () => None,
     }
 }
 

@@ -3,12 +3,12 @@
 use chumsky::prelude::*;
 
 use super::common::{
-    Input, Parse, Rule, before, broken_statement, close, name, one, rest_of_statement, semicolon,
-    type_name,
+    Input, Parse, Rule, before, broken_statement, close, name, nothing, one, rest_of_statement,
+    semicolon, type_name,
 };
 use super::error::{Expected, SyntaxError};
 use super::expr::{if_expression, required};
-use crate::ast::{BinaryOp, Block, Expr, ExprKind, IfExpr, Stmt, StmtKind};
+use crate::ast::{BinaryOp, Block, Expr, ExprKind, IfExpr, Stmt, StmtKind, UnaryOp};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
@@ -46,7 +46,8 @@ pub(super) fn piece<'t>(
     block: Rule<'t, Block>,
 ) -> Rule<'t, Piece> {
     let statement = choice((
-        binding(text, expression.clone()),
+        binding(text, false, expression.clone()),
+        binding(text, true, expression.clone()),
         for_loop(text, expression.clone(), block.clone()),
         while_loop(expression.clone(), block.clone()),
         jump(text),
@@ -81,7 +82,7 @@ pub(super) fn stray_docs<'t>() -> impl Parse<'t, ()> {
         }
         let span = inp.span_since(&start);
         if !any {
-            return Err(SyntaxError::new(span, None, Expected::default()));
+            return Err(nothing(span));
         }
         inp.emit(SyntaxError::special(span, misplaced_docs(found, span)));
         Ok(())
@@ -97,17 +98,21 @@ pub(super) fn misplaced_docs(found: Option<Token>, span: Span) -> Diagnostic {
     Diagnostic::new(Code::Syntax, span, message).hint(hint)
 }
 
-/// `let name: type = value;`, `var name: type = value;`
-pub(super) fn binding<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, StmtKind> {
-    let keyword = choice((just(Token::Let).to(false), just(Token::Var).to(true)));
+/// `let name: type = value;` or, when `mutable`, `var name: type = value;`
+pub(super) fn binding<'t>(
+    text: &'t str,
+    mutable: bool,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, StmtKind> {
+    let keyword = just(if mutable { Token::Var } else { Token::Let });
     let ty = just(Token::Colon).ignore_then(type_name(text)).or_not();
     keyword
-        .then(name(text))
+        .ignore_then(name(text))
         .then(ty)
         .then_ignore(just(Token::Assign))
         .then(required(expression))
         .then_ignore(semicolon(text))
-        .map(|(((mutable, name), ty), value)| StmtKind::Let {
+        .map(move |((name, ty), value)| StmtKind::Let {
             mutable,
             name,
             ty,
@@ -213,6 +218,10 @@ fn unused_value(value: &Expr) -> Diagnostic {
         ExprKind::Call { .. } => diagnostic.hint(
             "functions only have a value: name it, or leave out the `;` at the end of a block",
         ),
+        ExprKind::Binary(BinaryOp::Eq, ..) => diagnostic.hint("to assign, write `=`"),
+        ExprKind::Unary(UnaryOp::Neg, inner) if matches!(inner.kind, ExprKind::Unary(..)) => {
+            diagnostic.hint("to count down, write `name -= 1;`")
+        }
         _ => diagnostic.hint("to make it the value of the block, leave out the `;`"),
     }
 }
