@@ -3,8 +3,9 @@
 //! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it reads.
 
 pub mod bvh;
+mod image_file;
 pub mod lights;
-mod picture;
+
 pub mod scene;
 pub mod shader_part;
 pub mod texture;

@@ -6,7 +6,7 @@ use half::f16;
 use impasto_compiler::abi::{TextureRef, TextureSpace};
 use rayon::prelude::*;
 
-use crate::picture::{self, Picture};
+use crate::image_file::{self, Picture};
 use crate::scene::SceneError;
 use crate::shader_part::{BufferData, ShaderPart};
 
@@ -48,7 +48,7 @@ struct Packed {
 
 fn load(texture: &TextureRef, base: &Path) -> Result<Packed, SceneError> {
     let path = base.join(&texture.path);
-    let picture = picture::load(&path, "texture", texture.space == TextureSpace::Color)?;
+    let picture = image_file::load(&path, "texture", texture.space == TextureSpace::Color)?;
     check_range(&picture, &path)?;
     let pack = |[x, y]: [f32; 2]| {
         let [x, y] = [x, y].map(|v| u32::from(f16::from_f32(v).to_bits()));

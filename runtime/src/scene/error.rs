@@ -52,6 +52,14 @@ impl SceneError {
         self
     }
 
+    /// Says what to try, unless that has been said.
+    pub(crate) fn or_hint(self, hint: &str) -> Self {
+        match self.hint {
+            Some(_) => self,
+            None => self.hint(hint),
+        }
+    }
+
     fn place(&self) -> String {
         let Some(path) = &self.path else {
             return String::new();

@@ -7,12 +7,19 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
+mod bindings;
+mod description;
+mod document;
 mod error;
+mod load;
 mod mesh;
+mod mtl;
+mod obj;
 mod parts;
 pub mod surface;
 
 pub use error::SceneError;
+pub use load::load;
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use parts::SceneParts;
 

@@ -1,0 +1,354 @@
+//! What a scene file says, before any file that it names is read. `docs/scenes.md` describes the
+//! format.
+
+use glam::Vec3;
+use toml::de::DeValue;
+
+use super::document::{Document, Table, Value, numbers};
+use super::mtl::MtlValue;
+use super::{Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, SceneError};
+
+/// Pixels a side of the largest film.
+const MAX_FILM: u32 = 16_384;
+/// Longest path that can be asked for.
+const MAX_DEPTH: u32 = 65_535;
+
+pub(super) struct Description {
+    pub(super) name: Option<String>,
+    pub(super) camera: Camera,
+    pub(super) film: FilmSettings,
+    pub(super) integrator: Integrator,
+    pub(super) geometry: Vec<GeometrySpec>,
+    pub(super) materials: Vec<MaterialSpec>,
+    pub(super) lights: Vec<Light>,
+    pub(super) environment: Option<EnvironmentSpec>,
+}
+
+/// A `[[geometry]]` entry.
+pub(super) struct GeometrySpec {
+    pub(super) obj: String,
+    pub(super) scale: f32,
+    /// Turns about the x, the y and the z axis, in this order, in degrees.
+    pub(super) rotate: Vec3,
+    pub(super) translate: Vec3,
+    /// Material of all its faces, whatever the file says.
+    pub(super) material: Option<String>,
+    /// The error for a material of that name that does not exist, without hint.
+    pub(super) no_such_material: Option<SceneError>,
+}
+
+/// A `[materials.NAME]` entry.
+pub(super) struct MaterialSpec {
+    pub(super) name: String,
+    pub(super) file: String,
+    pub(super) material: Option<String>,
+    pub(super) params: Vec<(String, ParamSpec)>,
+}
+
+/// Where a parameter's value comes from.
+pub(super) enum ParamSpec {
+    /// An Impasto constant expression.
+    Source(String),
+    /// The MTL material that the binding is used for.
+    Mtl(MtlValue),
+}
+
+/// The `[environment]` table.
+pub(super) struct EnvironmentSpec {
+    pub(super) source: EnvironmentSpecSource,
+    pub(super) scale: f32,
+    pub(super) rotate: f32,
+    pub(super) sample: bool,
+}
+
+pub(super) enum EnvironmentSpecSource {
+    File(String),
+    Color(Vec3),
+}
+
+impl Description {
+    pub(super) fn read(document: &Document) -> Result<Description, SceneError> {
+        let parsed = document.parse()?;
+        let mut root = Table::new(document, "the scene", &parsed);
+        let name = root.get("name").map(|v| v.string().map(str::to_owned));
+        let description = Description {
+            name: name.transpose()?,
+            camera: camera(&mut root)?,
+            film: film(&mut root)?,
+            integrator: integrator(&mut root)?,
+            geometry: geometry(&mut root)?,
+            materials: materials(&mut root)?,
+            lights: lights(&mut root)?,
+            environment: environment(&mut root)?,
+        };
+        root.finish()?;
+        Ok(description)
+    }
+}
+
+fn camera(root: &mut Table) -> Result<Camera, SceneError> {
+    let hint = "add a [camera] table with `position`, `look_at` and `fov`";
+    let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
+    let mut table = value.table("[camera]")?;
+    let position = table.require("position")?.vector()?;
+    let look_at = table.require("look_at")?.vector()?;
+    let up = optional(&mut table, "up", Value::vector, Vec3::Y)?;
+    let fov = table.require("fov")?;
+    let fov = fov.float_where("an angle in degrees between 0 and 180", |v| {
+        v > 0.0 && v < 180.0
+    })?;
+    let aperture = |v: &Value| v.float_where("a diameter, 0 or more", |v| v >= 0.0);
+    let aperture = optional(&mut table, "aperture", aperture, 0.0)?;
+    let focus = |v: &Value| v.float_where("a distance above 0", |v| v > 0.0);
+    let focus = optional(&mut table, "focus", focus, position.distance(look_at))?;
+    let camera = Camera {
+        position,
+        look_at,
+        up,
+        fov,
+        aperture,
+        focus,
+    };
+    if position == look_at {
+        return Err(table
+            .error("[camera] looks at its own position")
+            .hint("`position` and `look_at` must differ"));
+    }
+    if camera.basis()[0] == Vec3::ZERO {
+        return Err(table
+            .error("`up` of [camera] is zero or along the view")
+            .hint("choose an `up` that is not parallel to `look_at` - `position`"));
+    }
+    table.finish()?;
+    Ok(camera)
+}
+
+fn film(root: &mut Table) -> Result<FilmSettings, SceneError> {
+    let mut film = FilmSettings {
+        width: 1024,
+        height: 768,
+    };
+    if let Some(value) = root.get("film") {
+        let mut table = value.table("[film]")?;
+        film.width = table.require("width")?.integer(1..=MAX_FILM)?;
+        film.height = table.require("height")?.integer(1..=MAX_FILM)?;
+        table.finish()?;
+    }
+    Ok(film)
+}
+
+fn integrator(root: &mut Table) -> Result<Integrator, SceneError> {
+    let mut integrator = Integrator {
+        max_depth: 16,
+        roulette_start: 8,
+    };
+    if let Some(value) = root.get("integrator") {
+        let mut table = value.table("[integrator]")?;
+        let depth = |v: &Value| v.integer(1..=MAX_DEPTH);
+        integrator.max_depth = optional(&mut table, "max_depth", depth, integrator.max_depth)?;
+        let start = |v: &Value| v.integer(0..=MAX_DEPTH);
+        integrator.roulette_start = optional(
+            &mut table,
+            "roulette_start",
+            start,
+            integrator.roulette_start,
+        )?;
+        table.finish()?;
+    }
+    Ok(integrator)
+}
+
+fn geometry(root: &mut Table) -> Result<Vec<GeometrySpec>, SceneError> {
+    let Some(value) = root.get("geometry") else {
+        return Ok(Vec::new());
+    };
+    let entry = |mut table: Table| {
+        let positive = |v: &Value| v.float_where("a number above 0", |v| v > 0.0);
+        let material = table.get("material");
+        let missing = |v: &Value| {
+            let message = v
+                .string()
+                .map(|name| format!("no material is called `{name}`"));
+            message.map(|m| v.error(m))
+        };
+        let spec = GeometrySpec {
+            obj: table.require("obj")?.string()?.to_owned(),
+            scale: optional(&mut table, "scale", positive, 1.0)?,
+            rotate: optional(&mut table, "rotate", Value::vector, Vec3::ZERO)?,
+            translate: optional(&mut table, "translate", Value::vector, Vec3::ZERO)?,
+            no_such_material: material.as_ref().map(missing).transpose()?,
+            material: material
+                .map(|v| v.string().map(str::to_owned))
+                .transpose()?,
+        };
+        table.finish()?;
+        Ok(spec)
+    };
+    value.tables("geometry")?.into_iter().map(entry).collect()
+}
+
+fn materials(root: &mut Table) -> Result<Vec<MaterialSpec>, SceneError> {
+    let Some(value) = root.get("materials") else {
+        return Ok(Vec::new());
+    };
+    let table = value.table("[materials]")?;
+    let entries = table.named().into_iter();
+    entries
+        .map(|(name, value)| material(name, &value))
+        .collect()
+}
+
+fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
+    let title = format!("[materials.{name:?}]");
+    let mut table = value.table(&title)?;
+    let file = table.require("file")?.string()?.to_owned();
+    let item = table.get("material").map(|v| v.string().map(str::to_owned));
+    let mut params = Vec::new();
+    if let Some(value) = table.get("params") {
+        let entries = value.table(format!("{title} params"))?.named();
+        for (key, value) in entries {
+            params.push((key.to_owned(), param(&value)?));
+        }
+    }
+    table.finish()?;
+    Ok(MaterialSpec {
+        name: name.to_owned(),
+        file,
+        material: item.transpose()?,
+        params,
+    })
+}
+
+/// A parameter's value as an Impasto constant expression, or the MTL value that gives it.
+fn param(value: &Value) -> Result<ParamSpec, SceneError> {
+    let source = match value.item() {
+        DeValue::Boolean(b) => b.to_string(),
+        DeValue::Integer(i) if i.radix() == 10 => i.as_str().to_owned(),
+        DeValue::Float(_) => float_source(value.float()?),
+        DeValue::Array(_) => {
+            let numbers = numbers(value.item()).filter(|n| (2..=4).contains(&n.len()));
+            let numbers = numbers.ok_or_else(|| value.mismatch("2 to 4 finite numbers"))?;
+            array_source(&numbers)
+        }
+        DeValue::String(text) => match text.strip_prefix('$') {
+            Some(key) => {
+                let known = || MtlValue::ALL.iter().map(|v| v.name());
+                let found = MtlValue::ALL.into_iter().find(|v| v.name() == key);
+                return found.map(ParamSpec::Mtl).ok_or_else(|| {
+                    let known: Vec<String> = known().map(|n| format!("${n}")).collect();
+                    value
+                        .error(format!("`${key}` is no value of an MTL file"))
+                        .hint(format!("there are {}", known.join(", ")))
+                });
+            }
+            None => text.trim().to_owned(),
+        },
+        _ => return Err(value.mismatch("a number, true, false, an array of numbers or a string")),
+    };
+    match source.is_empty() {
+        true => Err(value.mismatch("an Impasto expression, such as \"0.6 mm\"")),
+        false => Ok(ParamSpec::Source(source)),
+    }
+}
+
+/// The shortest literal that reads back as `value`, with a point or an exponent.
+pub(super) fn float_source(value: f32) -> String {
+    format!("{value:?}")
+}
+
+/// `vec2(a, b)`, `color(r, g, b)` or `vec4(a, b, c, d)`; colors stand for other triples, too.
+pub(super) fn array_source(numbers: &[f32]) -> String {
+    let name = match numbers.len() {
+        2 => "vec2",
+        3 => "color",
+        _ => "vec4",
+    };
+    let values: Vec<String> = numbers.iter().map(|&v| float_source(v)).collect();
+    format!("{name}({})", values.join(", "))
+}
+
+fn lights(root: &mut Table) -> Result<Vec<Light>, SceneError> {
+    let Some(value) = root.get("lights") else {
+        return Ok(Vec::new());
+    };
+    let light = |mut table: Table| {
+        let kind = table.require("kind")?;
+        let light = match kind.string()? {
+            "quad" => Light::Quad(quad(&mut table)?),
+            "distant" => Light::Distant(distant(&mut table)?),
+            _ => return Err(kind.mismatch("\"quad\" or \"distant\"")),
+        };
+        table.finish()?;
+        Ok(light)
+    };
+    value.tables("lights")?.into_iter().map(light).collect()
+}
+
+fn quad(table: &mut Table) -> Result<QuadLight, SceneError> {
+    let quad = QuadLight {
+        corner: table.require("corner")?.vector()?,
+        u: table.require("u")?.vector()?,
+        v: table.require("v")?.vector()?,
+        radiance: table.require("radiance")?.rgb()?,
+        two_sided: optional(table, "two_sided", Value::boolean, false)?,
+    };
+    let corners = [
+        quad.corner,
+        quad.corner + quad.u,
+        quad.corner + quad.u + quad.v,
+    ];
+    match super::mesh::has_area(&corners) {
+        true => Ok(quad),
+        false => Err(table
+            .error("the quad light has no area")
+            .hint("its edges `u` and `v` must not be zero or parallel")),
+    }
+}
+
+fn distant(table: &mut Table) -> Result<DistantLight, SceneError> {
+    let hint = "the direction from the scene towards the light";
+    let direction = table.require("to_light").map_err(|e| e.or_hint(hint))?;
+    let to_light = direction.vector()?.as_dvec3().normalize_or_zero().as_vec3();
+    if to_light == Vec3::ZERO {
+        return Err(direction.mismatch("a direction that is not zero"));
+    }
+    let angle =
+        |v: &Value| v.float_where("degrees from 0 to below 180", |v| (0.0..180.0).contains(&v));
+    Ok(DistantLight {
+        to_light,
+        irradiance: table.require("irradiance")?.rgb()?,
+        angle: optional(table, "angle", angle, 0.0)?,
+    })
+}
+
+fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> {
+    let Some(value) = root.get("environment") else {
+        return Ok(None);
+    };
+    let mut table = value.table("[environment]")?;
+    let source = match (table.get("file"), table.get("color")) {
+        (Some(file), None) => EnvironmentSpecSource::File(file.string()?.to_owned()),
+        (None, Some(color)) => EnvironmentSpecSource::Color(color.rgb()?),
+        _ => return Err(table.error("[environment] needs either `file` or `color`")),
+    };
+    let is_map = matches!(source, EnvironmentSpecSource::File(_));
+    let scale = |v: &Value| v.float_where("a number, 0 or more", |v| v >= 0.0);
+    let spec = EnvironmentSpec {
+        source,
+        scale: optional(&mut table, "scale", scale, 1.0)?,
+        rotate: optional(&mut table, "rotate", Value::float, 0.0)?,
+        sample: optional(&mut table, "sample", Value::boolean, is_map)?,
+    };
+    table.finish()?;
+    Ok(Some(spec))
+}
+
+/// The value of an optional key as `read` reads it, or `default`.
+fn optional<'d, T>(
+    table: &mut Table<'d>,
+    key: &'static str,
+    read: impl Fn(&Value<'d>) -> Result<T, SceneError>,
+    default: T,
+) -> Result<T, SceneError> {
+    table.get(key).map_or(Ok(default), |value| read(&value))
+}

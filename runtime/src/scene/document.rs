@@ -1,0 +1,268 @@
+//! A TOML file read strictly: every value knows its place, and keys nobody asked for are errors.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::path::Path;
+
+use glam::Vec3;
+use impasto_compiler::diag::nearest;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::SceneError;
+
+/// The text of a TOML file.
+pub(super) struct Document<'d> {
+    path: &'d Path,
+    text: &'d str,
+}
+
+impl<'d> Document<'d> {
+    pub(super) fn new(path: &'d Path, text: &'d str) -> Self {
+        Self { path, text }
+    }
+
+    pub(super) fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
+        DeTable::parse(self.text).map_err(|e| {
+            let place = e.span().unwrap_or(0..0);
+            self.error(place, format!("not valid TOML: {}", e.message()))
+        })
+    }
+
+    /// An error at a byte range of the text.
+    pub(super) fn error(&self, place: Range<usize>, message: impl Into<String>) -> SceneError {
+        let before = self.text.get(..place.start).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        SceneError {
+            line: Some(before.matches('\n').count() + 1),
+            column: Some(before[line_start..].chars().count() + 1),
+            ..SceneError::in_file(self.path, message)
+        }
+    }
+}
+
+/// A table whose keys are taken one by one; [`Table::finish`] refuses the rest.
+pub(super) struct Table<'d> {
+    document: &'d Document<'d>,
+    /// The table in words, such as `[camera]`.
+    name: String,
+    place: Range<usize>,
+    entries: &'d DeTable<'d>,
+    asked: Vec<&'static str>,
+}
+
+impl<'d> Table<'d> {
+    pub(super) fn new(
+        document: &'d Document<'d>,
+        name: impl Into<String>,
+        table: &'d Spanned<DeTable<'d>>,
+    ) -> Self {
+        Self::at(document, name, table.span(), table.get_ref())
+    }
+
+    fn at(
+        document: &'d Document<'d>,
+        name: impl Into<String>,
+        place: Range<usize>,
+        entries: &'d DeTable<'d>,
+    ) -> Self {
+        Self {
+            document,
+            name: name.into(),
+            place,
+            entries,
+            asked: Vec::new(),
+        }
+    }
+
+    /// An error about the table as a whole.
+    pub(super) fn error(&self, message: impl Into<String>) -> SceneError {
+        self.document.error(self.place.clone(), message)
+    }
+
+    /// The value of an optional key.
+    pub(super) fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
+        self.asked.push(key);
+        let item = self.entries.get(key)?;
+        Some(self.value(key, item))
+    }
+
+    /// The value of a key that must be there.
+    pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'d>, SceneError> {
+        if let Some(value) = self.get(key) {
+            return Ok(value);
+        }
+        let meant = |k: &&Spanned<Cow<str>>| nearest(k.get_ref(), [key]).is_some();
+        Err(match self.unknown().find(meant) {
+            Some(misspelled) => self.no_such_key(misspelled),
+            None => self.error(format!("{} needs `{key}`", self.name)),
+        })
+    }
+
+    /// All entries in the order of the file, for tables whose keys are names.
+    pub(super) fn named(&self) -> Vec<(&'d str, Value<'d>)> {
+        let mut entries: Vec<_> = self.entries.iter().collect();
+        entries.sort_by_key(|(key, _)| key.span().start);
+        let value = |(key, item): (&'d Spanned<_>, _)| {
+            let key: &'d Cow<str> = key.get_ref();
+            (key.as_ref(), self.value(key, item))
+        };
+        entries.into_iter().map(value).collect()
+    }
+
+    /// Refuses the first key that was not asked for.
+    pub(super) fn finish(self) -> Result<(), SceneError> {
+        let first = self.unknown().min_by_key(|k| k.span().start);
+        first.map_or(Ok(()), |key| Err(self.no_such_key(key)))
+    }
+
+    /// Keys that were not asked for (yet).
+    fn unknown(&self) -> impl Iterator<Item = &'d Spanned<Cow<'d, str>>> {
+        let keys = self.entries.keys();
+        keys.filter(|key| !self.asked.contains(&key.get_ref().as_ref()))
+    }
+
+    fn no_such_key(&self, key: &Spanned<Cow<str>>) -> SceneError {
+        let message = format!("{} has no key `{}`", self.name, key.get_ref());
+        let error = self.document.error(key.span(), message);
+        let known = self.asked.iter().copied();
+        match nearest(key.get_ref(), known.clone()) {
+            Some(best) => error.hint(format!("did you mean `{best}`?")),
+            None => error.hint(format!("its keys are {}", list(known))),
+        }
+    }
+
+    fn value(&self, key: &str, item: &'d Spanned<DeValue<'d>>) -> Value<'d> {
+        Value {
+            document: self.document,
+            name: format!("`{key}` of {}", self.name),
+            item,
+        }
+    }
+}
+
+/// One value with its place.
+pub(super) struct Value<'d> {
+    document: &'d Document<'d>,
+    /// The value in words, such as `` `fov` of [camera] ``.
+    name: String,
+    item: &'d Spanned<DeValue<'d>>,
+}
+
+impl<'d> Value<'d> {
+    /// An error at the value.
+    pub(super) fn error(&self, message: impl Into<String>) -> SceneError {
+        self.document.error(self.item.span(), message)
+    }
+
+    /// `` `fov` of [camera] must be ..., but it is ... ``
+    pub(super) fn mismatch(&self, expected: &str) -> SceneError {
+        let found = &self.document.text[self.item.span()];
+        let shown: String = found.chars().take(40).take_while(|c| *c != '\n').collect();
+        let more = if shown.len() < found.len() { "..." } else { "" };
+        self.error(format!(
+            "{} must be {expected}, not `{shown}{more}`",
+            self.name
+        ))
+    }
+
+    pub(super) fn item(&self) -> &'d DeValue<'d> {
+        self.item.get_ref()
+    }
+
+    pub(super) fn string(&self) -> Result<&'d str, SceneError> {
+        let text = self.item().as_str();
+        text.ok_or_else(|| self.mismatch("a string in quotes"))
+    }
+
+    pub(super) fn boolean(&self) -> Result<bool, SceneError> {
+        let value = self.item().as_bool();
+        value.ok_or_else(|| self.mismatch("true or false"))
+    }
+
+    /// An integer in `range`.
+    pub(super) fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
+        let (low, high) = (range.start(), range.end());
+        let value = self.item().as_integer().and_then(|i| {
+            let value = u32::from_str_radix(i.as_str(), i.radix()).ok()?;
+            range.contains(&value).then_some(value)
+        });
+        value.ok_or_else(|| self.mismatch(&format!("an integer from {low} to {high}")))
+    }
+
+    /// A finite number.
+    pub(super) fn float(&self) -> Result<f32, SceneError> {
+        number(self.item()).ok_or_else(|| self.mismatch("a finite number"))
+    }
+
+    /// A finite number for which `holds`.
+    pub(super) fn float_where(
+        &self,
+        expected: &str,
+        holds: impl Fn(f32) -> bool,
+    ) -> Result<f32, SceneError> {
+        let value = number(self.item()).filter(|&v| holds(v));
+        value.ok_or_else(|| self.mismatch(expected))
+    }
+
+    /// Three finite numbers.
+    pub(super) fn vector(&self) -> Result<Vec3, SceneError> {
+        let vector = numbers(self.item()).and_then(|v| <[f32; 3]>::try_from(v).ok());
+        let vector = vector.ok_or_else(|| self.mismatch("three finite numbers, as [x, y, z]"))?;
+        Ok(vector.into())
+    }
+
+    /// Linear RGB, not negative: three numbers, or one for a grey.
+    pub(super) fn rgb(&self) -> Result<Vec3, SceneError> {
+        let rgb = match number(self.item()) {
+            Some(grey) => Some([grey; 3]),
+            None => numbers(self.item()).and_then(|v| v.try_into().ok()),
+        };
+        let rgb = rgb.filter(|rgb| rgb.iter().all(|&c| c >= 0.0));
+        let expected = "a number or [r, g, b], finite and not negative";
+        Ok(rgb.ok_or_else(|| self.mismatch(expected))?.into())
+    }
+
+    /// The table, which errors call `name`.
+    pub(super) fn table(&self, name: impl Into<String>) -> Result<Table<'d>, SceneError> {
+        let entries = self.item().as_table();
+        let entries = entries.ok_or_else(|| self.mismatch("a table"))?;
+        Ok(Table::at(self.document, name, self.item.span(), entries))
+    }
+
+    /// The tables of `[[name]]`.
+    pub(super) fn tables(&self, name: &str) -> Result<Vec<Table<'d>>, SceneError> {
+        let expected = format!("a list of tables: write [[{name}]]");
+        let list = self.item().as_array();
+        let list = list.ok_or_else(|| self.mismatch(&expected))?;
+        let table = |item: &'d Spanned<DeValue<'d>>| {
+            let entries = item.get_ref().as_table();
+            let entries = entries.ok_or_else(|| self.mismatch(&expected))?;
+            let name = format!("[[{name}]]");
+            Ok(Table::at(self.document, name, item.span(), entries))
+        };
+        list.iter().map(table).collect()
+    }
+}
+
+/// `` `a`, `b`, `c` ``
+pub(super) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = names.map(|n| format!("`{n}`")).collect();
+    quoted.join(", ")
+}
+
+/// A finite number that fits `f32`.
+pub(super) fn number(value: &DeValue) -> Option<f32> {
+    let number = match value {
+        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok()? as f32,
+        DeValue::Float(f) => f.as_str().parse().ok()?,
+        _ => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+/// An array of finite numbers.
+pub(super) fn numbers(value: &DeValue) -> Option<Vec<f32>> {
+    let items = value.as_array()?.iter();
+    items.map(|item| number(item.get_ref())).collect()
+}

@@ -1,0 +1,307 @@
+//! OBJ files: triangles with the names of their materials.
+//!
+//! tobj parses them, from a normalised copy: by itself it tells no line numbers, takes polylines
+//! for faces, invents normals for faces that lack them, and fails on some legal files.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::SceneError;
+
+/// The triangles of an OBJ file, in its order.
+pub(super) struct Obj {
+    pub(super) triangles: Vec<ObjTriangle>,
+    /// Names after `usemtl` that faces use, in order of first use; faces before any `usemtl` use
+    /// the empty name.
+    pub(super) materials: Vec<String>,
+    /// The files that `mtllib` lines name.
+    pub(super) mtl_files: Vec<String>,
+    /// Faces with fewer than three corners, which were left out.
+    pub(super) thin_faces: usize,
+}
+
+/// One triangle as the file has it.
+pub(super) struct ObjTriangle {
+    pub(super) positions: [Vec3; 3],
+    pub(super) normals: Option<[Vec3; 3]>,
+    pub(super) uvs: Option<[Vec2; 3]>,
+    /// Index into [`Obj::materials`].
+    pub(super) material: usize,
+}
+
+/// Reads an OBJ file and cuts its faces into fans of triangles.
+pub(super) fn load(path: &Path) -> Result<Obj, SceneError> {
+    let bytes = std::fs::read(path)
+        .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut scan = Scan::new(path);
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        scan.line(index + 1, line)?;
+    }
+    scan.check_ranges()?;
+    if scan.attributes.is_empty() {
+        return Err(SceneError::in_file(path, "the OBJ file has no faces")
+            .hint("is it complete? faces are lines that start with `f`"));
+    }
+    let triangles = parse(&scan)
+        .map_err(|e| SceneError::in_file(path, format!("the OBJ file cannot be read: {e}")))?;
+    Ok(Obj {
+        triangles,
+        materials: scan.materials,
+        mtl_files: scan.mtl_files,
+        thin_faces: scan.thin_faces,
+    })
+}
+
+/// The three lists that faces index, in the order of indices in `1/2/3`.
+const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+/// What a pass over the lines finds.
+struct Scan<'p> {
+    path: &'p Path,
+    /// `v`, `vt` and `vn` lines; faces may come before what they use.
+    vertices: String,
+    /// `usemtl` lines with an index of `materials`, and `f` lines with absolute indices.
+    faces: String,
+    counts: [usize; 3],
+    /// The largest index into each list, and the line that has it.
+    largest: [(usize, usize); 3],
+    /// For each triangle whether all corners have texture coordinates and normals.
+    attributes: Vec<[bool; 2]>,
+    materials: Vec<String>,
+    /// What `usemtl` said last, and whether `faces` says so.
+    current: String,
+    current_written: bool,
+    mtl_files: Vec<String>,
+    thin_faces: usize,
+}
+
+impl<'p> Scan<'p> {
+    fn new(path: &'p Path) -> Self {
+        Scan {
+            path,
+            vertices: String::new(),
+            faces: String::new(),
+            counts: [0; 3],
+            largest: [(0, 0); 3],
+            attributes: Vec::new(),
+            materials: Vec::new(),
+            current: String::new(),
+            current_written: false,
+            mtl_files: Vec::new(),
+            thin_faces: 0,
+        }
+    }
+
+    fn error(&self, line: usize, message: impl Into<String>) -> SceneError {
+        SceneError::in_file(self.path, message).line(line)
+    }
+
+    fn line(&mut self, number: usize, line: &str) -> Result<(), SceneError> {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.ends_with('\\') {
+            let error = self.error(
+                number,
+                "the line goes on in the next, which is not supported",
+            );
+            return Err(error.hint("join lines that end in `\\`"));
+        }
+        let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        match key {
+            "v" => self.vertex(number, "v", 0, rest, 3),
+            "vt" => self.vertex(number, "vt", 1, rest, 1),
+            "vn" => self.vertex(number, "vn", 2, rest, 3),
+            "f" => self.face(number, rest),
+            "usemtl" => {
+                self.current = rest.trim().to_owned();
+                self.current_written = false;
+                Ok(())
+            }
+            "mtllib" => {
+                self.mtl_files.push(rest.trim().replace('\\', "/"));
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A line of at least `needed` numbers. What a fourth number of `v` divides by is kept,
+    /// colors and third texture coordinates are not.
+    fn vertex(
+        &mut self,
+        line: usize,
+        key: &str,
+        list: usize,
+        rest: &str,
+        needed: usize,
+    ) -> Result<(), SceneError> {
+        self.counts[list] += 1;
+        let what = format!("{} {}", LISTS[list], self.counts[list]);
+        let mut values = [0.0f32; 4];
+        let mut found = 0;
+        for word in rest.split_whitespace().take(4) {
+            values[found] = word.parse().map_err(|_| {
+                self.error(
+                    line,
+                    format!("{what} has `{word}` where a number should be"),
+                )
+            })?;
+            found += 1;
+        }
+        if found < needed {
+            let error = self.error(line, format!("{what} has {found} of {needed} numbers"));
+            return Err(error.hint("is the file complete?"));
+        }
+        if key == "v" && rest.split_whitespace().count() == 4 {
+            values = values.map(|v| v / values[3]);
+        }
+        let used = if key == "vt" {
+            &values[..2]
+        } else {
+            &values[..3]
+        };
+        if !used.iter().all(|v| v.is_finite()) {
+            return Err(self.error(line, format!("{what} is not finite: {rest}")));
+        }
+        self.vertices += key;
+        for value in used {
+            let _ = write!(self.vertices, " {value}"); // writing to a string cannot fail
+        }
+        self.vertices.push('\n');
+        Ok(())
+    }
+
+    fn face(&mut self, line: usize, rest: &str) -> Result<(), SceneError> {
+        let start = self.faces.len();
+        self.write_material();
+        self.faces.push('f');
+        let (mut corners, mut has) = (0, [true; 2]);
+        for word in rest.split_whitespace() {
+            let corner = self.corner(line, word)?;
+            corners += 1;
+            let _ = write!(self.faces, " {}/", corner[0].unwrap_or_default());
+            for (list, separator) in [(1, "/"), (2, "")] {
+                has[list - 1] &= corner[list].is_some();
+                if let Some(index) = corner[list] {
+                    let _ = write!(self.faces, "{index}");
+                }
+                self.faces += separator;
+            }
+        }
+        self.faces.push('\n');
+        if corners < 3 {
+            self.faces.truncate(start);
+            self.current_written = false;
+            self.thin_faces += 1;
+            return Ok(());
+        }
+        self.attributes
+            .extend(std::iter::repeat_n(has, corners - 2));
+        Ok(())
+    }
+
+    /// Tells tobj the material of what follows, unless it knows.
+    fn write_material(&mut self) {
+        if self.current_written {
+            return;
+        }
+        let known = self.materials.iter().position(|m| *m == self.current);
+        let index = known.unwrap_or(self.materials.len());
+        if known.is_none() {
+            self.materials.push(self.current.clone());
+        }
+        let _ = writeln!(self.faces, "usemtl {index}");
+        self.current_written = true;
+    }
+
+    /// The absolute indices, from 1, of `1/2/3`, `1//3`, `1/2` or `1`.
+    fn corner(&mut self, line: usize, word: &str) -> Result<[Option<usize>; 3], SceneError> {
+        let mut indices = [None; 3];
+        for (list, text) in word.split('/').enumerate() {
+            let malformed = || {
+                let message = format!("`{word}` is no corner of a face");
+                self.error(line, message)
+                    .hint("corners are written 1, 1/2, 1//3 or 1/2/3")
+            };
+            if list > 2 || (list == 0 && text.is_empty()) {
+                return Err(malformed());
+            }
+            if text.is_empty() {
+                continue;
+            }
+            let index: i64 = text.parse().map_err(|_| malformed())?;
+            let count = self.counts[list];
+            let absolute = match index {
+                1.. => usize::try_from(index).ok(),
+                _ => usize::try_from(count as i64 + 1 + index)
+                    .ok()
+                    .filter(|&i| i > 0 && index < 0),
+            };
+            let Some(absolute) = absolute else {
+                return Err(self.out_of_range(line, list, index, count));
+            };
+            if absolute > self.largest[list].0 {
+                self.largest[list] = (absolute, line);
+            }
+            indices[list] = Some(absolute);
+        }
+        Ok(indices)
+    }
+
+    fn out_of_range(&self, line: usize, list: usize, index: i64, count: usize) -> SceneError {
+        let what = LISTS[list];
+        let message = format!("the face uses {what} {index}, but the file has {count}");
+        self.error(line, message)
+            .hint("indices start at 1; negative ones count back from the latest")
+    }
+
+    fn check_ranges(&self) -> Result<(), SceneError> {
+        for (list, &(index, line)) in self.largest.iter().enumerate() {
+            let count = self.counts[list];
+            if index > count {
+                return Err(self.out_of_range(line, list, index as i64, count));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn parse(scan: &Scan) -> Result<Vec<ObjTriangle>, tobj::LoadError> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ..tobj::LoadOptions::default()
+    };
+    // The library is made up: it has a material for each index that `faces` uses.
+    let names = 0..scan.materials.len();
+    let text = format!("mtllib all\n{}{}", scan.vertices, scan.faces);
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| {
+        let material = |i: usize| tobj::Material {
+            name: i.to_string(),
+            ..tobj::Material::default()
+        };
+        let by_name = names.clone().map(|i| (i.to_string(), i)).collect();
+        Ok((names.clone().map(material).collect(), by_name))
+    })?;
+    let mut triangles = Vec::with_capacity(scan.attributes.len());
+    for mesh in models.iter().map(|m| &m.mesh) {
+        for first in (0..mesh.indices.len()).step_by(3) {
+            let [has_uv, has_normal] = scan.attributes[triangles.len()];
+            let corners = [first, first + 1, first + 2];
+            let triple = |values: &[f32], indices: &[u32]| {
+                corners.map(|k| Vec3::from_slice(&values[3 * indices[k] as usize..]))
+            };
+            let pair = |k: usize| {
+                Vec2::from_slice(&mesh.texcoords[2 * mesh.texcoord_indices[k] as usize..])
+            };
+            triangles.push(ObjTriangle {
+                positions: triple(&mesh.positions, &mesh.indices),
+                normals: has_normal.then(|| triple(&mesh.normals, &mesh.normal_indices)),
+                uvs: has_uv.then(|| corners.map(pair)),
+                material: mesh.material_id.unwrap_or_default(),
+            });
+        }
+    }
+    Ok(triangles)
+}
