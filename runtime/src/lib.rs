@@ -5,7 +5,6 @@
 pub mod bvh;
 mod image_file;
 pub mod lights;
-
 pub mod scene;
 pub mod shader_part;
 pub mod texture;

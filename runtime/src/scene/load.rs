@@ -197,8 +197,7 @@ fn load_map(
     let mut odd = 0;
     let mut repair = |value: f32| {
         let scaled = value * scale;
-        // NaN compares false.
-        if scaled >= 0.0 && scaled <= f32::MAX {
+        if (0.0..=f32::MAX).contains(&scaled) {
             return scaled;
         }
         odd += 1;
