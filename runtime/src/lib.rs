@@ -1,11 +1,34 @@
 //! The wavefront path tracer that runs compiled Impasto materials.
 //!
-//! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it reads.
+//! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it
+//! reads. The GPU side composes kernels of them and of compiled materials, as a plan says; a
+//! [`render::Renderer`] dispatches those until every path is done, and gives a [`film::Film`]
+//! and a [`report::Report`]. Between the two lies [`world::World`].
 
 pub mod bvh;
+pub mod camera;
+mod compose;
+pub mod error;
+pub mod film;
+pub mod gpu;
 mod image_file;
+mod layout;
 pub mod lights;
+mod modules;
+pub mod output;
+mod parallel;
+mod queues;
+mod random;
+pub mod render;
+pub mod report;
+mod resources;
 pub mod scene;
+mod schedule;
 pub mod shader_part;
+mod stages;
+mod state;
+mod status;
+mod text;
 pub mod texture;
 mod wgsl;
+pub mod world;

@@ -86,9 +86,9 @@ pub struct FilmSettings {
 /// When paths end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integrator {
-    /// Most scattering events of a path, at least 1; 16 by default.
+    /// Most segments of a path, at least 1, which shows lights alone; 16 by default.
     pub max_depth: u32,
-    /// Scattering events after which Russian roulette starts; 8 by default.
+    /// The segment at whose end Russian roulette starts; 8 by default.
     pub roulette_start: u32,
 }
 

@@ -1,0 +1,232 @@
+//! The text of one kernel: constants, accessors of path state, the parts that its stages name
+//! in the stage table, the stage functions, and the shell with the entry point.
+//!
+//! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
+//! nothing else.
+
+use impasto_compiler::abi::{Emission, InputSet};
+
+use crate::modules::{Composer, Kernel, Recipe};
+use crate::shader_part::{BufferData, ShaderPart};
+use crate::stages::{Part, StageId};
+use crate::state::{self, Storage};
+use crate::text::{mentions, predicate, preprocess, without_comments};
+use crate::{film, random};
+
+/// A buffer as a kernel binds it, in group 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Binding {
+    /// The index, the same in all kernels of a plan.
+    pub index: u32,
+    /// The WGSL variable.
+    pub name: String,
+    /// What kernels may do with it.
+    pub access: Access,
+}
+
+/// What kernels may do with a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Access {
+    Uniform,
+    Read,
+    ReadWrite,
+}
+
+/// The runtime's own buffers: name, type, access.
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 6] = [
+    ("run", "Run", Access::Uniform),
+    ("state", "array<vec4<u32>>", Access::ReadWrite),
+    ("queues", "array<u32>", Access::ReadWrite),
+    ("counters", "array<atomic<u32>>", Access::ReadWrite),
+    ("film", "array<atomic<u32>>", Access::ReadWrite),
+    ("arguments", "array<u32>", Access::ReadWrite),
+];
+
+/// Members of the uniform `run`, the settings that do not change a kernel's text.
+pub(crate) const RUN_MEMBERS: [&str; 4] = ["seed", "first_sample", "samples", "unused"];
+
+impl Composer<'_> {
+    /// Writes a kernel's text.
+    pub(crate) fn compose(&self, recipe: Recipe) -> Kernel {
+        let (stages, members) = (&recipe.stages, &recipe.members);
+        let storage = if self.layout.wavefront {
+            Storage::Memory
+        } else {
+            Storage::Registers
+        };
+        let mut text = self.constants(recipe.counter);
+        text += &state::accessors(self.layout.needs, stages, storage);
+        let mut parts: Vec<Part> = stages
+            .iter()
+            .flat_map(|s| s.stage().parts)
+            .copied()
+            .collect();
+        parts.sort_unstable();
+        parts.dedup();
+        for part in parts {
+            text += &self.part(part, members);
+        }
+        if stages.contains(&StageId::Logic) {
+            text += &self.fates();
+        }
+        for id in stages {
+            text += &preprocess(id.stage().body, &self.flags(*id, members));
+        }
+        text += &recipe.shell;
+        let (declarations, bindings) = self.declarations(&text);
+        Kernel {
+            recipe,
+            wgsl: declarations + &text,
+            bindings,
+        }
+    }
+
+    /// The conditions of a stage's text.
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 3] {
+        let needs = match stage {
+            StageId::Material => self.needs_of(members),
+            _ => self.layout.needs,
+        };
+        [
+            ("shadow_rays", needs.shadow_rays),
+            ("medium", needs.medium),
+            ("varying_emission", needs.varying_emission),
+        ]
+    }
+
+    fn constants(&self, nonfinite: usize) -> String {
+        let (world, sizes) = (self.world, self.sizes);
+        let mut out = String::new();
+        for (name, value) in [
+            ("POOL_SIZE", sizes.pool),
+            ("WORKGROUP_SIZE", sizes.workgroup),
+            ("ROW_GROUPS", sizes.row_groups),
+            ("PIXELS", world.width * world.height),
+            ("MAX_DEPTH", world.max_depth),
+            ("ROULETTE_START", world.roulette_start),
+            ("NOTHING", u32::MAX),
+            ("FILM_COUNT_PLANE", film::COUNT_PLANE),
+            (
+                "COUNTER_NONFINITE",
+                self.layout.counters.nonfinite(nonfinite) as u32,
+            ),
+        ] {
+            out += &format!("const {name}: u32 = {value}u;\n");
+        }
+        out + &self.layout.counters.constants() + &state::constants()
+    }
+
+    fn part(&self, part: Part, members: &[usize]) -> String {
+        let world = self.world;
+        let parts = &world.parts;
+        match part {
+            Part::Random => random::constants() + include_str!("kernels/random.wgsl"),
+            Part::Camera => world.camera.wgsl(world.width, world.height),
+            Part::Film => include_str!("kernels/film.wgsl").to_string(),
+            Part::Numbers => include_str!("kernels/numbers.wgsl").to_string(),
+            Part::Geometry => parts.geometry.wgsl.clone(),
+            Part::Surface => parts.surface.wgsl.clone(),
+            Part::Lights => parts.lights.wgsl.clone(),
+            Part::Traversal => parts.bvh.wgsl.clone(),
+            Part::Materials => self.materials(members),
+        }
+    }
+
+    /// Generated code for `members`, what it reads, and how its surface point is filled.
+    fn materials(&self, members: &[usize]) -> String {
+        let infos = self.infos(members);
+        let textured = infos.iter().any(|m| !m.textures.is_empty());
+        let textures = self.world.parts.texture.as_ref().filter(|_| textured);
+        let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
+        out += &self.source.wgsl(members);
+        out += &surface_point(infos.iter().map(|m| m.inputs));
+        out
+    }
+
+    /// What the logic stage must know of every material, as functions of its index.
+    fn fates(&self) -> String {
+        let infos = self.materials;
+        let smooth = |i: usize| !infos[i].delta_only;
+        let emits = |i: usize| infos[i].emission == Emission::Varying;
+        let mut out = predicate("scatters_sampled_light", infos.len(), smooth);
+        out += &predicate("needs_last_evaluation", infos.len(), emits);
+        out
+    }
+
+    /// Declarations of the buffers that `text` mentions.
+    fn declarations(&self, text: &str) -> (String, Vec<Binding>) {
+        let code = without_comments(text);
+        let scene = self.scene_buffers();
+        let scene = scene.map(|b| (b.name, b.wgsl_type, Access::Read));
+        let mut out = String::new();
+        let mut bindings = Vec::new();
+        for (index, (name, ty, access)) in OWN_BUFFERS.into_iter().chain(scene).enumerate() {
+            if !mentions(&code, name) {
+                continue;
+            }
+            let space = match access {
+                Access::Uniform => {
+                    out += &format!("struct {ty} {{ {}: u32 }}\n", RUN_MEMBERS.join(": u32, "));
+                    "uniform"
+                }
+                Access::Read => "storage, read",
+                Access::ReadWrite => "storage, read_write",
+            };
+            out += &format!("@group(0) @binding({index}) var<{space}> {name}: {ty};\n");
+            bindings.push(Binding {
+                index: index as u32,
+                name: name.to_string(),
+                access,
+            });
+        }
+        (out, bindings)
+    }
+
+    /// The buffers of all parts of the scene.
+    pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
+        let parts = &self.world.parts;
+        let parts: [Option<&ShaderPart>; 5] = [
+            Some(&parts.geometry),
+            Some(&parts.bvh),
+            Some(&parts.surface),
+            Some(&parts.lights),
+            parts.texture.as_ref(),
+        ];
+        parts.into_iter().flatten().flat_map(|part| &part.buffers)
+    }
+}
+
+/// The function that fills a material's inputs, those that some member reads; the others get
+/// what is at hand.
+fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
+    let all = inputs.fold(InputSet::default(), |a, b| InputSet {
+        position: a.position || b.position,
+        normal: a.normal || b.normal,
+        geometric_normal: a.geometric_normal || b.geometric_normal,
+        tangent: a.tangent || b.tangent,
+        uv: a.uv || b.uv,
+    });
+    let geometric = "hit_geometric_normal(hit.primitive)";
+    let pick = |used, value, other| if used { value } else { other };
+    format!(
+        "fn surface_point(hit: PathHit) -> SurfacePoint {{\n    \
+         let barycentrics = vec2<f32>(hit.u, hit.v);\n    \
+         return SurfacePoint({}, {}, {geometric}, {}, {});\n}}\n",
+        pick(
+            all.position,
+            "hit_position(hit.primitive, barycentrics)",
+            "vec3<f32>(0.0)"
+        ),
+        pick(
+            all.normal,
+            "hit_normal(hit.primitive, barycentrics)",
+            geometric
+        ),
+        pick(all.tangent, "hit_tangent(hit.primitive)", "vec3<f32>(0.0)"),
+        pick(
+            all.uv,
+            "hit_uv(hit.primitive, barycentrics)",
+            "vec2<f32>(0.0)"
+        ),
+    )
+}

@@ -1,0 +1,196 @@
+//! The GPU: finding an adapter, opening a device, and learning of its errors.
+//!
+//! wgpu reports errors through callbacks that panic by default. Here they are collected, and
+//! [`Gpu::check`] turns the first into a [`RuntimeError`].
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::error::RuntimeError;
+
+mod info;
+pub(crate) mod shader;
+pub(crate) mod timing;
+
+pub use info::GpuInfo;
+
+/// How to choose and open a GPU.
+#[derive(Clone, Debug, Default)]
+pub struct GpuOptions {
+    /// Part of the adapter's name, in any case; the fastest kind of adapter if `None`.
+    pub adapter: Option<String>,
+    /// Keeps wgpu's bounds checks and loop bounds in the kernels: slower, for finding defects.
+    pub checked: bool,
+}
+
+/// An open GPU.
+#[derive(Debug)]
+pub struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    pub(crate) adapter: wgpu::Adapter,
+    pub(crate) checked: bool,
+    failure: Arc<Mutex<Option<RuntimeError>>>,
+}
+
+/// Features that are used where they exist; nothing requires one.
+pub(crate) const USED_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
+    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+
+impl Gpu {
+    /// Opens a GPU, with every limit as high as its driver allows.
+    pub fn new(options: &GpuOptions) -> Result<Self, RuntimeError> {
+        let adapter = choose_adapter(adapters(), options.adapter.as_deref())?;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("impasto"),
+            required_features: adapter.features() & USED_FEATURES,
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..Default::default()
+        };
+        let request = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) = request.map_err(|e| RuntimeError::DeviceRequest {
+            adapter: adapter.get_info().name,
+            reason: e.to_string(),
+        })?;
+        let failure = collect_errors(&device);
+        Ok(Self {
+            device,
+            queue,
+            adapter,
+            checked: options.checked,
+            failure,
+        })
+    }
+
+    /// The names of all adapters, best first.
+    pub fn adapter_names() -> Vec<String> {
+        adapters().iter().map(|a| a.get_info().name).collect()
+    }
+
+    /// What the GPU is and can do.
+    pub fn info(&self) -> GpuInfo {
+        GpuInfo::new(self)
+    }
+
+    /// Whether the "GPU" is the processor: smaller portions of work keep it responsive.
+    pub(crate) fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The first error since the device was opened, if there was any.
+    pub(crate) fn check(&self) -> Result<(), RuntimeError> {
+        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.take().map_or(Ok(()), Err)
+    }
+
+    /// Fails if a storage buffer of `bytes` for `what` is more than a kernel can bind.
+    pub(crate) fn check_binding_size(&self, what: &str, bytes: u64) -> Result<(), RuntimeError> {
+        let limits = self.device.limits();
+        let binding = limits.max_storage_buffer_binding_size;
+        let (limit, has) = if limits.max_buffer_size < binding {
+            ("max_buffer_size", limits.max_buffer_size)
+        } else {
+            ("max_storage_buffer_binding_size", binding)
+        };
+        if bytes <= has {
+            return Ok(());
+        }
+        Err(RuntimeError::LimitTooSmall {
+            limit,
+            has,
+            needs: bytes,
+            what: format!("{what} (in bytes)"),
+            hint: "use a smaller scene or picture, or another GPU (`--gpu`)",
+        })
+    }
+}
+
+/// All adapters, the most capable kind first; equal kinds in the driver's order.
+fn adapters() -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    // Indirect arguments come from the prepare kernels alone, which keep to the limits;
+    // validating them again would cost more than the dispatch itself.
+    descriptor.flags = wgpu::InstanceFlags::from_build_config()
+        .difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL)
+        .with_env()
+        | wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER;
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    adapters
+}
+
+fn choose_adapter(
+    adapters: Vec<wgpu::Adapter>,
+    wanted: Option<&str>,
+) -> Result<wgpu::Adapter, RuntimeError> {
+    let found = adapters.iter().map(|a| a.get_info().name).collect();
+    let matches = |name: &str| {
+        wanted.is_none_or(|wanted| name.to_lowercase().contains(&wanted.to_lowercase()))
+    };
+    adapters
+        .into_iter()
+        .find(|adapter| matches(&adapter.get_info().name))
+        .ok_or_else(|| RuntimeError::NoAdapter {
+            wanted: wanted.map(String::from),
+            found,
+        })
+}
+
+/// Makes the device put its first error where [`Gpu::check`] finds it.
+fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
+    let failure = Arc::new(Mutex::new(None));
+    let keep_first = |slot: &Mutex<Option<RuntimeError>>, error| {
+        slot.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(error);
+    };
+    let on_error = failure.clone();
+    device.on_uncaptured_error(Arc::new(move |error| {
+        let error = match error {
+            wgpu::Error::OutOfMemory { source } => RuntimeError::OutOfMemory(source.to_string()),
+            other => RuntimeError::Validation(other.to_string()),
+        };
+        keep_first(&on_error, error);
+    }));
+    let on_loss = failure.clone();
+    device.set_device_lost_callback(move |reason, message| {
+        if reason != wgpu::DeviceLostReason::Destroyed {
+            keep_first(&on_loss, RuntimeError::DeviceLost(message));
+        }
+    });
+    failure
+}
+
+impl Gpu {
+    /// Waits for a submission, then gives the first `size` bytes of the mapped `buffer` to
+    /// `take` and unmaps it.
+    pub(crate) fn read<T>(
+        &self,
+        buffer: &wgpu::Buffer,
+        submission: wgpu::SubmissionIndex,
+        size: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, RuntimeError> {
+        let lost = |e: &dyn std::fmt::Display| RuntimeError::DeviceLost(e.to_string());
+        buffer.map_async(wgpu::MapMode::Read, 0..size, |_| {});
+        let waited = self.device.poll(wgpu::PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        });
+        self.check()?;
+        waited.map_err(|e| lost(&e))?;
+        let view = buffer.get_mapped_range(0..size).map_err(|e| lost(&e))?;
+        let taken = take(&view);
+        drop(view);
+        buffer.unmap();
+        Ok(taken)
+    }
+}

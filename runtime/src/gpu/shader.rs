@@ -1,0 +1,68 @@
+//! From WGSL text to a pipeline: validation first, so that a defect of code generation is
+//! reported with the line it concerns and never reaches a driver.
+
+use wgpu::naga;
+
+use super::Gpu;
+use crate::error::RuntimeError;
+
+/// Parses and validates `wgsl`, the text of the kernel called `kernel`.
+pub(crate) fn validate(kernel: &str, wgsl: &str) -> Result<naga::Module, RuntimeError> {
+    let failure = |message| RuntimeError::Shader {
+        kernel: kernel.to_string(),
+        message,
+    };
+    let module = naga::front::wgsl::parse_str(wgsl)
+        .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
+    let flags = naga::valid::ValidationFlags::all();
+    naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
+        .validate(&module)
+        .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
+    Ok(module)
+}
+
+impl Gpu {
+    /// Builds the pipeline of one validated kernel, whose entry point is `main`.
+    pub(crate) fn pipeline(
+        &self,
+        kernel: &str,
+        wgsl: &str,
+        layout: &wgpu::BindGroupLayout,
+    ) -> wgpu::ComputePipeline {
+        let module = self.shader_module(kernel, wgsl);
+        let layout = self
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(kernel),
+                bind_group_layouts: &[Some(layout)],
+                immediate_size: 0,
+            });
+        self.device
+            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(kernel),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+    }
+
+    #[allow(unsafe_code)]
+    fn shader_module(&self, kernel: &str, wgsl: &str) -> wgpu::ShaderModule {
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(kernel),
+            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+        };
+        if self.checked {
+            return self.device.create_shader_module(descriptor);
+        }
+        // SAFETY: the text is generated, not the user's. Its indices are slots and items that
+        // are compared with the pool's size, primitives from the hierarchy that was built
+        // over them, and pixels of a path that was begun inside the picture. Loops are bounded:
+        // the language demands a bound of every loop and traversal descends a finite tree.
+        // Divisors are constants or guarded.
+        let checks = wgpu::ShaderRuntimeChecks::unchecked();
+        unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
+    }
+}

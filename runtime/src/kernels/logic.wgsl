@@ -1,0 +1,100 @@
+// Takes in what the last ray casts found, and decides how a path goes on.
+//
+// MAX_DEPTH counts path segments. Light that arrives over at most that many is gathered, by
+// both strategies alike: a light sample of vertex n makes a path of n + 1 segments, and so
+// does the scattered ray that hits the light. Were they cut at different lengths, one half of
+// the weights that sum to 1 would be missing.
+
+fn logic(slot: u32) {
+    var path = load_radiance(slot);
+    if (path.flags & PATH_RETIRED) != 0u {
+        return;
+    }
+    if (path.flags & PATH_LIVE) == 0u {
+        request_new_path();
+        return;
+    }
+    let ray = load_ray_direction(slot);
+    let pixel = load_ray_origin(slot).pixel;
+    let vertex = path.flags & DEPTH_MASK;
+    var carried = load_throughput(slot);
+    var material = NOTHING;
+    var hit = PathHit(0.0, 0.0, 0.0, NOTHING);
+
+#if shadow_rays
+    if (path.flags & PATH_LIT) != 0u {
+        path.radiance += sampled_light(slot);
+    }
+#endif
+    // A throughput of zero says that scattering failed and no ray was cast.
+    if any(carried.throughput > vec3<f32>(0.0)) {
+        hit = load_hit(slot);
+        if hit.primitive == NOTHING {
+            path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
+        } else {
+            path.radiance += carried.throughput
+                * light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
+            material = primitive_material(hit.primitive);
+        }
+    }
+    if vertex >= MAX_DEPTH && !needs_last_evaluation(material) {
+        material = NOTHING;
+    }
+    if material != NOTHING && vertex >= ROULETTE_START {
+        let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_ROULETTE)).x;
+        let survival = survival_probability(carried.throughput);
+        if u < survival {
+            carried.throughput /= survival;
+            store_throughput(slot, carried);
+        } else {
+            material = NOTHING;
+        }
+    }
+    if material == NOTHING {
+        film_add(pixel, path.radiance);
+        request_new_path();
+        return;
+    }
+
+    path.flags = (path.flags & ~PATH_LIT) + 1u;
+#if shadow_rays
+    if vertex < MAX_DEPTH && scatters_sampled_light(material) {
+        let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
+        let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LIGHT));
+        path.flags |= choose_light(slot, position, u);
+    }
+#endif
+    store_radiance(slot, path);
+    request_material(material);
+}
+
+// At least the chance of the smallest random number, and a multiple of it: then the number
+// falls below it exactly that often, and dividing by it leaves the mean alone.
+fn survival_probability(throughput: vec3<f32>) -> f32 {
+    return ceil(min(max_component(throughput), 0.95) * 0x1p24) * 0x1p-24;
+}
+
+#if shadow_rays
+// The light sample of the last vertex; the shadow ray has zeroed its throughput if occluded.
+fn sampled_light(slot: u32) -> vec3<f32> {
+    let reach = load_light_throughput(slot);
+    let light = load_light_radiance(slot);
+    // Scattering cannot hit a discrete light (pdf 0), so its sample counts fully.
+    var weight = 1.0;
+    if light.light_pdf > 0.0 {
+        weight = power_heuristic(light.light_pdf, reach.bsdf_pdf);
+    }
+    return reach.throughput * light.radiance * weight;
+}
+
+// Samples a light for the material stage to aim at; the flag to set.
+fn choose_light(slot: u32, position: vec3<f32>, u: vec4<f32>) -> u32 {
+    let light = sample_light(position, u);
+    if !any(light.radiance > vec3<f32>(0.0)) {
+        return 0u;
+    }
+    store_shadow_ray(slot, PathShadowRay(light.wi, light.distance));
+    store_light_radiance(slot, PathLightRadiance(light.radiance, light.pdf));
+    return PATH_LIT;
+}
+#endif

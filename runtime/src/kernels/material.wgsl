@@ -1,0 +1,92 @@
+// The shell around generated material code: the surface point in, the next rays out.
+
+fn material(slot: u32, index: u32) {
+    var path = load_radiance(slot);
+    let hit = load_hit(slot);
+    let origin = load_ray_origin(slot);
+    let arrived = load_ray_direction(slot);
+    let carried = load_throughput(slot);
+    let point = surface_point(hit);
+    let side = hit_geometric_normal(hit.primitive);
+    let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
+    let wo = -arrived.direction;
+    let vertex = (path.flags & DEPTH_MASK) - 1u;
+
+#if varying_emission
+    path.radiance += carried.throughput * material_emission(index, point, wo);
+    store_radiance(slot, path);
+    if vertex >= MAX_DEPTH {
+        store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));
+        return;
+    }
+#endif
+    var wl = vec3<f32>(0.0);
+#if shadow_rays
+    let lit = (path.flags & PATH_LIT) != 0u;
+    var light = PathShadowRay(vec3<f32>(0.0), 0.0);
+    if lit {
+        light = load_shadow_ray(slot);
+        wl = light.direction;
+    }
+#endif
+    let u = random_numbers(origin.pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
+    let scattered = checked_sample(evaluate_material(index, point, wo, wl, u));
+
+    let weight = carried.throughput * scattered.throughput;
+    store_throughput(slot, PathThroughput(weight, scattered.pdf));
+    if any(weight > vec3<f32>(0.0)) {
+        let start = leave_surface(position, side, scattered.wi);
+        store_ray_origin(slot, PathRayOrigin(start, origin.pixel));
+        store_ray_direction(slot, PathRayDirection(scattered.wi, arrived.sample));
+        request_extension();
+    }
+#if medium
+    if scattered.transmitted > 0.5 {
+        let entered = select(0u, index + 1u, dot(side, wo) > 0.0);
+        path.flags = (path.flags & ((1u << MEDIUM_SHIFT) - 1u)) | (entered << MEDIUM_SHIFT);
+        store_radiance(slot, path);
+    }
+#endif
+#if shadow_rays
+    if lit {
+        let reach = carried.throughput * scattered.light_throughput;
+        store_light_throughput(slot, PathLightThroughput(reach, scattered.light_pdf));
+        if any(reach > vec3<f32>(0.0)) {
+            let start = leave_surface(position, side, wl);
+            store_shadow_origin(slot, PathShadowOrigin(start, hit.primitive));
+            store_shadow_ray(slot, aim(light, start - position));
+            request_shadow();
+        }
+    }
+#endif
+}
+
+// A ray's origin, off the surface on the side the ray leaves to.
+fn leave_surface(position: vec3<f32>, side: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
+    return offset_origin(position, select(-side, side, dot(side, direction) > 0.0));
+}
+
+// A sample with a value that is no number is dropped whole, and counted for its kernel.
+fn checked_sample(sample: MaterialSample) -> MaterialSample {
+    let densities = vec3<f32>(sample.pdf, sample.light_pdf, 0.0);
+    if is_light(sample.throughput) && is_light(sample.light_throughput) && is_light(densities)
+        && is_finite(sample.wi) {
+        return sample;
+    }
+    atomicAdd(&counters[COUNTER_NONFINITE], 1u);
+    let none = vec3<f32>(0.0);
+    return MaterialSample(none, 0.0, none, 0.0, none, 0.0);
+}
+
+#if shadow_rays
+// The ray from the moved origin to the point that was sampled, ending just before it, since
+// the light itself must not occlude. Discrete lights far away stay in their direction.
+fn aim(light: PathShadowRay, moved: vec3<f32>) -> PathShadowRay {
+    if light.distance > 1e18 {
+        return light;
+    }
+    let to_light = light.direction * light.distance - moved;
+    let distance = length(to_light);
+    return PathShadowRay(to_light / max(distance, 1e-30), distance * 0.9999);
+}
+#endif

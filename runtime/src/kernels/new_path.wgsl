@@ -1,0 +1,22 @@
+// Starts a path: takes the next item of work and casts the camera's ray.
+//
+// The prepare kernel hands out work in portions, one for all slots of this iteration, so that
+// no counter is contended and more than 2^32 paths need no 64-bit arithmetic here.
+
+fn new_path(slot: u32, item: u32) {
+    let place = atomicLoad(&counters[COUNTER_WORK_PIXEL]) + item;
+    let sample = atomicLoad(&counters[COUNTER_WORK_SAMPLE]) + place / PIXELS;
+    if sample >= run.samples {
+        store_radiance(slot, PathRadiance(vec3<f32>(0.0), PATH_RETIRED));
+        return;
+    }
+    let pixel = place % PIXELS;
+    let index = run.first_sample + sample;
+    let ray = camera_ray(pixel, random_numbers(pixel, index, DRAW_CAMERA));
+    store_ray_origin(slot, PathRayOrigin(ray.origin, pixel));
+    store_ray_direction(slot, PathRayDirection(ray.direction, index));
+    store_hit(slot, PathHit(0.0, 0.0, 0.0, NOTHING));
+    store_throughput(slot, PathThroughput(vec3<f32>(1.0), 0.0));
+    store_radiance(slot, PathRadiance(vec3<f32>(0.0), PATH_LIVE + 1u));
+    request_extension();
+}

@@ -1,0 +1,21 @@
+// A kernel of the wavefront: one thread an item of its queue, or a slot of the pool.
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;
+    var slot = item;
+#if queued
+    let in_range = item < atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
+    if in_range {
+        slot = queues[CONSUMED_QUEUE * POOL_SIZE + item];
+    }
+#else
+    let in_range = item < POOL_SIZE;
+#endif
+    if in_range {
+        run_stage(slot, item);
+    }
+#if pushes
+    push_requests(lane, slot);
+#endif
+}

@@ -1,0 +1,100 @@
+//! What follows from a scene's materials and a plan before any text is written: what must
+//! exist, which queues there are, and where counters lie.
+
+use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::partition::{Form, Organisation, Plan};
+
+use crate::error::RuntimeError;
+use crate::queues::{Counters, Queues};
+use crate::state::{self, MAX_MATERIALS, Needs};
+use crate::world::World;
+
+/// The layout of one plan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    /// What must exist.
+    pub needs: Needs,
+    /// The queues of a wavefront.
+    pub queues: Queues,
+    /// The buffer of counters.
+    pub counters: Counters,
+    /// Whether stages are kernels of their own.
+    pub wavefront: bool,
+}
+
+impl Layout {
+    pub(crate) fn new(
+        world: &World,
+        materials: &[MaterialInfo],
+        plan: &Plan,
+    ) -> Result<Self, RuntimeError> {
+        check_plan(plan, materials.len())?;
+        let needs = needs(world, materials);
+        let queued = plan.kernels.iter().filter(|k| k.form != Form::Inline);
+        let queues = Queues {
+            materials: queued.count(),
+            shadow_rays: needs.shadow_rays,
+        };
+        let wavefront = plan.organisation == Organisation::Wavefront;
+        let counters = Counters {
+            queues: if wavefront { queues.count() } else { 0 },
+            kernels: if wavefront { plan.kernels.len() } else { 1 },
+        };
+        Ok(Self {
+            needs,
+            queues,
+            counters,
+            wavefront,
+        })
+    }
+
+    /// Bytes of path state in memory; a megakernel has it in registers.
+    pub(crate) fn path_bytes(&self) -> u64 {
+        if self.wavefront {
+            state::path_bytes(self.needs)
+        } else {
+            0
+        }
+    }
+}
+
+/// What a scene and its materials need.
+fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
+    Needs {
+        shadow_rays: world.parts.has_sampled_lights
+            && world.max_depth > 1
+            && materials.iter().any(|m| !m.delta_only),
+        medium: materials.iter().any(|m| m.transmissive),
+        varying_emission: materials.iter().any(|m| m.emission == Emission::Varying),
+    }
+}
+
+/// Fails unless every material is in exactly one kernel.
+fn check_plan(plan: &Plan, count: usize) -> Result<(), RuntimeError> {
+    let refuse = |reason: String| {
+        Err(RuntimeError::Plan {
+            strategy: plan.strategy.clone(),
+            reason,
+        })
+    };
+    if count > MAX_MATERIALS {
+        return refuse(format!(
+            "{count} materials, at most {MAX_MATERIALS} are possible"
+        ));
+    }
+    let mut planned: Vec<usize> = plan
+        .kernels
+        .iter()
+        .flat_map(|k| k.materials.clone())
+        .collect();
+    planned.sort_unstable();
+    if planned != (0..count).collect::<Vec<_>>() {
+        return refuse(format!(
+            "it assigns materials {planned:?}, and there are {count}, each to be assigned once"
+        ));
+    }
+    match plan.kernels.iter().find(|k| k.materials.is_empty()) {
+        Some(empty) => refuse(format!("kernel `{}` has no material", empty.name)),
+        None => Ok(()),
+    }
+}

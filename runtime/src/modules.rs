@@ -1,0 +1,311 @@
+//! Which kernels a plan needs: their stages, what feeds them, and the shells around stages.
+//! Their text is put together in `compose`.
+
+use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::partition::{Form, Organisation, Plan};
+
+use crate::compose::Binding;
+use crate::layout::Layout;
+use crate::queues::Queues;
+use crate::stages::{STAGES, StageId};
+use crate::state::{Need, Needs};
+use crate::text::{case_labels, preprocess};
+use crate::world::{MaterialSource, World};
+
+/// Threads of a prepare kernel, which is one workgroup.
+const PREPARE_THREADS: u32 = 64;
+
+/// What decides how many threads a kernel gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Feed {
+    /// One for every slot of the pool.
+    Pool,
+    /// One for every item of a queue, through indirect arguments.
+    Queue(usize),
+    /// One workgroup.
+    Once,
+}
+
+/// What a kernel is made of, before its text.
+#[derive(Clone, Debug)]
+pub(crate) struct Recipe {
+    /// Its name in reports and GPU captures.
+    pub name: String,
+    /// How it treats its materials, if it evaluates any.
+    pub form: Option<Form>,
+    /// The stages it runs.
+    pub stages: Vec<StageId>,
+    /// The materials it evaluates.
+    pub members: Vec<usize>,
+    /// How many threads it gets.
+    pub feed: Feed,
+    /// Which counter of dropped samples is its own, if it evaluates materials.
+    pub counter: usize,
+    /// WGSL of its requests and entry point.
+    pub shell: String,
+}
+
+/// One kernel of a plan.
+#[derive(Clone, Debug)]
+pub(crate) struct Kernel {
+    /// What it is made of.
+    pub recipe: Recipe,
+    /// Its text, entry point `main`.
+    pub wgsl: String,
+    /// The buffers it binds.
+    pub bindings: Vec<Binding>,
+}
+
+/// Sizes that the kernels of a plan share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sizes {
+    /// Slots in the pool.
+    pub pool: u32,
+    /// Threads of a workgroup.
+    pub workgroup: u32,
+    /// Workgroups in the first dimension of a dispatch, before a second is opened.
+    pub row_groups: u32,
+}
+
+/// Composes the kernels of one plan.
+pub(crate) struct Composer<'a> {
+    pub world: &'a World,
+    pub source: &'a dyn MaterialSource,
+    pub materials: &'a [MaterialInfo],
+    pub plan: &'a Plan,
+    pub layout: Layout,
+    pub sizes: Sizes,
+}
+
+impl Composer<'_> {
+    /// Every kernel, in the order of an iteration.
+    pub(crate) fn kernels(&self) -> Vec<Kernel> {
+        let recipes = match self.plan.organisation {
+            Organisation::Wavefront => self.wavefront(),
+            Organisation::Mega => vec![self.prepare("prepare", 0..0, true), self.mega()],
+        };
+        recipes
+            .into_iter()
+            .map(|recipe| self.compose(recipe))
+            .collect()
+    }
+
+    /// The logic stage, the material stage with new paths, then ray casts. Kernels between
+    /// two prepare kernels may run in any order, but shadow rays before extension rays, which
+    /// overwrite the hit.
+    fn wavefront(&self) -> Vec<Recipe> {
+        let queues = self.layout.queues;
+        let rays = queues.extension();
+        let mut recipes = vec![
+            self.logic(),
+            self.prepare("prepare_materials", 0..rays, true),
+            self.stage(StageId::NewPath, Queues::NEW_PATH),
+        ];
+        recipes.extend(self.material_kernels());
+        recipes.push(self.prepare("prepare_rays", rays..queues.count(), false));
+        if self.layout.needs.met(Need::ShadowRays) {
+            recipes.push(self.stage(StageId::Shadow, queues.shadow()));
+        }
+        recipes.push(self.stage(StageId::Extension, rays));
+        recipes
+    }
+
+    pub(crate) fn infos(&self, members: &[usize]) -> Vec<&MaterialInfo> {
+        members
+            .iter()
+            .filter_map(|i| self.materials.get(*i))
+            .collect()
+    }
+
+    /// The needs of a kernel that evaluates `members` only.
+    pub(crate) fn needs_of(&self, members: &[usize]) -> Needs {
+        let infos = self.infos(members);
+        Needs {
+            shadow_rays: self.layout.needs.shadow_rays && infos.iter().any(|m| !m.delta_only),
+            medium: infos.iter().any(|m| m.transmissive),
+            varying_emission: infos.iter().any(|m| m.emission == Emission::Varying),
+        }
+    }
+
+    /// The logic kernel, which also evaluates the materials that have no queue.
+    fn logic(&self) -> Recipe {
+        let inline = self.plan.kernels.iter().enumerate();
+        let inline: Vec<_> = inline.filter(|(_, k)| k.form == Form::Inline).collect();
+        let members: Vec<usize> = inline
+            .iter()
+            .flat_map(|(_, k)| k.materials.clone())
+            .collect();
+        let mut stages = vec![StageId::Logic];
+        let mut run = "logic(slot);".to_string();
+        if !members.is_empty() {
+            stages.push(StageId::Material);
+            run += " if wanted_material != NOTHING && wanted_work == NOTHING { \
+                     material(slot, wanted_material); }";
+        }
+        let shell = self.shell(&Shell {
+            run,
+            consumes: None,
+            sorts: true,
+            casts: !members.is_empty(),
+            casts_shadows: self.needs_of(&members).shadow_rays,
+        });
+        Recipe {
+            name: StageId::Logic.stage().name.to_string(),
+            form: inline.first().map(|(_, kernel)| kernel.form),
+            stages,
+            members,
+            feed: Feed::Pool,
+            counter: inline.first().map_or(0, |(index, _)| *index),
+            shell,
+        }
+    }
+
+    fn material_kernels(&self) -> impl Iterator<Item = Recipe> {
+        let kernels = self.plan.kernels.iter().enumerate();
+        let queued = kernels.filter(|(_, k)| k.form != Form::Inline);
+        queued.enumerate().map(|(position, (counter, planned))| {
+            let material = match planned.materials[..] {
+                [only] => format!("{only}u"),
+                _ => "primitive_material(load_hit(slot).primitive)".to_string(),
+            };
+            let queue = self.layout.queues.material(position);
+            let shell = self.shell(&Shell {
+                run: format!("material(slot, {material});"),
+                consumes: Some(queue),
+                sorts: false,
+                casts: true,
+                casts_shadows: self.needs_of(&planned.materials).shadow_rays,
+            });
+            Recipe {
+                name: planned.name.clone(),
+                form: Some(planned.form),
+                stages: vec![StageId::Material],
+                members: planned.materials.clone(),
+                feed: Feed::Queue(queue),
+                counter,
+                shell,
+            }
+        })
+    }
+
+    /// A kernel of one stage that reads `queue` and evaluates no material.
+    fn stage(&self, id: StageId, queue: usize) -> Recipe {
+        let name = id.stage().name;
+        let starts = id == StageId::NewPath;
+        let arguments = if starts { "slot, item" } else { "slot" };
+        let shell = self.shell(&Shell {
+            run: format!("{name}({arguments});"),
+            consumes: Some(queue),
+            sorts: false,
+            casts: starts,
+            casts_shadows: false,
+        });
+        recipe(name, vec![id], Feed::Queue(queue), shell)
+    }
+
+    /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
+    fn prepare(&self, name: &str, consumed: std::ops::Range<usize>, hands_out: bool) -> Recipe {
+        let flags = [("queues", !consumed.is_empty()), ("work", hands_out)];
+        let mut text = self.layout.queues.constants();
+        for (name, value) in [
+            ("PREPARE_SIZE", PREPARE_THREADS),
+            ("FIRST_CONSUMED", consumed.start as u32),
+            ("END_CONSUMED", consumed.end as u32),
+        ] {
+            text += &format!("const {name}: u32 = {value}u;\n");
+        }
+        text += &preprocess(include_str!("kernels/prepare.wgsl"), &flags);
+        recipe(name, Vec::new(), Feed::Once, text)
+    }
+
+    fn mega(&self) -> Recipe {
+        let flags = [("shadow_rays", self.layout.needs.shadow_rays)];
+        let shell = preprocess(include_str!("kernels/mega.wgsl"), &flags);
+        let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));
+        let stages = stages.map(|s| s.id).collect();
+        Recipe {
+            form: Some(Form::Inline),
+            members: (0..self.materials.len()).collect(),
+            ..recipe("mega", stages, Feed::Pool, shell)
+        }
+    }
+
+    /// Constants, request functions and entry point of a wavefront kernel.
+    fn shell(&self, shell: &Shell) -> String {
+        let pushes = shell.sorts || shell.casts;
+        let mut out = self.layout.queues.constants();
+        if let Some(queue) = shell.consumes {
+            out += &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n");
+        }
+        if pushes {
+            let rays = self.layout.queues.extension();
+            let first = if shell.sorts { Queues::NEW_PATH } else { rays };
+            let end = if shell.casts {
+                self.layout.queues.count()
+            } else {
+                rays
+            };
+            out += &format!("const FIRST_PUSHED: u32 = {first}u;\n");
+            out += &format!("const PUSHED_QUEUES: u32 = {}u;\n", end - first);
+            let flags = [
+                ("sorts", shell.sorts),
+                ("casts", shell.casts),
+                ("casts_shadows", shell.casts_shadows),
+            ];
+            out += &preprocess(include_str!("kernels/queue.wgsl"), &flags);
+        }
+        if shell.sorts {
+            out += &self.material_queue();
+        }
+        out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
+        let flags = [("queued", shell.consumes.is_some()), ("pushes", pushes)];
+        out + &preprocess(include_str!("kernels/shell.wgsl"), &flags)
+    }
+
+    /// The queue of a material; `NOTHING` if it is evaluated where it was found.
+    fn material_queue(&self) -> String {
+        let queued = self.plan.kernels.iter().filter(|k| k.form != Form::Inline);
+        let mut cases: Vec<String> = queued
+            .enumerate()
+            .map(|(i, kernel)| {
+                let labels = case_labels(&kernel.materials);
+                format!(
+                    "case {labels}: {{ return {}u; }}",
+                    self.layout.queues.material(i)
+                )
+            })
+            .collect();
+        cases.push("default: { return NOTHING; }".to_string());
+        format!(
+            "fn material_queue(material: u32) -> u32 {{ switch material {{ {} }} }}\n",
+            cases.join(" ")
+        )
+    }
+}
+
+/// A kernel that evaluates no material.
+fn recipe(name: &str, stages: Vec<StageId>, feed: Feed, shell: String) -> Recipe {
+    Recipe {
+        name: name.to_string(),
+        form: None,
+        stages,
+        members: Vec::new(),
+        feed,
+        counter: 0,
+        shell,
+    }
+}
+
+/// What a wavefront kernel does around its stage.
+struct Shell {
+    /// The call of the stage.
+    run: String,
+    /// The queue it reads; every slot if `None`.
+    consumes: Option<usize>,
+    /// Whether it pushes to the queues of new paths and materials.
+    sorts: bool,
+    /// Whether it pushes to the queue of extension rays.
+    casts: bool,
+    /// Whether it pushes to the queue of shadow rays.
+    casts_shadows: bool,
+}

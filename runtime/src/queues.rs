@@ -1,0 +1,167 @@
+//! The queues between stages and the counters of a render: where each lies in its buffer, for
+//! the kernels (as WGSL constants) and for the host alike.
+
+use std::fmt::Write;
+
+/// Which queues a wavefront has, in the order of the buffer: new paths, one a queued material
+/// kernel, extension rays and, if light is sampled, shadow rays. Each has room for the pool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Queues {
+    /// Material kernels with a queue.
+    pub materials: usize,
+    /// Whether shadow rays are cast.
+    pub shadow_rays: bool,
+}
+
+impl Queues {
+    pub(crate) const NEW_PATH: usize = 0;
+
+    /// The queue of the `index`-th material kernel that has one.
+    pub(crate) fn material(self, index: usize) -> usize {
+        1 + index
+    }
+
+    pub(crate) fn extension(self) -> usize {
+        1 + self.materials
+    }
+
+    pub(crate) fn shadow(self) -> usize {
+        2 + self.materials
+    }
+
+    pub(crate) fn count(self) -> usize {
+        2 + self.materials + usize::from(self.shadow_rays)
+    }
+
+    pub(crate) fn constants(self) -> String {
+        let mut out = format!(
+            "const QUEUE_NEW_PATH: u32 = {}u;\nconst QUEUE_EXTENSION: u32 = {}u;\n",
+            Self::NEW_PATH,
+            self.extension()
+        );
+        if self.shadow_rays {
+            let _ = writeln!(out, "const QUEUE_SHADOW: u32 = {}u;", self.shadow());
+        }
+        out
+    }
+}
+
+/// A single counter of the buffer `counters`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scalar {
+    /// Requests that found a queue full.
+    Overflow,
+    /// Paths that ended with a radiance that is no number, or below zero.
+    FilmNonfinite,
+    /// Samples above what the film holds.
+    FilmClamped,
+    /// The first pixel and sample that no slot was given yet.
+    NextPixel,
+    NextSample,
+    /// The first pixel and sample for the slots that start paths in this iteration.
+    WorkPixel,
+    WorkSample,
+    /// Slots that found no work left.
+    Retired,
+}
+
+const SCALARS: [(Scalar, &str); 8] = [
+    (Scalar::Overflow, "OVERFLOW"),
+    (Scalar::FilmNonfinite, "FILM_NONFINITE"),
+    (Scalar::FilmClamped, "FILM_CLAMPED"),
+    (Scalar::NextPixel, "NEXT_PIXEL"),
+    (Scalar::NextSample, "NEXT_SAMPLE"),
+    (Scalar::WorkPixel, "WORK_PIXEL"),
+    (Scalar::WorkSample, "WORK_SAMPLE"),
+    (Scalar::Retired, "RETIRED"),
+];
+
+/// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
+/// so far and its length when it was consumed, then items consumed in 64 bits, then one count
+/// of dropped samples for each kernel that evaluates materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Counters {
+    /// Number of queues; 0 in a megakernel.
+    pub queues: usize,
+    /// Number of kernels that evaluate materials.
+    pub kernels: usize,
+}
+
+impl Counters {
+    fn pushed(self) -> usize {
+        SCALARS.len()
+    }
+
+    fn taken(self) -> usize {
+        self.pushed() + self.queues
+    }
+
+    fn items(self) -> usize {
+        self.taken() + self.queues
+    }
+
+    /// The word that counts samples dropped by the `kernel`-th kernel that evaluates materials.
+    pub(crate) fn nonfinite(self, kernel: usize) -> usize {
+        self.items() + 2 * self.queues + kernel
+    }
+
+    /// Words in all.
+    pub(crate) fn len(self) -> usize {
+        self.nonfinite(self.kernels)
+    }
+
+    pub(crate) fn constants(self) -> String {
+        let scalars = SCALARS
+            .iter()
+            .enumerate()
+            .map(|(at, (_, name))| (*name, at));
+        let arrays = [
+            ("PUSHED", self.pushed()),
+            ("TAKEN", self.taken()),
+            ("ITEMS", self.items()),
+        ];
+        let mut out = String::new();
+        for (name, at) in scalars.chain(arrays) {
+            let _ = writeln!(out, "const COUNTER_{name}: u32 = {at}u;");
+        }
+        out
+    }
+
+    /// A scalar's value in the words read back.
+    pub(crate) fn scalar(self, words: &[u32], scalar: Scalar) -> u32 {
+        let at = SCALARS.iter().position(|(s, _)| *s == scalar);
+        at.and_then(|at| words.get(at)).copied().unwrap_or(0)
+    }
+
+    /// How many items of `queue` were consumed, in the words read back.
+    pub(crate) fn items_of(self, words: &[u32], queue: usize) -> u64 {
+        let word = |i: usize| words.get(i).copied().map_or(0, u64::from);
+        let low = self.items() + 2 * queue;
+        word(low) | word(low + 1) << 32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_do_not_overlap() {
+        let queues = Queues {
+            materials: 3,
+            shadow_rays: true,
+        };
+        assert_eq!(queues.shadow() + 1, queues.count());
+        let counters = Counters {
+            queues: queues.count(),
+            kernels: 4,
+        };
+        let mut words: Vec<u32> = (0..counters.len() as u32).collect();
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
+        assert_eq!(counters.nonfinite(0), 8 + 4 * 6);
+        assert_eq!(counters.len(), 8 + 4 * 6 + 4);
+        words[counters.items() + 2] = 5;
+        words[counters.items() + 3] = 1;
+        assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);
+    }
+}

@@ -1,0 +1,411 @@
+//! The renderer: pipelines and buffers for one plan over one world, and the loop that runs
+//! iterations until every path is done.
+//!
+//! The host stays two submissions ahead of what it knows: while one runs, the next is queued,
+//! and the small status of the one before is read. Work in a submission is bounded by the
+//! pool and by adapting the number of iterations, so that a driver never sees a long kernel.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use impasto_compiler::Program;
+use impasto_compiler::partition::Plan;
+
+use crate::error::RuntimeError;
+use crate::film::Film;
+use crate::gpu::Gpu;
+use crate::gpu::timing::Timing;
+use crate::layout::Layout;
+use crate::modules::{Composer, Feed, Kernel, Sizes};
+use crate::queues::{Queues, Scalar};
+use crate::report::Report;
+use crate::resources::Resources;
+use crate::scene::Scene;
+use crate::schedule::{Schedule, Size, Step};
+use crate::status::{Flight, Status};
+use crate::world::{MaterialSource, World};
+use crate::{film, state};
+
+/// What to render of a world.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// Samples in each pixel, at least 1.
+    pub samples: u32,
+    /// Index of each pixel's first sample: renders of disjoint ranges are independent and may
+    /// be averaged.
+    pub first_sample: u32,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Paths in flight; chosen by the size of the picture and the GPU if `None`.
+    pub pool: Option<u32>,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            samples: 16,
+            first_sample: 0,
+            seed: 0,
+            pool: None,
+        }
+    }
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Paths finished.
+    pub paths: u64,
+    /// Paths in all.
+    pub total: u64,
+    /// Time since the render began.
+    pub elapsed: Duration,
+}
+
+/// A finished (or stopped) render.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The picture.
+    pub film: Film,
+    /// What it took.
+    pub report: Report,
+}
+
+/// Everything that is needed to render a world by a plan, as often as wanted.
+#[derive(Debug)]
+pub struct Renderer<'g> {
+    gpu: &'g Gpu,
+    options: RenderOptions,
+    layout: Layout,
+    kernels: Vec<Kernel>,
+    resources: Resources,
+    schedule: Schedule,
+    facts: Facts,
+}
+
+/// What the report says of the world and the plan.
+#[derive(Debug)]
+struct Facts {
+    strategy: String,
+    width: u32,
+    height: u32,
+    triangles: u64,
+    pool: u32,
+    material_names: Vec<String>,
+    compile_seconds: f64,
+}
+
+/// Paths in flight by default, as in Laine et al. 2013, and on software GPUs, where a smaller
+/// pool stays in the processor's cache.
+const DEFAULT_POOL: u32 = 1 << 20;
+const SOFTWARE_POOL: u32 = 1 << 16;
+/// Threads of a workgroup.
+const WORKGROUP: u32 = 128;
+/// Submissions in flight.
+const FLIGHTS: usize = 2;
+/// A submission is made longer below the first and shorter above the second.
+const SHORT: Duration = Duration::from_millis(20);
+const LONG: Duration = Duration::from_millis(100);
+/// Iterations in a submission at most.
+const MAX_ITERATIONS: u32 = 64;
+
+impl<'g> Renderer<'g> {
+    /// Prepares to render `scene`, whose materials compiled to `program`.
+    pub fn new(
+        gpu: &'g Gpu,
+        scene: &Scene,
+        program: &Program,
+        plan: &Plan,
+        options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        let world = World::new(scene, &program.infos(), &program.textures())?;
+        Self::from_world(gpu, &world, program, plan, options)
+    }
+
+    /// Composes and builds the kernels of `plan` and uploads the world's buffers.
+    pub fn from_world(
+        gpu: &'g Gpu,
+        world: &World,
+        source: &dyn MaterialSource,
+        plan: &Plan,
+        options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        let begin = Instant::now();
+        check_settings(world, options)?;
+        let materials = source.infos();
+        let layout = Layout::new(world, &materials, plan)?;
+        let sizes = sizes(gpu, world, &layout, options)?;
+        let composer = Composer {
+            world,
+            source,
+            materials: &materials,
+            plan,
+            layout,
+            sizes,
+        };
+        let kernels = composer.kernels();
+        let resources = Resources::new(gpu, &composer, options)?;
+        let steps = build_steps(gpu, &kernels, &resources, sizes)?;
+        let schedule = Schedule {
+            steps,
+            arguments: resources.arguments().clone(),
+            timing: Timing::of(gpu),
+        };
+        let facts = Facts {
+            strategy: plan.strategy.clone(),
+            width: world.width,
+            height: world.height,
+            triangles: world.triangles,
+            pool: sizes.pool,
+            material_names: materials.iter().map(|m| m.name.clone()).collect(),
+            compile_seconds: begin.elapsed().as_secs_f64(),
+        };
+        Ok(Self {
+            gpu,
+            options: options.clone(),
+            layout,
+            kernels,
+            resources,
+            schedule,
+            facts,
+        })
+    }
+
+    /// The kernels' names and their WGSL, in the order of an iteration.
+    pub fn kernels(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.kernels
+            .iter()
+            .map(|k| (k.recipe.name.as_str(), k.wgsl.as_str()))
+    }
+
+    /// Renders. `progress` is called after each submission; when it breaks, the paths that
+    /// are finished by then make the picture, each pixel by its own number of samples.
+    pub fn render(
+        &mut self,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        let begin = Instant::now();
+        self.resources.clear(self.gpu);
+        let status = self.run(begin, progress)?;
+        let words = self.resources.read_film(self.gpu)?;
+        let film = Film::from_words(self.facts.width, self.facts.height, &words);
+        let report = self.report(&status, &film, begin.elapsed().as_secs_f64());
+        Ok(Rendering { film, report })
+    }
+
+    /// Submits iterations until no path is left or `progress` breaks.
+    fn run(
+        &self,
+        begin: Instant,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Status, RuntimeError> {
+        let steps = self.schedule.steps.len();
+        let mut status = Status::new(steps);
+        let mut flights: VecDeque<Flight> = VecDeque::new();
+        let mut spare: Vec<Flight> = Vec::new();
+        let mut pace = Pace::new(self.schedule.timing.max_dispatches() / steps as u32);
+        let mut going = true;
+        loop {
+            while going && flights.len() < FLIGHTS {
+                let flight = spare.pop().map_or_else(|| self.new_flight(pace.max), Ok)?;
+                flights.push_back(self.submit(flight, pace.iterations));
+            }
+            let Some(mut flight) = flights.pop_front() else {
+                return Ok(status);
+            };
+            flight.land(self.gpu, &self.schedule, &mut status)?;
+            pace.adapt();
+            spare.push(flight);
+            let now = self.progress(&status, begin);
+            going &= now.paths < now.total;
+            if progress(&now).is_break() {
+                going = false;
+            }
+        }
+    }
+
+    fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
+        let dispatches = max_iterations * self.schedule.steps.len() as u32;
+        Flight::new(
+            self.gpu,
+            self.layout.counters.len(),
+            self.schedule.timing.queries(dispatches),
+        )
+    }
+
+    fn submit(&self, mut flight: Flight, iterations: u32) -> Flight {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.schedule
+            .record(&mut encoder, iterations, flight.queries());
+        let dispatches = iterations * self.schedule.steps.len() as u32;
+        let queries = self.schedule.timing.queries(dispatches);
+        flight.copy(&mut encoder, self.resources.counters(), queries);
+        flight.depart(self.gpu, encoder, iterations);
+        flight
+    }
+
+    /// How far the counters say the render is. A slot asks for a path at first and whenever
+    /// one is finished; a megakernel finishes what it was handed.
+    fn progress(&self, status: &Status, begin: Instant) -> Progress {
+        let counters = self.layout.counters;
+        let pixels = u64::from(self.facts.width) * u64::from(self.facts.height);
+        let total = pixels * u64::from(self.options.samples);
+        let words = &status.counters;
+        let scalar = |s| u64::from(counters.scalar(words, s));
+        let paths = if self.layout.wavefront {
+            let asked = counters.items_of(words, Queues::NEW_PATH);
+            asked.saturating_sub(u64::from(self.facts.pool))
+        } else {
+            scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)
+        };
+        Progress {
+            paths,
+            total,
+            elapsed: begin.elapsed(),
+        }
+    }
+
+    fn report(&self, status: &Status, film: &Film, wall_seconds: f64) -> Report {
+        crate::report::Inputs {
+            gpu: self.gpu.info(),
+            options: &self.options,
+            layout: &self.layout,
+            kernels: &self.kernels,
+            timed: self.schedule.timing != Timing::None,
+            strategy: &self.facts.strategy,
+            triangles: self.facts.triangles,
+            pool: self.facts.pool,
+            material_names: &self.facts.material_names,
+            compile_seconds: self.facts.compile_seconds,
+            wall_seconds,
+        }
+        .report(status, film)
+    }
+}
+
+/// How many iterations a submission has.
+struct Pace {
+    iterations: u32,
+    max: u32,
+    last: Instant,
+}
+
+impl Pace {
+    fn new(max: u32) -> Self {
+        Self {
+            iterations: 1,
+            max: max.clamp(1, MAX_ITERATIONS),
+            last: Instant::now(),
+        }
+    }
+
+    /// Called whenever a submission is done.
+    fn adapt(&mut self) {
+        let took = self.last.elapsed();
+        self.last = Instant::now();
+        if took < SHORT {
+            self.iterations = (2 * self.iterations).min(self.max);
+        } else if took > LONG {
+            self.iterations = (self.iterations / 2).max(1);
+        }
+    }
+}
+
+fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeError> {
+    let refuse = |setting, value: String, expected: &str| {
+        Err(RuntimeError::Setting {
+            setting,
+            value,
+            expected: expected.to_string(),
+        })
+    };
+    let pixels = u64::from(world.width) * u64::from(world.height);
+    if pixels == 0 || pixels > 1 << 29 {
+        let size = format!("{} x {}", world.width, world.height);
+        return refuse("the picture's size", size, "1 to 2^29 pixels");
+    }
+    if world.max_depth == 0 || world.max_depth > state::MAX_DEPTH {
+        let expected = format!("1 to {} segments", state::MAX_DEPTH);
+        return refuse("max_depth", world.max_depth.to_string(), &expected);
+    }
+    if options.samples == 0 {
+        return refuse("samples", "0".into(), "at least 1 sample a pixel");
+    }
+    if options.first_sample.checked_add(options.samples).is_none() {
+        let last = u64::from(options.first_sample) + u64::from(options.samples);
+        return refuse(
+            "the last sample's index",
+            last.to_string(),
+            "less than 2^32",
+        );
+    }
+    if options.pool == Some(0) {
+        return refuse("pool", "0".into(), "at least 1 path");
+    }
+    Ok(())
+}
+
+/// Chooses the pool, within what the GPU can bind.
+fn sizes(
+    gpu: &Gpu,
+    world: &World,
+    layout: &Layout,
+    options: &RenderOptions,
+) -> Result<Sizes, RuntimeError> {
+    let limits = gpu.device.limits();
+    let pixels = u64::from(world.width) * u64::from(world.height);
+    let film = pixels * u64::from(film::PLANES) * 4;
+    gpu.check_binding_size("the film", film)?;
+    let queue_bytes = 4 * layout.counters.queues as u64;
+    let slot_bytes = layout.path_bytes().max(queue_bytes).max(1);
+    let most = limits
+        .max_buffer_size
+        .min(limits.max_storage_buffer_binding_size);
+    let fits = u32::try_from(most / slot_bytes)
+        .unwrap_or(u32::MAX)
+        .min(1 << 30);
+    if let Some(pool) = options.pool {
+        let bytes = u64::from(pool) * slot_bytes;
+        gpu.check_binding_size("a pool of that size", bytes)?;
+    }
+    let default = if gpu.is_software() {
+        SOFTWARE_POOL
+    } else {
+        DEFAULT_POOL
+    };
+    let paths = pixels.saturating_mul(u64::from(options.samples));
+    let enough = u32::try_from(paths).unwrap_or(u32::MAX);
+    Ok(Sizes {
+        pool: options.pool.unwrap_or(default).min(enough).min(fits).max(1),
+        workgroup: WORKGROUP.min(limits.max_compute_invocations_per_workgroup),
+        row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
+    })
+}
+
+/// Validates the kernels and builds their pipelines, several at a time.
+fn build_steps(
+    gpu: &Gpu,
+    kernels: &[Kernel],
+    resources: &Resources,
+    sizes: Sizes,
+) -> Result<Vec<Step>, RuntimeError> {
+    let build = |kernel: &Kernel| -> Result<Step, RuntimeError> {
+        let name = &kernel.recipe.name;
+        crate::gpu::shader::validate(name, &kernel.wgsl)?;
+        let layout = resources.bind_group_layout(gpu, kernel)?;
+        Ok(Step {
+            name: name.clone(),
+            pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
+            bind_group: resources.bind_group(gpu, kernel, &layout),
+            size: match kernel.recipe.feed {
+                Feed::Once => Size::Direct(1, 1),
+                Feed::Pool => Size::for_items(sizes.pool, sizes.workgroup, sizes.row_groups),
+                Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
+            },
+        })
+    };
+    let steps = crate::parallel::map(kernels, build);
+    gpu.check()?;
+    steps.into_iter().collect()
+}

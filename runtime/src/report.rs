@@ -1,0 +1,172 @@
+//! The report of a render: what ran, on what, how long, and what was dropped. Scripts read it
+//! as JSON; the names of fields are a promise.
+
+use serde::Serialize;
+
+use crate::film::Film;
+use crate::gpu::GpuInfo;
+use crate::layout::Layout;
+use crate::modules::{Feed, Kernel};
+use crate::queues::Scalar;
+use crate::render::RenderOptions;
+use crate::status::Status;
+
+/// What a render did. Times are in seconds, sizes in bytes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// The GPU.
+    pub adapter: AdapterReport,
+    /// The plan's strategy.
+    pub strategy: String,
+    /// Columns of the picture.
+    pub width: u32,
+    /// Rows of the picture.
+    pub height: u32,
+    /// Samples asked for in each pixel.
+    pub samples_per_pixel: u32,
+    /// Index of each pixel's first sample.
+    pub first_sample: u32,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Triangles of the scene.
+    pub triangles: u64,
+    /// Paths finished. Fewer than pixels times samples if the render was stopped.
+    pub paths: u64,
+    /// Time the GPU was busy, without building pipelines.
+    pub gpu_seconds: f64,
+    /// Where GPU times come from: `timestamps`, or `wall` on GPUs without them, where
+    /// `gpu_seconds` is the time waited and kernels have none.
+    pub timing: &'static str,
+    /// Time from the first submission to the finished film.
+    pub wall_seconds: f64,
+    /// Time to compose and build the pipelines; callers add what they spent on materials.
+    pub compile_seconds: f64,
+    /// Paths finished in a second of `gpu_seconds`.
+    pub paths_per_second: f64,
+    /// Memory for the state of one path; 0 in a megakernel.
+    pub path_state_bytes: u64,
+    /// Paths in flight.
+    pub pool_size: u32,
+    /// Times every kernel was dispatched.
+    pub iterations: u64,
+    /// The kernels in the order of an iteration.
+    pub kernels: Vec<KernelReport>,
+    /// Samples dropped because a value was no finite number, or below zero: those that
+    /// kernels dropped at a material, and those found when a path ended.
+    pub nonfinite_samples: u64,
+    /// Samples cut to what the film holds.
+    pub clamped_samples: u64,
+    /// Requests lost because a queue was full; anything but 0 is a defect.
+    pub queue_overflow: u64,
+}
+
+/// The GPU of a report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct AdapterReport {
+    /// Its name.
+    pub name: String,
+    /// The interface it was reached through.
+    pub backend: String,
+    /// The driver's name and version.
+    pub driver: String,
+}
+
+/// What one kernel did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KernelReport {
+    /// Its name.
+    pub name: String,
+    /// How it treats its materials (`own`, `mixed`, `inline`); absent if it evaluates none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<impasto_compiler::partition::Form>,
+    /// The names of the materials it evaluates.
+    pub materials: Vec<String>,
+    /// Items it worked on: of its queue, or slots, or for a megakernel paths.
+    pub items: u64,
+    /// GPU time; 0 without timestamps.
+    pub gpu_seconds: f64,
+    /// Samples that its materials gave a value that is no finite number, or below zero.
+    pub nonfinite_samples: u64,
+}
+
+/// What a report is made of.
+pub(crate) struct Inputs<'a> {
+    pub gpu: GpuInfo,
+    pub options: &'a RenderOptions,
+    pub layout: &'a Layout,
+    pub kernels: &'a [Kernel],
+    pub timed: bool,
+    pub strategy: &'a str,
+    pub triangles: u64,
+    pub pool: u32,
+    pub material_names: &'a [String],
+    pub compile_seconds: f64,
+    pub wall_seconds: f64,
+}
+
+impl Inputs<'_> {
+    pub(crate) fn report(self, status: &Status, film: &Film) -> Report {
+        let paths = film.total_samples();
+        let gpu_seconds = if self.timed {
+            status.gpu_seconds
+        } else {
+            self.wall_seconds
+        };
+        let kernels: Vec<_> = self.kernels.iter().zip(&status.step_seconds).collect();
+        let kernels: Vec<_> = kernels
+            .into_iter()
+            .map(|(kernel, seconds)| self.kernel(kernel, *seconds, status, paths))
+            .collect();
+        let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
+        let dropped: u64 = kernels.iter().map(|k| k.nonfinite_samples).sum();
+        Report {
+            strategy: self.strategy.to_string(),
+            width: film.width,
+            height: film.height,
+            samples_per_pixel: self.options.samples,
+            first_sample: self.options.first_sample,
+            seed: self.options.seed,
+            triangles: self.triangles,
+            paths,
+            gpu_seconds,
+            timing: if self.timed { "timestamps" } else { "wall" },
+            wall_seconds: self.wall_seconds,
+            compile_seconds: self.compile_seconds,
+            paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
+            path_state_bytes: self.layout.path_bytes(),
+            pool_size: self.pool,
+            iterations: status.iterations,
+            kernels,
+            nonfinite_samples: dropped + scalar(Scalar::FilmNonfinite),
+            clamped_samples: scalar(Scalar::FilmClamped),
+            queue_overflow: scalar(Scalar::Overflow),
+            adapter: AdapterReport {
+                name: self.gpu.name,
+                backend: self.gpu.backend,
+                driver: self.gpu.driver,
+            },
+        }
+    }
+
+    fn kernel(&self, kernel: &Kernel, seconds: f64, status: &Status, paths: u64) -> KernelReport {
+        let (recipe, counters) = (&kernel.recipe, self.layout.counters);
+        let name = |index: &usize| self.material_names.get(*index).cloned();
+        let nonfinite = counters.nonfinite(recipe.counter);
+        KernelReport {
+            name: recipe.name.clone(),
+            form: recipe.form,
+            materials: recipe.members.iter().filter_map(name).collect(),
+            items: match recipe.feed {
+                Feed::Queue(queue) => counters.items_of(&status.counters, queue),
+                Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
+                Feed::Pool => paths,
+                Feed::Once => status.iterations,
+            },
+            gpu_seconds: seconds,
+            nonfinite_samples: match recipe.form {
+                Some(_) => status.counters.get(nonfinite).map_or(0, |n| u64::from(*n)),
+                None => 0,
+            },
+        }
+    }
+}

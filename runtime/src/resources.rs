@@ -1,0 +1,209 @@
+//! The buffers of a render and how kernels bind them.
+
+use crate::compose::{Access, OWN_BUFFERS, RUN_MEMBERS};
+use crate::error::RuntimeError;
+use crate::film;
+use crate::gpu::Gpu;
+use crate::modules::{Composer, Kernel};
+use crate::random;
+use crate::render::RenderOptions;
+
+/// Every buffer, by the index that kernels bind it at.
+#[derive(Debug)]
+pub(crate) struct Resources {
+    buffers: Vec<wgpu::Buffer>,
+}
+
+/// The indices of the runtime's own buffers that the host touches.
+fn own(name: &str) -> usize {
+    // Every name given here is in the table, which a test asserts.
+    OWN_BUFFERS
+        .iter()
+        .position(|(n, ..)| *n == name)
+        .unwrap_or(0)
+}
+
+impl Resources {
+    /// Makes the runtime's buffers and uploads the scene's.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        composer: &Composer<'_>,
+        options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        let mut buffers = Vec::new();
+        for (name, _, access) in OWN_BUFFERS {
+            let bytes = own_bytes(name, composer);
+            buffers.push(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(name),
+                size: bytes.max(16).next_multiple_of(4),
+                usage: match access {
+                    Access::Uniform => wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                    _ => {
+                        wgpu::BufferUsages::STORAGE
+                            | wgpu::BufferUsages::COPY_SRC
+                            | wgpu::BufferUsages::COPY_DST
+                            | if name == "arguments" {
+                                wgpu::BufferUsages::INDIRECT
+                            } else {
+                                wgpu::BufferUsages::empty()
+                            }
+                    }
+                },
+                mapped_at_creation: false,
+            }));
+        }
+        for data in composer.scene_buffers() {
+            // A binding cannot be empty; what is not there is never read.
+            let size = (data.bytes.len() as u64).next_multiple_of(16).max(16);
+            gpu.check_binding_size(&format!("the scene's buffer `{}`", data.name), size)?;
+            let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(data.name),
+                size,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            let mut bytes = data.bytes.clone();
+            bytes.resize(size as usize, 0);
+            gpu.queue.write_buffer(&buffer, 0, &bytes);
+            buffers.push(buffer);
+        }
+        gpu.check()?;
+        let run = run_words(options);
+        gpu.queue
+            .write_buffer(&buffers[own("run")], 0, bytemuck::cast_slice(&run));
+        Ok(Self { buffers })
+    }
+
+    pub(crate) fn arguments(&self) -> &wgpu::Buffer {
+        &self.buffers[own("arguments")]
+    }
+
+    pub(crate) fn counters(&self) -> &wgpu::Buffer {
+        &self.buffers[own("counters")]
+    }
+
+    /// Empties pool, counters and film, so that a render starts anew.
+    pub(crate) fn clear(&self, gpu: &Gpu) {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for name in ["state", "counters", "film"] {
+            encoder.clear_buffer(&self.buffers[own(name)], 0, None);
+        }
+        gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// The words of the film.
+    pub(crate) fn read_film(&self, gpu: &Gpu) -> Result<Vec<u32>, RuntimeError> {
+        let film = &self.buffers[own("film")];
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("film readback"),
+            size: film.size(),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(film, 0, &staging, 0, film.size());
+        let index = gpu.queue.submit([encoder.finish()]);
+        gpu.read(&staging, index, film.size(), |bytes| {
+            bytemuck::pod_collect_to_vec(bytes)
+        })
+    }
+
+    pub(crate) fn bind_group_layout(
+        &self,
+        gpu: &Gpu,
+        kernel: &Kernel,
+    ) -> Result<wgpu::BindGroupLayout, RuntimeError> {
+        let name = &kernel.recipe.name;
+        let storage = kernel
+            .bindings
+            .iter()
+            .filter(|b| b.access != Access::Uniform);
+        let needs = storage.count() as u64;
+        let has = gpu.device.limits().max_storage_buffers_per_shader_stage;
+        if needs > u64::from(has) {
+            return Err(RuntimeError::LimitTooSmall {
+                limit: "max_storage_buffers_per_shader_stage",
+                has: has.into(),
+                needs,
+                what: format!("the kernel `{name}` (in buffers)"),
+                hint: "use a plan with smaller kernels (`--strategy wavefront`), or another GPU",
+            });
+        }
+        let entries: Vec<_> = kernel
+            .bindings
+            .iter()
+            .map(|binding| wgpu::BindGroupLayoutEntry {
+                binding: binding.index,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match binding.access {
+                        Access::Uniform => wgpu::BufferBindingType::Uniform,
+                        access => wgpu::BufferBindingType::Storage {
+                            read_only: access == Access::Read,
+                        },
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let descriptor = wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &entries,
+        };
+        Ok(gpu.device.create_bind_group_layout(&descriptor))
+    }
+
+    pub(crate) fn bind_group(
+        &self,
+        gpu: &Gpu,
+        kernel: &Kernel,
+        layout: &wgpu::BindGroupLayout,
+    ) -> wgpu::BindGroup {
+        let entry = |index: u32| {
+            let buffer = self.buffers.get(index as usize)?;
+            Some(wgpu::BindGroupEntry {
+                binding: index,
+                resource: buffer.as_entire_binding(),
+            })
+        };
+        let entries: Vec<_> = kernel
+            .bindings
+            .iter()
+            .filter_map(|b| entry(b.index))
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&kernel.recipe.name),
+            layout,
+            entries: &entries,
+        })
+    }
+}
+
+fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
+    let layout = &composer.layout;
+    let pool = u64::from(composer.sizes.pool);
+    let queues = layout.counters.queues as u64;
+    match name {
+        "run" => 4 * RUN_MEMBERS.len() as u64,
+        "state" => pool * layout.path_bytes(),
+        "queues" => 4 * pool * queues,
+        "counters" => 4 * layout.counters.len() as u64,
+        "arguments" => 12 * queues,
+        _ => {
+            let pixels = u64::from(composer.world.width) * u64::from(composer.world.height);
+            4 * pixels * u64::from(film::PLANES)
+        }
+    }
+}
+
+/// The uniform `run`, member by member.
+fn run_words(options: &RenderOptions) -> [u32; RUN_MEMBERS.len()] {
+    RUN_MEMBERS.map(|member| match member {
+        "seed" => random::hash_seed(options.seed),
+        "first_sample" => options.first_sample,
+        "samples" => options.samples,
+        _ => 0,
+    })
+}

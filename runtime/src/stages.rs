@@ -1,0 +1,138 @@
+//! The table of stages of the path tracer, after Laine et al. 2013, section 4.2.
+//!
+//! A stage is one WGSL function that works on one slot of the pool. It reaches path state
+//! through accessors and asks for further work through `request_*` functions, so that the
+//! same body runs as a kernel of the wavefront or as a step of the megakernel. What follows
+//! from the table (which text a kernel is composed of, which queues there are) is derived in
+//! `modules` and `queues`. A new stage is one file in `kernels/` and one row here.
+
+use crate::state::Need;
+
+/// The stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum StageId {
+    /// Ends or goes on with every path, and samples a light.
+    Logic,
+    /// Starts a path.
+    NewPath,
+    /// Evaluates the material that was hit.
+    Material,
+    /// Asks whether a light sample is seen.
+    Shadow,
+    /// Finds what the path's next segment hits.
+    Extension,
+}
+
+/// A text that stages need beside their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Part {
+    /// Random numbers.
+    Random,
+    /// Camera rays.
+    Camera,
+    /// The sums of the picture.
+    Film,
+    /// Tests for numbers that are none.
+    Numbers,
+    /// The triangles.
+    Geometry,
+    /// What a hit says of the surface.
+    Surface,
+    /// Sampling and evaluation of lights.
+    Lights,
+    /// Ray casts.
+    Traversal,
+    /// Generated material code with what it reads.
+    Materials,
+}
+
+/// One stage.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    /// Which.
+    pub id: StageId,
+    /// Its name in reports and GPU captures, and of its WGSL function.
+    pub name: &'static str,
+    /// The WGSL function.
+    pub body: &'static str,
+    /// The texts it needs.
+    pub parts: &'static [Part],
+    /// When it exists.
+    pub need: Need,
+}
+
+/// Every stage, in the order of an iteration. Shadow rays come before extension rays because
+/// those overwrite the hit.
+pub(crate) const STAGES: [Stage; 5] = [
+    Stage {
+        id: StageId::Logic,
+        name: "logic",
+        body: include_str!("kernels/logic.wgsl"),
+        parts: &[
+            Part::Random,
+            Part::Numbers,
+            Part::Film,
+            Part::Geometry,
+            Part::Surface,
+            Part::Lights,
+        ],
+        need: Need::Always,
+    },
+    Stage {
+        id: StageId::NewPath,
+        name: "new_path",
+        body: include_str!("kernels/new_path.wgsl"),
+        parts: &[Part::Random, Part::Camera],
+        need: Need::Always,
+    },
+    Stage {
+        id: StageId::Material,
+        name: "material",
+        body: include_str!("kernels/material.wgsl"),
+        parts: &[
+            Part::Random,
+            Part::Numbers,
+            Part::Geometry,
+            Part::Surface,
+            Part::Materials,
+        ],
+        need: Need::Always,
+    },
+    Stage {
+        id: StageId::Shadow,
+        name: "shadow",
+        body: include_str!("kernels/shadow.wgsl"),
+        parts: &[Part::Geometry, Part::Traversal],
+        need: Need::ShadowRays,
+    },
+    Stage {
+        id: StageId::Extension,
+        name: "extension",
+        body: include_str!("kernels/extension.wgsl"),
+        parts: &[Part::Geometry, Part::Traversal],
+        need: Need::Always,
+    },
+];
+
+impl StageId {
+    /// Its row in the table.
+    pub(crate) fn stage(self) -> &'static Stage {
+        // The table holds every stage, which a test asserts.
+        STAGES.iter().find(|s| s.id == self).unwrap_or(&STAGES[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stage_is_in_the_table_once() {
+        for stage in &STAGES {
+            assert_eq!(stage.id.stage().name, stage.name);
+            assert_eq!(STAGES.iter().filter(|s| s.id == stage.id).count(), 1);
+            assert!(stage.body.contains(&format!("\nfn {}(", stage.name)));
+        }
+        assert_eq!(StageId::Extension as usize, STAGES.len() - 1);
+    }
+}

@@ -1,0 +1,67 @@
+//! What the renderer renders, without knowing where it came from: the camera, and shader
+//! parts that answer questions about geometry, lights and materials.
+//!
+//! This is the boundary of the GPU side. A scene becomes a [`World`]; tests build small ones
+//! by hand, from a few lines of WGSL.
+
+use impasto_compiler::abi::{MaterialInfo, TextureRef};
+
+use crate::camera::CameraFrame;
+use crate::scene::{Scene, SceneError, SceneParts};
+
+/// A scene as the kernels see it.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Columns of the picture.
+    pub width: u32,
+    /// Rows of the picture.
+    pub height: u32,
+    /// Where it is seen from.
+    pub camera: CameraFrame,
+    /// Longest path in segments; 1 shows lights alone.
+    pub max_depth: u32,
+    /// The segment from whose end on a path may be ended at random.
+    pub roulette_start: u32,
+    /// What kernels ask geometry, lights and textures through.
+    pub parts: SceneParts,
+    /// Number of triangles, for the report.
+    pub triangles: u64,
+}
+
+impl World {
+    /// The world of a scene whose materials compiled to `materials`, reading `textures`.
+    pub fn new(
+        scene: &Scene,
+        materials: &[MaterialInfo],
+        textures: &[TextureRef],
+    ) -> Result<Self, SceneError> {
+        let (width, height) = (scene.film.width, scene.film.height);
+        Ok(Self {
+            width,
+            height,
+            camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
+            max_depth: scene.integrator.max_depth,
+            roulette_start: scene.integrator.roulette_start,
+            parts: SceneParts::build(scene, materials, textures)?,
+            triangles: scene.mesh.len() as u64,
+        })
+    }
+}
+
+/// Compiled materials.
+pub trait MaterialSource {
+    /// What the runtime must know of each, in program order.
+    fn infos(&self) -> Vec<MaterialInfo>;
+    /// WGSL that evaluates the materials with the given indices, ascending.
+    fn wgsl(&self, members: &[usize]) -> String;
+}
+
+impl MaterialSource for impasto_compiler::Program {
+    fn infos(&self) -> Vec<MaterialInfo> {
+        self.infos()
+    }
+
+    fn wgsl(&self, members: &[usize]) -> String {
+        self.wgsl(members)
+    }
+}

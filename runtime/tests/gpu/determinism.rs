@@ -1,0 +1,122 @@
+//! A random number depends on (pixel, sample, draw, seed) and on nothing else.
+
+use crate::stub::{Kind, Materials, Room, materials, red, render, samples};
+use impasto_runtime::film::Film;
+use impasto_runtime::render::RenderOptions;
+
+fn room() -> Room {
+    Room {
+        plate: true,
+        emitters: vec![3],
+        max_depth: 5,
+        roulette_start: 3,
+        materials: [0, 1, 0, 0, 1, 0, 2],
+        ..Room::default()
+    }
+}
+
+fn surfaces() -> Materials {
+    materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror])
+}
+
+fn film(options: RenderOptions) -> Film {
+    render(&room().world(), &surfaces(), &options).film
+}
+
+#[test]
+fn equal_seeds_give_equal_bits_in_pools_of_any_size() {
+    let reference = film(samples(8));
+    assert_eq!(film(samples(8)), reference);
+    for pool in [1000, 128, 77] {
+        let options = RenderOptions {
+            pool: Some(pool),
+            ..samples(8)
+        };
+        assert_eq!(film(options), reference, "pool {pool}");
+    }
+}
+
+#[test]
+fn seeds_differ_in_every_pixel_and_are_uncorrelated() {
+    let world = Room {
+        max_depth: 3,
+        ..Room::default()
+    };
+    let picture = |seed| {
+        let options = RenderOptions { seed, ..samples(1) };
+        red(&render(
+            &world.world(),
+            &materials(&[Kind::Diffuse(0.5)]),
+            &options,
+        ))
+        .collect::<Vec<_>>()
+    };
+    let seeds = [0, 1, 2, 4, 1 << 16, 1 << 31];
+    let pictures = seeds.map(picture);
+    for (i, a) in pictures.iter().enumerate() {
+        for (j, b) in pictures.iter().enumerate().skip(i + 1) {
+            let r = correlation(a, b);
+            let bound = 4.0 / (a.len() as f64).sqrt();
+            assert!(r.abs() < bound, "seeds {} and {}: {r}", seeds[i], seeds[j]);
+        }
+    }
+}
+
+#[test]
+fn neighbouring_pixels_and_samples_are_uncorrelated() {
+    let world = Room {
+        max_depth: 3,
+        ..Room::default()
+    };
+    let picture = |first_sample| {
+        let options = RenderOptions {
+            first_sample,
+            ..samples(1)
+        };
+        red(&render(
+            &world.world(),
+            &materials(&[Kind::Diffuse(0.5)]),
+            &options,
+        ))
+        .collect::<Vec<_>>()
+    };
+    let first = picture(0);
+    let bound = 4.0 / (first.len() as f64).sqrt();
+    let r = correlation(&first[1..], &first[..first.len() - 1]);
+    assert!(r.abs() < bound, "pixels: {r}");
+    // 65,536 would repeat sample 0 if an index had 16 bits.
+    for sample in [1, 2, 65_535, 65_536, 70_000, u32::MAX - 1] {
+        let r = correlation(&first, &picture(sample));
+        assert!(r.abs() < bound, "sample {sample}: {r}");
+    }
+}
+
+#[test]
+fn ranges_of_samples_add_up() {
+    let range = |first_sample, samples| {
+        film(RenderOptions {
+            first_sample,
+            ..crate::stub::samples(samples)
+        })
+    };
+    let (all, low, high) = (range(0, 8), range(0, 4), range(4, 4));
+    for ((all, low), high) in all.pixels.iter().zip(&low.pixels).zip(&high.pixels) {
+        let expected = 0.5 * (low[0] + high[0]);
+        assert!((all[0] - expected).abs() <= 1e-6 * expected.max(1.0));
+    }
+    assert_ne!(low, high);
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let covariance = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| (a - ma) * (b - mb))
+        .sum::<f64>();
+    let spread = |v: &[f64], m: f64| v.iter().map(|x| (x - m).powi(2)).sum::<f64>();
+    let spreads = (spread(a, ma) * spread(b, mb)).sqrt();
+    assert!(spreads > 0.0, "the pictures have no noise");
+    covariance / spreads
+}

@@ -1,0 +1,129 @@
+//! The film's sums: exact over both words, clamped and counted at their ends.
+
+use std::ops::ControlFlow;
+
+use crate::stub::{Kind, Room, gpu, materials, plan, red, render, samples};
+use impasto_compiler::partition::Strategy;
+use impasto_runtime::render::{Progress, Renderer, Rendering};
+use impasto_runtime::shader_part::BufferData;
+
+/// Every path sees the sky at once, so that every sample is `value` exactly.
+fn sky(value: f32, count: u32) -> Rendering {
+    let mut world = Room {
+        walls: false,
+        width: 2,
+        height: 1,
+        ..Room::default()
+    }
+    .scattering()
+    .world();
+    let lights = &mut world.parts.lights;
+    lights.wgsl = lights.wgsl.replace("weight * SKY", "sky_value[0]");
+    lights
+        .buffers
+        .push(BufferData::new("sky_value", "array<f32>", &[value]));
+    render(&world, &materials(&[Kind::Diffuse(0.5)]), &samples(count))
+}
+
+#[test]
+fn sums_carry_exactly_however_many_paths_add_at_once() {
+    let unit = f32::powi(2.0, -24);
+    for value in [
+        unit,
+        1.0 - unit,
+        1.0,
+        200.0,
+        255.0 + 1.0 / 65536.0,
+        256.0,
+        65_793.0,
+        3.0e8,
+    ] {
+        let rendering = sky(value, 1000);
+        assert!(
+            red(&rendering).all(|v| v == f64::from(value)),
+            "{value}: {:?}",
+            rendering.film
+        );
+        assert_eq!(rendering.report.clamped_samples, 0);
+        assert_eq!(rendering.report.nonfinite_samples, 0);
+    }
+}
+
+#[test]
+fn samples_that_are_no_light_are_dropped_and_counted() {
+    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -1e-30] {
+        let rendering = sky(value, 10);
+        assert_eq!(rendering.report.nonfinite_samples, 20, "{value}");
+        assert!(red(&rendering).all(|v| v == 0.0), "{value}");
+    }
+    assert_eq!(sky(-0.0, 10).report.nonfinite_samples, 0);
+}
+
+#[test]
+fn samples_beyond_the_films_range_are_clamped_and_counted() {
+    let rendering = sky(1e30, 16);
+    assert_eq!(rendering.report.clamped_samples, 32);
+    let limit = f64::powi(2.0, 39) / 16.0;
+    assert!(red(&rendering).all(|v| v == limit), "{:?}", rendering.film);
+}
+
+#[test]
+fn materials_that_give_no_numbers_are_counted_by_their_kernel() {
+    let room = Room {
+        plate: true,
+        materials: [0, 0, 0, 0, 0, 0, 1],
+        max_depth: 2,
+        ..Room::default()
+    };
+    let surfaces = materials(&[Kind::Diffuse(0.5), Kind::Broken]);
+    let report = render(&room.world(), &surfaces, &samples(4)).report;
+    let kernel = |name: &str| {
+        report
+            .kernels
+            .iter()
+            .find(|k| k.name == name)
+            .expect("a kernel")
+    };
+    let broken = kernel("material_m1");
+    assert!(broken.items > 0);
+    assert_eq!(broken.nonfinite_samples, broken.items);
+    assert_eq!(kernel("material_m0").nonfinite_samples, 0);
+    assert_eq!(report.nonfinite_samples, broken.items);
+}
+
+#[test]
+fn a_stopped_render_shows_the_samples_it_has() {
+    let room = Room {
+        walls: false,
+        sky: 3.0,
+        width: 64,
+        height: 64,
+        ..Room::default()
+    }
+    .scattering();
+    let mut options = samples(1 << 20);
+    options.pool = Some(4096);
+    let surfaces = materials(&[Kind::Diffuse(0.5)]);
+    let plan = plan(Strategy::Own, &surfaces);
+    let mut renderer = Renderer::from_world(gpu(), &room.world(), &surfaces, &plan, &options)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let mut last = None;
+    let stop_at_some = &mut |progress: &Progress| {
+        last = Some(*progress);
+        match progress.paths {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        }
+    };
+    let rendering = renderer
+        .render(stop_at_some)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let last = last.expect("progress was reported");
+    assert!(last.paths > 0 && last.paths < last.total);
+    let paths = rendering.film.total_samples();
+    assert_eq!(paths, rendering.report.paths);
+    assert!(paths > 0 && paths < last.total);
+    for (samples, value) in rendering.film.samples.iter().zip(red(&rendering)) {
+        assert_eq!(value, if *samples > 0 { 3.0 } else { 0.0 });
+    }
+}

@@ -1,0 +1,12 @@
+//! Tests that run kernels, on whatever GPU there is (a software one will do). They fail
+//! without one: a renderer that cannot be run is not tested.
+//!
+//! The worlds are small and made by hand, so that what should come out is known in closed
+//! form; see `stub`.
+
+mod determinism;
+mod film;
+mod furnace;
+mod lights;
+mod plans;
+mod stub;
