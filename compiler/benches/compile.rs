@@ -19,13 +19,23 @@ impl Loader for Files {
 /// Every material of the folder, found by walking it.
 fn materials(c: &mut Criterion) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../materials");
-    let mut files: Vec<_> = std::fs::read_dir(&folder).expect("materials").flatten().map(|e| e.path()).collect();
+    let mut files: Vec<_> = std::fs::read_dir(&folder)
+        .expect("materials")
+        .flatten()
+        .map(|e| e.path())
+        .collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "impasto"));
     files.sort();
     let mut group = c.benchmark_group("compile");
-    group.sample_size(20).measurement_time(std::time::Duration::from_secs(2));
+    group
+        .sample_size(20)
+        .measurement_time(std::time::Duration::from_secs(2));
     for file in files {
-        let name = file.file_stem().expect("name").to_string_lossy().into_owned();
+        let name = file
+            .file_stem()
+            .expect("name")
+            .to_string_lossy()
+            .into_owned();
         let request = [MaterialRequest::new(&name, file.to_string_lossy())];
         group.bench_function(&name, |b| {
             b.iter(|| {

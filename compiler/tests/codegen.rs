@@ -10,7 +10,9 @@ const DIFFUSE: &str = "use std::bsdf::diffuse;";
 
 #[test]
 fn equal_input_gives_equal_text() {
-    let text = format!("{DIFFUSE} use std::noise::perlin; material m {{ surface = diffuse(0.5 + 0.5 * perlin(position / 1 m)); }}");
+    let text = format!(
+        "{DIFFUSE} use std::noise::perlin; material m {{ surface = diffuse(0.5 + 0.5 * perlin(position / 1 m)); }}"
+    );
     assert_eq!(wgsl(&text), wgsl(&text));
 }
 
@@ -59,65 +61,143 @@ fn constants_are_computed_before() {
 #[test]
 fn every_reserved_word_is_a_usable_name() {
     let words = [
-        "array", "fn_", "f32", "vec3f", "switch", "loop", "override", "ptr", "sampler", "self", "class", "discard", "bitcast",
-        "select_", "texture_fetch", "evaluate_material", "wi", "wo", "u", "point_", "turn", "v1", "choice", "total", "diffuse_eval",
-        "op_hash", "SurfacePoint_", "material_", "var_", "enable", "alias", "atomic", "workgroup",
+        "array",
+        "fn_",
+        "f32",
+        "vec3f",
+        "switch",
+        "loop",
+        "override",
+        "ptr",
+        "sampler",
+        "self",
+        "class",
+        "discard",
+        "bitcast",
+        "select_",
+        "texture_fetch",
+        "evaluate_material",
+        "wi",
+        "wo",
+        "u",
+        "point_",
+        "turn",
+        "v1",
+        "choice",
+        "total",
+        "diffuse_eval",
+        "op_hash",
+        "SurfacePoint_",
+        "material_",
+        "var_",
+        "enable",
+        "alias",
+        "atomic",
+        "workgroup",
     ];
     for word in words {
-        let text = format!("{DIFFUSE} fn f_{word}({word}: float) -> float {{ let x_{word} = {word} * 2; x_{word} }} material {word} {{ let {word} = f_{word}(uv.x); surface = diffuse(saturate({word})); }}");
+        let text = format!(
+            "{DIFFUSE} fn f_{word}({word}: float) -> float {{ let x_{word} = {word} * 2; x_{word} }} material {word} {{ let {word} = f_{word}(uv.x); surface = diffuse(saturate({word})); }}"
+        );
         let compiled = compilation(&text, &[]);
-        assert!(compiled.program.is_some(), "{word}: {:?}", compiled.diagnostics);
+        assert!(
+            compiled.program.is_some(),
+            "{word}: {:?}",
+            compiled.diagnostics
+        );
     }
 }
 
 #[test]
 fn locals_never_hide_what_they_call() {
     // The function is `user_f` in WGSL; so is the variable, were names not kept apart.
-    let text = format!("{DIFFUSE} fn f(x: float) -> float = x * x; material m {{ let user_f = f(uv.x); let b = f(user_f); surface = diffuse(saturate(b)); }}");
+    let text = format!(
+        "{DIFFUSE} fn f(x: float) -> float = x * x; material m {{ let user_f = f(uv.x); let b = f(user_f); surface = diffuse(saturate(b)); }}"
+    );
     codegen::validate(&wgsl(&text)).expect("valid");
 }
 
 #[test]
 fn materials_of_one_name_are_kept_apart() {
     let mut files = MemoryLoader::default();
-    files.add("a.impasto", format!("{DIFFUSE} fn tint() -> color = color(0.9); material x {{ surface = diffuse(tint()); }}"));
-    files.add("b.impasto", format!("{DIFFUSE} fn tint() -> color = color(0.1); material x {{ surface = diffuse(tint()); }}"));
-    let requests = [MaterialRequest::new("x", "a.impasto"), MaterialRequest::new("x", "b.impasto"), MaterialRequest::new("material", "b.impasto")];
+    files.add(
+        "a.impasto",
+        format!(
+            "{DIFFUSE} fn tint() -> color = color(0.9); material x {{ surface = diffuse(tint()); }}"
+        ),
+    );
+    files.add(
+        "b.impasto",
+        format!(
+            "{DIFFUSE} fn tint() -> color = color(0.1); material x {{ surface = diffuse(tint()); }}"
+        ),
+    );
+    let requests = [
+        MaterialRequest::new("x", "a.impasto"),
+        MaterialRequest::new("x", "b.impasto"),
+        MaterialRequest::new("material", "b.impasto"),
+    ];
     let compiled = compile(&requests, &mut files);
     let program = compiled.program.expect("compiles");
     let names: Vec<String> = program.infos().into_iter().map(|i| i.name).collect();
     assert_eq!(names.len(), 3);
     assert!(names[0] != names[1] && names[2] != "material", "{names:?}");
     codegen::validate(&program.wgsl(&[0, 1, 2])).expect("valid");
-    assert!(!program.wgsl(&[0]).contains("0.1"), "one member's module has the other's code");
+    assert!(
+        !program.wgsl(&[0]).contains("0.1"),
+        "one member's module has the other's code"
+    );
 }
 
 #[test]
 fn parameters_take_a_scenes_values() {
-    let text = format!("{DIFFUSE} material m {{ param tint: color = 0.5; param size: length = 1 mm in 0.1 mm .. 10 mm; surface = diffuse(tint * saturate(float(size) * position.x)); }}");
-    let set = compilation(&text, &[("tint", "srgb(0xff0000)"), ("size", "4 mm")]).program.expect("compiles").wgsl(&[0]);
-    assert!(set.contains("vec3f(1.0, 0.0, 0.0)") && set.contains("0.004"), "{set}");
+    let text = format!(
+        "{DIFFUSE} material m {{ param tint: color = 0.5; param size: length = 1 mm in 0.1 mm .. 10 mm; surface = diffuse(tint * saturate(float(size) * position.x)); }}"
+    );
+    let set = compilation(&text, &[("tint", "srgb(0xff0000)"), ("size", "4 mm")])
+        .program
+        .expect("compiles")
+        .wgsl(&[0]);
+    assert!(
+        set.contains("vec3f(1.0, 0.0, 0.0)") && set.contains("0.004"),
+        "{set}"
+    );
     assert_eq!(codes(&text, &[("size", "20 mm")]), ["E0305"]);
     assert_eq!(codes(&text, &[("size", "4")]), ["E0303"]);
     assert_eq!(codes(&text, &[("sise", "4 mm")]), ["E0214"]);
-    assert!(compilation(&text, &[("tint", "color(1, 2")]).program.is_none());
+    assert!(
+        compilation(&text, &[("tint", "color(1, 2")])
+            .program
+            .is_none()
+    );
     assert_eq!(codes(&text, &[("tint", "position")]), ["E0201"]);
 }
 
 #[test]
 fn only_read_textures_are_asked_for() {
-    let text = format!("{DIFFUSE} material m {{ param a: texture = \"a.png\"; param b: texture = \"b.png\"; surface = diffuse(image(a, uv) * image_data(b, uv).x); }}");
-    let set = compilation(&text, &[("b", "\"c.png\"")]).program.expect("compiles");
+    let text = format!(
+        "{DIFFUSE} material m {{ param a: texture = \"a.png\"; param b: texture = \"b.png\"; surface = diffuse(image(a, uv) * image_data(b, uv).x); }}"
+    );
+    let set = compilation(&text, &[("b", "\"c.png\"")])
+        .program
+        .expect("compiles");
     let textures = set.textures();
     let paths: Vec<&str> = textures.iter().map(|t| t.path.as_str()).collect();
-    assert!(paths.contains(&"a.png") && paths.contains(&"c.png") && !paths.contains(&"b.png"), "{paths:?}");
+    assert!(
+        paths.contains(&"a.png") && paths.contains(&"c.png") && !paths.contains(&"b.png"),
+        "{paths:?}"
+    );
     let wgsl = set.wgsl(&[0]);
     for (slot, texture) in textures.iter().enumerate() {
         let wanted = match (texture.path.as_str(), texture.space) {
             ("a.png", TextureSpace::Color) | ("c.png", TextureSpace::Data) => true,
             _ => continue,
         };
-        assert_eq!(wgsl.contains(&format!("texture_fetch({slot}u, ")), wanted, "slot {slot} in\n{wgsl}");
+        assert_eq!(
+            wgsl.contains(&format!("texture_fetch({slot}u, ")),
+            wanted,
+            "slot {slot} in\n{wgsl}"
+        );
     }
 }
 
@@ -127,20 +207,36 @@ fn emission_is_classified() {
         let text = format!("use std::edf::uniform; material m {{ emission = {emission}; }}");
         program(&text).infos()[0].emission
     };
-    assert_eq!(kind("uniform(color(1, 2, 3))"), Emission::Uniform([1.0, 2.0, 3.0]));
-    assert_eq!(kind("2.0 * uniform(color(1, 2, 3))"), Emission::Uniform([2.0, 4.0, 6.0]));
+    assert_eq!(
+        kind("uniform(color(1, 2, 3))"),
+        Emission::Uniform([1.0, 2.0, 3.0])
+    );
+    assert_eq!(
+        kind("2.0 * uniform(color(1, 2, 3))"),
+        Emission::Uniform([2.0, 4.0, 6.0])
+    );
     assert_eq!(kind("0.0 * uniform(color(1, 2, 3))"), Emission::None);
     assert_eq!(kind("uniform(color(uv.x))"), Emission::Varying);
-    assert_eq!(kind("if uv.x > 0.5 { uniform(1.0) } else { uniform(2.0) }"), Emission::Varying);
-    let bsdf_only = program(&format!("{DIFFUSE} material m {{ surface = diffuse(0.5); }}"));
+    assert_eq!(
+        kind("if uv.x > 0.5 { uniform(1.0) } else { uniform(2.0) }"),
+        Emission::Varying
+    );
+    let bsdf_only = program(&format!(
+        "{DIFFUSE} material m {{ surface = diffuse(0.5); }}"
+    ));
     assert_eq!(bsdf_only.infos()[0].emission, Emission::None);
 }
 
 #[test]
 fn inputs_are_those_read() {
-    let text = format!("{DIFFUSE} material m {{ let _p = position.x; surface = diffuse(saturate(uv.x)); }}");
+    let text = format!(
+        "{DIFFUSE} material m {{ let _p = position.x; surface = diffuse(saturate(uv.x)); }}"
+    );
     let inputs = program(&text).infos()[0].inputs;
-    assert!(inputs.uv && inputs.normal && inputs.geometric_normal && !inputs.position, "{inputs:?}");
+    assert!(
+        inputs.uv && inputs.normal && inputs.geometric_normal && !inputs.position,
+        "{inputs:?}"
+    );
 }
 
 #[test]
@@ -149,23 +245,49 @@ fn work_that_cannot_end_is_refused() {
         let mut text = String::from(DIFFUSE);
         text.push_str("fn f0(x: float) -> float = x * 1.01 + 0.1;\n");
         for i in 1..n {
-            text.push_str(&format!("fn f{i}(x: float) -> float = f{0}(x) + f{0}(x + 1);\n", i - 1));
+            text.push_str(&format!(
+                "fn f{i}(x: float) -> float = f{0}(x) + f{0}(x + 1);\n",
+                i - 1
+            ));
         }
-        text.push_str(&format!("material m {{ surface = diffuse(saturate(f{}(uv.x))); }}", n - 1));
+        text.push_str(&format!(
+            "material m {{ surface = diffuse(saturate(f{}(uv.x))); }}",
+            n - 1
+        ));
         text
     };
     assert_eq!(codes(&deep(60), &[]), ["E0315"]);
     assert!(codes(&deep(8), &[]).is_empty());
-    let constant = deep(60).replace("uv.x", "0.5").replace("material m {", "const C: float = f59(0.5); material m { let _c = C;");
-    assert!(codes(&constant, &[]).contains(&"E0304"), "a constant that takes for ever");
-    let looped = format!("{DIFFUSE} fn g(x: float) -> float {{ var y = x; for i in 0..300 {{ y += 1; }} y }} material m {{ var z = 0.0; for i in 0..300 {{ z += g(z); }} surface = diffuse(saturate(z)); }}");
+    let constant = deep(60).replace("uv.x", "0.5").replace(
+        "material m {",
+        "const C: float = f59(0.5); material m { let _c = C;",
+    );
+    assert!(
+        codes(&constant, &[]).contains(&"E0304"),
+        "a constant that takes for ever"
+    );
+    let looped = format!(
+        "{DIFFUSE} fn g(x: float) -> float {{ var y = x; for i in 0..300 {{ y += 1; }} y }} material m {{ var z = 0.0; for i in 0..300 {{ z += g(z); }} surface = diffuse(saturate(z)); }}"
+    );
     assert_eq!(codes(&looped, &[]), ["E0308"]);
 }
 
 #[test]
 fn too_many_lobes_are_refused() {
     let sum = vec!["0.01 * diffuse(0.5)"; 65].join(", ");
-    assert!(codes(&format!("{DIFFUSE} material m {{ surface = layer({sum}); }}"), &[]).contains(&"E0312"));
+    assert!(
+        codes(
+            &format!("{DIFFUSE} material m {{ surface = layer({sum}); }}"),
+            &[]
+        )
+        .contains(&"E0312")
+    );
     let sum = vec!["0.01 * diffuse(0.5)"; 64].join(", ");
-    assert!(codes(&format!("{DIFFUSE} material m {{ surface = layer({sum}); }}"), &[]).is_empty());
+    assert!(
+        codes(
+            &format!("{DIFFUSE} material m {{ surface = layer({sum}); }}"),
+            &[]
+        )
+        .is_empty()
+    );
 }

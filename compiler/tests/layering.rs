@@ -6,9 +6,9 @@
 
 mod common;
 
+use impasto_compiler::Program;
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::Program;
 
 /// A compiled material, asked as a kernel asks it.
 struct Asked {
@@ -29,18 +29,47 @@ struct Answer {
 impl Asked {
     /// Compiles `uses` and a material whose surface is `surface`.
     fn new(uses: &str, surface: &str) -> Self {
-        Self { program: common::program(&format!("{uses}\nmaterial m {{ surface = {surface}; }}")) }
+        Self {
+            program: common::program(&format!("{uses}\nmaterial m {{ surface = {surface}; }}")),
+        }
     }
 
     fn ask(&self, wo: [f64; 3], wl: [f64; 3], u: [f64; 4]) -> Answer {
         let z = || Value::vector(&[0.0, 0.0, 1.0]);
-        let point = vec![Value::vector(&[0.3, -1.2, 0.7]), z(), z(), Value::vector(&[1.0, 0.0, 0.0]), Value::vector(&[0.4, 0.6])];
-        let args = vec![Value::Struct(point), Value::vector(&wo), Value::vector(&wl), Value::vector(&u)];
+        let point = vec![
+            Value::vector(&[0.3, -1.2, 0.7]),
+            z(),
+            z(),
+            Value::vector(&[1.0, 0.0, 0.0]),
+            Value::vector(&[0.4, 0.6]),
+        ];
+        let args = vec![
+            Value::Struct(point),
+            Value::vector(&wo),
+            Value::vector(&wl),
+            Value::vector(&u),
+        ];
         let mut run = Interpreter::<f64>::new(self.program.ir(), u64::MAX);
-        let result = run.run(&self.program.compiled()[0].evaluate, args).expect("fuel");
-        let vector = |i: usize| -> [f64; 3] { result.field(i).expect("field").to_f64().try_into().expect("vec3") };
+        let result = run
+            .run(&self.program.compiled()[0].evaluate, args)
+            .expect("fuel");
+        let vector = |i: usize| -> [f64; 3] {
+            result
+                .field(i)
+                .expect("field")
+                .to_f64()
+                .try_into()
+                .expect("vec3")
+        };
         let float = |i: usize| result.field(i).expect("field").as_float();
-        Answer { wi: vector(0), pdf: float(1), throughput: vector(2), light_pdf: float(3), light_throughput: vector(4), transmitted: float(5) }
+        Answer {
+            wi: vector(0),
+            pdf: float(1),
+            throughput: vector(2),
+            light_pdf: float(3),
+            light_throughput: vector(4),
+            transmitted: float(5),
+        }
     }
 
     /// The mean of the sampled throughput: the material's albedo as a renderer sees it.
@@ -66,7 +95,10 @@ fn direction(theta_degrees: f64, phi: f64) -> [f64; 3] {
 }
 
 fn near(a: f64, b: f64, tolerance: f64, what: &str) {
-    assert!((a - b).abs() <= tolerance, "{what}: {a} is not {b} (within {tolerance})");
+    assert!(
+        (a - b).abs() <= tolerance,
+        "{what}: {a} is not {b} (within {tolerance})"
+    );
 }
 
 const USES: &str = "use std::bsdf::{diffuse, specular, mirror, blinn_phong};";
@@ -76,7 +108,12 @@ fn diffuse_gives_its_reflectance() {
     let m = Asked::new(USES, "diffuse(color(0.2, 0.5, 0.9))");
     let albedo = m.sampled_albedo(direction(40.0, 1.0), 64);
     for (a, b) in albedo.iter().zip([0.2, 0.5, 0.9]) {
-        near(*a, b, 1e-9, "every sample of diffuse has its reflectance as throughput");
+        near(
+            *a,
+            b,
+            1e-9,
+            "every sample of diffuse has its reflectance as throughput",
+        );
     }
 }
 
@@ -85,15 +122,22 @@ fn layer_passes_on_what_the_top_leaves() {
     // A discrete top of albedo 0.3 over a white-ish base: 0.3 + 0.7 * 0.5.
     let m = Asked::new(USES, "layer(specular(0.3), diffuse(0.5))");
     let albedo = m.sampled_albedo(direction(30.0, 0.4), 20_000);
-    albedo.iter().for_each(|a| near(*a, 0.3 + 0.7 * 0.5, 2e-3, "albedo of the layer"));
+    albedo
+        .iter()
+        .for_each(|a| near(*a, 0.3 + 0.7 * 0.5, 2e-3, "albedo of the layer"));
 }
 
 #[test]
 fn three_layers_in_order() {
-    let m = Asked::new(USES, "layer(specular(0.2), 0.5 * diffuse(0.4), diffuse(0.9))");
+    let m = Asked::new(
+        USES,
+        "layer(specular(0.2), 0.5 * diffuse(0.4), diffuse(0.9))",
+    );
     let below = 0.5 * 0.4 + (1.0 - 0.5 * 0.4) * 0.9;
     let albedo = m.sampled_albedo(direction(50.0, 2.0), 20_000);
-    albedo.iter().for_each(|a| near(*a, 0.2 + 0.8 * below, 3e-3, "albedo of three layers"));
+    albedo
+        .iter()
+        .for_each(|a| near(*a, 0.2 + 0.8 * below, 3e-3, "albedo of three layers"));
 }
 
 #[test]
@@ -101,13 +145,18 @@ fn mix_is_linear_and_ends_are_exact() {
     for (t, expected) in [(0.0, 0.2), (0.25, 0.2 * 0.75 + 0.8 * 0.25), (1.0, 0.8)] {
         let m = Asked::new(USES, &format!("mix(diffuse(0.2), specular(0.8), {t:?})"));
         let albedo = m.sampled_albedo(direction(20.0, 0.0), 20_000);
-        albedo.iter().for_each(|a| near(*a, expected, 2e-3, &format!("mix at {t}")));
+        albedo
+            .iter()
+            .for_each(|a| near(*a, expected, 2e-3, &format!("mix at {t}")));
     }
 }
 
 #[test]
 fn weights_color_and_sum() {
-    let m = Asked::new(USES, "color(0.5, 1.0, 0.0) * diffuse(0.6) + 0.25 * specular(1.0)");
+    let m = Asked::new(
+        USES,
+        "color(0.5, 1.0, 0.0) * diffuse(0.6) + 0.25 * specular(1.0)",
+    );
     let albedo = m.sampled_albedo(direction(10.0, 0.0), 20_000);
     for (a, b) in albedo.iter().zip([0.3 + 0.25, 0.6 + 0.25, 0.25]) {
         near(*a, b, 3e-3, "sum of weighted closures");
@@ -116,17 +165,29 @@ fn weights_color_and_sum() {
 
 #[test]
 fn choice_takes_one_side() {
-    let m = Asked::new(USES, "if uv.x > 0.5 { diffuse(0.9) } else { specular(0.3) }");
+    let m = Asked::new(
+        USES,
+        "if uv.x > 0.5 { diffuse(0.9) } else { specular(0.3) }",
+    );
     let answer = m.ask(direction(10.0, 0.0), direction(20.0, 0.0), [0.7; 4]);
-    assert_eq!(answer.pdf, 0.0, "uv.x is 0.4, so the discrete side is taken");
+    assert_eq!(
+        answer.pdf, 0.0,
+        "uv.x is 0.4, so the discrete side is taken"
+    );
     assert_eq!(answer.light_throughput, [0.0; 3]);
-    answer.throughput.iter().for_each(|t| near(*t, 0.3, 1e-9, "throughput"));
+    answer
+        .throughput
+        .iter()
+        .for_each(|t| near(*t, 0.3, 1e-9, "throughput"));
 }
 
 /// The answer for a light must be that for a sample in the same direction.
 #[test]
 fn the_light_sees_what_is_sampled() {
-    let m = Asked::new(USES, "layer(0.4 * blinn_phong(exponent: 30, normal: normalize(normal + vec3(0.2, 0, 0))), specular(0.1), diffuse(0.7))");
+    let m = Asked::new(
+        USES,
+        "layer(0.4 * blinn_phong(exponent: 30, normal: normalize(normal + vec3(0.2, 0, 0))), specular(0.1), diffuse(0.7))",
+    );
     let mut continuous = 0;
     for i in 0..2000 {
         let wo = direction((i % 80) as f64, i as f64);
@@ -136,19 +197,35 @@ fn the_light_sees_what_is_sampled() {
             let light = m.ask(wo, sampled.wi, point4(i));
             near(light.light_pdf, sampled.pdf, 1e-9 * sampled.pdf, "density");
             for c in 0..3 {
-                near(light.light_throughput[c], sampled.throughput[c] * sampled.pdf, 1e-9 * sampled.pdf, "value");
+                near(
+                    light.light_throughput[c],
+                    sampled.throughput[c] * sampled.pdf,
+                    1e-9 * sampled.pdf,
+                    "value",
+                );
             }
         }
     }
-    assert!(continuous > 1000, "only {continuous} samples of lobes with a density");
+    assert!(
+        continuous > 1000,
+        "only {continuous} samples of lobes with a density"
+    );
 }
 
 /// Chi-squared over a grid of directions: samples fall where the density says, and the share of
 /// discrete and failed samples is what the density leaves.
 #[test]
 fn samples_follow_the_density_of_all_lobes() {
-    let m = Asked::new(USES, "layer(0.5 * blinn_phong(exponent: 8), specular(0.2), mix(diffuse(0.7), blinn_phong(exponent: 3, normal: normalize(normal + vec3(0, 0.4, 0))), 0.5))");
-    for wo in [direction(0.0, 0.0), direction(45.0, 0.7), direction(75.0, -2.0), [0.6, 0.0, -0.8]] {
+    let m = Asked::new(
+        USES,
+        "layer(0.5 * blinn_phong(exponent: 8), specular(0.2), mix(diffuse(0.7), blinn_phong(exponent: 3, normal: normalize(normal + vec3(0, 0.4, 0))), 0.5))",
+    );
+    for wo in [
+        direction(0.0, 0.0),
+        direction(45.0, 0.7),
+        direction(75.0, -2.0),
+        [0.6, 0.0, -0.8],
+    ] {
         chi_squared(&m, wo);
     }
 }
@@ -179,10 +256,18 @@ fn chi_squared(m: &Asked, wo: [f64; 3]) {
         }
     }
     let found: f64 = counts.iter().sum();
-    near(found / N as f64, total / N as f64, 0.01, "share of samples with a density");
+    near(
+        found / N as f64,
+        total / N as f64,
+        0.01,
+        "share of samples with a density",
+    );
     // Four standard deviations of the chi-squared distribution; the sequence is better spread
     // than random numbers, so a right sampler stays far below.
-    assert!(statistic < cells + 4.0 * (2.0_f64 * cells).sqrt(), "chi-squared {statistic} over {cells} cells for wo {wo:?}");
+    assert!(
+        statistic < cells + 4.0 * (2.0_f64 * cells).sqrt(),
+        "chi-squared {statistic} over {cells} cells for wo {wo:?}"
+    );
 }
 
 fn bin(w: [f64; 3], cos: usize, phi: usize) -> usize {
@@ -201,7 +286,9 @@ fn integral(m: &Asked, wo: [f64; 3], c: usize, p: usize, cos: usize, phi: usize)
         let turn = (p as f64 + ((i % SUB) as f64 + 0.5) / SUB as f64) / phi as f64 - 0.5;
         let s = (1.0 - z * z).sqrt();
         let angle = turn * std::f64::consts::TAU;
-        sum += m.ask(wo, [s * angle.cos(), s * angle.sin(), z], [0.5; 4]).light_pdf;
+        sum += m
+            .ask(wo, [s * angle.cos(), s * angle.sin(), z], [0.5; 4])
+            .light_pdf;
     }
     sum / (SUB * SUB) as f64 * area
 }
@@ -211,21 +298,39 @@ fn discrete_materials_answer_lights_with_nothing() {
     let m = Asked::new(USES, "mirror(fresnel: 1.5)");
     let info = &m.program.infos()[0];
     assert!(info.delta_only && !info.transmissive);
-    let answer = m.ask(direction(30.0, 0.0), direction(30.0, std::f64::consts::PI), [0.5; 4]);
-    assert_eq!((answer.light_pdf, answer.light_throughput, answer.pdf), (0.0, [0.0; 3], 0.0));
-    assert!(answer.throughput[0] > 0.03 && answer.transmitted == 0.0, "{answer:?}");
+    let answer = m.ask(
+        direction(30.0, 0.0),
+        direction(30.0, std::f64::consts::PI),
+        [0.5; 4],
+    );
+    assert_eq!(
+        (answer.light_pdf, answer.light_throughput, answer.pdf),
+        (0.0, [0.0; 3], 0.0)
+    );
+    assert!(
+        answer.throughput[0] > 0.03 && answer.transmitted == 0.0,
+        "{answer:?}"
+    );
 }
 
 #[test]
 fn glass_changes_sides_and_says_so() {
     let m = Asked::new("use std::bsdf::dielectric;", "dielectric(1.5)");
     assert!(m.program.infos()[0].transmissive);
-    let sides: Vec<f64> = (0..5000).map(|i| m.ask(direction(20.0, 0.3), [0.0; 3], point4(i))).map(|a| {
-        assert_eq!(a.transmitted, f64::from(u8::from(a.wi[2] < 0.0)), "{a:?}");
-        a.transmitted
-    }).collect();
+    let sides: Vec<f64> = (0..5000)
+        .map(|i| m.ask(direction(20.0, 0.3), [0.0; 3], point4(i)))
+        .map(|a| {
+            assert_eq!(a.transmitted, f64::from(u8::from(a.wi[2] < 0.0)), "{a:?}");
+            a.transmitted
+        })
+        .collect();
     let through = sides.iter().sum::<f64>() / 5000.0;
-    near(through, 0.9594, 0.003, "share of light that enters glass at 20 degrees");
+    near(
+        through,
+        0.9594,
+        0.003,
+        "share of light that enters glass at 20 degrees",
+    );
 }
 
 #[test]
@@ -234,6 +339,12 @@ fn a_weight_of_zero_leaves_no_trace() {
     let without = Asked::new(USES, "diffuse(0.5)");
     assert_eq!(with.program.infos()[0].lobes, 1);
     assert!(!with.program.wgsl(&[0]).contains("blinn_phong"));
-    let (a, b) = (with.ask(direction(30.0, 0.0), direction(10.0, 0.0), [0.3; 4]), without.ask(direction(30.0, 0.0), direction(10.0, 0.0), [0.3; 4]));
-    assert_eq!((a.pdf, a.throughput, a.light_pdf), (b.pdf, b.throughput, b.light_pdf));
+    let (a, b) = (
+        with.ask(direction(30.0, 0.0), direction(10.0, 0.0), [0.3; 4]),
+        without.ask(direction(30.0, 0.0), direction(10.0, 0.0), [0.3; 4]),
+    );
+    assert_eq!(
+        (a.pdf, a.throughput, a.light_pdf),
+        (b.pdf, b.throughput, b.light_pdf)
+    );
 }

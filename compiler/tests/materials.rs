@@ -18,7 +18,11 @@ impl Loader for Files {
 
 fn files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../materials");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).expect("materials").flatten().map(|e| e.path()).collect();
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .expect("materials")
+        .flatten()
+        .map(|e| e.path())
+        .collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "impasto"));
     files.sort();
     assert!(files.len() >= 5, "only {} materials", files.len());
@@ -26,7 +30,10 @@ fn files() -> Vec<PathBuf> {
 }
 
 fn program(file: &Path) -> Program {
-    let compiled = compile(&[MaterialRequest::new("m", file.to_string_lossy())], &mut Files);
+    let compiled = compile(
+        &[MaterialRequest::new("m", file.to_string_lossy())],
+        &mut Files,
+    );
     let problems = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
     assert_eq!(problems, "", "{} has diagnostics", file.display());
     compiled.program.expect("compiles")
@@ -37,7 +44,10 @@ struct Numbers(u64);
 
 impl Numbers {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / (1u64 << 24) as f64
     }
 
@@ -64,17 +74,39 @@ impl Query {
             wo = [0.0, 0.0, 1.0];
         }
         let position = std::array::from_fn(|_| 4.0 * n.next() - 2.0);
-        Self { position, uv: [n.next(), n.next()], wo, u: std::array::from_fn(|_| n.next()) }
+        Self {
+            position,
+            uv: [n.next(), n.next()],
+            wo,
+            u: std::array::from_fn(|_| n.next()),
+        }
     }
 }
 
 /// wi, pdf, throughput, light_pdf, light_throughput.
-fn ask<F: Real>(program: &Program, q: &Query, wl: &[f64]) -> (Vec<f64>, f64, Vec<f64>, f64, Vec<f64>) {
+fn ask<F: Real>(
+    program: &Program,
+    q: &Query,
+    wl: &[f64],
+) -> (Vec<f64>, f64, Vec<f64>, f64, Vec<f64>) {
     let z = || Value::vector(&[0.0, 0.0, 1.0]);
-    let point = vec![Value::vector(&q.position), z(), z(), Value::vector(&[1.0, 0.0, 0.0]), Value::vector(&q.uv)];
-    let args = vec![Value::Struct(point), Value::vector(&q.wo), Value::vector(wl), Value::vector(&q.u)];
+    let point = vec![
+        Value::vector(&q.position),
+        z(),
+        z(),
+        Value::vector(&[1.0, 0.0, 0.0]),
+        Value::vector(&q.uv),
+    ];
+    let args = vec![
+        Value::Struct(point),
+        Value::vector(&q.wo),
+        Value::vector(wl),
+        Value::vector(&q.u),
+    ];
     let mut run = Interpreter::<F>::new(program.ir(), u64::MAX);
-    let out = run.run(&program.compiled()[0].evaluate, args).expect("fuel");
+    let out = run
+        .run(&program.compiled()[0].evaluate, args)
+        .expect("fuel");
     let field = |i: usize| out.field(i).expect("field").to_f64();
     (field(0), field(1)[0], field(2), field(3)[0], field(4))
 }
@@ -87,12 +119,28 @@ fn answers_are_finite_and_not_negative() {
         for _ in 0..300 {
             let q = Query::new(&mut n);
             let wl = n.direction();
-            for (bits, answer) in [(64, ask::<f64>(&program, &q, &wl)), (32, ask::<f32>(&program, &q, &wl))] {
+            for (bits, answer) in [
+                (64, ask::<f64>(&program, &q, &wl)),
+                (32, ask::<f32>(&program, &q, &wl)),
+            ] {
                 let (wi, pdf, throughput, light_pdf, light) = answer;
-                let values = wi.iter().chain([&pdf, &light_pdf]).chain(&throughput).chain(&light);
-                assert!(values.clone().all(|v| v.is_finite()), "{} in f{bits}: {:?}", file.display(), values.collect::<Vec<_>>());
+                let values = wi
+                    .iter()
+                    .chain([&pdf, &light_pdf])
+                    .chain(&throughput)
+                    .chain(&light);
+                assert!(
+                    values.clone().all(|v| v.is_finite()),
+                    "{} in f{bits}: {:?}",
+                    file.display(),
+                    values.collect::<Vec<_>>()
+                );
                 let light_values = throughput.iter().chain(&light).chain([&pdf, &light_pdf]);
-                assert!(light_values.clone().all(|v| *v >= 0.0), "{} in f{bits}: negative", file.display());
+                assert!(
+                    light_values.clone().all(|v| *v >= 0.0),
+                    "{} in f{bits}: negative",
+                    file.display()
+                );
             }
         }
     }
@@ -111,14 +159,27 @@ fn a_sampled_direction_and_a_lights_get_one_answer() {
                 continuous += 1;
                 let (_, _, _, light_pdf, light) = ask::<f64>(&program, &q, &wi);
                 let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
-                assert!(same(light_pdf, pdf), "{}: pdf {pdf} and {light_pdf}", file.display());
+                assert!(
+                    same(light_pdf, pdf),
+                    "{}: pdf {pdf} and {light_pdf}",
+                    file.display()
+                );
                 for c in 0..3 {
-                    assert!(same(light[c], throughput[c] * pdf), "{}: value", file.display());
+                    assert!(
+                        same(light[c], throughput[c] * pdf),
+                        "{}: value",
+                        file.display()
+                    );
                 }
             }
         }
         let info = &program.infos()[0];
-        assert_eq!(continuous == 0, info.delta_only, "{}: {continuous} continuous samples", file.display());
+        assert_eq!(
+            continuous == 0,
+            info.delta_only,
+            "{}: {continuous} continuous samples",
+            file.display()
+        );
     }
 }
 
@@ -139,7 +200,12 @@ fn no_material_makes_light() {
             }
             let albedo = sum.map(|s| s / f64::from(samples));
             // Three standard deviations of the mean are about 0.05 with weights below 2.
-            assert!(albedo.iter().all(|a| *a < 1.06), "{} reflects {albedo:?} towards {:?}", file.display(), q.wo);
+            assert!(
+                albedo.iter().all(|a| *a < 1.06),
+                "{} reflects {albedo:?} towards {:?}",
+                file.display(),
+                q.wo
+            );
         }
     }
 }
@@ -161,6 +227,10 @@ fn single_precision_agrees_with_double() {
         }
         // A pattern has edges (a flake, a tile, a Voronoi cell) that rounding moves, but few; only
         // a fractal has many.
-        assert!(differing * 10 <= compared, "{}: {differing} of {compared} differ", file.display());
+        assert!(
+            differing * 10 <= compared,
+            "{}: {differing} of {compared} differ",
+            file.display()
+        );
     }
 }

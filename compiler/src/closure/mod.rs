@@ -6,9 +6,11 @@
 //! albedo, and value and density are sums over the lobes. All of it is ordinary IR: the GPU
 //! and the interpreter run the same function, without a runtime stack of BSDFs.
 
+use crate::ir::interp::Interpreter;
+use crate::ir::value::Value;
 use crate::ir::{
-    Closure, ClosureId, Const, ExprId, ExprKind, Function, FunctionId, Lobe, Material, Methods,
-    Module,
+    Closure, ClosureDefId, ClosureId, Const, ExprId, Function, FunctionId, Lobe, Local, Material,
+    Methods, Module, Type,
 };
 
 mod emission;
@@ -90,64 +92,57 @@ pub fn delta_only(module: &Module, lobes: &[Path<'_>]) -> bool {
         .all(|p| module.closures[p.lobe.def.index()].delta)
 }
 
-/// Could a lobe scatter to the other side? True if its sample or evaluation does not stay on
-/// one side, found by sampling it: directions are tried on a fixed grid with its own arguments
-/// where these are constant, and with its functions alone where they are not.
+/// Could a lobe scatter to the other side? Found by drawing directions from it, over a fixed grid
+/// of numbers, with its own arguments where these are constant and with one half where not.
 pub fn transmissive(module: &Module, material: &Material, lobes: &[Path<'_>]) -> bool {
+    let mut asked: Vec<(ClosureDefId, Vec<Const>)> = Vec::new();
     lobes.iter().any(|p| {
         let def = &module.closures[p.lobe.def.index()];
         let Methods::Bsdf { sample, .. } = def.methods else {
             return false;
         };
-        let args: Option<Vec<Const>> = p
-            .lobe
-            .args
-            .iter()
-            .map(|&a| material.body.constant(a).cloned())
-            .collect();
-        match args {
-            Some(args) => samples_transmit(module, sample, &args),
-            // What varies over the surface is not known here: ask the function's text.
-            None => may_transmit(module, sample),
+        let stand_in = |(arg, param): (&ExprId, &Local)| {
+            let constant = material.body.constant(*arg).cloned();
+            constant.unwrap_or_else(|| half(param.ty))
+        };
+        let args: Vec<Const> = p.lobe.args.iter().zip(&def.params).map(stand_in).collect();
+        let key = (p.lobe.def, args);
+        if asked.contains(&key) {
+            return false;
         }
+        let crosses = samples_cross(module, sample, &key.1);
+        asked.push(key);
+        crosses
     })
 }
 
-/// Draws directions from a sample method with constant arguments, both sides of the surface.
-fn samples_transmit(module: &Module, sample: FunctionId, args: &[Const]) -> bool {
-    use crate::ir::{interp::Interpreter, value::Value};
-    let grid = [0.02, 0.35, 0.65, 0.98];
-    let mut run = Interpreter::<f64>::new(module, 1 << 22);
-    for wo in [
-        [0.6, 0.0, 0.8],
-        [0.6, 0.0, -0.8],
-        [0.0, 0.995, 0.0998],
-        [0.0, 0.995, -0.0998],
-    ] {
-        for i in 0..64 {
-            let u = [grid[i & 3], grid[(i >> 2) & 3], grid[i >> 4]];
-            let mut values: Vec<Value<f64>> = args.iter().map(Value::constant).collect();
-            values.extend([Value::vector(&wo), Value::vector(&u)]);
-            let Ok(wi) = run.call(sample, values) else {
-                return true;
-            };
-            if wi.to_f64().get(2).is_some_and(|z| z * wo[2] < 0.0) {
-                return true;
-            }
-        }
+/// One half in every component of a type.
+fn half(ty: Type) -> Const {
+    match ty {
+        Type::Bool => Const::Bool(true),
+        Type::Int => Const::Int(0),
+        _ => Const::Float(vec![0.5; ty.width().unwrap_or(1)]),
     }
-    false
 }
 
-/// Does a sample method, or what it calls, refract? Conservative: any call but of functions
-/// known to stay on the side of `wo` counts.
-fn may_transmit(module: &Module, sample: FunctionId) -> bool {
-    let f = &module.functions[sample.index()];
-    f.exprs.iter().any(|e| match e.kind {
-        ExprKind::Call(callee, _) => {
-            let name = module.functions[callee.index()].name.as_str();
-            name.starts_with("refract") || may_transmit(module, callee)
-        }
-        _ => false,
-    })
+/// Does a sample method with these arguments ever leave the side of `wo`?
+fn samples_cross(module: &Module, sample: FunctionId, args: &[Const]) -> bool {
+    const DIRECTION: [[f64; 2]; 4] = [[0.02, 0.5], [0.35, 0.1], [0.65, 0.9], [0.98, 0.35]];
+    const CHOICE: [f64; 4] = [0.001, 0.35, 0.65, 0.999];
+    let mut run = Interpreter::<f64>::new(module, 1 << 22);
+    [[0.6, 0.0, 0.8], [0.6, 0.0, -0.8]]
+        .iter()
+        .any(|wo: &[f64; 3]| {
+            CHOICE
+                .iter()
+                .zip(DIRECTION.iter().cycle().skip(1))
+                .chain(CHOICE.iter().zip(&DIRECTION))
+                .any(|(z, [x, y])| {
+                    let mut values: Vec<Value<f64>> = args.iter().map(Value::constant).collect();
+                    values.extend([Value::vector(wo), Value::vector(&[*x, *y, *z])]);
+                    // What takes too long to find out is taken to cross.
+                    let wi = run.call(sample, values).map(|wi| wi.to_f64());
+                    wi.map_or(true, |wi| wi.get(2).is_some_and(|z| z * wo[2] < 0.0))
+                })
+        })
 }

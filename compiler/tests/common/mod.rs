@@ -6,8 +6,14 @@ use impasto_compiler::{Compilation, MaterialRequest, MemoryLoader, Program, comp
 pub fn compilation(text: &str, params: &[(&str, &str)]) -> Compilation {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", text);
-    let params = params.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
-    let request = MaterialRequest { params, ..MaterialRequest::new("m", "m.impasto") };
+    let params = params
+        .iter()
+        .map(|(n, v)| ((*n).to_owned(), (*v).to_owned()))
+        .collect();
+    let request = MaterialRequest {
+        params,
+        ..MaterialRequest::new("m", "m.impasto")
+    };
     compile(&[request], &mut files)
 }
 
@@ -15,7 +21,9 @@ pub fn compilation(text: &str, params: &[(&str, &str)]) -> Compilation {
 pub fn program(text: &str) -> Program {
     let compiled = compilation(text, &[]);
     let problems = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
-    compiled.program.unwrap_or_else(|| panic!("{text}\n{problems}"))
+    compiled
+        .program
+        .unwrap_or_else(|| panic!("{text}\n{problems}"))
 }
 
 /// The WGSL of a text that must compile.
@@ -27,5 +35,9 @@ pub fn wgsl(text: &str) -> String {
 /// Ids of the diagnostics of a text.
 #[allow(dead_code)]
 pub fn codes(text: &str, params: &[(&str, &str)]) -> Vec<&'static str> {
-    compilation(text, params).diagnostics.iter().map(|d| d.code.id()).collect()
+    compilation(text, params)
+        .diagnostics
+        .iter()
+        .map(|d| d.code.id())
+        .collect()
 }
