@@ -258,8 +258,17 @@ struct Sample {
 
 fn sample(parts: &SceneParts, position: Vec3, count: usize, seed: u64) -> Vec<Sample> {
     let mut random = Random::new(seed);
+    let numbers: Vec<Row> = (0..count)
+        .map(|_| row([(); 4].map(|_| random.uniform())))
+        .collect();
+    sample_with(parts, position, &numbers)
+}
+
+/// One sample for each row of random numbers.
+fn sample_with(parts: &SceneParts, position: Vec3, numbers: &[Row]) -> Vec<Sample> {
+    let count = numbers.len();
     let mut input = vec![row(position.extend(0.0).to_array())];
-    input.extend((0..count).map(|_| row([(); 4].map(|_| random.uniform()))));
+    input.extend(numbers);
     let body = EMISSION.to_owned()
         + "
         let position = bitcast<vec3<f32>>(input[0].xyz);
@@ -731,6 +740,28 @@ fn black_lights_are_as_good_as_none() {
         );
         let directions = [Vec3::Y, Vec3::NEG_Y, Vec3::new(0.3, 1.0, 0.3).normalize()];
         assert_eq!(met(&parts, Vec3::ZERO, &directions, 0.0), [Vec3::ZERO; 3]);
+    }
+}
+
+#[test]
+fn extreme_random_numbers_give_finite_samples() {
+    // Row 11: u = 0 and the largest number below 1, in every position. sample() checks for finite values.
+    let ends = [0.0f32, 0.99999994];
+    let corners = |i: usize| row([0, 1, 2, 3].map(|k| ends[i >> k & 1]));
+    let numbers: Vec<Row> = (0..16).map(corners).collect();
+    let (mixed, infos) = mixed_scene();
+    for (name, scene, infos) in scenes().into_iter().chain([("mixed", mixed, infos)]) {
+        for s in sample_with(&parts(&scene, &infos), Vec3::ZERO, &numbers) {
+            let nothing = s.radiance == Vec3::ZERO;
+            assert!(
+                nothing || (s.wi.length() - 1.0).abs() < 1e-5,
+                "{name}: {s:?}"
+            );
+            assert!(
+                s.pdf >= 0.0 && s.radiance.min_element() >= 0.0,
+                "{name}: {s:?}"
+            );
+        }
     }
 }
 

@@ -87,12 +87,11 @@ fn normalise(path: &Path, text: &str) -> Result<String, SceneError> {
         match key {
             "newmtl" if rest.is_empty() => return Err(error("a name")),
             "newmtl" => out += &format!("newmtl {rest}\n"),
+            // Spectra and CIE XYZ are legal and rare; the fallback stands for them.
+            "Kd" | "Ks" | "Ke" if rest.starts_with("spectral") || rest.starts_with("xyz") => {}
             "Kd" | "Ks" | "Ke" => {
-                // Spectra and CIE XYZ are legal and rare; the fallback stands for them.
-                if !rest.starts_with("spectral") && !rest.starts_with("xyz") {
-                    let rgb = color(rest).ok_or_else(|| error("three finite numbers"))?;
-                    out += &format!("{key} {} {} {}\n", rgb[0], rgb[1], rgb[2]);
-                }
+                let rgb = color(rest).ok_or_else(|| error("three finite numbers"))?;
+                out += &format!("{key} {} {} {}\n", rgb[0], rgb[1], rgb[2]);
             }
             "Ns" | "Ni" | "d" | "Tr" => {
                 let last = rest.split_whitespace().last().and_then(finite);
