@@ -291,3 +291,13 @@ fn too_many_lobes_are_refused() {
         .is_empty()
     );
 }
+
+#[test]
+fn comparisons_that_face_each_other_are_no_template_list() {
+    // Compiling includes validation. In WGSL `select` takes the value for false first.
+    common::program(
+        "use std::bsdf::diffuse;
+        fn faces(h: float, t: bool) -> bool = select(t, h > 0.0, h < 0.0);
+        material m { surface = diffuse(select(faces(uv.x, uv.y > 0.0), 1.0, 0.0)); }",
+    );
+}

@@ -356,10 +356,7 @@ impl Printer<'_> {
     }
 
     fn list(&self, args: &[ExprId]) -> String {
-        args.iter()
-            .map(|&a| self.operand(a))
-            .collect::<Vec<_>>()
-            .join(", ")
+        joined(args.iter().map(|&a| self.operand(a)).collect())
     }
 
     fn op(&mut self, op: Op, args: &[ExprId], ty: Type) -> String {
@@ -371,12 +368,9 @@ impl Printer<'_> {
             Wgsl::Infix(symbol) => {
                 format!("{} {symbol} {}", self.tight(args[0]), self.tight(args[1]))
             }
-            Wgsl::Builtin("select") => format!(
-                "select({}, {}, {})",
-                self.operand(args[2]),
-                self.operand(args[1]),
-                self.operand(args[0])
-            ),
+            Wgsl::Builtin("select") => {
+                format!("select({})", self.list(&[args[2], args[1], args[0]]))
+            }
             Wgsl::Builtin(name) => format!("{name}({})", self.widened(op, args, ty)),
             Wgsl::Helper(text, _) => {
                 let operand_ty = if matches!(op.info().shape, Shape::Float(_) | Shape::Number(_)) {
@@ -402,7 +396,7 @@ impl Printer<'_> {
                 text
             }
         };
-        args.iter().map(widen).collect::<Vec<_>>().join(", ")
+        joined(args.iter().map(widen).collect())
     }
 
     fn texture(&mut self, op: Op, args: &[ExprId]) -> String {
@@ -622,4 +616,17 @@ impl<'a> Inliner<'a> {
         self.loads[id.index()] =
             matches!(kind, ExprKind::Load(_)) || inlined.clone().any(|a| self.loads[a.index()]);
     }
+}
+
+/// Arguments with commas between them. `a < b, c > d` would begin a template list in WGSL, so
+/// comparisons that face each other like that get parentheses.
+fn joined(mut args: Vec<String>) -> String {
+    let less = args.iter().position(|a| a.contains(" <"));
+    let greater = args.iter().rposition(|a| a.contains(" >"));
+    if less.zip(greater).is_some_and(|(less, greater)| less < greater) {
+        for arg in args.iter_mut().filter(|a| a.contains(" <") || a.contains(" >")) {
+            *arg = format!("({arg})");
+        }
+    }
+    args.join(", ")
 }
