@@ -1,0 +1,133 @@
+//! Writes a material that uses everything a library file defines.
+//!
+//! Arguments depend on the surface point, so that nothing is folded to a constant.
+
+use std::path::Path;
+
+use impasto::compiler::ast::{ClosureKind, Field, Item, ItemKind, Module, Param};
+use impasto::compiler::parser;
+use impasto::compiler::source::SourceMap;
+
+/// The source of the probe of the library file at `path`; none if it defines nothing to call.
+pub(crate) fn source(path: &Path) -> Option<String> {
+    let folder = path.parent()?.file_name()?.to_str()?;
+    let name = path.file_stem()?.to_str()?;
+    let module = parsed(impasto_stdlib::file(folder, name)?.text);
+    let used = module.items.iter().filter(|item| is_callable(item));
+    let names: Vec<&str> = used.map(|item| item.name.node.as_str()).collect();
+    if names.is_empty() {
+        return None;
+    }
+    let mut source = String::new();
+    if folder != impasto_stdlib::CORE {
+        source += &format!("use std::{folder}::{{{}}};\n", names.join(", "));
+    }
+    if !names.contains(&"diffuse") {
+        source += "use std::bsdf::diffuse as probe_diffuse;\n";
+    }
+    for item in &module.items {
+        if let ItemKind::Closure(closure) = &item.kind {
+            let output = match closure.kind {
+                ClosureKind::Edf => "emission",
+                _ => "surface",
+            };
+            let call = call(item, &closure.params);
+            source += &format!(
+                "material probe_{} {{ {output} = {call}; }}\n",
+                item.name.node
+            );
+        }
+    }
+    Some(source + &functions(&module))
+}
+
+/// One material whose color is the sum of what all functions of the module give.
+fn functions(module: &Module) -> String {
+    let values = module.items.iter().filter_map(|item| match &item.kind {
+        ItemKind::Function(f) => Some((call(item, &f.params), f.result.node.as_str())),
+        _ => None,
+    });
+    let values: Vec<(String, &str)> = values.collect();
+    if values.is_empty() {
+        return String::new();
+    }
+    let mut body = String::from("    var sum = color(0.0);\n");
+    for (index, (call, ty)) in values.iter().enumerate() {
+        let value = color_of(&format!("v{index}"), ty);
+        body += &format!("    let v{index} = {call};\n    sum += {value};\n");
+    }
+    format!("material probe_functions {{\n{body}    surface = probe_diffuse(sum);\n}}\n")
+}
+
+fn is_callable(item: &Item) -> bool {
+    matches!(item.kind, ItemKind::Function(_) | ItemKind::Closure(_))
+}
+
+fn call(item: &Item, params: &[Param]) -> String {
+    let args = params.iter().map(|param| argument(&param.ty.node));
+    let args: Vec<String> = args.collect();
+    format!("{}({})", item.name.node, args.join(", "))
+}
+
+/// Some value of a type.
+fn argument(ty: &str) -> String {
+    let text = match ty {
+        "bool" => "position.x > 0.0",
+        "int" => "int(position.y)",
+        "float" => "position.z",
+        "length" => "position.x * 1 m",
+        "angle" => "position.y * 1 rad",
+        "vec2" => "uv",
+        "vec3" | "point" => "position",
+        "vector" | "normal" => "normal",
+        "vec4" => "vec4(position, 1.0)",
+        "color" => "color(position)",
+        "mat3" => "mat3(tangent, normal, geometric_normal)",
+        "texture" => "\"probe.png\"",
+        name => return structure(name),
+    };
+    text.into()
+}
+
+fn structure(name: &str) -> String {
+    let fields = fields(name);
+    let args: Vec<String> = fields.iter().map(|f| argument(&f.ty.node)).collect();
+    format!("{name}({})", args.join(", "))
+}
+
+/// A color that depends on `value`.
+fn color_of(value: &str, ty: &str) -> String {
+    match ty {
+        "bool" => format!("color(select({value}, 1.0, 0.0))"),
+        "int" | "float" | "length" | "angle" => format!("color(float({value}))"),
+        "vec2" => format!("color({value}.x + {value}.y)"),
+        "vec3" | "point" | "vector" | "normal" => format!("color({value})"),
+        "vec4" => format!("color({value}.xyz)"),
+        "color" => value.into(),
+        "mat3" => format!("color({value} * normal)"),
+        name => {
+            let fields = fields(name);
+            let field = |f: &Field| color_of(&format!("{value}.{}", f.name.node), &f.ty.node);
+            fields.iter().map(field).collect::<Vec<_>>().join(" + ")
+        }
+    }
+}
+
+/// The fields of a struct of the library.
+fn fields(name: &str) -> Vec<Field> {
+    let items = impasto_stdlib::files()
+        .iter()
+        .flat_map(|file| parsed(file.text).items);
+    let found = items
+        .filter(|item| item.name.node == name)
+        .find_map(|item| match item.kind {
+            ItemKind::Struct(fields) => Some(fields),
+            _ => None,
+        });
+    found.unwrap_or_else(|| panic!("the probe knows no type `{name}`"))
+}
+
+fn parsed(text: &str) -> Module {
+    let file = SourceMap::default().add("library", text);
+    parser::parse(file, text).0
+}
