@@ -1,8 +1,33 @@
 //! Impasto: a material language, and the renderer that its compiler feeds.
 //!
-//! [`compile`] compiles the materials that a scene names, [`plan`] decides which of them share a
-//! kernel. The crates [`compiler`] and [`runtime`] have more to offer; the
-//! `impasto` command is built on the same functions.
+//! A picture takes four steps, one function each. Data runs one way through them:
+//!
+//! | step | from | to |
+//! |---|---|---|
+//! | [`load`] | a scene file | a [`Scene`]: geometry, lights, and which materials it binds |
+//! | [`compile`] | the `.impasto` files that the scene names | a [`Program`]: validated WGSL |
+//! | [`plan`] | the program's materials | a [`Plan`]: which of them share a kernel |
+//! | [`render`] | scene, program and plan | a [`Rendering`]: the picture and a report |
+//!
+//! ```no_run
+//! # fn main() -> Result<(), impasto::Error> {
+//! use impasto::{RenderOptions, Strategy};
+//!
+//! let scene = impasto::load("examples/cornell/scene.toml".as_ref())?;
+//! let program = impasto::compile(&scene)?;
+//! let plan = impasto::plan(&program, Strategy::Own);
+//! let options = RenderOptions { samples: 16, ..RenderOptions::default() };
+//! let rendering = impasto::render(&scene, &program, &plan, &options)?;
+//! impasto::runtime::output::write(&rendering.film, "cornell.png".as_ref(), 0.0)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Each step has more to offer than its function here: the crates [`compiler`] and [`runtime`]
+//! are the places to look. The `impasto` command is built on the same functions.
+
+use std::ops::ControlFlow;
+use std::path::Path;
 
 pub use impasto_compiler as compiler;
 pub use impasto_runtime as runtime;
@@ -11,6 +36,9 @@ pub use compiler::partition::{Plan, Strategy};
 pub use compiler::{Compilation, MaterialRequest, Program};
 pub use files::FileLoader;
 pub use ir_text::ir_text;
+pub use runtime::error::RuntimeError;
+pub use runtime::gpu::{Gpu, GpuOptions};
+pub use runtime::render::{RenderOptions, Renderer, Rendering};
 pub use runtime::scene::{Scene, SceneError};
 
 pub mod files;
@@ -25,6 +53,14 @@ pub enum Error {
     /// A material has errors; the text shows each with its place, expectation and hint.
     #[error("the scene's materials have errors\n{0}")]
     Materials(String),
+    /// The GPU, or something that it was asked for.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
+}
+
+/// Reads a scene file and the geometry, lights and environment that it names.
+pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    runtime::scene::load(path)
 }
 
 /// The materials that a scene binds, as the compiler is asked for them.
@@ -58,4 +94,17 @@ pub fn compile(scene: &Scene) -> Result<Program, Error> {
 pub fn plan(program: &Program, strategy: Strategy) -> Plan {
     let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
     strategy.plan(&names)
+}
+
+/// Renders on the most capable GPU, without showing progress; [`Renderer`] shows it and can be
+/// stopped.
+pub fn render(
+    scene: &Scene,
+    program: &Program,
+    plan: &Plan,
+    options: &RenderOptions,
+) -> Result<Rendering, Error> {
+    let gpu = Gpu::new(&GpuOptions::default())?;
+    let mut renderer = Renderer::new(&gpu, scene, program, plan, options)?;
+    Ok(renderer.render(&mut |_| ControlFlow::Continue(()))?)
 }

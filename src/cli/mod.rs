@@ -14,13 +14,16 @@ mod check;
 mod completions;
 mod emit;
 mod explain;
+mod info;
+mod interrupt;
+mod render;
 
 /// A material language, and the wavefront path tracer its compiler feeds.
 #[derive(Parser)]
 #[command(
     name = "impasto",
     version,
-    after_help = "Exit codes: 0 fine; 1 diagnostics; 2 usage, input or output."
+    after_help = "Exit codes: 0 fine; 1 diagnostics; 2 usage, input or output; 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -58,6 +61,10 @@ enum Command {
     Check(check::CheckArgs),
     /// Print what the compiler makes of a material file
     Emit(emit::EmitArgs),
+    /// Render a scene
+    Render(Box<render::RenderArgs>),
+    /// Show the GPU that would be rendered on, and its limits
+    Info(info::GpuArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
     Explain(explain::ExplainArgs),
     /// Print a completion script for a shell
@@ -70,6 +77,8 @@ enum Failure {
     Diagnostics,
     /// A usage, input or output error, still to be reported: exit code 2.
     Error(String),
+    /// Ctrl-C; what could be kept was kept and said: exit code 130.
+    Interrupted,
 }
 
 impl From<String> for Failure {
@@ -87,6 +96,8 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
+        Command::Render(args) => render::run(&args, &global),
+        Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),
     };
@@ -97,6 +108,7 @@ pub(crate) fn main() -> ExitCode {
             say(&format!("{}: {message}", global.error_word()));
             ExitCode::from(2)
         }
+        Err(Failure::Interrupted) => ExitCode::from(130),
     }
 }
 
@@ -129,6 +141,13 @@ impl Global {
     /// A note on standard error, unless `--quiet`.
     fn note(&self, message: &str) {
         if !self.quiet {
+            say(message);
+        }
+    }
+
+    /// A note on standard error with `--verbose` only.
+    fn detail(&self, message: &str) {
+        if self.verbose > 0 {
             say(message);
         }
     }

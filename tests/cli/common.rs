@@ -4,6 +4,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+/// The example that every test of rendering uses.
+pub(crate) const SCENE: &str = "examples/cornell/scene.toml";
+
 /// A valid material of which the tests know what it is.
 pub(crate) const GOOD: &str = "use std::bsdf::diffuse;\n\
     material plain { surface = diffuse(color(0.5)); }\n";

@@ -4,7 +4,7 @@ use crate::common::{GOOD, command, folder, impasto, impasto_with, names, write};
 
 #[test]
 fn help_and_version_are_results() {
-    for args in [&["--help"][..], &["--version"], &["check", "--help"]] {
+    for args in [&["--help"][..], &["--version"], &["render", "--help"]] {
         let run = impasto(args).exits(0);
         assert!(!run.stdout.is_empty() && run.stderr.is_empty(), "{run:#?}");
     }
@@ -12,11 +12,21 @@ fn help_and_version_are_results() {
 
 #[test]
 fn wrong_usage_exits_with_2() {
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 9] = [
         (&[], "Usage"),
         (&["paint"], "paint"),
         (&["check"], "FILE"),
         (&["emit", "x.impasto", "--what", "spirv"], "wgsl"),
+        (&["render", "x.toml"], "--out"),
+        (&["render", "x.toml", "--out", "x.exr", "--spp", "0"], "spp"),
+        (
+            &["render", "x.toml", "--out", "x.exr", "--size", "0x4"],
+            "640x480",
+        ),
+        (
+            &["render", "x.toml", "--out", "x.exr", "--strategy", "best"],
+            "mega",
+        ),
         (&["explain", "E9999"], "E9999"),
     ];
     for (args, mentioned) in cases {

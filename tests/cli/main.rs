@@ -3,3 +3,4 @@
 
 mod common;
 mod emit_check;
+mod render;

@@ -1,0 +1,35 @@
+//! `impasto info`: the GPU that would be rendered on.
+
+use clap::Args;
+use impasto::{Gpu, GpuOptions};
+
+use super::{Failure, Global, Outcome, print};
+
+/// Which GPU to use, and how.
+#[derive(Args)]
+pub(super) struct GpuArgs {
+    /// Use the GPU whose name contains this; the most capable one otherwise
+    #[arg(long, value_name = "NAME")]
+    gpu: Option<String>,
+    /// Keep the checks of array bounds and loops in all kernels (slower)
+    #[arg(long)]
+    checked: bool,
+}
+
+impl GpuArgs {
+    pub(super) fn open(&self) -> Result<Gpu, Failure> {
+        let options = GpuOptions {
+            adapter: self.gpu.clone(),
+            checked: self.checked,
+        };
+        Gpu::new(&options).map_err(|error| Failure::Error(error.to_string()))
+    }
+}
+
+pub(super) fn run(args: &GpuArgs, global: &Global) -> Outcome {
+    let info = args.open()?.info();
+    match global.json() {
+        true => print(&format!("{:#}\n", serde_json::json!(info))),
+        false => print(&info.to_string()),
+    }
+}

@@ -1,0 +1,273 @@
+//! `impasto render`: from a scene file to a picture and a report.
+//!
+//! Everything that can fail for a reason known beforehand (options, places to write to, the
+//! scene, its materials) is checked before the first sample is taken.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use impasto::compiler::{self, Loader};
+use impasto::runtime::output;
+use impasto::runtime::scene::FilmSettings;
+use impasto::{
+    FileLoader, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene, Strategy, files,
+};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::info::GpuArgs;
+use super::{Failure, Global, Outcome, interrupt, print};
+
+#[derive(Args)]
+pub(super) struct RenderArgs {
+    /// The scene, a TOML file
+    scene: PathBuf,
+    /// The picture: `.exr` (linear radiance; a `.png` is written beside it) or `.png` alone
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+    /// Samples per pixel
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Width and height in pixels, as in 640x480; the scene's own otherwise
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Seed of all random numbers: equal seeds give equal pictures
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// How materials share kernels
+    #[arg(long, default_value = "wavefront", value_parser = parse_strategy)]
+    strategy: Strategy,
+    /// Where to write the report, as JSON (see docs/report.md)
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Brightens the PNG by this many stops; the EXR stays as it is
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
+    exposure: f32,
+    /// Paths in flight; chosen by the size of the picture otherwise
+    #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
+    pool: Option<u32>,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']);
+    let sides = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match sides {
+        Some((width, height))
+            if (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height) =>
+        {
+            Ok((width, height))
+        }
+        _ => Err(format!(
+            "expected width and height from 1 to {MAX_SIDE}, as in 640x480"
+        )),
+    }
+}
+
+/// Longest side of a picture in pixels.
+const MAX_SIDE: u32 = 65_536;
+
+fn parse_strategy(name: &str) -> Result<Strategy, String> {
+    Strategy::from_name(name).ok_or_else(|| {
+        let names: Vec<&str> = Strategy::ALL.iter().map(|(_, name)| *name).collect();
+        format!("expected one of {}", names.join(", "))
+    })
+}
+
+fn parse_exposure(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(stops) if stops.abs() <= 64.0 => Ok(stops),
+        _ => Err("expected a number of stops from -64 to 64".into()),
+    }
+}
+
+/// The files that a run writes.
+struct Outputs<'a> {
+    exr: Option<&'a Path>,
+    png: PathBuf,
+    report: Option<&'a Path>,
+}
+
+impl<'a> Outputs<'a> {
+    /// What the arguments ask for, once it is sure that all of it can be written.
+    fn of(args: &'a RenderArgs) -> Result<Self, String> {
+        let extension = args
+            .out
+            .extension()
+            .unwrap_or_default()
+            .to_ascii_lowercase();
+        let exr = match extension.to_str() {
+            Some("exr") => Some(args.out.as_path()),
+            Some("png") => None,
+            _ => {
+                return Err(format!(
+                    "cannot write `{}`: pictures are .exr or .png files",
+                    args.out.display()
+                ));
+            }
+        };
+        let png = match exr {
+            Some(exr) => exr.with_extension("png"),
+            None => args.out.clone(),
+        };
+        let report = args.report.as_deref();
+        for path in exr.into_iter().chain([png.as_path()]).chain(report) {
+            files::check_writable(path)?;
+        }
+        Ok(Self { exr, png, report })
+    }
+
+    fn write(&self, rendering: &Rendering, args: &RenderArgs) -> Result<(), Failure> {
+        for path in self.exr.into_iter().chain([self.png.as_path()]) {
+            output::write(&rendering.film, path, args.exposure).map_err(runtime)?;
+        }
+        if let Some(path) = self.report {
+            let json = serde_json::to_string_pretty(&rendering.report)
+                .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+            files::write_whole(path, format!("{json}\n").as_bytes())?;
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
+    let outputs = Outputs::of(args)?;
+    interrupt::install()?;
+    let scene = load(args, global)?;
+    let started = Instant::now();
+    let program = compile(&scene, global)?;
+    let material_seconds = started.elapsed().as_secs_f64();
+    let plan = impasto::plan(&program, args.strategy);
+    let gpu = args.gpu.open()?;
+    let mut renderer =
+        Renderer::new(&gpu, &scene, &program, &plan, &args.options()).map_err(runtime)?;
+    let mut rendering = sample(&mut renderer, global).map_err(runtime)?;
+    rendering.report.compile_seconds += material_seconds;
+    if rendering.report.paths == 0 {
+        global.note("interrupted before the first sample: nothing is written");
+        return Err(Failure::Interrupted);
+    }
+    outputs.write(&rendering, args)?;
+    summarise(&rendering, &outputs, global);
+    match is_complete(&rendering) {
+        true => Ok(()),
+        false => Err(Failure::Interrupted),
+    }
+}
+
+impl RenderArgs {
+    fn options(&self) -> RenderOptions {
+        RenderOptions {
+            samples: self.spp,
+            seed: self.seed,
+            pool: self.pool,
+            ..RenderOptions::default()
+        }
+    }
+}
+
+fn runtime(error: RuntimeError) -> Failure {
+    Failure::Error(error.to_string())
+}
+
+/// The scene, at the size that was asked for. What is odd about it is noted.
+fn load(args: &RenderArgs, global: &Global) -> Result<Scene, Failure> {
+    let mut scene = impasto::load(&args.scene).map_err(|e| Failure::Error(e.to_string()))?;
+    for warning in &scene.warnings {
+        global.note(&format!("warning: {warning}"));
+    }
+    if let Some((width, height)) = args.size {
+        scene.film = FilmSettings { width, height };
+    }
+    Ok(scene)
+}
+
+/// The scene's materials. A file that is not there is an input error, not one of the language.
+fn compile(scene: &Scene, global: &Global) -> Result<Program, Failure> {
+    let mut loader = FileLoader::new(&scene.base);
+    let requests = impasto::requests(scene);
+    for request in &requests {
+        let file = &request.file;
+        loader.load(file).map_err(|why| {
+            let name = &request.name;
+            format!("cannot read `{file}`, which the scene names for the material `{name}`: {why}")
+        })?;
+    }
+    let compiled = compiler::compile(&requests, &mut loader);
+    if global.json() {
+        let found = super::json(&compiled.sources, &compiled.diagnostics);
+        print(&format!(
+            "{:#}\n",
+            serde_json::json!({ "diagnostics": found })
+        ))?;
+    } else {
+        global.report(&compiled.sources, &compiled.diagnostics);
+    }
+    compiled.program.ok_or(Failure::Diagnostics)
+}
+
+/// Takes all samples, or those until Ctrl-C.
+fn sample(renderer: &mut Renderer, global: &Global) -> Result<Rendering, RuntimeError> {
+    global.detail("samples are taken; Ctrl-C ends rendering and keeps the picture");
+    let bar = progress_bar(global);
+    let rendering = renderer.render(&mut |progress| {
+        bar.set_length(progress.total);
+        bar.set_position(progress.paths);
+        match interrupt::requested() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
+    bar.finish_and_clear();
+    rendering
+}
+
+/// Was every sample taken that was asked for?
+fn is_complete(rendering: &Rendering) -> bool {
+    let report = &rendering.report;
+    let pixels = u64::from(report.width) * u64::from(report.height);
+    report.paths >= pixels * u64::from(report.samples_per_pixel)
+}
+
+/// What was written, and how it went.
+fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
+    let report = &rendering.report;
+    let files = outputs.exr.into_iter().chain([outputs.png.as_path()]);
+    let files: Vec<String> = files.map(|path| path.display().to_string()).collect();
+    let pixels = f64::from(report.width) * f64::from(report.height);
+    let samples = report.paths as f64 / pixels;
+    global.note(&format!(
+        "wrote {} ({samples:.0} samples per pixel, {:.1} s, {:.2} Mpaths/s on {})",
+        files.join(" and "),
+        report.wall_seconds,
+        report.paths_per_second * 1e-6,
+        report.adapter.name,
+    ));
+    if report.nonfinite_samples > 0 {
+        let lost = report.nonfinite_samples;
+        global.note(&format!(
+            "warning: {lost} samples were not finite and were left out"
+        ));
+    }
+    if report.queue_overflow > 0 {
+        let lost = report.queue_overflow;
+        global.note(&format!(
+            "warning: {lost} entries did not fit a queue; please report this"
+        ));
+    }
+}
+
+/// A progress bar on standard error; invisible where that is no terminal.
+fn progress_bar(global: &Global) -> ProgressBar {
+    let bar = match global.quiet {
+        true => ProgressBar::hidden(),
+        false => ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()),
+    };
+    let template = "{wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
+}
