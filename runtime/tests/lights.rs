@@ -196,6 +196,18 @@ fn scenes() -> Vec<(&'static str, Scene, Vec<MaterialInfo>)> {
         Vec3::splat(if y == 0 { 3.0 } else { f32::from(y == 4) })
     });
     scenes.push(("bright poles", turned(poles, -20.0), vec![]));
+    // Row 28: a sun of 1e6 beside a sky of 1e-3.
+    let sun = |x, y| Vec3::splat(if (x, y) == (4, 2) { 1e6 } else { 1e-3 });
+    scenes.push(("sun and sky", map_scene(16, 8, sun), vec![]));
+    let both = vec![
+        distant([0.0, 1.0, 0.5], 5.0, 10.0),
+        distant([1.0, 0.3, 0.0], 1.0, 40.0),
+    ];
+    let two = Scene {
+        lights: both,
+        ..dark_scene()
+    };
+    scenes.push(("two distant lights", two, vec![]));
     let tiny = map_scene(1, 1, |_, _| Vec3::splat(2.0));
     scenes.push(("map of one texel", tiny, vec![]));
     scenes

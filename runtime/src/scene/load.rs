@@ -139,22 +139,19 @@ fn load_library(base: &Path, name: &str, obj: &Obj) -> Library {
 
 fn geometry_warnings(name: &str, source: &Source, oddities: Oddities) -> Vec<String> {
     let mut warnings = Vec::new();
-    let mut counted = |count: usize, what: &str| {
+    let mut counted = |what: &str, count: usize| {
         if count > 0 {
-            warnings.push(format!("{name}: {count} {what}"));
+            warnings.push(format!("{name}: {what}: {count}"));
         }
     };
+    counted("triangles without area, left out", oddities.without_area);
     counted(
-        oddities.without_area,
-        "triangles without area were left out",
-    );
-    counted(
+        "triangles wound against their normals, turned over",
         oddities.turned,
-        "triangles were wound against their normals and turned over",
     );
     counted(
+        "faces of fewer than three corners, left out",
         source.obj.thin_faces,
-        "faces with fewer than three corners were left out",
     );
     if let Some(missing) = &source.library.missing {
         warnings.push(format!("{}; no material needs it", missing.clone()));
@@ -215,7 +212,7 @@ fn load_map(
     let texels = texels.collect();
     if odd > 0 {
         warnings.push(format!(
-            "{file}: {odd} values that are negative or not finite became 0, or 65504 if infinite"
+            "{file}: values that are negative (now 0), infinite (now 65504) or no number (now 0): {odd}"
         ));
     }
     Ok(EnvironmentMap {

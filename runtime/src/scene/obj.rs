@@ -35,6 +35,10 @@ pub(super) struct ObjTriangle {
 pub(super) fn load(path: &Path) -> Result<Obj, SceneError> {
     let bytes = std::fs::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
+    if bytes.contains(&0) {
+        let error = SceneError::in_file(path, "the OBJ file is binary or in UTF-16");
+        return Err(error.hint("save it as UTF-8 or ASCII text"));
+    }
     let text = String::from_utf8_lossy(&bytes);
     let mut scan = Scan::new(path);
     for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
@@ -138,36 +142,35 @@ impl<'p> Scan<'p> {
         needed: usize,
     ) -> Result<(), SceneError> {
         self.counts[list] += 1;
-        let what = format!("{} {}", LISTS[list], self.counts[list]);
-        let mut values = [0.0f32; 4];
-        let mut found = 0;
-        for word in rest.split_whitespace().take(4) {
-            values[found] = word.parse().map_err(|_| {
-                self.error(
-                    line,
-                    format!("{what} has `{word}` where a number should be"),
-                )
-            })?;
-            found += 1;
+        let what = || format!("{} {}", LISTS[list], self.counts[list]);
+        let mut words = [""; 5];
+        for (place, word) in words.iter_mut().zip(rest.split_whitespace()) {
+            *place = word;
         }
-        if found < needed {
-            let error = self.error(line, format!("{what} has {found} of {needed} numbers"));
-            return Err(error.hint("is the file complete?"));
-        }
-        if key == "v" && rest.split_whitespace().count() == 4 {
-            values = values.map(|v| v / values[3]);
-        }
-        let used = if key == "vt" {
-            &values[..2]
-        } else {
-            &values[..3]
+        let has_weight = key == "v" && !words[3].is_empty() && words[4].is_empty();
+        let kept = match key {
+            "vt" => 2,
+            _ => 3 + usize::from(has_weight),
         };
-        if !used.iter().all(|v| v.is_finite()) {
-            return Err(self.error(line, format!("{what} is not finite: {rest}")));
+        let mut values = [0.0f32, 0.0, 0.0, 1.0];
+        for (found, word) in words[..kept].iter().enumerate() {
+            if word.is_empty() && found < needed {
+                let message = format!("{} has {found} of {needed} numbers", what());
+                return Err(self.error(line, message).hint("is the file complete?"));
+            }
+            let word = if word.is_empty() { "0" } else { word };
+            values[found] = word.parse().map_err(|_| {
+                let message = format!("{} has `{word}` where a number should be", what());
+                self.error(line, message)
+            })?;
+        }
+        if !values[..3].iter().all(|v| (v / values[3]).is_finite()) {
+            return Err(self.error(line, format!("{} is not finite: {}", what(), rest.trim())));
         }
         self.vertices += key;
-        for value in used {
-            let _ = write!(self.vertices, " {value}"); // writing to a string cannot fail
+        for word in &words[..kept] {
+            self.vertices.push(' ');
+            self.vertices += if word.is_empty() { "0" } else { word };
         }
         self.vertices.push('\n');
         Ok(())
