@@ -4,6 +4,8 @@
 //! nothing. Debian's `mesa-vulkan-drivers` brings a software device.
 #![allow(dead_code)] // each test binary uses its part
 
+pub(crate) mod light_scenes;
+
 use std::sync::OnceLock;
 
 use impasto_runtime::shader_part::ShaderPart;
