@@ -377,6 +377,26 @@ fn large_sources_without_nesting_are_fine() {
     assert_eq!(parse(&source).2, []);
 }
 
+/// Takes each token of a good source away in turn. One slip should give one diagnostic; where a
+/// bracket is gone, a few more may follow.
+#[test]
+fn one_slip_gives_about_one_diagnostic() {
+    let source = include_str!("syntax/tree.impasto");
+    let (tokens, _) = lexer::lex(FileId(0), source);
+    let mut counts = Vec::new();
+    for (_, span) in &tokens {
+        let mut broken = source.to_owned();
+        broken.replace_range(span.range(), "");
+        let count = parse(&broken).2.len();
+        assert!(count <= 5, "{count} without {span:?}");
+        counts.push(count);
+    }
+    let broken = counts.iter().filter(|n| **n > 0).count();
+    let total: usize = counts.iter().sum();
+    assert!(broken > tokens.len() / 2, "{broken} of {}", tokens.len());
+    assert!(total * 10 <= broken * 11, "{total} for {broken} slips");
+}
+
 /// Nesting up to the limit is parsed, printed and dropped on the small stack of a test's thread.
 #[test]
 fn the_limit_of_nesting_is_exact_and_safe() {

@@ -1,10 +1,14 @@
 //! Balances brackets before the grammar reads the tokens.
 //!
 //! A missing closing bracket is reported and put in, a stray one reported and taken out. So the
-//! grammar always finds where a broken construct ends. Where a bracket is missing is a guess:
+//! grammar always finds where a broken construct ends. Where a bracket is missing is a guess,
 //! from what cannot stand inside one (`;` in parentheses, a definition in braces) and from how
-//! lines are indented.
+//! lines are indented. That a brace is missing often shows only much later; then a second pass
+//! uses what the first one learned.
 
+use std::collections::BTreeSet;
+
+use super::lines::Lines;
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::{FileId, Span};
@@ -12,28 +16,29 @@ use crate::source::{FileId, Span};
 /// Tokens with balanced brackets, and what was wrong with them.
 pub(super) struct Balanced {
     pub(super) tokens: Vec<(Token, Span)>,
-    pub(super) diagnostics: Vec<Diagnostic>,
+    /// Opening brackets without partner: where they are, and what to say.
+    pub(super) unclosed: Vec<(Span, Diagnostic)>,
+    /// Closing brackets without partner.
+    pub(super) stray: Vec<(Span, Diagnostic)>,
 }
 
 /// Balances the brackets of `tokens`.
 pub(super) fn balance(file: FileId, text: &str, tokens: &[(Token, Span)]) -> Balanced {
-    let mut balancer = Balancer {
-        tokens,
-        lines: Lines::new(text),
-        open: Vec::new(),
-        suspects: Vec::new(),
-        closed_at: 0,
-        out: Balanced {
-            tokens: Vec::with_capacity(tokens.len()),
-            diagnostics: Vec::new(),
-        },
-    };
-    for index in 0..tokens.len() {
-        balancer.take(index);
+    let unaware = Clues::default();
+    let first = Balancer::run(file, text, tokens, &unaware);
+    if first.learned.close.is_empty() && first.learned.drop.is_empty() {
+        return first.out;
     }
-    let end = Span::new(file, text.len()..text.len());
-    balancer.close_down_to(0, end, "at the end of the file");
-    balancer.out
+    Balancer::run(file, text, tokens, &first.learned).out
+}
+
+/// What indentation tells about braces, by the byte they start at.
+#[derive(Default)]
+struct Clues {
+    /// Those to be closed where a line is indented no further than theirs.
+    close: BTreeSet<u32>,
+    /// Closing ones to be taken out.
+    drop: BTreeSet<u32>,
 }
 
 /// An opening bracket whose partner was not met yet.
@@ -43,37 +48,70 @@ struct Open {
     span: Span,
     /// The blanks at the start of its line.
     indent: u32,
+    /// Is it a bracket that `;` cannot stand in?
+    is_list: bool,
     /// Was there an `if` or `else` in it since its last `,`? Then a block may follow.
     branches: bool,
 }
 
+/// A bracket whose partner starts a line that is indented otherwise than the bracket's line.
+#[derive(Clone, Copy)]
+struct Suspect {
+    open: Open,
+    close: Span,
+    close_indent: u32,
+}
+
 struct Balancer<'t> {
     tokens: &'t [(Token, Span)],
+    clues: &'t Clues,
     lines: Lines<'t>,
     open: Vec<Open>,
-    /// Braces whose partner is indented otherwise.
-    suspects: Vec<Open>,
-    /// Up to this token, a `;` in parentheses is known to be in them by mistake.
+    suspects: Vec<Suspect>,
+    learned: Clues,
+    /// Up to this token, what stands in a list by mistake is known to be inside it.
     closed_at: usize,
     out: Balanced,
 }
 
-impl Balancer<'_> {
+impl<'t> Balancer<'t> {
+    fn run(file: FileId, text: &'t str, tokens: &'t [(Token, Span)], clues: &'t Clues) -> Self {
+        let mut balancer = Self {
+            tokens,
+            clues,
+            lines: Lines::new(text),
+            open: Vec::new(),
+            suspects: Vec::new(),
+            learned: Clues::default(),
+            closed_at: 0,
+            out: Balanced {
+                tokens: Vec::with_capacity(tokens.len()),
+                unclosed: Vec::new(),
+                stray: Vec::new(),
+            },
+        };
+        for index in 0..tokens.len() {
+            balancer.take(index);
+        }
+        let end = Span::new(file, text.len()..text.len());
+        balancer.close_down_to(0, end, "at the end of the file");
+        balancer
+    }
+
     fn take(&mut self, index: usize) {
         let (token, span) = self.tokens[index];
         self.lines.advance(span);
+        self.close_by_indent(span);
+        if self.starts_definition(token) {
+            self.close_down_to(0, span, "before this definition");
+        }
+        if self.ends_list(index) {
+            let place = format!("before this `{}`", token.spelling().unwrap_or_default());
+            self.close_down_to(self.innermost_block(), span, &place);
+        }
         match token {
-            Token::Semicolon if self.in_parens() && !self.closes_soon(index) => {
-                self.close_down_to(self.innermost_brace(), span, "before this `;`");
-            }
-            Token::LeftBrace if self.in_parens() && self.starts_body(index) => {
-                self.close_down_to(self.innermost_brace(), span, "before this `{`");
-            }
             Token::If | Token::Else => self.set_branches(true),
             Token::Comma => self.set_branches(false),
-            _ if self.starts_definition(token) => {
-                self.close_down_to(0, span, "before this definition");
-            }
             _ => {}
         }
         if token.closer().is_some() {
@@ -81,6 +119,7 @@ impl Balancer<'_> {
                 token,
                 span,
                 indent: self.lines.indent,
+                is_list: token != Token::LeftBrace || self.follows_path(index),
                 branches: false,
             });
         } else if token.is_closer() && !self.close(token, span) {
@@ -95,11 +134,50 @@ impl Balancer<'_> {
         }
     }
 
-    /// Is the innermost open bracket another than a brace?
-    fn in_parens(&self) -> bool {
-        self.open
-            .last()
-            .is_some_and(|o| o.token != Token::LeftBrace)
+    /// Is the brace at `index` that of a `use`?
+    fn follows_path(&self, index: usize) -> bool {
+        let previous = index.checked_sub(1).and_then(|i| self.tokens.get(i));
+        previous.is_some_and(|(token, _)| *token == Token::PathSeparator)
+    }
+
+    /// Closes a brace that the first pass found unclosed, where the lines inside it end.
+    fn close_by_indent(&mut self, span: Span) {
+        if self.clues.close.is_empty() || !self.lines.is_first {
+            return;
+        }
+        let ends = |open: &Open| {
+            let known = self.clues.close.contains(&open.span.start);
+            known && self.lines.indent <= open.indent
+        };
+        if let Some(depth) = self.open.iter().position(ends) {
+            self.close_down_to(depth, span, "before this line");
+        }
+    }
+
+    /// Definitions do not nest: one at the start of a line closes all that is open.
+    fn starts_definition(&self, token: Token) -> bool {
+        use Token::*;
+        let keyword = matches!(
+            token,
+            Material | Bsdf | Delta | Edf | Fn | Struct | Const | Use
+        );
+        keyword && !self.open.is_empty() && self.lines.is_first && self.lines.indent == 0
+    }
+
+    /// Is the token at `index` one that cannot stand in the list it is in?
+    fn ends_list(&mut self, index: usize) -> bool {
+        use Token::*;
+        let Some(open) = self.open.last().filter(|open| open.is_list) else {
+            return false;
+        };
+        let branches = open.branches;
+        match self.tokens[index].0 {
+            Semicolon | Arrow | When | Let | Var | Param | For | While | Break | Continue => {
+                !self.closes_soon(index)
+            }
+            LeftBrace => !branches && self.starts_body(index),
+            _ => false,
+        }
     }
 
     /// Is the innermost bracket closed later on this line?
@@ -114,11 +192,12 @@ impl Balancer<'_> {
             }
             if token.closer().is_some() {
                 depth += 1;
-            } else if token.is_closer() && depth == 0 {
-                self.closed_at = i;
-                return *token != Token::RightBrace;
-            } else if token.is_closer() {
+            } else if token.is_closer() && depth > 0 {
                 depth -= 1;
+            } else if token.is_closer() {
+                let closes = *token != Token::RightBrace;
+                self.closed_at = if closes { i } else { 0 };
+                return closes;
             }
         }
         false
@@ -133,17 +212,7 @@ impl Balancer<'_> {
         );
         // A struct made as in other languages, `f(S { a: 1 })`, closes soon enough.
         let named = matches!(self.tokens.get(index + 2), Some((Token::Colon, _)));
-        after_operand && !named && self.open.last().is_some_and(|o| !o.branches)
-    }
-
-    /// Definitions do not nest: one at the start of a line closes all that is open.
-    fn starts_definition(&self, token: Token) -> bool {
-        use Token::*;
-        let keyword = matches!(
-            token,
-            Material | Bsdf | Delta | Edf | Fn | Struct | Const | Use
-        );
-        keyword && !self.open.is_empty() && self.lines.is_first && self.lines.indent == 0
+        after_operand && !named
     }
 
     /// Closes the bracket that `closer` belongs to, and those inside it. Gives false when there
@@ -152,33 +221,55 @@ impl Balancer<'_> {
         // A `)` cannot reach over a block that is still open.
         let floor = match closer {
             Token::RightBrace => 0,
-            _ => self.innermost_brace(),
+            _ => self.innermost_block(),
         };
         let is_partner = |open: &Open| open.token.closer() == Some(closer);
-        let Some(at) = self.open[floor..].iter().rposition(is_partner) else {
-            let wrong = self.open.get(floor..).and_then(<[Open]>::last).copied();
-            self.report(stray(closer, span, wrong));
-            // A closing bracket of another kind stands for the right one.
-            if let Some(right) = wrong.and_then(|open| open.token.closer()) {
-                self.open.pop();
-                self.out.tokens.push((right, span));
-            }
+        let partner = self.open[floor..].iter().rposition(is_partner);
+        let Some(at) = partner.filter(|_| !self.clues.drop.contains(&span.start)) else {
+            self.reject(closer, span, floor);
             return false;
         };
         self.close_down_to(floor + at + 1, span, "before this bracket");
-        if let Some(open) = self.open.pop() {
-            let moved = self.lines.is_first && self.lines.indent != open.indent;
-            if closer == Token::RightBrace && moved {
-                self.suspects.push(open);
-            }
+        if let Some(open) = self.open.pop()
+            && self.lines.is_first
+            && self.lines.indent != open.indent
+        {
+            self.suspects.push(Suspect {
+                open,
+                close: span,
+                close_indent: self.lines.indent,
+            });
         }
         true
     }
 
-    /// The number of open brackets up to the innermost brace.
-    fn innermost_brace(&self) -> usize {
-        let brace = self.open.iter().rposition(|o| o.token == Token::LeftBrace);
-        brace.map_or(0, |i| i + 1)
+    /// Reports a closing bracket without partner. One of the wrong kind stands for the right one.
+    fn reject(&mut self, closer: Token, span: Span, floor: usize) {
+        let wrong = match closer {
+            Token::RightBrace => None,
+            _ => self.open[floor..].last().copied(),
+        };
+        if self.out.stray.len() < super::MAX_ERRORS {
+            self.out.stray.push((span, stray(closer, span, wrong)));
+        }
+        if let Some(right) = wrong.and_then(|open| open.token.closer()) {
+            self.open.pop();
+            self.out.tokens.push((right, span));
+        }
+        if closer == Token::RightBrace {
+            // Perhaps an earlier one, indented further than what it closed, was the stray one.
+            let deeper = |s: &Suspect| s.close_indent > s.open.indent;
+            if let Some(suspect) = self.suspects.iter().find(|s| deeper(s)) {
+                self.learned.drop.insert(suspect.close.start);
+            }
+            self.suspects.clear();
+        }
+    }
+
+    /// The number of open brackets up to the innermost block.
+    fn innermost_block(&self) -> usize {
+        let block = self.open.iter().rposition(|o| !o.is_list);
+        block.map_or(0, |i| i + 1)
     }
 
     /// Reports one of the brackets above `depth`, and closes them all before `at`.
@@ -186,10 +277,23 @@ impl Balancer<'_> {
         let Some(innermost) = self.open[depth..].last().copied() else {
             return;
         };
-        let inside = |o: &&Open| o.token == innermost.token && o.span.start > innermost.span.start;
-        let culprit = self.suspects.iter().find(inside).copied();
-        self.report(unclosed(culprit.unwrap_or(innermost), at, place));
+        // One inside took the partner of this one if its own is missing.
+        let took = |s: &&Suspect| {
+            s.open.token == innermost.token && s.open.span.start > innermost.span.start
+        };
+        let culprit = self
+            .suspects
+            .iter()
+            .find(took)
+            .map_or(innermost, |s| s.open);
         self.suspects.clear();
+        if culprit.token == Token::LeftBrace {
+            self.learned.close.insert(culprit.span.start);
+        }
+        if self.out.unclosed.len() < super::MAX_ERRORS {
+            let diagnostic = unclosed(culprit, at, place);
+            self.out.unclosed.push((culprit.span, diagnostic));
+        }
         let here = Span {
             end: at.start,
             ..at
@@ -199,25 +303,16 @@ impl Balancer<'_> {
             self.out.tokens.extend(closer.map(|closer| (closer, here)));
         }
     }
-
-    fn report(&mut self, diagnostic: Diagnostic) {
-        if self.out.diagnostics.len() < super::MAX_ERRORS {
-            self.out.diagnostics.push(diagnostic);
-        }
-    }
 }
 
 fn unclosed(open: Open, at: Span, place: &str) -> Diagnostic {
     let spelling = open.token.spelling().unwrap_or_default();
     let closer = open.token.closer().and_then(Token::spelling);
     let closer = closer.unwrap_or_default();
-    Diagnostic::new(
-        Code::Unclosed,
-        open.span,
-        format!("`{spelling}` is never closed"),
-    )
-    .expected(format!("`{closer}` {place}"))
-    .label(at, format!("`{closer}` is missing {place}"))
+    let message = format!("`{spelling}` is never closed");
+    Diagnostic::new(Code::Unclosed, open.span, message)
+        .expected(format!("`{closer}` {place}"))
+        .label(at, format!("`{closer}` is missing {place}"))
 }
 
 /// `wrong` is the bracket of another kind that `closer` would have to close.
@@ -234,50 +329,5 @@ fn stray(closer: Token, span: Span, wrong: Option<Open>) -> Diagnostic {
                 .hint(format!("did you mean `{}`?", partner.unwrap_or_default()))
         }
         None => diagnostic.hint(format!("remove this `{spelling}`")),
-    }
-}
-
-/// Follows the lines of the text from token to token.
-struct Lines<'t> {
-    text: &'t str,
-    /// Where looking for line breaks goes on.
-    scanned: usize,
-    line_start: usize,
-    /// The blanks before the first token of the line.
-    indent: u32,
-    /// Is the token the first of its line?
-    is_first: bool,
-}
-
-impl<'t> Lines<'t> {
-    fn new(text: &'t str) -> Self {
-        Self {
-            text,
-            scanned: 0,
-            line_start: 0,
-            indent: 0,
-            is_first: false,
-        }
-    }
-
-    /// Goes on to the token at `span`.
-    fn advance(&mut self, span: Span) {
-        let start = span.start as usize;
-        let skipped = self.text.get(self.scanned..start).unwrap_or("");
-        let newline = skipped.rfind('\n');
-        self.is_first = newline.is_some() || self.scanned == 0;
-        if let Some(newline) = newline {
-            self.line_start = self.scanned + newline + 1;
-        }
-        if self.is_first {
-            self.indent = (start - self.line_start) as u32;
-        }
-        self.scanned = span.end as usize;
-    }
-
-    /// Is there a line break between two tokens?
-    fn breaks(&self, first: Span, second: Span) -> bool {
-        let between = self.text.get(first.end as usize..second.start as usize);
-        between.is_some_and(|text| text.contains('\n'))
     }
 }

@@ -10,7 +10,7 @@ use chumsky::prelude::*;
 
 use super::error::{Expected, SyntaxError, Want};
 use crate::ast::Name;
-use crate::lexer::Token;
+use crate::lexer::{Token, doc_text};
 use crate::source::{Span, Spanned};
 
 /// The parsers' input.
@@ -74,6 +74,19 @@ pub(super) fn spell(text: &str, span: Span) -> Name {
         node: text.get(span.range()).unwrap_or("").to_owned(),
         span,
     }
+}
+
+/// `///` lines.
+pub(super) fn docs<'t>(text: &'t str) -> Rule<'t, Vec<String>> {
+    just(Token::DocOuter)
+        .map_with(move |_, e| doc_line(text, e.span()))
+        .repeated()
+        .collect()
+        .boxed()
+}
+
+pub(super) fn doc_line(text: &str, span: Span) -> String {
+    doc_text(text.get(span.range()).unwrap_or("")).to_owned()
 }
 
 /// `;`. When it is missing, that is reported once and the statement ends all the same.
@@ -147,10 +160,12 @@ pub(super) fn rest_of_statement<'t>(text: &'t str) -> impl Parse<'t, ()> + Copy 
     })
 }
 
-/// Skips a broken statement from its first token. Fails where no statement can be.
+/// Skips a broken statement from its first token, documentation included. Fails where no
+/// statement can be.
 pub(super) fn broken_statement<'t>() -> impl Parse<'t, ()> + Copy {
     custom(|inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
+        skip_docs(inp);
         match inp.peek() {
             Some(token) if !token.is_closer() => {
                 skip_statement(inp, 1);
@@ -161,6 +176,16 @@ pub(super) fn broken_statement<'t>() -> impl Parse<'t, ()> + Copy {
     })
 }
 
+/// Skips documentation comments and gives the last one's kind.
+pub(super) fn skip_docs(inp: &mut Input<'_, '_>) -> Option<Token> {
+    let mut last = None;
+    while let Some(token @ (Token::DocOuter | Token::DocInner)) = inp.peek() {
+        inp.skip();
+        last = Some(token);
+    }
+    last
+}
+
 fn skip_statement(inp: &mut Input<'_, '_>, least: usize) {
     let mut count = 0;
     while let Some(token) = inp.peek() {
@@ -169,11 +194,18 @@ fn skip_statement(inp: &mut Input<'_, '_>, least: usize) {
         }
         skip_one(inp);
         count += 1;
-        let block_ended = token == Token::LeftBrace && inp.peek() != Some(Token::Else);
+        let goes_on = matches!(inp.peek(), Some(Token::Else | Token::When));
+        let block_ended = token == Token::LeftBrace && !goes_on;
         if token == Token::Semicolon || (block_ended && inp.peek() != Some(Token::Semicolon)) {
             return;
         }
     }
+}
+
+/// Does the statement before `token`, the next one, end there at the latest?
+pub(super) fn ends_statement<'t>(text: &'t str, token: Token, inp: &mut Input<'t, '_>) -> bool {
+    let ends = token.is_closer() || token == Token::Semicolon;
+    ends || begins_statement(token) || on_new_line(text, inp)
 }
 
 /// Keywords that only ever start a statement or declaration.
@@ -186,7 +218,7 @@ fn begins_statement(token: Token) -> bool {
 }
 
 /// Does the next token start a line, or is there none?
-fn on_new_line<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
+pub(super) fn on_new_line<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
     let here = inp.cursor();
     let previous_end = here.inner().1.unwrap_or(0) as usize;
     let before = inp.save();

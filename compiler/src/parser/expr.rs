@@ -3,13 +3,16 @@
 use chumsky::pratt::{infix, left, postfix, prefix};
 use chumsky::prelude::*;
 
-use super::common::{Extra, Input, Parse, Rule, Tokens, before, close, list, name, spell};
+use super::common::{
+    Extra, Input, Parse, Rule, Tokens, before, close, list, name, nothing, on_new_line, one, spell,
+};
 use super::error::{Expected, SyntaxError, Want};
-use super::stmt;
-use crate::ast::{Arg, BinaryOp, Block, Expr, ExprKind, IfExpr, Name, UnaryOp, Unit};
-use crate::diag::{Code, Diagnostic, nearest};
-use crate::lexer::{Number, Token, read_number};
-use crate::source::{Span, Spanned};
+use super::literal::literal;
+use super::stmt::{self, Wanted};
+use crate::ast::{Arg, BinaryOp, Block, Expr, ExprKind, IfExpr, Name, UnaryOp};
+use crate::diag::{Code, Diagnostic};
+use crate::lexer::Token;
+use crate::source::Span;
 
 /// The rule for expressions. It fails only before a token that starts none, and takes nothing
 /// then.
@@ -33,28 +36,97 @@ pub(super) fn required<'t>(expression: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
 
 /// `if cond { ... } else if cond { ... } else { ... }`
 pub(super) fn if_expression<'t>(
+    text: &'t str,
     expression: Rule<'t, Expr>,
     block: Rule<'t, Block>,
 ) -> Rule<'t, (IfExpr, Span)> {
-    let block = block.recover_with(via_parser(empty().map_with(|(), e| Block {
-        stmts: Vec::new(),
-        value: None,
-        span: e.span(),
-    })));
-    let arm = just(Token::If)
-        .ignore_then(required(expression))
-        .then(block.clone())
-        .map_with(|(cond, then), e| (cond, then, e.span()))
-        .boxed();
+    let arm = headed(text, required(expression), |cond| cond, block.clone());
+    let arm = arm.map_with(|(cond, then), e| (cond, then, e.span()));
+    // Of `else a > b { ... }`, the `if` is missing.
+    let forgotten = custom(move |inp: &mut Input<'t, '_>| {
+        let here = inp.cursor();
+        match inp.peek() {
+            Some(token) if condition_starts(token) && !on_new_line(text, inp) => Ok(()),
+            _ => Err(nothing(inp.span_since(&here))),
+        }
+    });
+    let expected = Expected::tokens(&[Token::If, Token::LeftBrace]);
+    let keyword = one(expected, |t| t == Token::If).ignored();
     let more = just(Token::Else)
+        .ignore_then(keyword.recover_with(via_parser(forgotten)))
         .ignore_then(arm.clone())
         .repeated()
         .collect::<Vec<_>>();
-    let last = just(Token::Else).ignore_then(block).or_not();
-    arm.then(more)
+    let last = just(Token::Else)
+        .ignore_then(stmt::wanted_block(text, block))
+        .map_with(|wanted, e| match wanted {
+            Wanted::Block(block) => block,
+            Wanted::Late(block, error) | Wanted::Missing(block, error) => {
+                e.emit(error);
+                block
+            }
+        })
+        .or_not();
+    just(Token::If)
+        .ignore_then(arm)
+        .then(more)
         .then(last)
         .map_with(|((first, more), last), e| (chain(first, more, last), e.span()))
         .boxed()
+}
+
+/// Can `token` start the condition of an `else if` without its `if`?
+fn condition_starts(token: Token) -> bool {
+    starts(token) && !matches!(token, Token::LeftBrace | Token::If)
+}
+
+/// A header that ends in an expression, and its block. When an operand is missing before the
+/// block, the block was read as that operand; it is put right here. Fails only if `header` does.
+pub(super) fn headed<'t, H: 't>(
+    text: &'t str,
+    header: impl Parse<'t, H>,
+    last: fn(&mut H) -> &mut Expr,
+    block: Rule<'t, Block>,
+) -> Rule<'t, (H, Block)> {
+    header
+        .then(stmt::wanted_block(text, block))
+        .map_with(move |(mut head, wanted), e| {
+            let (block, error) = match wanted {
+                Wanted::Block(block) => return (head, block),
+                Wanted::Late(block, error) => (block, error),
+                Wanted::Missing(empty, error) => match take_block(last(&mut head)) {
+                    Some(block) => {
+                        let brace = Span {
+                            end: block.span.start + 1,
+                            ..block.span
+                        };
+                        let expected = Expected::want(Want::Expression);
+                        (
+                            block,
+                            SyntaxError::new(brace, Some(Token::LeftBrace), expected),
+                        )
+                    }
+                    None => (empty, error),
+                },
+            };
+            e.emit(error);
+            (head, block)
+        })
+        .boxed()
+}
+
+/// Takes the block that is the last operand of `value` out of it.
+fn take_block(value: &mut Expr) -> Option<Block> {
+    match &mut value.kind {
+        ExprKind::Binary(_, _, operand) | ExprKind::Unary(_, operand) => take_block(operand),
+        ExprKind::Block(block) if block.span == value.span => {
+            match std::mem::replace(&mut value.kind, ExprKind::Error) {
+                ExprKind::Block(block) => Some(*block),
+                _ => None,
+            }
+        }
+        _ => None,
+    }
 }
 
 type Arm = (Expr, Block, Span);
@@ -113,18 +185,11 @@ fn operand<'t>(
     block: Rule<'t, Block>,
 ) -> impl Parse<'t, Expr> {
     let make = |kind, span| Expr { kind, span };
-    let boolean = choice((
-        just(Token::True).to(ExprKind::Bool(true)),
-        just(Token::False).to(ExprKind::Bool(false)),
-    ))
-    .map_with(move |kind, e| make(kind, e.span()));
-    let string =
-        just(Token::Str).map_with(move |_, e| make(string_value(text, e.span()), e.span()));
     let group = just(Token::LeftParen)
         .ignore_then(required(expression.clone()))
         .then_ignore(close(Token::RightParen))
         .map_with(move |inner: Expr, e| make(inner.kind, e.span()));
-    let chosen = if_expression(expression.clone(), block.clone())
+    let chosen = if_expression(text, expression.clone(), block.clone())
         .map(move |(chosen, span)| make(ExprKind::If(Box::new(chosen)), span));
     let block = block.map(move |b| {
         let span = b.span;
@@ -134,10 +199,8 @@ fn operand<'t>(
     let unknown = just(Token::Unknown).map_with(move |_, e| make(ExprKind::Error, e.span()));
     choice((
         name_or_call(text, expression),
-        number(text),
+        literal(text),
         group,
-        string,
-        boolean,
         chosen,
         block,
         unknown,
@@ -186,105 +249,6 @@ fn argument_name<'t>(text: &'t str) -> impl Parse<'t, Option<Name>> {
             }
         }
     })
-}
-
-fn string_value(text: &str, span: Span) -> ExprKind {
-    let slice = text.get(span.range()).unwrap_or("");
-    let inner = slice.strip_prefix('"').unwrap_or(slice);
-    ExprKind::Str(inner.strip_suffix('"').unwrap_or(inner).to_owned())
-}
-
-/// A number, with a unit when a name follows it.
-fn number<'t>(text: &'t str) -> impl Parse<'t, Expr> {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let found = inp.next();
-        let span = inp.span_since(&start);
-        let Some(token @ (Token::Int | Token::Hex | Token::Float)) = found else {
-            let expected = Expected::want(Want::Expression);
-            return Err(SyntaxError::new(span, found, expected));
-        };
-        // A number that has no value was reported by the lexer.
-        let slice = text.get(span.range()).unwrap_or("");
-        let number = read_number(token, slice, true).unwrap_or(Number::Int(0));
-        let kind = match (unit(text, span, inp), number) {
-            (UnitAfter::None, Number::Int(value)) => ExprKind::Int(value),
-            (UnitAfter::None, Number::Float(value)) => ExprKind::Float(value),
-            (UnitAfter::Unknown, _) => ExprKind::Error,
-            (UnitAfter::Unit(unit), Number::Int(value)) => ExprKind::Quantity(value as f64, unit),
-            (UnitAfter::Unit(unit), Number::Float(value)) => ExprKind::Quantity(value, unit),
-        };
-        Ok(Expr {
-            kind,
-            span: inp.span_since(&start),
-        })
-    })
-}
-
-enum UnitAfter {
-    None,
-    Unit(Spanned<Unit>),
-    Unknown,
-}
-
-/// The unit after the number at `number`. A name on the next line is none, unless it is spelled
-/// like a unit: there a `;` is missing.
-fn unit<'t>(text: &'t str, number: Span, inp: &mut Input<'t, '_>) -> UnitAfter {
-    if inp.peek() != Some(Token::Ident) {
-        return UnitAfter::None;
-    }
-    let before = inp.save();
-    inp.skip();
-    let span = inp.span_since(before.cursor());
-    let name = text.get(span.range()).unwrap_or("");
-    if let Some(unit) = Unit::from_name(name) {
-        return UnitAfter::Unit(Spanned { node: unit, span });
-    }
-    let between = text.get(number.end as usize..span.start as usize);
-    let words = ["and", "or", "xor", "mod"];
-    if words.contains(&name) || between.unwrap_or("").contains('\n') {
-        inp.rewind(before);
-        return UnitAfter::None;
-    }
-    inp.emit(SyntaxError::special(
-        span,
-        unknown_unit(text, number, name, span),
-    ));
-    UnitAfter::Unknown
-}
-
-fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic {
-    let digits = text.get(number.range()).unwrap_or("");
-    let diagnostic = Diagnostic::new(Code::UnknownUnit, span, format!("`{name}` is not a unit"))
-        .expected("um, mm, cm, m or km after a length, deg or rad after an angle");
-    if name.starts_with('_') {
-        return diagnostic.hint("the digits of a number are written without separators");
-    }
-    if digits == "0"
-        && matches!(name.as_bytes(), [b'b' | b'o' | b'X', rest @ ..] if !rest.is_empty())
-    {
-        return diagnostic.hint("ints are written in decimal or, with `0x`, in hexadecimal");
-    }
-    if matches!(name, "f" | "u" | "i" | "h" | "f32" | "u32" | "i32" | "lf") {
-        return diagnostic.hint("numbers have no suffix for their type; a float has a point");
-    }
-    let units = Unit::ALL.iter().map(|(_, name, _)| *name);
-    let known = match name {
-        "degree" | "degrees" => Some("deg"),
-        "radian" | "radians" => Some("rad"),
-        "micron" | "microns" | "micrometer" | "micrometre" => Some("um"),
-        "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some("mm"),
-        "meter" | "meters" | "metre" | "metres" => Some("m"),
-        _ if name.len() > 1 => {
-            let as_long = units.clone().filter(|unit| unit.len() == name.len());
-            nearest(name, as_long).or_else(|| nearest(name, units))
-        }
-        _ => None,
-    };
-    match known {
-        Some(unit) => diagnostic.hint(format!("did you mean `{digits} {unit}`?")),
-        None => diagnostic.hint(format!("to multiply, write `{digits} * {name}`")),
-    }
 }
 
 /// An operator of one level of binding power.

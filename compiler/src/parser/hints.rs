@@ -61,21 +61,7 @@ impl<'t> Slip<'_, 't> {
 
     /// The first token of the statement that the one found is in.
     fn statement_start(&self) -> usize {
-        let mut depth = 0_usize;
-        let mut start = self.at;
-        while let Some(token) = start.checked_sub(1).and_then(|i| self.source.token(i)) {
-            use Token::*;
-            match token {
-                RightParen | RightBracket => depth += 1,
-                LeftParen | LeftBracket if depth == 0 => break,
-                LeftParen | LeftBracket => depth -= 1,
-                Semicolon | LeftBrace | RightBrace | DocOuter | DocInner if depth == 0 => break,
-                Use | Let | Var | For | While | Param if depth == 0 => return start - 1,
-                _ => {}
-            }
-            start -= 1;
-        }
-        start
+        self.source.statement_start(self.at)
     }
 
     /// Something else where a definition is expected.
@@ -295,6 +281,7 @@ impl<'t> Slip<'_, 't> {
             Material | Fn | Struct | Const | Use | Bsdf | Edf | Delta if self.expects(Let) => {
                 Some("definitions stand at the top level of a file".to_owned())
             }
+            When => Some("`when` follows a value, as in `= value when condition;`".to_owned()),
             found if found.is_keyword() && self.wants(Want::Name) => {
                 let word = self.text();
                 Some(format!(

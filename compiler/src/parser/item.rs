@@ -1,200 +1,34 @@
-//! The top level: `use`, materials, closures, functions, structs and constants.
+//! Definitions: materials, closures, functions, structs and constants.
 
 use chumsky::prelude::*;
 
-use super::common::{
-    Input, Parse, Rule, broken_statement, close, list, name, nothing, one, semicolon, skip_one,
-    spell, type_name,
-};
-use super::error::{Expected, SyntaxError, Want};
+use super::common::{Parse, Rule, broken_statement, close, docs, list, name, semicolon, type_name};
+use super::error::SyntaxError;
 use super::expr::required;
-use super::stmt::{self, Piece, misplaced_docs, piece, stray_docs};
+use super::stmt::{self, Piece, piece, stray_docs};
 use crate::ast::{
-    Block, Body, ClosureDef, ClosureKind, Const, Expr, Field, Function, Item, ItemKind, Material,
-    MaterialParam, Method, Module, Name, Param, Stmt, Use, UseName,
+    Block, Body, ClosureDef, ClosureKind, Const, Expr, Field, Function, ItemKind, Material,
+    MaterialParam, Method, Name, Param, Stmt,
 };
 use crate::diag::{Code, Diagnostic};
-use crate::lexer::{Token, doc_text};
+use crate::lexer::Token;
 use crate::source::Span;
 
-/// A whole file.
-pub(super) fn module<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, Module> {
-    let docs = just(Token::DocInner)
-        .map_with(move |_, e| doc_line(text, e.span()))
-        .repeated()
-        .collect::<Vec<_>>();
-    let entry =
-        entry(text, expression).recover_with(via_parser(broken_entry(text).to(Entry::Broken)));
-    docs.then(entry.repeated().collect::<Vec<_>>())
-        .map_with(|(docs, entries), e| {
-            let mut module = Module {
-                docs,
-                uses: Vec::new(),
-                items: Vec::new(),
-            };
-            for entry in entries {
-                match entry {
-                    Entry::Use(declaration) => {
-                        if !module.items.is_empty() {
-                            let late = late_use(declaration.span);
-                            e.emit(SyntaxError::special(declaration.span, late));
-                        }
-                        module.uses.push(declaration);
-                    }
-                    Entry::Item(item) => module.items.push(*item),
-                    Entry::Broken => {}
-                }
-            }
-            module
-        })
-        .boxed()
-}
-
-#[derive(Clone)]
-enum Entry {
-    Use(Use),
-    Item(Box<Item>),
-    Broken,
-}
-
-fn late_use(span: Span) -> Diagnostic {
-    let message = "`use` after a definition";
-    Diagnostic::new(Code::Syntax, span, message).hint("move it to the top of the file")
-}
-
-fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry> {
+/// A definition: its name and what it is.
+pub(super) fn item<'t>(
+    text: &'t str,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, (Name, ItemKind)> {
     let block = stmt::block(text, expression.clone());
     let body = body(text, expression.clone(), block.clone());
     let parameters = parameters(text, expression.clone());
-    let item = choice((
+    choice((
         material(text, expression.clone(), block),
         closure(text, expression.clone(), parameters.clone(), body.clone()),
         function(text, parameters, body),
         structure(text),
         constant(text, expression),
-    ));
-    let item = docs(text)
-        .then(item.map_with(|(name, kind), e| (name, kind, e.span())))
-        .map(|(docs, (name, kind, span))| {
-            Entry::Item(Box::new(Item {
-                docs,
-                name,
-                kind,
-                span,
-            }))
-        });
-    choice((
-        item,
-        use_declaration(text).map(Entry::Use),
-        undocumented().to(Entry::Broken),
     ))
-    .boxed()
-}
-
-/// Documentation at the top level that belongs to no definition.
-fn undocumented<'t>() -> impl Parse<'t, ()> + Copy {
-    custom(|inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let mut marker = None;
-        while let Some(token @ (Token::DocOuter | Token::DocInner)) = inp.peek() {
-            inp.skip();
-            marker = marker.max(Some(token));
-        }
-        let span = inp.span_since(&start);
-        match (marker, inp.peek()) {
-            (Some(Token::DocInner), _) | (Some(_), None | Some(Token::Use)) => {
-                inp.emit(SyntaxError::special(span, misplaced_docs(marker, span)));
-                Ok(())
-            }
-            _ => Err(nothing(span)),
-        }
-    })
-}
-
-/// `///` lines.
-fn docs<'t>(text: &'t str) -> Rule<'t, Vec<String>> {
-    just(Token::DocOuter)
-        .map_with(move |_, e| doc_line(text, e.span()))
-        .repeated()
-        .collect()
-        .boxed()
-}
-
-fn doc_line(text: &str, span: Span) -> String {
-    doc_text(text.get(span.range()).unwrap_or("")).to_owned()
-}
-
-/// Skips a broken definition, at least its first token, to the next one.
-fn broken_entry<'t>(text: &'t str) -> impl Parse<'t, ()> + Copy {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        if inp.peek().is_none() {
-            return Err(nothing(inp.span_since(&start)));
-        }
-        while matches!(inp.peek(), Some(Token::DocOuter)) {
-            inp.skip();
-        }
-        loop {
-            let first = inp.peek();
-            skip_one(inp);
-            let ended = matches!(first, Some(Token::Semicolon | Token::LeftBrace));
-            if ended || at_entry(text, inp) {
-                return Ok(());
-            }
-        }
-    })
-}
-
-/// Is the input at its end, before a definition or at a word that starts a line without blanks?
-fn at_entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
-    use Token::*;
-    let before = inp.save();
-    let first = inp.next();
-    let span: Span = inp.span_since(before.cursor());
-    let second = inp.peek();
-    inp.rewind(before);
-    let line_starts = text
-        .get(..span.start as usize)
-        .unwrap_or("")
-        .ends_with('\n');
-    match first {
-        None | Some(Material | Fn | Struct | Const | Use | Delta | DocOuter) => true,
-        // These two are also types.
-        Some(Bsdf | Edf) => line_starts || second == Some(Ident),
-        Some(token) => line_starts && (token == Ident || token.is_keyword()),
-    }
-}
-
-/// `use std::noise::{flakes, perlin as noise};`
-fn use_declaration<'t>(text: &'t str) -> impl Parse<'t, Use> {
-    // Folders of the standard library are named like the closures they hold.
-    let segment = one(Expected::want(Want::Name), |t| {
-        matches!(t, Token::Ident | Token::Bsdf | Token::Edf)
-    })
-    .map(move |span| spell(text, span));
-    let alias = just(Token::As).ignore_then(name(text)).or_not();
-    let imported = name(text)
-        .then(alias)
-        .map(|(name, alias)| UseName { name, alias });
-    let group = list(Token::LeftBrace, imported, Token::RightBrace);
-    let next = just(Token::PathSeparator);
-    let single = segment
-        .then(alias)
-        .map(|(name, alias)| vec![UseName { name, alias }]);
-    let path = segment
-        .then_ignore(next)
-        .repeated()
-        .at_least(1)
-        .collect::<Vec<_>>();
-    just(Token::Use)
-        .ignore_then(path)
-        .then(choice((group, single)))
-        .then_ignore(semicolon(text))
-        .map_with(|(path, names), e| Use {
-            path,
-            names,
-            span: e.span(),
-        })
 }
 
 #[derive(Clone)]

@@ -1,16 +1,19 @@
 //! Tokens to syntax tree.
 //!
-//! The grammar is written with chumsky, a file for each level: [`item`], [`stmt`], [`expr`].
-//! Before it runs, [`nesting`] bounds how deep the source nests and [`brackets`] balances its
-//! brackets; after it, [`report`] turns what did not match into diagnostics with the hints of
-//! [`hints`].
+//! The grammar is written with chumsky, a file for each level: `file`, `item`, `stmt`, `expr`,
+//! `literal`, on what `common` provides. Before it runs, `nesting` bounds how deep the source
+//! nests and `brackets` balances its brackets; after it, `report` turns what did not match into
+//! diagnostics with the `hints`.
 
 mod brackets;
 mod common;
 mod error;
 mod expr;
+mod file;
 mod hints;
 mod item;
+mod lines;
+mod literal;
 mod nesting;
 mod print;
 mod report;
@@ -39,7 +42,7 @@ pub fn parse(file: FileId, text: &str) -> (Module, Vec<Diagnostic>) {
         uses: Vec::new(),
         items: Vec::new(),
     };
-    let (module, diagnostics) = run(file, text, item::module);
+    let (module, diagnostics) = run(file, text, file::module);
     (module.unwrap_or(empty), diagnostics)
 }
 
@@ -59,7 +62,6 @@ fn run<T>(
         return (None, diagnostics);
     }
     let balanced = brackets::balance(file, text, &tokens);
-    diagnostics.extend(balanced.diagnostics);
     let tokens: &[(Token, Span)] = &balanced.tokens;
     let (value, errors) = {
         let end = Span::new(file, text.len()..text.len());
@@ -67,7 +69,7 @@ fn run<T>(
         let rule = grammar(text, expr::expression(text));
         rule.parse(input).into_output_errors()
     };
-    let source = report::Source::new(file, text, tokens);
+    let source = report::Source::new(file, text, &balanced);
     report::report(&source, errors, &mut diagnostics);
     (value, diagnostics)
 }

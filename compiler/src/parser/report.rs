@@ -1,12 +1,13 @@
 //! Syntax errors to diagnostics, in people's words.
 //!
 //! One slip often makes the grammar stumble several times. So an error is not reported that
-//! follows another at the same or next token, that is about an expression with an error inside,
-//! or that is on a line where a character or string was already reported.
+//! follows another within two tokens, that is about an expression with an error inside,
+//! or that is on a line where a character, string or bracket was already reported.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::MAX_ERRORS;
+use super::brackets::Balanced;
 use super::error::{Expected, SyntaxError, Want, describe};
 use super::hints;
 use crate::diag::{Code, Diagnostic};
@@ -18,23 +19,46 @@ pub(super) struct Source<'t> {
     pub(super) file: FileId,
     pub(super) text: &'t str,
     pub(super) tokens: &'t [(Token, Span)],
+    balanced: &'t Balanced,
     newlines: Vec<u32>,
 }
 
 impl<'t> Source<'t> {
-    pub(super) fn new(file: FileId, text: &'t str, tokens: &'t [(Token, Span)]) -> Self {
+    pub(super) fn new(file: FileId, text: &'t str, balanced: &'t Balanced) -> Self {
         let newlines = text.bytes().zip(0_u32..).filter(|(byte, _)| *byte == b'\n');
         Self {
             file,
             text,
-            tokens,
+            tokens: &balanced.tokens,
+            balanced,
             newlines: newlines.map(|(_, at)| at).collect(),
         }
     }
 
-    /// The number of the first token at or after `place`.
+    /// The number of the first token at or after `place`, of those that were written.
     fn index_at(&self, place: u32) -> usize {
-        self.tokens.partition_point(|(_, span)| span.start < place)
+        let index = self.tokens.partition_point(|(_, span)| span.start < place);
+        let put_in = |t: &&(Token, Span)| t.1.start == t.1.end;
+        index + self.tokens[index..].iter().take_while(put_in).count()
+    }
+
+    /// The first token of the statement that the token at `index` is in.
+    pub(super) fn statement_start(&self, index: usize) -> usize {
+        let mut depth = 0_usize;
+        let mut start = index;
+        while let Some(token) = start.checked_sub(1).and_then(|i| self.token(i)) {
+            use Token::*;
+            match token {
+                RightParen | RightBracket => depth += 1,
+                LeftParen | LeftBracket if depth == 0 => break,
+                LeftParen | LeftBracket => depth -= 1,
+                Semicolon | LeftBrace | RightBrace | DocOuter | DocInner if depth == 0 => break,
+                Use | Let | Var | For | While | Param if depth == 0 => return start - 1,
+                _ => {}
+            }
+            start -= 1;
+        }
+        start
     }
 
     /// The end of the last token before `place`.
@@ -69,54 +93,92 @@ impl<'t> Source<'t> {
     }
 }
 
-/// Appends the diagnostics of `errors` to those of the tokens.
+/// Appends the diagnostics of brackets and of `errors` to those of the lexer.
 pub(super) fn report(source: &Source<'_>, errors: Vec<SyntaxError>, out: &mut Vec<Diagnostic>) {
-    let garbled: BTreeSet<usize> = out
-        .iter()
-        .filter(|d| matches!(d.code, Code::UnknownCharacter | Code::Unterminated))
-        .filter_map(|d| d.span)
-        .map(|span| source.line(span.start))
-        .collect();
+    let is_garbage =
+        |d: &&Diagnostic| matches!(d.code, Code::UnknownCharacter | Code::Unterminated);
+    let garbled = out.iter().filter(is_garbage).filter_map(|d| d.span);
+    let garbled: BTreeSet<usize> = garbled.map(|span| source.line(span.start)).collect();
     let is_garbled = |place: u32| garbled.contains(&source.line(place));
-    out.retain(|d| d.code != Code::Unclosed || !d.span.is_some_and(|s| is_garbled(s.start)));
-    let mut reported: Vec<Span> = Vec::new();
+    let unclosed = &source.balanced.unclosed;
+    let unclosed = unclosed.iter().filter(|(at, _)| !is_garbled(at.start));
+    out.extend(unclosed.map(|(_, diagnostic)| diagnostic.clone()));
+
+    let unclosed = &source.balanced.unclosed;
+    let unclosed: BTreeMap<usize, u32> = unclosed
+        .iter()
+        .map(|(at, _)| (source.line(at.start), at.start))
+        .collect();
+    let behind_unclosed = |place: u32| {
+        let on_line = unclosed.get(&source.line(place));
+        on_line.is_some_and(|open| *open < place)
+    };
+    let mut reported: Vec<SyntaxError> = Vec::new();
+    let mut more = false;
     for error in errors {
-        let previous = source.end_before(error.span.start);
-        let garbled = is_garbled(error.span.start) || is_garbled(previous);
-        if garbled
-            || is_put_in(&error)
-            || reported.last().is_some_and(|r| follows(source, *r, &error))
+        let place = error.span.start;
+        if reported
+            .last()
+            .is_some_and(|last| follows(source, last, &error))
+            || is_garbled(place)
+            || is_garbled(source.end_before(place))
+            || behind_unclosed(place)
+            || is_at_put_in(source, &error)
         {
             continue;
         }
-        if reported.len() == MAX_ERRORS {
-            let end = Span::new(source.file, source.text.len()..source.text.len());
-            let message = "more syntax errors follow that are not shown";
-            out.push(Diagnostic::new(Code::Syntax, end, message));
-            return;
+        more = reported.len() == MAX_ERRORS;
+        if more {
+            break;
         }
-        reported.push(error.span);
-        out.push(diagnose(source, error));
+        reported.push(error);
     }
+    let stray = source.balanced.stray.iter();
+    let stray =
+        stray.filter(|(at, _)| !is_garbled(at.start) && !is_explained(source, *at, &reported));
+    out.extend(stray.map(|(_, diagnostic)| diagnostic.clone()));
+    if more {
+        let end = Span::new(source.file, source.text.len()..source.text.len());
+        let message = "more syntax errors follow that are not shown";
+        out.push(Diagnostic::new(Code::Syntax, end, message));
+    }
+    out.extend(reported.into_iter().map(|error| diagnose(source, error)));
 }
 
-/// Is `error` a consequence of the one at `reported`, which the grammar met before?
-fn follows(source: &Source<'_>, reported: Span, error: &SyntaxError) -> bool {
-    let (first, second) = (reported.start, error.span.start);
+/// Is `error` a consequence of `last`, which the grammar met before?
+fn follows(source: &Source<'_>, last: &SyntaxError, error: &SyntaxError) -> bool {
+    let (first, second) = (last.span.start, error.span.start);
     if second <= first {
         return first <= error.span.end;
     }
-    if error.special.is_some() {
-        return false;
-    }
     let at = source.index_at(first);
     let ends = matches!(source.token(at), Some(Token::Semicolon | Token::RightBrace));
-    !ends && source.index_at(second) - at <= 1
+    let apart = source.line(first) < source.line(second) && last.special.is_none();
+    !ends && !apart && error.special.is_none() && source.index_at(second) - at <= 2
 }
 
-/// Is the token found one that was put in because brackets are not balanced?
-fn is_put_in(error: &SyntaxError) -> bool {
-    error.found.is_some_and(Token::is_closer) && error.span.start == error.span.end
+/// Is `error` at or behind a bracket that was put in?
+fn is_at_put_in(source: &Source<'_>, error: &SyntaxError) -> bool {
+    let put_in = |span: Span| span.start == span.end;
+    let before = source.index_at(error.span.start).checked_sub(1);
+    let before = before.and_then(|index| source.tokens.get(index));
+    let at = error.found.is_some_and(Token::is_closer) && put_in(error.span);
+    at || before.is_some_and(|(_, span)| put_in(*span))
+}
+
+/// Does a syntax error before the stray bracket at `stray` say why it has no partner?
+fn is_explained(source: &Source<'_>, stray: Span, reported: &[SyntaxError]) -> bool {
+    let index = source.index_at(stray.start);
+    let start = source.tokens.get(source.statement_start(index));
+    let start = start.map_or(stray.start, |(_, span)| span.start);
+    let is_brace = source.text.get(stray.range()) == Some("}");
+    reported.iter().any(|error| {
+        let brace = Expected::token(Token::LeftBrace);
+        let operand = Expected::token(Token::Minus);
+        let misses_brace = error.expected.has(brace) && !error.expected.has(operand);
+        let inside = error.span.start >= start || (is_brace && misses_brace);
+        inside && error.span.start <= stray.start
+    })
 }
 
 fn diagnose(source: &Source<'_>, error: SyntaxError) -> Diagnostic {

@@ -3,11 +3,11 @@
 use chumsky::prelude::*;
 
 use super::common::{
-    Input, Parse, Rule, before, broken_statement, close, name, nothing, one, rest_of_statement,
-    semicolon, type_name,
+    Input, Parse, Rule, before, broken_statement, close, ends_statement, name, nothing, one,
+    rest_of_statement, semicolon, skip_docs, skip_one, type_name,
 };
 use super::error::{Expected, SyntaxError};
-use super::expr::{if_expression, required};
+use super::expr::{headed, if_expression, required};
 use crate::ast::{BinaryOp, Block, Expr, ExprKind, IfExpr, Stmt, StmtKind, UnaryOp};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
@@ -38,6 +38,47 @@ pub(super) fn block<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, B
     .boxed()
 }
 
+/// A block where one has to be.
+#[derive(Clone)]
+pub(super) enum Wanted {
+    /// It is there.
+    Block(Block),
+    /// It is there behind what does not belong.
+    Late(Block, SyntaxError),
+    /// There is none on this line; an empty block stands for it.
+    Missing(Block, SyntaxError),
+}
+
+/// A block where one has to be. Never fails.
+pub(super) fn wanted_block<'t>(text: &'t str, block: Rule<'t, Block>) -> Rule<'t, Wanted> {
+    custom(move |inp: &mut Input<'t, '_>| {
+        let start = inp.save();
+        let error = match inp.parse(&block) {
+            Ok(block) => return Ok(Wanted::Block(block)),
+            Err(error) => error,
+        };
+        inp.rewind(start.clone());
+        let span = inp.span_since(start.cursor());
+        while let Some(token) = inp.peek() {
+            if token == Token::LeftBrace {
+                return Ok(Wanted::Late(inp.parse(&block)?, error));
+            }
+            if token == Token::Else || ends_statement(text, token, inp) {
+                break;
+            }
+            skip_one(inp);
+        }
+        inp.rewind(start);
+        let empty = Block {
+            stmts: Vec::new(),
+            value: None,
+            span,
+        };
+        Ok(Wanted::Missing(empty, error))
+    })
+    .boxed()
+}
+
 /// A statement or value. It always takes a token, and fails only before a closing bracket or the
 /// end of the file.
 pub(super) fn piece<'t>(
@@ -49,7 +90,7 @@ pub(super) fn piece<'t>(
         binding(text, false, expression.clone()),
         binding(text, true, expression.clone()),
         for_loop(text, expression.clone(), block.clone()),
-        while_loop(expression.clone(), block.clone()),
+        while_loop(text, expression.clone(), block.clone()),
         jump(text),
     ))
     .map_with(|kind, e| {
@@ -58,8 +99,8 @@ pub(super) fn piece<'t>(
             span: e.span(),
         })
     });
-    let branch =
-        if_expression(expression.clone(), block).map(|(chosen, span)| Piece::If(chosen, span));
+    let branch = if_expression(text, expression.clone(), block)
+        .map(|(chosen, span)| Piece::If(chosen, span));
     choice((
         statement.boxed(),
         branch,
@@ -70,21 +111,17 @@ pub(super) fn piece<'t>(
     .boxed()
 }
 
-/// Documentation where nothing can be documented.
+/// Documentation where nothing can be documented. Before a `param` it fails: it is not the
+/// documentation that is wrong with that.
 pub(super) fn stray_docs<'t>() -> impl Parse<'t, ()> {
     custom(|inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
-        let found = inp.peek();
-        let mut any = false;
-        while matches!(inp.peek(), Some(Token::DocOuter | Token::DocInner)) {
-            inp.skip();
-            any = true;
-        }
+        let last = skip_docs(inp);
         let span = inp.span_since(&start);
-        if !any {
+        if last.is_none() || inp.peek() == Some(Token::Param) {
             return Err(nothing(span));
         }
-        inp.emit(SyntaxError::special(span, misplaced_docs(found, span)));
+        inp.emit(SyntaxError::special(span, misplaced_docs(last, span)));
         Ok(())
     })
 }
@@ -126,31 +163,37 @@ fn for_loop<'t>(
     expression: Rule<'t, Expr>,
     block: Rule<'t, Block>,
 ) -> impl Parse<'t, StmtKind> {
-    just(Token::For)
+    let header = just(Token::For)
         .ignore_then(name(text))
         .then_ignore(just(Token::In))
         .then(expression.clone())
         .then_ignore(just(Token::Range))
-        .then(expression)
-        .then(block)
-        .map(|(((name, low), high), body)| StmtKind::For {
-            name,
-            low,
-            high,
-            body,
-        })
+        .then(expression);
+    headed(text, header, |(_, high)| high, block).map(|(((name, low), high), body)| StmtKind::For {
+        name,
+        low,
+        high,
+        body,
+    })
 }
 
 /// `while cond limit count { ... }`
-fn while_loop<'t>(expression: Rule<'t, Expr>, block: Rule<'t, Block>) -> impl Parse<'t, StmtKind> {
+fn while_loop<'t>(
+    text: &'t str,
+    expression: Rule<'t, Expr>,
+    block: Rule<'t, Block>,
+) -> impl Parse<'t, StmtKind> {
     let limit = just(Token::Limit)
         .ignore_then(required(expression.clone()))
         .or_not();
-    just(Token::While)
-        .ignore_then(expression)
-        .then(limit)
-        .then(block)
-        .map(|((cond, limit), body)| StmtKind::While { cond, limit, body })
+    let header = just(Token::While).ignore_then(expression).then(limit);
+    headed(
+        text,
+        header,
+        |(cond, limit)| limit.as_mut().unwrap_or(cond),
+        block,
+    )
+    .map(|((cond, limit), body)| StmtKind::While { cond, limit, body })
 }
 
 /// `break;`, `continue;`

@@ -1,0 +1,123 @@
+//! Literals: numbers with their units, strings and truth values.
+
+use chumsky::prelude::*;
+
+use super::common::{Input, Parse};
+use super::error::{Expected, SyntaxError, Want};
+use crate::ast::{Expr, ExprKind, Unit};
+use crate::diag::{Code, Diagnostic, nearest};
+use crate::lexer::{Number, Token, read_number};
+use crate::source::{Span, Spanned};
+
+/// Any literal.
+pub(super) fn literal<'t>(text: &'t str) -> impl Parse<'t, Expr> {
+    let boolean = choice((
+        just(Token::True).to(ExprKind::Bool(true)),
+        just(Token::False).to(ExprKind::Bool(false)),
+    ));
+    let string = just(Token::Str).map_with(move |_, e| string_value(text, e.span()));
+    let other = choice((string, boolean)).map_with(|kind, e| Expr {
+        kind,
+        span: e.span(),
+    });
+    choice((number(text), other))
+}
+
+fn string_value(text: &str, span: Span) -> ExprKind {
+    let slice = text.get(span.range()).unwrap_or("");
+    let inner = slice.strip_prefix('"').unwrap_or(slice);
+    ExprKind::Str(inner.strip_suffix('"').unwrap_or(inner).to_owned())
+}
+
+/// A number, with a unit when a name follows it.
+fn number<'t>(text: &'t str) -> impl Parse<'t, Expr> {
+    custom(move |inp: &mut Input<'t, '_>| {
+        let start = inp.cursor();
+        let found = inp.next();
+        let span = inp.span_since(&start);
+        let Some(token @ (Token::Int | Token::Hex | Token::Float)) = found else {
+            let expected = Expected::want(Want::Expression);
+            return Err(SyntaxError::new(span, found, expected));
+        };
+        // A number that has no value was reported by the lexer.
+        let slice = text.get(span.range()).unwrap_or("");
+        let number = read_number(token, slice, true).unwrap_or(Number::Int(0));
+        let kind = match (unit(text, span, inp), number) {
+            (UnitAfter::None, Number::Int(value)) => ExprKind::Int(value),
+            (UnitAfter::None, Number::Float(value)) => ExprKind::Float(value),
+            (UnitAfter::Unknown, _) => ExprKind::Error,
+            (UnitAfter::Unit(unit), Number::Int(value)) => ExprKind::Quantity(value as f64, unit),
+            (UnitAfter::Unit(unit), Number::Float(value)) => ExprKind::Quantity(value, unit),
+        };
+        Ok(Expr {
+            kind,
+            span: inp.span_since(&start),
+        })
+    })
+}
+
+enum UnitAfter {
+    None,
+    Unit(Spanned<Unit>),
+    Unknown,
+}
+
+/// The unit after the number at `number`. A name on the next line is none, unless it is spelled
+/// like a unit: there a `;` is missing.
+fn unit<'t>(text: &'t str, number: Span, inp: &mut Input<'t, '_>) -> UnitAfter {
+    if inp.peek() != Some(Token::Ident) {
+        return UnitAfter::None;
+    }
+    let before = inp.save();
+    inp.skip();
+    let span = inp.span_since(before.cursor());
+    let name = text.get(span.range()).unwrap_or("");
+    if let Some(unit) = Unit::from_name(name) {
+        return UnitAfter::Unit(Spanned { node: unit, span });
+    }
+    let between = text.get(number.end as usize..span.start as usize);
+    let words = ["and", "or", "xor", "mod"];
+    if words.contains(&name) || between.unwrap_or("").contains('\n') {
+        inp.rewind(before);
+        return UnitAfter::None;
+    }
+    inp.emit(SyntaxError::special(
+        span,
+        unknown_unit(text, number, name, span),
+    ));
+    UnitAfter::Unknown
+}
+
+fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic {
+    let digits = text.get(number.range()).unwrap_or("");
+    let diagnostic = Diagnostic::new(Code::UnknownUnit, span, format!("`{name}` is not a unit"))
+        .expected("um, mm, cm, m or km after a length, deg or rad after an angle");
+    if name.starts_with('_') {
+        return diagnostic.hint("the digits of a number are written without separators");
+    }
+    if digits == "0"
+        && matches!(name.as_bytes(), [b'b' | b'o' | b'X', rest @ ..] if !rest.is_empty())
+    {
+        return diagnostic.hint("ints are written in decimal or, with `0x`, in hexadecimal");
+    }
+    if matches!(name, "f" | "u" | "i" | "h" | "f32" | "u32" | "i32" | "lf") {
+        return diagnostic.hint("numbers have no suffix for their type; a float has a point");
+    }
+    let units = Unit::ALL.iter().map(|(_, name, _)| *name);
+    let known = match name {
+        "degree" | "degrees" => Some("deg"),
+        "radian" | "radians" => Some("rad"),
+        "micron" | "microns" | "micrometer" | "micrometre" => Some("um"),
+        "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some("mm"),
+        "meter" | "meters" | "metre" | "metres" => Some("m"),
+        _ if name.len() > 1 => {
+            let as_long = units.clone().filter(|unit| unit.len() == name.len());
+            nearest(name, as_long).or_else(|| nearest(name, units))
+        }
+        _ => None,
+    };
+    match known {
+        Some(unit) => diagnostic.hint(format!("did you mean `{digits} {unit}`?")),
+        None => diagnostic.hint(format!("to multiply, write `{digits} * {name}`")),
+    }
+}
