@@ -48,6 +48,9 @@ pub fn evaluate(
     lower.b.finish(value)
 }
 
+/// What decides a frame: the normal and tangent that a lobe asks for, if it does.
+type FrameKey = (Option<ExprId>, Option<ExprId>);
+
 /// What evaluation needs of a lobe.
 struct Ready<'a> {
     path: &'a Path<'a>,
@@ -153,7 +156,7 @@ impl Lower<'_> {
     fn frame(
         &mut self,
         path: &Path<'_>,
-        known: &mut BTreeMap<(Option<ExprId>, Option<ExprId>), (ExprId, ExprId)>,
+        known: &mut BTreeMap<FrameKey, (ExprId, ExprId)>,
     ) -> (ExprId, ExprId) {
         let key = (path.lobe.normal, path.lobe.tangent);
         if let Some(found) = known.get(&key) {

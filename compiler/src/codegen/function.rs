@@ -623,8 +623,14 @@ impl<'a> Inliner<'a> {
 fn joined(mut args: Vec<String>) -> String {
     let less = args.iter().position(|a| a.contains(" <"));
     let greater = args.iter().rposition(|a| a.contains(" >"));
-    if less.zip(greater).is_some_and(|(less, greater)| less < greater) {
-        for arg in args.iter_mut().filter(|a| a.contains(" <") || a.contains(" >")) {
+    if less
+        .zip(greater)
+        .is_some_and(|(less, greater)| less < greater)
+    {
+        for arg in args
+            .iter_mut()
+            .filter(|a| a.contains(" <") || a.contains(" >"))
+        {
             *arg = format!("({arg})");
         }
     }

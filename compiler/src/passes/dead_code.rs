@@ -46,9 +46,11 @@ impl Live {
 
     /// Marks what live stores and control flow read; true if anything was new.
     fn block(&mut self, f: &Function, block: &Block) -> bool {
-        block
-            .iter()
-            .fold(false, |changed, stmt| self.stmt(f, stmt) || changed)
+        let mut changed = false;
+        for stmt in block {
+            changed |= self.stmt(f, stmt);
+        }
+        changed
     }
 
     fn stmt(&mut self, f: &Function, stmt: &Stmt) -> bool {

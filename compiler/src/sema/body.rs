@@ -181,9 +181,9 @@ impl<'c, 'l> Body<'c, 'l> {
             return Some(operand);
         };
         let id = match (from, to) {
-            (Ty::Int, Ty::Float) => self.to_float(id, span),
+            (Ty::Int, Ty::Float) => self.promote(id, span),
             (Ty::Int, Ty::Color) => {
-                let float = self.to_float(id, span);
+                let float = self.promote(id, span);
                 self.builder.compose(ir::Type::Vec3, &[float], span)
             }
             (Ty::Float, Ty::Color) => self.builder.compose(ir::Type::Vec3, &[id], span),
@@ -193,7 +193,7 @@ impl<'c, 'l> Body<'c, 'l> {
     }
 
     /// An int as a float.
-    pub fn to_float(&mut self, id: ExprId, span: Span) -> ExprId {
+    pub fn promote(&mut self, id: ExprId, span: Span) -> ExprId {
         self.builder.op(crate::ops::Op::ToFloat, &[id], span)
     }
 

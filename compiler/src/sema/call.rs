@@ -243,13 +243,16 @@ impl Body<'_, '_> {
 
     fn apply(&mut self, op: Op, values: &[(ExprId, Ty, Span)], span: Span) -> Option<Operand> {
         let all_ints = values.iter().all(|v| v.1 == Ty::Int);
-        let wants_floats = !matches!(op.info().shape, Shape::Int(_) | Shape::IntToFloat)
-            && !(all_ints && matches!(op.info().shape, Shape::Number(_) | Shape::Select));
+        let takes_ints = match op.info().shape {
+            Shape::Int(_) | Shape::IntToFloat => true,
+            Shape::Number(_) | Shape::Select => all_ints,
+            _ => false,
+        };
         let mut ids = Vec::new();
         let mut types = Vec::new();
         for &(id, ty, at) in values {
-            let promote = wants_floats && ty == Ty::Int;
-            ids.push(if promote { self.to_float(id, at) } else { id });
+            let promote = !takes_ints && ty == Ty::Int;
+            ids.push(if promote { self.promote(id, at) } else { id });
             types.push(if promote { Ty::Float } else { ty });
         }
         let machine: Vec<ir::Type> = ids.iter().map(|&id| self.builder.ty(id)).collect();
@@ -323,7 +326,7 @@ impl Body<'_, '_> {
             {
                 let parts = [(*r, *rt), (*g, *gt), (*b, *bt)].map(|(id, ty)| {
                     if ty == Ty::Int {
-                        self.to_float(id, span)
+                        self.promote(id, span)
                     } else {
                         id
                     }
@@ -351,7 +354,7 @@ impl Body<'_, '_> {
         let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
         let id = match (to, values.as_slice()) {
             (_, &[(id, ty, _)]) if ty == to => Some(id),
-            (Ty::Float, &[(id, Ty::Int, _)]) => Some(self.to_float(id, span)),
+            (Ty::Float, &[(id, Ty::Int, _)]) => Some(self.promote(id, span)),
             (Ty::Float, &[(id, ty, _)]) if ty.is_dimension() => Some(id),
             (Ty::Float, &[(id, Ty::Bool, _)]) => {
                 let (one, zero) = (self.builder.float(1.0, span), self.builder.float(0.0, span));
@@ -409,7 +412,7 @@ impl Body<'_, '_> {
         let mut width = 0;
         for &(id, ty, at) in values {
             let id = if ty == Ty::Int {
-                self.to_float(id, at)
+                self.promote(id, at)
             } else {
                 id
             };

@@ -394,7 +394,7 @@ impl Body<'_, '_> {
 
     fn weight(&mut self, w: ExprId, wt: Ty, c: ClosureId, ty: Ty, span: Span) -> Option<Operand> {
         let w = match wt {
-            Ty::Int => self.to_float(w, span),
+            Ty::Int => self.promote(w, span),
             Ty::Float | Ty::Color => w,
             _ => {
                 let message = format!(

@@ -15,9 +15,12 @@ pub const MAX_TURNS: u64 = 65_536;
 impl Body<'_, '_> {
     /// Checks statements in order; false if any does not check.
     pub fn statements(&mut self, stmts: &[Stmt]) -> bool {
-        stmts
-            .iter()
-            .fold(true, |ok, stmt| self.statement(stmt).is_some() && ok)
+        // All are checked, also after one that is wrong, so that all are reported.
+        let mut ok = true;
+        for stmt in stmts {
+            ok &= self.statement(stmt).is_some();
+        }
+        ok
     }
 
     fn statement(&mut self, stmt: &Stmt) -> Option<()> {
@@ -365,8 +368,8 @@ impl Body<'_, '_> {
             return None;
         };
         let (x, xt, y, yt) = match (xt, yt) {
-            (Ty::Int, t) if t != Ty::Int => (self.to_float(x, span), Ty::Float, y, t),
-            (t, Ty::Int) if t != Ty::Int => (x, t, self.to_float(y, span), Ty::Float),
+            (Ty::Int, t) if t != Ty::Int => (self.promote(x, span), Ty::Float, y, t),
+            (t, Ty::Int) if t != Ty::Int => (x, t, self.promote(y, span), Ty::Float),
             _ => (x, xt, y, yt),
         };
         let (ir_op, ty) = operator(op, xt, yt).or_else(|| self.no_operator(op, xt, yt, span))?;
