@@ -14,8 +14,7 @@ use impasto_compiler::partition::Plan;
 
 use crate::error::RuntimeError;
 use crate::film::Film;
-use crate::gpu::Gpu;
-use crate::gpu::timing::Timing;
+use crate::gpu::{Gpu, Timing};
 use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
 use crate::queues::{Queues, Scalar};
@@ -150,7 +149,7 @@ impl<'g> Renderer<'g> {
         let schedule = Schedule {
             steps,
             arguments: resources.arguments().clone(),
-            timing: Timing::of(gpu),
+            timing: gpu.timing,
         };
         let facts = Facts {
             strategy: plan.strategy.clone(),

@@ -1,6 +1,6 @@
 //! Recording: the dispatches of iterations, in order, with their timestamps.
 
-use crate::gpu::timing::Timing;
+use crate::gpu::Timing;
 
 /// How many workgroups a dispatch has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,9 +9,10 @@ use crate::error::RuntimeError;
 
 mod info;
 pub(crate) mod shader;
-pub(crate) mod timing;
+mod timing;
 
 pub use info::GpuInfo;
+pub use timing::Timing;
 
 /// How to choose and open a GPU.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +21,8 @@ pub struct GpuOptions {
     pub adapter: Option<String>,
     /// Keeps wgpu's bounds checks and loop bounds in the kernels: slower, for finding defects.
     pub checked: bool,
+    /// How finely to time kernels; coarser if the GPU cannot.
+    pub timing: Timing,
 }
 
 /// An open GPU.
@@ -29,6 +32,7 @@ pub struct Gpu {
     pub(crate) queue: wgpu::Queue,
     pub(crate) adapter: wgpu::Adapter,
     pub(crate) checked: bool,
+    pub(crate) timing: Timing,
     failure: Arc<Mutex<Option<RuntimeError>>>,
 }
 
@@ -54,11 +58,13 @@ impl Gpu {
             reason: e.to_string(),
         })?;
         let failure = collect_errors(&device);
+        let timing = options.timing.min(Timing::finest(device.features()));
         Ok(Self {
             device,
             queue,
             adapter,
             checked: options.checked,
+            timing,
             failure,
         })
     }

@@ -1,22 +1,20 @@
 //! GPU time by timestamps, as finely as the device can give them.
 
-use super::Gpu;
-
-/// Where timestamps can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Timing {
-    /// Between the dispatches of one pass.
-    InPass,
+/// Where timestamps are written, finest last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Timing {
+    /// Nowhere: only the time waited is known.
+    None,
     /// Around passes, so that each dispatch takes a pass of its own.
     AroundPass,
-    /// Nowhere.
-    None,
+    /// Between the dispatches of one pass.
+    #[default]
+    InPass,
 }
 
 impl Timing {
-    /// The best that `gpu` can do.
-    pub(crate) fn of(gpu: &Gpu) -> Self {
-        let features = gpu.device.features();
+    /// The finest that a device with `features` can do.
+    pub(crate) fn finest(features: wgpu::Features) -> Self {
         if features.contains(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES) {
             Timing::InPass
         } else if features.contains(wgpu::Features::TIMESTAMP_QUERY) {

@@ -9,4 +9,5 @@ mod film;
 mod furnace;
 mod lights;
 mod plans;
+mod scene;
 mod stub;

@@ -1,11 +1,14 @@
 //! Plans organise the same computation: wavefront, megakernel and what is between them must
 //! render the same picture, and count the same work.
 
+use std::ops::ControlFlow;
+
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
 use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel, Strategy};
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Film;
-use impasto_runtime::render::Renderer;
+use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
+use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::report::Report;
 
 fn room() -> Room {
@@ -118,6 +121,42 @@ fn reports_say_what_ran() {
     assert_eq!(json["strategy"], "mega");
     assert_eq!(json["kernels"][1]["form"], "inline");
     assert!(json["kernels"][0].get("form").is_none());
+}
+
+/// Checked kernels and coarser timing are for finding defects and for lesser GPUs; they must
+/// not change a picture.
+#[test]
+fn checks_and_timing_do_not_change_the_picture() {
+    let surfaces = surfaces();
+    let plan = plan(Strategy::Own, &surfaces);
+    let (reference, _) = run(&plan);
+    for (timing, checked) in [(Timing::AroundPass, false), (Timing::None, true)] {
+        let options = GpuOptions {
+            timing,
+            checked,
+            ..GpuOptions::default()
+        };
+        let gpu = Gpu::new(&options).unwrap_or_else(|e| panic!("{e}"));
+        let mut renderer =
+            Renderer::from_world(&gpu, &room().world(), &surfaces, &plan, &samples(16))
+                .unwrap_or_else(|e| panic!("{e}"));
+        // Twice, since a renderer starts anew each time.
+        for _ in 0..2 {
+            let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
+            let Rendering { film, report } = rendering.unwrap_or_else(|e| panic!("{e}"));
+            assert_equal_but_for_rounding(&film, &reference);
+            let timed = report
+                .kernels
+                .iter()
+                .filter(|k| k.gpu_seconds > 0.0)
+                .count();
+            match timing {
+                Timing::None => assert_eq!((report.timing, timed), ("wall", 0)),
+                _ => assert_eq!((report.timing, timed), ("timestamps", report.kernels.len())),
+            }
+            assert!(report.gpu_seconds > 0.0 && report.gpu_seconds <= report.wall_seconds);
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,170 @@
+//! Scenes from files with compiled materials: the same closed forms as in `furnace`, through
+//! the real hierarchy, lights and generated code.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use impasto_compiler::partition::{Form, Strategy};
+use impasto_compiler::{Loader, MaterialRequest, Program, compile};
+use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
+use impasto_runtime::scene::{self, Scene};
+
+use crate::stub::{assert_mean, gpu, mean, red, samples};
+
+/// A cube from -1 to 1 whose faces look inwards.
+const ROOM: &str = "
+v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+usemtl wall
+f 1 2 3 4\nf 8 7 6 5\nf 5 1 4 8\nf 2 6 7 3\nf 4 3 7 8\nf 5 6 2 1
+";
+
+/// A cube from -0.4 to 0.4 whose faces look outwards.
+const BLOCK: &str = "
+v -.4 -.4 -.4\nv .4 -.4 -.4\nv .4 .4 -.4\nv -.4 .4 -.4
+v -.4 -.4 .4\nv .4 -.4 .4\nv .4 .4 .4\nv -.4 .4 .4
+usemtl block
+f 4 3 2 1\nf 5 6 7 8\nf 8 4 1 5\nf 3 7 6 2\nf 8 7 3 4\nf 1 2 6 5
+";
+
+const MATERIALS: &str = "
+use std::bsdf::{dielectric, diffuse, mirror};
+use std::edf::uniform;
+material glowing { surface = diffuse(0.7); emission = uniform(color(1)); }
+material dull { surface = diffuse(0.6); }
+material glass { surface = dielectric(ior: 1.5); }
+material silver { surface = mirror(); }
+";
+
+struct Folder<'a>(&'a Path);
+
+impl Loader for Folder<'_> {
+    fn load(&mut self, path: &str) -> Result<Vec<u8>, String> {
+        std::fs::read(self.0.join(path)).map_err(|e| e.to_string())
+    }
+}
+
+/// Loads a scene with this TOML after a common head, and compiles its materials.
+fn load(toml: &str) -> (Scene, Program) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let files = [
+        ("room.obj", ROOM),
+        ("block.obj", BLOCK),
+        ("m.impasto", MATERIALS),
+        ("scene.toml", toml),
+    ];
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let request = |binding: &scene::MaterialBinding| MaterialRequest {
+        name: binding.name.clone(),
+        file: binding.file.clone(),
+        material: binding.material.clone(),
+        params: binding.params.clone(),
+    };
+    let requests: Vec<_> = scene.materials.iter().map(request).collect();
+    let compilation = compile(&requests, &mut Folder(folder.path()));
+    let program = compilation.program;
+    (
+        scene,
+        program.unwrap_or_else(|| panic!("{:?}", compilation.diagnostics)),
+    )
+}
+
+fn render(scene: &Scene, program: &Program, strategy: &str, options: &RenderOptions) -> Rendering {
+    let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
+    let inline = strategy == "inline";
+    let strategy = Strategy::from_name(if inline { "shared" } else { strategy });
+    let mut plan = strategy.expect("a strategy").plan(&names);
+    for kernel in &mut plan.kernels {
+        if inline {
+            kernel.form = Form::Inline;
+        }
+    }
+    let mut renderer =
+        Renderer::new(gpu(), scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"));
+    let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
+    let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(rendering.report.queue_overflow, 0);
+    assert_eq!(rendering.report.nonfinite_samples, 0);
+    rendering
+}
+
+fn room(size: f32, offset: f32, depth: u32) -> String {
+    let place = |p: [f32; 3]| p.map(|v| v * size + offset);
+    format!(
+        "film = {{ width = 24, height = 16 }}\nintegrator.max_depth = {depth}\n\
+         camera = {{ position = {:?}, look_at = {:?}, fov = 60 }}\n\
+         [[geometry]]\nobj = 'room.obj'\nscale = {size:?}\ntranslate = {:?}\n\
+         [materials.wall]\nfile = 'm.impasto'\nmaterial = 'glowing'\n",
+        place([0.1, 0.6, 0.8]),
+        place([0.0, 0.0, 0.0]),
+        [offset; 3],
+    )
+}
+
+/// All walls emit 1 and reflect 0.7: three segments see 1 + 0.7 + 0.49, whatever the size and
+/// place of the room.
+#[test]
+fn closed_room_of_a_compiled_emissive_material() {
+    for (size, offset) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 300.0)] {
+        let (scene, program) = load(&room(size, offset, 3));
+        let rendering = render(&scene, &program, "wavefront", &samples(64));
+        assert!(
+            rendering
+                .report
+                .kernels
+                .iter()
+                .any(|k| k.name == "shadow" && k.items > 0)
+        );
+        assert_mean(&rendering, 1.0 + 0.7 + 0.49);
+    }
+}
+
+/// Glass neither absorbs nor loses a path at its faces, so under an even sky it is as bright
+/// as the sky; what is missing is caught inside for more than 60 segments.
+#[test]
+fn glass_under_an_even_sky_is_invisible() {
+    let (scene, program) = load(
+        "film = { width = 24, height = 16 }\n\
+         integrator = { max_depth = 64, roulette_start = 1000 }\n\
+         camera = { position = [1.1, 0.9, 1.3], look_at = [0, 0, 0], fov = 40 }\n\
+         environment = { color = 2 }\n\
+         [[geometry]]\nobj = 'block.obj'\n\
+         [materials.block]\nfile = 'm.impasto'\nmaterial = 'glass'\n",
+    );
+    let rendering = render(&scene, &program, "wavefront", &samples(64));
+    let extended = rendering
+        .report
+        .kernels
+        .iter()
+        .find(|k| k.name == "material_block");
+    assert!(extended.is_some_and(|k| k.items > rendering.report.paths / 4));
+    let (mean, _) = mean(red(&rendering));
+    assert!((mean - 2.0).abs() < 0.02, "{mean}");
+}
+
+/// A lamp, walls, and a block of glass or metal: every organisation gives the same picture.
+#[test]
+fn every_organisation_renders_the_same_scene() {
+    for block in ["glass", "silver", "dull"] {
+        let toml = room(1.0, 0.0, 6).replace("glowing", "dull")
+            + &format!(
+                "[[geometry]]\nobj = 'block.obj'\n\
+                 [materials.block]\nfile = 'm.impasto'\nmaterial = '{block}'\n\
+                 [[lights]]\nkind = 'quad'\ncorner = [-0.3, 0.99, -0.3]\n\
+                 u = [0.6, 0, 0]\nv = [0, 0, 0.6]\nradiance = [10, 10, 10]\n"
+            );
+        let (scene, program) = load(&toml);
+        let reference = render(&scene, &program, "wavefront", &samples(8));
+        assert!(red(&reference).all(|v| v >= 0.0) && red(&reference).any(|v| v > 0.1));
+        for strategy in ["shared", "inline", "mega"] {
+            let other = render(&scene, &program, strategy, &samples(8));
+            if gpu().info().kind == "software" {
+                assert!(other.film == reference.film, "{block}: {strategy} differs");
+            }
+            let (difference, error) = mean(red(&other).zip(red(&reference)).map(|(a, b)| a - b));
+            assert!(difference.abs() <= 4.0 * error, "{block}: {strategy}");
+        }
+    }
+}
