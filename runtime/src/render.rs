@@ -151,6 +151,7 @@ impl<'g> Renderer<'g> {
             arguments: resources.arguments().clone(),
             timing: gpu.timing,
         };
+        warm_up(gpu, &resources, &schedule, options)?;
         let facts = Facts {
             strategy: plan.strategy.clone(),
             width: world.width,
@@ -380,6 +381,28 @@ fn sizes(
         workgroup: WORKGROUP.min(limits.max_compute_invocations_per_workgroup),
         row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
     })
+}
+
+/// Runs an iteration without any work: some drivers finish building a kernel when it first
+/// runs, which would count as rendering.
+fn warm_up(
+    gpu: &Gpu,
+    resources: &Resources,
+    schedule: &Schedule,
+    options: &RenderOptions,
+) -> Result<(), RuntimeError> {
+    let no_work = RenderOptions {
+        samples: 0,
+        ..options.clone()
+    };
+    resources.set_run(gpu, &no_work);
+    resources.clear(gpu);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    schedule.record(&mut encoder, 1, None);
+    let index = gpu.queue.submit([encoder.finish()]);
+    gpu.wait(index)?;
+    resources.set_run(gpu, options);
+    Ok(())
 }
 
 /// Validates the kernels and builds their pipelines, several at a time.

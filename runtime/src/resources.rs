@@ -68,10 +68,16 @@ impl Resources {
             buffers.push(buffer);
         }
         gpu.check()?;
-        let run = run_words(options);
-        gpu.queue
-            .write_buffer(&buffers[own("run")], 0, bytemuck::cast_slice(&run));
-        Ok(Self { buffers })
+        let resources = Self { buffers };
+        resources.set_run(gpu, options);
+        Ok(resources)
+    }
+
+    /// Writes the settings that kernels read.
+    pub(crate) fn set_run(&self, gpu: &Gpu, options: &RenderOptions) {
+        let words = run_words(options);
+        let run = &self.buffers[own("run")];
+        gpu.queue.write_buffer(run, 0, bytemuck::cast_slice(&words));
     }
 
     pub(crate) fn arguments(&self) -> &wgpu::Buffer {

@@ -176,6 +176,17 @@ fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
 }
 
 impl Gpu {
+    /// Waits for a submission and reports what went wrong until then.
+    pub(crate) fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), RuntimeError> {
+        let waited = self.device.poll(wgpu::PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        });
+        self.check()?;
+        waited.map_err(|e| RuntimeError::DeviceLost(e.to_string()))?;
+        Ok(())
+    }
+
     /// Waits for a submission, then gives the first `size` bytes of the mapped `buffer` to
     /// `take` and unmaps it.
     pub(crate) fn read<T>(
@@ -185,15 +196,10 @@ impl Gpu {
         size: u64,
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, RuntimeError> {
-        let lost = |e: &dyn std::fmt::Display| RuntimeError::DeviceLost(e.to_string());
         buffer.map_async(wgpu::MapMode::Read, 0..size, |_| {});
-        let waited = self.device.poll(wgpu::PollType::Wait {
-            submission_index: Some(submission),
-            timeout: None,
-        });
-        self.check()?;
-        waited.map_err(|e| lost(&e))?;
-        let view = buffer.get_mapped_range(0..size).map_err(|e| lost(&e))?;
+        self.wait(submission)?;
+        let view = buffer.get_mapped_range(0..size);
+        let view = view.map_err(|e| RuntimeError::DeviceLost(e.to_string()))?;
         let taken = take(&view);
         drop(view);
         buffer.unmap();
