@@ -21,6 +21,7 @@ impl GpuArgs {
         let options = GpuOptions {
             adapter: self.gpu.clone(),
             checked: self.checked,
+            ..GpuOptions::default()
         };
         Gpu::new(&options).map_err(|error| Failure::Error(error.to_string()))
     }
