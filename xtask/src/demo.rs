@@ -13,7 +13,7 @@ const SCENE: &str = "examples/cornell/scene.toml";
 #[derive(Args)]
 pub(crate) struct DemoArgs {
     /// Samples per pixel
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 48)]
     spp: u32,
     /// Width and height in pixels
     #[arg(long, default_value = "256x256")]
