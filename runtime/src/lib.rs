@@ -17,6 +17,7 @@ pub mod lights;
 mod modules;
 pub mod output;
 mod parallel;
+mod pool;
 mod queues;
 mod random;
 pub mod render;

@@ -17,14 +17,15 @@ use crate::film::Film;
 use crate::gpu::{Gpu, Timing};
 use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
+use crate::pool::{self, Pace};
 use crate::queues::{Queues, Scalar};
 use crate::report::Report;
 use crate::resources::Resources;
 use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
+use crate::state;
 use crate::status::{Flight, Status};
 use crate::world::{MaterialSource, World};
-use crate::{film, state};
 
 /// What to render of a world.
 #[derive(Clone, Debug)]
@@ -95,20 +96,8 @@ struct Facts {
     compile_seconds: f64,
 }
 
-/// Paths in flight by default, as in Laine et al. 2013, and on software GPUs, where a smaller
-/// pool stays in the processor's cache.
-const DEFAULT_POOL: u32 = 1 << 20;
-const SOFTWARE_POOL: u32 = 1 << 16;
-/// Threads of a workgroup.
-const WORKGROUP: u32 = 128;
 /// Submissions in flight.
 const FLIGHTS: usize = 2;
-/// A submission is made longer below the first and shorter above the second.
-const SHORT: Duration = Duration::from_millis(20);
-const LONG: Duration = Duration::from_millis(100);
-/// Iterations in a submission at most.
-const MAX_ITERATIONS: u32 = 64;
-
 impl<'g> Renderer<'g> {
     /// Prepares to render `scene`, whose materials compiled to `program`.
     pub fn new(
@@ -134,7 +123,7 @@ impl<'g> Renderer<'g> {
         check_settings(world, options)?;
         let materials = source.infos();
         let layout = Layout::new(world, &materials, plan)?;
-        let sizes = sizes(gpu, world, &layout, options)?;
+        let sizes = pool::sizes(gpu, world, &layout, options)?;
         let composer = Composer {
             world,
             source,
@@ -205,11 +194,14 @@ impl<'g> Renderer<'g> {
         let mut flights: VecDeque<Flight> = VecDeque::new();
         let mut spare: Vec<Flight> = Vec::new();
         let mut pace = Pace::new(self.schedule.timing.max_dispatches() / steps as u32);
+        let mut now = self.progress(&status, begin);
         let mut going = true;
         loop {
             while going && flights.len() < FLIGHTS {
+                let ahead = flights.iter().map(Flight::iterations).sum();
+                let iterations = pace.next(&now, status.iterations, ahead);
                 let flight = spare.pop().map_or_else(|| self.new_flight(pace.max), Ok)?;
-                flights.push_back(self.submit(flight, pace.iterations));
+                flights.push_back(self.submit(flight, iterations));
             }
             let Some(mut flight) = flights.pop_front() else {
                 return Ok(status);
@@ -217,7 +209,7 @@ impl<'g> Renderer<'g> {
             flight.land(self.gpu, &self.schedule, &mut status)?;
             pace.adapt();
             spare.push(flight);
-            let now = self.progress(&status, begin);
+            now = self.progress(&status, begin);
             going &= now.paths < now.total;
             if progress(&now).is_break() {
                 going = false;
@@ -284,34 +276,6 @@ impl<'g> Renderer<'g> {
     }
 }
 
-/// How many iterations a submission has.
-struct Pace {
-    iterations: u32,
-    max: u32,
-    last: Instant,
-}
-
-impl Pace {
-    fn new(max: u32) -> Self {
-        Self {
-            iterations: 1,
-            max: max.clamp(1, MAX_ITERATIONS),
-            last: Instant::now(),
-        }
-    }
-
-    /// Called whenever a submission is done.
-    fn adapt(&mut self) {
-        let took = self.last.elapsed();
-        self.last = Instant::now();
-        if took < SHORT {
-            self.iterations = (2 * self.iterations).min(self.max);
-        } else if took > LONG {
-            self.iterations = (self.iterations / 2).max(1);
-        }
-    }
-}
-
 fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeError> {
     let refuse = |setting, value: String, expected: &str| {
         Err(RuntimeError::Setting {
@@ -344,43 +308,6 @@ fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeE
         return refuse("pool", "0".into(), "at least 1 path");
     }
     Ok(())
-}
-
-/// Chooses the pool, within what the GPU can bind.
-fn sizes(
-    gpu: &Gpu,
-    world: &World,
-    layout: &Layout,
-    options: &RenderOptions,
-) -> Result<Sizes, RuntimeError> {
-    let limits = gpu.device.limits();
-    let pixels = u64::from(world.width) * u64::from(world.height);
-    let film = pixels * u64::from(film::PLANES) * 4;
-    gpu.check_binding_size("the film", film)?;
-    let queue_bytes = 4 * layout.counters.queues as u64;
-    let slot_bytes = layout.path_bytes().max(queue_bytes).max(1);
-    let most = limits
-        .max_buffer_size
-        .min(limits.max_storage_buffer_binding_size);
-    let fits = u32::try_from(most / slot_bytes)
-        .unwrap_or(u32::MAX)
-        .min(1 << 30);
-    if let Some(pool) = options.pool {
-        let bytes = u64::from(pool) * slot_bytes;
-        gpu.check_binding_size("a pool of that size", bytes)?;
-    }
-    let default = if gpu.is_software() {
-        SOFTWARE_POOL
-    } else {
-        DEFAULT_POOL
-    };
-    let paths = pixels.saturating_mul(u64::from(options.samples));
-    let enough = u32::try_from(paths).unwrap_or(u32::MAX);
-    Ok(Sizes {
-        pool: options.pool.unwrap_or(default).min(enough).min(fits).max(1),
-        workgroup: WORKGROUP.min(limits.max_compute_invocations_per_workgroup),
-        row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
-    })
 }
 
 /// Runs an iteration without any work: some drivers finish building a kernel when it first

@@ -74,6 +74,11 @@ impl Flight {
         Ok(flight)
     }
 
+    /// Iterations of the submission that is under way.
+    pub(crate) fn iterations(&self) -> u64 {
+        u64::from(self.iterations)
+    }
+
     pub(crate) fn queries(&self) -> Option<&wgpu::QuerySet> {
         self.queries.as_ref().map(|(set, _)| set)
     }

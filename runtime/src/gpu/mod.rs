@@ -84,6 +84,11 @@ impl Gpu {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
+    /// Whether its memory is not the processor's.
+    pub(crate) fn has_own_memory(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::DiscreteGpu
+    }
+
     /// The first error since the device was opened, if there was any.
     pub(crate) fn check(&self) -> Result<(), RuntimeError> {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

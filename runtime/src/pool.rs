@@ -1,0 +1,147 @@
+//! How much work at a time: the paths in flight, and the iterations of a submission.
+
+use std::time::{Duration, Instant};
+
+use crate::error::RuntimeError;
+use crate::film;
+use crate::gpu::Gpu;
+use crate::layout::Layout;
+use crate::modules::Sizes;
+use crate::render::{Progress, RenderOptions};
+use crate::world::World;
+
+/// Paths in flight by default, as in Laine et al. 2013. In a megakernel it bounds the work of
+/// one dispatch.
+const POOL: u32 = 1 << 20;
+/// The same for the wavefront on GPUs with memory of their own: each kernel drains the machine
+/// once an iteration, so that an H200 renders 1.2 times as fast as with a quarter of it.
+const LARGE_POOL: u32 = 1 << 22;
+/// What a default pool may take, in bytes.
+const LARGE_POOL_BYTES: u64 = 1 << 30;
+/// The same for GPUs in software, to stay responsive.
+const SOFTWARE_POOL: u32 = 1 << 16;
+/// Threads of a workgroup. On an H200 128 and 256 are equal, and 64 is 5 % slower.
+const WORKGROUP: u32 = 128;
+
+/// A submission is made longer below the first and shorter above the second.
+const SHORT: Duration = Duration::from_millis(20);
+const LONG: Duration = Duration::from_millis(100);
+/// Iterations in a submission: at most, and at least when the end is near.
+const MAX_ITERATIONS: u32 = 64;
+const LAST_ITERATIONS: u64 = 8;
+
+/// Chooses the pool, within what the GPU can bind.
+pub(crate) fn sizes(
+    gpu: &Gpu,
+    world: &World,
+    layout: &Layout,
+    options: &RenderOptions,
+) -> Result<Sizes, RuntimeError> {
+    let limits = gpu.device.limits();
+    let pixels = u64::from(world.width) * u64::from(world.height);
+    let film = pixels * u64::from(film::PLANES) * 4;
+    gpu.check_binding_size("the film", film)?;
+    // State and queues are one buffer each.
+    let state_bytes = layout.path_bytes();
+    let queue_bytes = 4 * layout.counters.queues as u64;
+    let slot_bytes = state_bytes.max(queue_bytes).max(1);
+    if let Some(pool) = options.pool {
+        let bytes = u64::from(pool) * slot_bytes;
+        gpu.check_binding_size("a pool of that size", bytes)?;
+    }
+    let most = limits
+        .max_buffer_size
+        .min(limits.max_storage_buffer_binding_size);
+    let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
+    let default = default_pool(gpu, layout, state_bytes + queue_bytes);
+    let paths = pixels.saturating_mul(u64::from(options.samples));
+    let enough = u32::try_from(paths).unwrap_or(u32::MAX);
+    Ok(Sizes {
+        pool: options
+            .pool
+            .unwrap_or(default)
+            .min(enough)
+            .min(fits)
+            .clamp(1, 1 << 30),
+        workgroup: WORKGROUP.min(limits.max_compute_invocations_per_workgroup),
+        row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
+    })
+}
+
+fn default_pool(gpu: &Gpu, layout: &Layout, slot_bytes: u64) -> u32 {
+    if gpu.is_software() {
+        return SOFTWARE_POOL;
+    }
+    if !gpu.has_own_memory() || !layout.wavefront {
+        return POOL;
+    }
+    let affordable = LARGE_POOL_BYTES / slot_bytes.max(1);
+    LARGE_POOL.min(u32::try_from(affordable).unwrap_or(u32::MAX))
+}
+
+/// How many iterations a submission has.
+pub(crate) struct Pace {
+    iterations: u32,
+    /// The most that will be asked for.
+    pub max: u32,
+    last: Instant,
+}
+
+impl Pace {
+    /// At most `max` iterations, starting with one.
+    pub(crate) fn new(max: u32) -> Self {
+        Self {
+            iterations: 1,
+            max: max.clamp(1, MAX_ITERATIONS),
+            last: Instant::now(),
+        }
+    }
+
+    /// Called whenever a submission is done.
+    pub(crate) fn adapt(&mut self) {
+        let took = self.last.elapsed();
+        self.last = Instant::now();
+        if took < SHORT {
+            self.iterations = (2 * self.iterations).min(self.max);
+        } else if took > LONG {
+            self.iterations = (self.iterations / 2).max(1);
+        }
+    }
+
+    /// Iterations of the next submission, when `progress` took `done` iterations and `ahead`
+    /// more are submitted: not many more than the rest will take at that rate.
+    pub(crate) fn next(&self, progress: &Progress, done: u64, ahead: u64) -> u32 {
+        let rest = u128::from(progress.total - progress.paths.min(progress.total));
+        let needed = match progress.paths {
+            0 => u64::MAX,
+            paths => u64::try_from(rest * u128::from(done) / u128::from(paths)).unwrap_or(u64::MAX),
+        };
+        let useful = needed.saturating_sub(ahead).max(LAST_ITERATIONS);
+        self.iterations
+            .min(u32::try_from(useful).unwrap_or(u32::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_submission_asks_for_what_is_left() {
+        let pace = Pace {
+            iterations: 64,
+            max: 64,
+            last: Instant::now(),
+        };
+        let after = |paths| Progress {
+            paths,
+            total: 1000,
+            elapsed: Duration::ZERO,
+        };
+        assert_eq!(pace.next(&after(0), 10, 20), 64);
+        assert_eq!(pace.next(&after(100), 10, 20), 64);
+        assert_eq!(pace.next(&after(500), 50, 20), 30);
+        assert_eq!(pace.next(&after(999), 50, 20), 8);
+        assert_eq!(pace.next(&after(1000), 50, 0), 8);
+    }
+}
