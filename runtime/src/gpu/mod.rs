@@ -120,12 +120,10 @@ impl Gpu {
 /// All adapters, the most capable kind first; equal kinds in the driver's order.
 fn adapters() -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    // Indirect arguments come from the prepare kernels alone, which keep to the limits;
-    // validating them again would cost more than the dispatch itself.
-    descriptor.flags = wgpu::InstanceFlags::from_build_config()
-        .difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL)
-        .with_env()
-        | wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER;
+    // No debug layers unless the environment asks for them (`WGPU_VALIDATION`, `WGPU_DEBUG`),
+    // and no validation of indirect arguments: those come from the prepare kernels alone,
+    // which keep to the limits, and checking them again costs more than the dispatch itself.
+    descriptor.flags = wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER.with_env();
     let instance = wgpu::Instance::new(descriptor);
     let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {

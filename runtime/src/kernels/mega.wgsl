@@ -3,7 +3,6 @@
 
 var<private> wanted_material: u32 = NOTHING;
 var<private> wants_extension: bool = false;
-var<private> wants_shadow: bool = false;
 
 // The loop ends instead: what the path gathered is in the film.
 fn request_new_path() {}
@@ -17,6 +16,8 @@ fn request_extension() {
 }
 
 #if shadow_rays
+var<private> wants_shadow: bool = false;
+
 fn request_shadow() {
     wants_shadow = true;
 }

@@ -7,6 +7,7 @@
 mod determinism;
 mod film;
 mod furnace;
+mod info;
 mod lights;
 mod plans;
 mod scene;

@@ -123,6 +123,40 @@ fn reports_say_what_ran() {
     assert!(json["kernels"][0].get("form").is_none());
 }
 
+/// The text of all kernels of a room.
+fn texts(room: &Room, surfaces: &Materials, strategy: Strategy) -> String {
+    let plan = plan(strategy, surfaces);
+    let renderer = Renderer::from_world(gpu(), &room.world(), surfaces, &plan, &samples(1))
+        .unwrap_or_else(|e| panic!("{e}"));
+    renderer.kernels().map(|(_, wgsl)| wgsl).collect()
+}
+
+#[test]
+fn what_a_scene_does_not_need_is_absent_from_its_kernels() {
+    let surfaces = materials(&[Kind::Diffuse(0.5)]);
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let needless = texts(&Room::default().scattering(), &surfaces, strategy);
+        let shadowed = texts(&Room::default(), &surfaces, strategy);
+        for name in [
+            "fn shadow(",
+            "fn choose_light(",
+            "light_throughput(slot",
+            "wants_shadow",
+        ] {
+            assert!(!needless.contains(name), "{strategy:?}: {name}");
+            assert!(shadowed.contains(name), "{strategy:?}: {name}");
+        }
+        let glowing = materials(&[Kind::Glowing(0.5, 1.0)]);
+        let glowing = texts(&Room::default(), &glowing, strategy);
+        assert!(
+            glowing.contains("= material_emission(") || glowing.contains("* material_emission(")
+        );
+        assert!(!shadowed.contains("material_emission("));
+        // The stub's materials neither transmit nor need a lens.
+        assert!(!shadowed.contains("let entered") && !shadowed.contains("LENS_RADIUS"));
+    }
+}
+
 /// Checked kernels and coarser timing are for finding defects and for lesser GPUs; they must
 /// not change a picture.
 #[test]
