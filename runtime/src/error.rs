@@ -58,6 +58,16 @@ pub enum RuntimeError {
     /// wgpu refused a call; always a defect of Impasto.
     #[error("internal error: the GPU interface refused a call; please report this\n{0}")]
     Validation(String),
+    /// No path was finished for longer than any path can take; always a defect of Impasto.
+    #[error(
+        "internal error: no path was finished in {iterations} iterations, where each takes at most {expected}; please report this"
+    )]
+    Stalled {
+        /// Iterations since the last path was finished.
+        iterations: u64,
+        /// Iterations that the longest path takes.
+        expected: u64,
+    },
     /// A setting has a value that cannot be rendered.
     #[error("{setting} is {value}: expected {expected}")]
     Setting {

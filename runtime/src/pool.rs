@@ -27,7 +27,7 @@ const WORKGROUP: u32 = 128;
 const SHORT: Duration = Duration::from_millis(20);
 const LONG: Duration = Duration::from_millis(100);
 /// Iterations in a submission: at most, and at least when the end is near.
-const MAX_ITERATIONS: u32 = 64;
+pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
 /// Chooses the pool, within what the GPU can bind.

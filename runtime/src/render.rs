@@ -91,6 +91,7 @@ struct Facts {
     width: u32,
     height: u32,
     triangles: u64,
+    max_depth: u32,
     pool: u32,
     material_names: Vec<String>,
     compile_seconds: f64,
@@ -146,6 +147,7 @@ impl<'g> Renderer<'g> {
             width: world.width,
             height: world.height,
             triangles: world.triangles,
+            max_depth: world.max_depth,
             pool: sizes.pool,
             material_names: materials.iter().map(|m| m.name.clone()).collect(),
             compile_seconds: begin.elapsed().as_secs_f64(),
@@ -195,6 +197,7 @@ impl<'g> Renderer<'g> {
         let mut spare: Vec<Flight> = Vec::new();
         let mut pace = Pace::new(self.schedule.timing.max_dispatches() / steps as u32);
         let mut now = self.progress(&status, begin);
+        let mut finished_at = 0;
         let mut going = true;
         loop {
             while going && flights.len() < FLIGHTS {
@@ -209,12 +212,31 @@ impl<'g> Renderer<'g> {
             flight.land(self.gpu, &self.schedule, &mut status)?;
             pace.adapt();
             spare.push(flight);
+            let before = now.paths;
             now = self.progress(&status, begin);
+            if now.paths > before {
+                finished_at = status.iterations;
+            }
+            self.check_stall(status.iterations - finished_at)?;
             going &= now.paths < now.total;
             if progress(&now).is_break() {
                 going = false;
             }
         }
+    }
+
+    /// Fails if `iterations` in a row finished no path, which would go on for ever. A path takes
+    /// an iteration a segment, one to begin and one to end; what the counters say is as old
+    /// as a submission is long.
+    fn check_stall(&self, iterations: u64) -> Result<(), RuntimeError> {
+        let expected = u64::from(self.facts.max_depth) + 2;
+        if iterations <= 2 * expected + 2 * u64::from(pool::MAX_ITERATIONS) {
+            return Ok(());
+        }
+        Err(RuntimeError::Stalled {
+            iterations,
+            expected,
+        })
     }
 
     fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
