@@ -199,14 +199,15 @@ impl<'c, 'l> Body<'c, 'l> {
 
     fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: &str) -> Option<T> {
         let (found, wanted) = (self.cx.type_text(from), self.cx.type_text(to));
+        let (a_found, a_wanted) = (self.cx.a_type(from), self.cx.a_type(to));
         let number = matches!(from, Ty::Int | Ty::Float);
         let code = match to {
             _ if to.is_dimension() && number => Code::NeedsUnit,
             _ if from.is_closure() && !to.is_closure() => Code::ClosureUse,
             _ => Code::TypeMismatch,
         };
-        let wrong = Diagnostic::new(code, span, format!("{place} is a {found}, not a {wanted}"))
-            .expected(format!("a {wanted}"));
+        let wrong = Diagnostic::new(code, span, format!("{place} is {a_found}, not {a_wanted}"))
+            .expected(a_wanted);
         let wrong = match (from, to) {
             (_, Ty::Length) if number => wrong.hint(
                 "write a length with its unit, as in `0.5 mm`, or multiply by one: `x * 1 m`",

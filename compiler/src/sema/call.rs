@@ -1,7 +1,7 @@
 //! Checking calls: built-in functions, type conversions, functions, structs and closures.
 
 use crate::ast::{Arg, ExprKind, ItemKind, Name};
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{self, Code, Diagnostic};
 use crate::ir::{self, Const, ExprId};
 use crate::ops::{Op, Shape};
 use crate::source::Span;
@@ -297,12 +297,16 @@ impl Body<'_, '_> {
             format!("unknown function `{}`", callee.node),
         )
         .expected("a built-in function, or one defined or imported in this file");
-        let unknown = match self.cx.importable(&callee.node) {
-            Some(import) => unknown.hint(format!("import it: `{import}`")),
-            None => match foreign_function(&callee.node) {
-                Some(own) => unknown.hint(format!("here this is `{own}`")),
-                None => unknown.did_you_mean(&callee.node, names.iter().map(String::as_str)),
-            },
+        let visible = diag::nearest(&callee.node, names.iter().map(String::as_str));
+        let unknown = match (
+            foreign_function(&callee.node),
+            visible,
+            self.cx.importable(&callee.node),
+        ) {
+            (Some(own), ..) => unknown.hint(format!("here this is `{own}`")),
+            (_, Some(best), _) => unknown.hint(format!("did you mean `{best}`?")),
+            (_, _, Some(import)) => unknown.hint(format!("import it: `{import}`")),
+            _ => unknown,
         };
         self.report(unknown)
     }

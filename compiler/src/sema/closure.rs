@@ -252,8 +252,8 @@ impl Body<'_, '_> {
                 Some(Operand::Closure(id, ty)) => all.push((id, ty, at)),
                 Some(Operand::Value(_, ty)) => {
                     let message = format!(
-                        "`{what}` combines closures, and this is a {}",
-                        self.cx.type_text(ty)
+                        "`{what}` combines closures, and this is {}",
+                        self.cx.a_type(ty)
                     );
                     let wrong = Diagnostic::new(Code::TypeMismatch, at, message)
                         .expected("a bsdf")
@@ -350,13 +350,13 @@ impl Body<'_, '_> {
         if a == b {
             return Some(());
         }
-        let (a, b) = (self.cx.type_text(a), self.cx.type_text(b));
+        let (a, b) = (self.cx.a_type(a), self.cx.a_type(b));
         let wrong = Diagnostic::new(
             Code::TypeMismatch,
             span,
-            format!("a {a} and a {b} do not combine"),
+            format!("{a} and {b} do not combine"),
         )
-        .expected(format!("a {a}"));
+        .expected(a);
         self.report(wrong)
     }
 
@@ -397,10 +397,7 @@ impl Body<'_, '_> {
             Ty::Int => self.promote(w, span),
             Ty::Float | Ty::Color => w,
             _ => {
-                let message = format!(
-                    "a closure cannot be weighted by a {}",
-                    self.cx.type_text(wt)
-                );
+                let message = format!("a closure cannot be weighted by {}", self.cx.a_type(wt));
                 return self.report(
                     Diagnostic::new(Code::TypeMismatch, span, message)
                         .expected("a float or a color"),

@@ -230,13 +230,13 @@ impl Body<'_, '_> {
             }
             None => {
                 let (ty_text, letters) = (
-                    self.cx.type_text(ty),
+                    self.cx.a_type(ty),
                     if ty == Ty::Color { "rgb" } else { "xyzw" },
                 );
                 let unknown = Diagnostic::new(
                     Code::UnknownField,
                     part.span,
-                    format!("a {ty_text} has no `.{}`", part.node),
+                    format!("{ty_text} has no `.{}`", part.node),
                 );
                 let width = ty.ir().and_then(ir::Type::width).unwrap_or(0);
                 let unknown = if width > 1 {
@@ -304,14 +304,14 @@ impl Body<'_, '_> {
         let (other, other_block) = self.arm(otherwise, span);
         let ((a, a_span), (b, b_span)) = (then?, other?);
         let Some(ty) = a.ty().unify(b.ty()) else {
-            let (a_text, b_text) = (self.cx.type_text(a.ty()), self.cx.type_text(b.ty()));
+            let (a_text, b_text) = (self.cx.a_type(a.ty()), self.cx.a_type(b.ty()));
             let differ = Diagnostic::new(
                 Code::TypeMismatch,
                 b_span,
                 format!("the branches differ: {a_text} and {b_text}"),
             )
-            .expected(format!("a {a_text}"))
-            .label(a_span, format!("this is a {a_text}"));
+            .expected(a_text.clone())
+            .label(a_span, format!("this is {a_text}"));
             return self.report(differ);
         };
         let local = self.builder.local("choice", ty.ir()?);

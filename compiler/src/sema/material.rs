@@ -123,7 +123,7 @@ impl Checker<'_> {
             let wrong = Diagnostic::new(
                 Code::Unsupported,
                 p.ty.span,
-                format!("a parameter cannot be a {}", self.type_text(ty)),
+                format!("a parameter cannot be {}", self.a_type(ty)),
             )
             .expected("a bool, number, vector, color, length, angle or texture");
             self.report(wrong);

@@ -265,6 +265,13 @@ impl<'a> Checker<'a> {
         self.report(wrong);
     }
 
+    /// A type with its article: `a float`, `an int`.
+    fn a_type(&self, ty: Ty) -> String {
+        let name = self.type_text(ty);
+        let vowel = name.starts_with(['a', 'e', 'i', 'o', 'u']);
+        format!("{} {name}", if vowel { "an" } else { "a" })
+    }
+
     /// How authors see a type.
     fn type_text(&self, ty: Ty) -> String {
         match ty {

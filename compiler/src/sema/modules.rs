@@ -9,7 +9,7 @@ use impasto_stdlib::StdFile;
 
 use super::Checker;
 use crate::ast::{self, ItemKind, Name};
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{self, Code, Diagnostic};
 use crate::parser;
 use crate::source::Span;
 
@@ -321,14 +321,17 @@ impl Checker<'_> {
         wanted.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Where the standard library defines `name`, for the hint to import it.
-    pub(super) fn importable(&mut self, name: &str) -> Option<String> {
-        let importable = folders().into_iter().find(|f| {
+    /// The `use` that brings the definition of the standard library whose name is `name`, or
+    /// near it.
+    pub(super) fn importable(&self, name: &str) -> Option<String> {
+        let files = || {
             impasto_stdlib::files()
                 .iter()
-                .any(|s| s.folder == *f && s.name == name)
-        })?;
-        Some(format!("use std::{importable}::{name};"))
+                .filter(|f| f.folder != "core")
+        };
+        let nearest = diag::nearest(name, files().map(|f| f.name))?;
+        let file = files().find(|f| f.name == nearest)?;
+        Some(format!("use std::{}::{};", file.folder, file.name))
     }
 }
 
