@@ -2,7 +2,7 @@
 //!
 //! Definitions are checked when something asks for them, callees before callers, so what a
 //! material does not reach never exists after this stage. [`Checker`] owns the modules and the
-//! IR under construction; [`body::Body`] checks one function or material.
+//! IR under construction; `body::Body` checks one function or material.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,7 +1,7 @@
 //! The GPU: finding an adapter, opening a device, and learning of its errors.
 //!
 //! wgpu reports errors through callbacks that panic by default. Here they are collected, and
-//! [`Gpu::check`] turns the first into a [`RuntimeError`].
+//! `Gpu::check` turns the first into a [`RuntimeError`].
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -153,7 +153,7 @@ fn choose_adapter(
         })
 }
 
-/// Makes the device put its first error where [`Gpu::check`] finds it.
+/// Makes the device put its first error where `Gpu::check` finds it.
 fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
     let failure = Arc::new(Mutex::new(None));
     let keep_first = |slot: &Mutex<Option<RuntimeError>>, error| {

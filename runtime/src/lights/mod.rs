@@ -1,7 +1,7 @@
 //! Every kind of light as one shader part: a table to choose a light from, and what each kind
 //! contributes to a light sample, a hit and an escaping ray.
 //!
-//! A kind is a file here, a file in `kernels/lights` and a row in [`KINDS`]. Kinds that a scene
+//! A kind is a file here, a file in `kernels/lights` and a row in `KINDS`. Kinds that a scene
 //! lacks leave no trace in its WGSL.
 
 use glam::Vec3;
