@@ -95,6 +95,7 @@ impl<'a> Checker<'a> {
             fields: Vec::new(),
             closure_params: Vec::new(),
         };
+        checker.add_std_sources();
         checker.load_core();
         checker
     }
@@ -105,7 +106,7 @@ impl<'a> Checker<'a> {
     }
 
     /// The syntax tree of a loaded file.
-    pub fn ast(&self, module: ModuleId) -> std::rc::Rc<ast::Module> {
+    pub fn ast(&self, module: ModuleId) -> std::sync::Arc<ast::Module> {
         self.modules[module.0].ast.clone()
     }
 

@@ -4,6 +4,7 @@
 //! a file of it is parsed only when a name in it is asked for.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
 
 use impasto_stdlib::StdFile;
 
@@ -11,7 +12,7 @@ use super::Checker;
 use crate::ast::{self, ItemKind, Name};
 use crate::diag::{self, Code, Diagnostic};
 use crate::parser;
-use crate::source::Span;
+use crate::source::{FileId, Span};
 
 /// A loaded file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,7 +30,7 @@ pub struct ItemRef {
 /// A loaded file and its names.
 pub struct ModuleData {
     /// Its syntax tree.
-    pub ast: std::rc::Rc<ast::Module>,
+    pub ast: Arc<ast::Module>,
     /// Path it was loaded by.
     pub path: String,
     /// Is it part of the standard library?
@@ -69,7 +70,7 @@ impl Checker<'_> {
         }
         let loaded = self
             .read(path, asked)
-            .map(|text| self.add_module(path, &text, false));
+            .map(|text| self.add_module(path, &text));
         if loaded.is_none() {
             self.loading.insert(path.to_owned(), Loading::Failed);
         }
@@ -100,13 +101,22 @@ impl Checker<'_> {
     }
 
     /// Parses a text and resolves its imports.
-    fn add_module(&mut self, path: &str, text: &str, is_std: bool) -> ModuleId {
+    fn add_module(&mut self, path: &str, text: &str) -> ModuleId {
         let file = self.sources.add(path, text);
         let (ast, diagnostics) = parser::parse(file, text);
+        self.define_module(path, Arc::new(ast), diagnostics, false)
+    }
+
+    fn define_module(
+        &mut self,
+        path: &str,
+        ast: Arc<ast::Module>,
+        diagnostics: Vec<Diagnostic>,
+        is_std: bool,
+    ) -> ModuleId {
         let id = ModuleId(self.modules.len());
         self.leave_out_broken(id, &ast, &diagnostics);
         diagnostics.into_iter().for_each(|d| self.report(d));
-        let ast = std::rc::Rc::new(ast);
         self.modules.push(ModuleData {
             ast: ast.clone(),
             path: path.to_owned(),
@@ -279,7 +289,17 @@ impl Checker<'_> {
         match self.loading.get(&path) {
             Some(Loading::Done(id) | Loading::InProgress(id)) => Some(*id),
             Some(Loading::Failed) => None,
-            None => Some(self.add_module(&path, file.text, true)),
+            None => {
+                let (ast, diagnostics) = parsed_std(file)?;
+                Some(self.define_module(&path, ast, diagnostics, true))
+            }
+        }
+    }
+
+    /// Adds the texts of the standard library, so that each has the same id in every compilation.
+    pub(super) fn add_std_sources(&mut self) {
+        for file in impasto_stdlib::files() {
+            self.sources.add(std_path(file), file.text);
         }
     }
 
@@ -333,6 +353,21 @@ impl Checker<'_> {
         let file = files().find(|f| f.name == nearest)?;
         Some(format!("use std::{}::{};", file.folder, file.name))
     }
+}
+
+/// The syntax tree of a standard library file with its errors: parsed at most once a process,
+/// since the library never changes and its files have the same ids in every compilation.
+fn parsed_std(file: &StdFile) -> Option<(Arc<ast::Module>, Vec<Diagnostic>)> {
+    type Parsed = OnceLock<(Arc<ast::Module>, Vec<Diagnostic>)>;
+    static TREES: OnceLock<Vec<Parsed>> = OnceLock::new();
+    let files = impasto_stdlib::files();
+    let trees = TREES.get_or_init(|| files.iter().map(|_| OnceLock::new()).collect());
+    let index = files.iter().position(|f| f == file)?;
+    let parse = || {
+        let (ast, diagnostics) = parser::parse(FileId(index as u32), file.text);
+        (Arc::new(ast), diagnostics)
+    };
+    Some(trees[index].get_or_init(parse).clone())
 }
 
 /// The path of a standard library file in diagnostics.
