@@ -1,0 +1,207 @@
+//! A partition of the sphere that follows a density, and integrals over its cells.
+//!
+//! Cells are rectangles in the cosine `z` and the azimuth, whose product is solid angle. They
+//! are halved until none holds many samples, so sharp lobes get fine cells and need no special
+//! treatment.
+
+use std::f64::consts::TAU;
+
+use super::statistics::direction;
+
+/// A rectangle in z and azimuth.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    z: [f64; 2],
+    phi: [f64; 2],
+}
+
+/// What is integrated: a density, and a value in three channels.
+pub type Measures = [f64; 4];
+
+/// Rows and columns of a hemisphere before samples refine it.
+const ROWS: usize = 6;
+const COLUMNS: usize = 12;
+
+/// Relative error at which the integral over a cell is good, and the absolute one.
+const RELATIVE: f64 = 3e-4;
+const ABSOLUTE: f64 = 3e-7;
+
+/// Halvings of a cell in each direction, at most.
+const DEEPEST: usize = 9;
+
+/// Nodes and weights of Gauss and Legendre's rule with four points on [0, 1].
+const NODES: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+impl Cell {
+    fn width(&self) -> f64 {
+        self.phi[1] - self.phi[0]
+    }
+
+    fn area(&self) -> f64 {
+        (self.z[1] - self.z[0]) * self.width()
+    }
+
+    /// Is it longer from the pole than around it?
+    fn is_tall(&self) -> bool {
+        let angle = |z: f64| z.clamp(-1.0, 1.0).acos();
+        let [low, high] = self.z.map(angle);
+        let around = self.width() * (0.5 * (low + high)).sin();
+        (low - high).abs() > around
+    }
+
+    fn halves(self, tall: bool, cut: f64) -> [Cell; 2] {
+        if tall {
+            [Cell { z: [self.z[0], cut], ..self }, Cell { z: [cut, self.z[1]], ..self }]
+        } else {
+            [Cell { phi: [self.phi[0], cut], ..self }, Cell { phi: [cut, self.phi[1]], ..self }]
+        }
+    }
+
+    fn quarters(self) -> [Cell; 4] {
+        let middle = |r: [f64; 2]| 0.5 * (r[0] + r[1]);
+        let [a, b] = self.halves(true, middle(self.z));
+        let [[c, d], [e, f]] = [a, b].map(|h| h.halves(false, middle(self.phi)));
+        [c, d, e, f]
+    }
+
+    fn points(&self) -> impl Iterator<Item = [f64; 3]> + use<> {
+        let (z, phi) = (self.z, self.phi);
+        NODES.into_iter().flat_map(move |(s, _)| {
+            NODES.into_iter().map(move |(t, _)| {
+                direction(z[0] + s * (z[1] - z[0]), phi[0] + t * (phi[1] - phi[0]))
+            })
+        })
+    }
+}
+
+/// Cosine and azimuth of a direction, the latter in [0, 2 pi).
+fn place(w: &[f64; 3]) -> [f64; 2] {
+    [w[2].clamp(-1.0, 1.0), w[1].atan2(w[0]).rem_euclid(TAU)]
+}
+
+/// Cells over the whole sphere, none with more than `most` of the `samples`; halves of the
+/// sphere are never in one cell.
+pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
+    let mut open: Vec<(Cell, Vec<[f64; 2]>)> = Vec::new();
+    for row in 0..2 * ROWS {
+        for column in 0..COLUMNS {
+            let z = [row, row + 1].map(|r| r as f64 / ROWS as f64 - 1.0);
+            let phi = [column, column + 1].map(|c| c as f64 / COLUMNS as f64 * TAU);
+            open.push((Cell { z, phi }, Vec::new()));
+        }
+    }
+    for [z, phi] in samples.iter().map(place) {
+        let row = (((z + 1.0) * ROWS as f64) as usize).min(2 * ROWS - 1);
+        let column = ((phi / TAU * COLUMNS as f64) as usize).min(COLUMNS - 1);
+        open[row * COLUMNS + column].1.push([z, phi]);
+    }
+    let mut done = Vec::new();
+    while let Some((cell, mut inside)) = open.pop() {
+        let tall = cell.is_tall();
+        let axis = usize::from(!tall);
+        inside.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+        let cut = inside.get(inside.len() / 2).map_or(0.0, |m| m[axis]);
+        let range = if tall { cell.z } else { cell.phi };
+        let splits = range[0] < cut && cut < range[1];
+        if inside.len() <= most || !splits {
+            done.push(cell);
+            continue;
+        }
+        let above = inside.split_off(inside.partition_point(|p| p[axis] < cut));
+        let [a, b] = cell.halves(tall, cut);
+        open.extend([(a, inside), (b, above)]);
+    }
+    done
+}
+
+/// How many of `samples` fall into each cell.
+pub fn counts(cells: &[Cell], samples: &[[f64; 3]]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    order.sort_by(|&a, &b| cells[a].z[0].total_cmp(&cells[b].z[0]));
+    let mut found = vec![0; cells.len()];
+    // A coarse index by z: cells are searched within the slab of a sample only.
+    let slab = |z: f64| (((z + 1.0) * 512.0) as usize).min(1023);
+    let mut slabs = vec![Vec::new(); 1024];
+    for &i in &order {
+        (slab(cells[i].z[0])..=slab(cells[i].z[1])).for_each(|s| slabs[s].push(i));
+    }
+    for [z, phi] in samples.iter().map(place) {
+        let inside = |c: &Cell| {
+            let in_z = c.z[0] <= z && (z < c.z[1] || (z >= 1.0 && c.z[1] >= 1.0));
+            in_z && c.phi[0] <= phi && phi < c.phi[1]
+        };
+        let cell = slabs[slab(z)].iter().find(|&&i| inside(&cells[i]));
+        found[*cell.expect("cells cover the sphere")] += 1;
+    }
+    found
+}
+
+/// Integrals over each cell. `measure` answers many directions at once.
+pub fn integrate(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<Measures> {
+    let mut totals = vec![[0.0; 4]; cells.len()];
+    let mut open: Vec<(usize, Cell, Measures)> = Vec::new();
+    let first = rule(cells, measure);
+    open.extend(cells.iter().zip(first).enumerate().map(|(i, (c, m))| (i, *c, m)));
+    for depth in 0..=DEEPEST {
+        let quarters: Vec<Cell> = open.iter().flat_map(|(_, c, _)| c.quarters()).collect();
+        let finer = rule(&quarters, measure);
+        let mut next = Vec::new();
+        for (k, (i, _, coarse)) in open.iter().enumerate() {
+            let parts = &finer[4 * k..4 * k + 4];
+            let sum: Measures = std::array::from_fn(|c| parts.iter().map(|p| p[c]).sum());
+            let good = (0..4).all(|c| (sum[c] - coarse[c]).abs() <= RELATIVE * sum[c].abs() + ABSOLUTE);
+            if good || depth == DEEPEST {
+                (0..4).for_each(|c| totals[*i][c] += sum[c]);
+            } else {
+                next.extend((0..4).map(|q| (*i, quarters[4 * k + q], parts[q])));
+            }
+        }
+        if next.is_empty() {
+            break;
+        }
+        open = next;
+    }
+    totals
+}
+
+/// The four-by-four rule over each cell.
+fn rule(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<Measures> {
+    let mut sums = Vec::with_capacity(cells.len());
+    for chunk in cells.chunks(256) {
+        let points: Vec<[f64; 3]> = chunk.iter().flat_map(Cell::points).collect();
+        let values = measure(&points);
+        for (cell, values) in chunk.iter().zip(values.chunks(16)) {
+            let weights = NODES.iter().flat_map(|(_, s)| NODES.iter().map(move |(_, t)| s * t));
+            let mut sum = [0.0; 4];
+            for (w, v) in weights.zip(values) {
+                (0..4).for_each(|c| sum[c] += w * v[c] * cell.area());
+            }
+            sums.push(sum);
+        }
+    }
+    sums
+}
+
+#[test]
+fn cells_cover_the_sphere_once_and_integrate_it() {
+    let mut n = super::statistics::Numbers::new(3);
+    let lobe: Vec<[f64; 3]> = (0..4000).map(|_| direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit())).collect();
+    let cells = partition(&lobe, 50);
+    assert!(cells.len() > 100);
+    let area: f64 = cells.iter().map(Cell::area).sum();
+    assert!((area - 2.0 * TAU).abs() < 1e-9);
+    assert_eq!(counts(&cells, &lobe).iter().sum::<usize>(), 4000);
+    // Integrals of 1, cos on the upper side, z^2, and a sharp lobe of known integral.
+    let sharp = |w: &[f64; 3]| (1e5 * (w[2] - 1.0)).exp();
+    let value = |w: &[f64; 3]| [1.0, w[2].max(0.0), w[2] * w[2], sharp(w)];
+    let sums = integrate(&cells, &|ws| ws.iter().map(value).collect());
+    let sum: Measures = std::array::from_fn(|c| sums.iter().map(|s| s[c]).sum());
+    for (found, exact) in sum.iter().zip([2.0 * TAU, 0.5 * TAU, 2.0 * TAU / 3.0, TAU * 1e-5]) {
+        assert!((found / exact - 1.0).abs() < 1e-3, "{found} instead of {exact}");
+    }
+}

@@ -1,0 +1,191 @@
+//! Walks the BSDFs of the library and makes test cases of them: each BSDF with each of the
+//! parameter values that its documentation asks to try.
+//!
+//! Lines of a BSDF's doc comment that tests read:
+//! `Try: name = value | value` (any Impasto constants; the default is tried anyway),
+//! `Albedo: within 0.02.` or `Albedo: exact.`, and `Radiance:`, which says that what passes is
+//! scaled by the squared ratio of the indices, given by the parameter `ior`.
+
+use impasto_compiler::ast::{ClosureKind, ItemKind};
+use impasto_compiler::ir::{Closure, Const, FunctionId, Methods, Module};
+use impasto_compiler::source::FileId;
+use impasto_compiler::{MemoryLoader, check, diag, parser, passes};
+
+/// Cases of one BSDF beyond which parameters vary one at a time.
+const MOST_CASES: usize = 30;
+
+/// A BSDF of the library.
+pub struct Bsdf {
+    pub name: String,
+    pub delta: bool,
+    /// How far `albedo` may be from the integral of `eval`.
+    pub albedo_within: f64,
+    /// Is transmitted radiance scaled by the indices?
+    pub scales_radiance: bool,
+    pub module: Module,
+    pub sample: FunctionId,
+    pub eval: FunctionId,
+    pub pdf: FunctionId,
+    pub albedo: FunctionId,
+    pub cases: Vec<Case>,
+}
+
+/// A BSDF's parameters.
+pub struct Case {
+    /// As written in a call.
+    pub label: String,
+    pub args: Vec<Const>,
+    /// Index inside over the index outside, where it matters.
+    pub ior: f64,
+}
+
+/// A parameter and the values to try, as source text; none is the default.
+struct Tried {
+    name: String,
+    values: Vec<Option<String>>,
+}
+
+/// Every BSDF of `std::bsdf`, with its cases.
+pub fn bsdfs() -> Vec<Bsdf> {
+    let files: Vec<_> = impasto_stdlib::folder("bsdf").collect();
+    assert!(files.len() >= 8, "only {} files in bsdf/", files.len());
+    files.into_iter().map(|file| bsdf(file.name, file.text)).collect()
+}
+
+/// The BSDF that a file of the library defines under its own name.
+fn bsdf(name: &str, text: &str) -> Bsdf {
+    let (ast, _) = parser::parse(FileId(0), text);
+    let item = ast.items.iter().find(|i| i.name.node == name);
+    let item = item.unwrap_or_else(|| panic!("bsdf/{name} does not define `{name}`"));
+    let ItemKind::Closure(def) = &item.kind else { panic!("`{name}` is no bsdf") };
+    let mut tried: Vec<Tried> = def.params.iter().map(|p| untold(&p.name.node, &p.ty.node)).collect();
+    for line in item.docs.iter().filter_map(|l| l.trim().strip_prefix("Try:")) {
+        let (param, values) = line.split_once('=').expect("`Try: name = value | ...`");
+        let known = tried.iter_mut().find(|t| t.name == param.trim());
+        let known = known.unwrap_or_else(|| panic!("{name} has no parameter `{}`", param.trim()));
+        let values = values.split('|').map(|v| Some(v.trim().to_owned()));
+        known.values = std::iter::once(None).chain(values).collect();
+    }
+    let calls = combinations(&tried);
+    let docs = item.docs.join(" ");
+    build(name, def.kind == ClosureKind::DeltaBsdf, &docs, &calls)
+}
+
+/// What to try of a parameter that the documentation does not mention.
+fn untold(name: &str, ty: &str) -> Tried {
+    let values: &[&str] = match ty {
+        "color" => &["1.0"],
+        "float" => &["0.0", "1.0"],
+        _ => &[],
+    };
+    let values = values.iter().map(|v| Some((*v).to_owned()));
+    Tried { name: name.to_owned(), values: std::iter::once(None).chain(values).collect() }
+}
+
+/// Argument lists: all combinations, or when they are many, one parameter at a time and a
+/// diagonal through all.
+fn combinations(tried: &[Tried]) -> Vec<String> {
+    let sizes: Vec<usize> = tried.iter().map(|t| t.values.len()).collect();
+    let all: usize = sizes.iter().product();
+    let digits = |mut k: usize| -> Vec<usize> {
+        let digit = |&n: &usize| {
+            let d = k % n;
+            k /= n;
+            d
+        };
+        sizes.iter().map(digit).collect()
+    };
+    let mut chosen: Vec<Vec<usize>> = if all <= MOST_CASES {
+        (0..all).map(digits).collect()
+    } else {
+        let single = (0..sizes.len()).flat_map(|p| {
+            (0..sizes[p]).map(move |v| (0..).take(p).map(|_| 0).chain([v]).collect::<Vec<_>>())
+        });
+        // A step that has no factor in common with the sizes goes through all digits.
+        let diagonal = (0..MOST_CASES / 2).map(|i| digits((i * 7919 + 1) % all));
+        single.map(|mut c| { c.resize(sizes.len(), 0); c }).chain(diagonal).collect()
+    };
+    chosen.sort();
+    chosen.dedup();
+    chosen.iter().map(|c| arguments(tried, c)).collect()
+}
+
+fn arguments(tried: &[Tried], chosen: &[usize]) -> String {
+    let given = tried.iter().zip(chosen).filter_map(|(t, &v)| {
+        t.values[v].as_ref().map(|value| format!("{}: {value}", t.name))
+    });
+    given.collect::<Vec<_>>().join(", ")
+}
+
+/// Has the compiler evaluate the argument lists, each in a material of its own.
+fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
+    let materials = calls.iter().enumerate().map(|(i, call)| {
+        format!("material case_{i} {{ surface = {name}({call}); }}\n")
+    });
+    let text = format!("use std::bsdf::{name};\n{}", materials.collect::<String>());
+    let mut files = MemoryLoader::default();
+    files.add("cases.impasto", text);
+    let checked = check("cases.impasto", &mut files);
+    let problems = diag::render::text(&checked.sources, &checked.diagnostics, false);
+    assert!(!diag::has_errors(&checked.diagnostics), "{name}:\n{problems}");
+
+    let module = checked.ir;
+    let def = module.closures.iter().find(|c| c.name == name).expect("the bsdf itself");
+    let Methods::Bsdf { sample, eval, pdf, albedo } = def.methods else {
+        panic!("`{name}` is no bsdf")
+    };
+    let ior = def.params.iter().position(|p| p.name == "ior");
+    let cases = checked.checked.into_iter().zip(calls).map(|(mut material, call)| {
+        passes::fold_body(&module, &mut material.body);
+        let surface = material.surface.expect("a surface");
+        let Closure::Lobe(lobe) = &material.closures[surface.index()] else {
+            panic!("one lobe")
+        };
+        let constant = |&a: &_| material.body.constant(a).cloned().expect("a constant argument");
+        let args: Vec<Const> = lobe.args.iter().map(constant).collect();
+        let ior = match ior.map(|i| &args[i]) {
+            Some(Const::Float(v)) if v.len() == 1 => v[0],
+            _ => 1.0,
+        };
+        Case { label: format!("{name}({call})"), args, ior }
+    });
+    let cases = cases.collect();
+    Bsdf {
+        name: name.to_owned(),
+        delta,
+        albedo_within: promised_albedo(name, docs),
+        scales_radiance: docs.contains("Radiance:"),
+        sample,
+        eval,
+        pdf,
+        albedo,
+        cases,
+        module,
+    }
+}
+
+/// How exact the documentation says `albedo` is.
+fn promised_albedo(name: &str, docs: &str) -> f64 {
+    let promise = docs.split_once("Albedo:").map_or("", |(_, rest)| rest.trim_start());
+    if promise.starts_with("exact") {
+        return 0.0;
+    }
+    let number = promise.strip_prefix("within ").map(|rest| {
+        rest.split(|c: char| !(c.is_ascii_digit() || c == '.')).next().unwrap_or("").trim_end_matches('.')
+    });
+    number.and_then(|n| n.parse().ok()).unwrap_or_else(|| {
+        panic!("{name}: its documentation must say `Albedo: exact.` or `Albedo: within X.`")
+    })
+}
+
+impl Bsdf {
+    /// What the power that goes from `wi` to `wo` is over the radiance: undoes the scaling of
+    /// what passes.
+    pub fn power_over_radiance(&self, case: &Case, wo_z: f64, wi_z: f64) -> f64 {
+        match self.scales_radiance && wo_z * wi_z < 0.0 {
+            true if wo_z > 0.0 => case.ior * case.ior,
+            true => 1.0 / (case.ior * case.ior),
+            false => 1.0,
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! Holds every continuous BSDF to being a distribution: `sample` draws what `pdf` says, nothing
+//! that `eval` reflects is left out, no light is made, and `albedo` is the integral.
+
+use super::cells::{self, Measures};
+use super::lanes::{self, Lanes};
+use super::library::{Bsdf, Case};
+use super::statistics::{Numbers, chi_squared_tail, direction, sidak};
+
+/// Directions drawn for each case and view; a quarter decides on the cells.
+const SAMPLES: usize = 1 << 16;
+
+/// Significance of all chi-squared tests of a BSDF together.
+const SIGNIFICANCE: f64 = 0.01;
+
+/// Angles of `wo` to the normal in degrees; above 90 is inside.
+pub const VIEWS: [f64; 7] = [0.0, 30.0, 60.0, 80.0, 89.0, 130.0, 175.0];
+
+/// Lanes evaluated together.
+const BATCH: usize = 4096;
+
+/// The unit direction at `degrees` from the normal.
+pub fn view(degrees: f64) -> [f64; 3] {
+    direction(degrees.to_radians().cos(), 0.7)
+}
+
+/// A distribution of directions seen from one side: a BSDF with its parameters and `wo`.
+pub struct Distribution<'a> {
+    /// What it is, for messages.
+    pub label: String,
+    /// Directions from uniform numbers; zero where it fails.
+    pub sample: Box<dyn Fn(&[[f64; 4]]) -> Vec<[f64; 3]> + 'a>,
+    /// Density and value toward directions.
+    pub measure: Box<dyn Fn(&[[f64; 3]]) -> Vec<Measures> + 'a>,
+    /// Directions with a density, of those that `sample` gives. Others are discrete.
+    pub pass_rate: f64,
+}
+
+/// What sampling and integrating a distribution gave.
+pub struct Outcome {
+    /// Chi-squared probability of deviations as large as those found.
+    pub fit: f64,
+    /// Integral of the density.
+    pub total: f64,
+    /// Integral of the value, by quadrature and by sampling with its standard error.
+    pub energy: [f64; 3],
+    pub sampled_energy: [f64; 3],
+    pub error: [f64; 3],
+    /// The greatest value over density.
+    pub greatest_weight: f64,
+}
+
+/// A BSDF seen from `wo`.
+pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distribution<'a> {
+    let first = move || -> Vec<Lanes> {
+        let args = case.args.iter().map(lanes::constant);
+        args.chain([lanes::uniform(&wo)]).collect()
+    };
+    let sample = move |u: &[[f64; 4]]| {
+        let mut args = first();
+        args.push((0..3).map(|c| lanes::floats(u.iter().map(|u| u[c]).collect())).collect());
+        let wi = lanes::call(&bsdf.module, bsdf.sample, args);
+        (0..u.len()).map(|l| std::array::from_fn(|c| lanes::float_at(&wi, c, l))).collect()
+    };
+    let measure = move |wi: &[[f64; 3]]| {
+        let mut args = first();
+        args.push((0..3).map(|c| lanes::floats(wi.iter().map(|w| w[c]).collect())).collect());
+        let pdf = lanes::call(&bsdf.module, bsdf.pdf, args.clone());
+        let value = lanes::call(&bsdf.module, bsdf.eval, args);
+        let answer = |(l, wi): (usize, &[f64; 3])| {
+            let power = bsdf.power_over_radiance(case, wo[2], wi[2]);
+            let v = |c: usize| power * lanes::float_at(&value, c, l);
+            [lanes::float_at(&pdf, 0, l), v(0), v(1), v(2)]
+        };
+        wi.iter().enumerate().map(answer).collect()
+    };
+    Distribution {
+        label: format!("{} from {:.0} degrees", case.label, wo[2].acos().to_degrees()),
+        sample: Box::new(sample),
+        measure: Box::new(measure),
+        pass_rate: 1.0,
+    }
+}
+
+/// Samples and integrates. Panics on answers that no distribution gives.
+pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
+    let mut n = Numbers::new(seed);
+    let mut drawn: Vec<[f64; 3]> = Vec::with_capacity(samples);
+    let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+    let mut greatest_weight: f64 = 0.0;
+    for _ in 0..samples.div_ceil(BATCH) {
+        let u: Vec<[f64; 4]> = (0..BATCH).map(|_| std::array::from_fn(|_| n.unit())).collect();
+        let wi: Vec<[f64; 3]> = (d.sample)(&u).into_iter().filter(|w| *w != [0.0; 3]).collect();
+        for (w, m) in wi.iter().zip((d.measure)(&wi)) {
+            let length = w.iter().map(|x| x * x).sum::<f64>().sqrt();
+            assert!((length - 1.0).abs() < 1e-6, "{}: sampled {w:?}, not unit", d.label);
+            assert!(m.iter().all(|x| x.is_finite() && *x >= 0.0), "{}: {m:?} at {w:?}", d.label);
+            assert!(m[0] > 0.0, "{}: density 0 at the sampled {w:?}", d.label);
+            for c in 0..3 {
+                let weight = m[c + 1] / m[0];
+                greatest_weight = greatest_weight.max(weight);
+                sum[c] += weight;
+                squares[c] += weight * weight;
+            }
+        }
+        drawn.extend(wi);
+    }
+    let all = (samples.div_ceil(BATCH) * BATCH) as f64;
+    let sampled_energy = sum.map(|s| s / all);
+    let deviation = |c: usize| ((squares[c] / all - sampled_energy[c].powi(2)).max(0.0) / all).sqrt();
+
+    let (pilot, tested) = drawn.split_at(drawn.len() / 4);
+    let cells = cells::partition(pilot, (pilot.len() / 128).max(16));
+    let integrals = cells::integrate(&cells, &*d.measure);
+    let total: f64 = integrals.iter().map(|m| m[0]).sum();
+    let found = cells::counts(&cells, tested);
+    // Failed samples are one more cell.
+    let failed = 0.75 * all - tested.len() as f64;
+    let expected = integrals.iter().map(|m| m[0]).chain([(1.0 - total).max(0.0)]);
+    let found = found.iter().map(|&n| n as f64).chain([failed.max(0.0)]);
+    let pairs: Vec<(f64, f64)> = expected.map(|p| p * 0.75 * all).zip(found).collect();
+    Outcome {
+        fit: chi_squared(&pairs),
+        total,
+        energy: std::array::from_fn(|c| integrals.iter().map(|m| m[c + 1]).sum()),
+        sampled_energy,
+        error: std::array::from_fn(deviation),
+        greatest_weight,
+    }
+}
+
+/// The probability of deviations as large as between expected and found counts. Cells in which
+/// few are expected are taken together.
+fn chi_squared(pairs: &[(f64, f64)]) -> f64 {
+    let (mut statistic, mut cells) = (0.0, 0.0);
+    let mut rare = (0.0, 0.0);
+    let mut add = |(expected, found): (f64, f64)| {
+        statistic += (found - expected).powi(2) / expected;
+        cells += 1.0;
+    };
+    for &(expected, found) in pairs {
+        if expected >= 10.0 {
+            add((expected, found));
+        } else {
+            rare = (rare.0 + expected, rare.1 + found);
+        }
+    }
+    if rare.0 >= 5.0 {
+        add(rare);
+    } else if rare.1 > 30.0 {
+        // Found where next to nothing is expected.
+        return 0.0;
+    }
+    if cells < 2.0 { 1.0 } else { chi_squared_tail(statistic, cells - 1.0) }
+}
+
+/// Fails if the outcome is not that of a distribution that keeps energy. `tests` is how many
+/// share the significance level.
+pub fn judge(d: &Distribution<'_>, o: &Outcome, tests: usize) {
+    let label = &d.label;
+    assert!(o.total < 1.0 + 2e-3, "{label}: the density integrates to {}", o.total);
+    assert!(o.fit > sidak(SIGNIFICANCE, tests), "{label}: samples do not follow the density, p = {:e}", o.fit);
+    for c in 0..3 {
+        let (exact, sampled) = (o.energy[c], o.sampled_energy[c]);
+        assert!(exact < 1.0 + 1e-3, "{label}: reflects {exact}");
+        let most = 5.0 * o.error[c] + 2e-3 * exact + 1e-5;
+        assert!((exact - sampled).abs() < most, "{label}: {exact} by integration, {sampled} by sampling");
+    }
+}
+
+#[test]
+fn samples_follow_the_density_and_keep_energy() {
+    let all = super::library::bsdfs();
+    let continuous: Vec<&Bsdf> = all.iter().filter(|b| !b.delta).collect();
+    let work: Vec<(&Bsdf, &Case, f64)> = continuous
+        .iter()
+        .flat_map(|b| b.cases.iter().flat_map(|c| VIEWS.map(|v| (*b, c, v))))
+        .collect();
+    let tests = work.len();
+    super::parallel(&work, |i, (bsdf, case, degrees)| {
+        let wo = view(*degrees);
+        let d = distribution(bsdf, case, wo);
+        let outcome = examine(&d, SAMPLES, i as u64);
+        judge(&d, &outcome, tests);
+        // Rough lobes are sampled where they are bright: no weight is far above the albedo.
+        assert!(outcome.greatest_weight < 4.0, "{}: weight {}", d.label, outcome.greatest_weight);
+        check_albedo(bsdf, case, wo, &outcome);
+    });
+}
+
+/// `albedo` is the integral, within what its documentation promises.
+fn check_albedo(bsdf: &Bsdf, case: &Case, wo: [f64; 3], outcome: &Outcome) {
+    let mut args: Vec<Lanes> = case.args.iter().map(lanes::constant).collect();
+    args.push(lanes::uniform(&wo));
+    let albedo = lanes::call(&bsdf.module, bsdf.albedo, args);
+    for c in 0..3 {
+        let said = lanes::float_at(&albedo, c, 0);
+        assert!((0.0..=1.0).contains(&said), "{}: albedo {said}", case.label);
+        let off = (said - outcome.energy[c]).abs();
+        assert!(
+            off < bsdf.albedo_within + 1e-3,
+            "{} from {wo:?}: albedo says {said}, the integral is {}", case.label, outcome.energy[c]
+        );
+    }
+}
+
+#[test]
+fn the_test_sees_wrong_densities() {
+    // A cosine lobe whose density is wrong by 3 %, lacks its cosine, or whose sample is uniform.
+    let cosine = |u: &[[f64; 4]]| u.iter().map(|u| direction((1.0 - u[0]).sqrt(), 6.283_185 * u[1])).collect();
+    let uniform = |u: &[[f64; 4]]| u.iter().map(|u| direction(1.0 - u[0], 6.283_185 * u[1])).collect();
+    let density = |scale: f64, power: i32| {
+        move |w: &[[f64; 3]]| -> Vec<Measures> {
+            let at = |w: &[f64; 3]| if w[2] > 0.0 { scale * w[2].powi(power) / 6.283_185_307 } else { 0.0 };
+            w.iter().map(|w| [at(w), at(w), at(w), at(w)]).collect()
+        }
+    };
+    let fit = |sample: &dyn Fn(&[[f64; 4]]) -> Vec<[f64; 3]>, scale, power| {
+        let d = Distribution {
+            label: String::new(),
+            sample: Box::new(sample),
+            measure: Box::new(density(scale, power)),
+            pass_rate: 1.0,
+        };
+        examine(&d, SAMPLES, 1).fit
+    };
+    assert!(fit(&cosine, 2.0, 1) > 1e-4);
+    assert!(fit(&cosine, 1.94, 1) < 1e-6);
+    assert!(fit(&cosine, 1.0, 0) < 1e-6);
+    assert!(fit(&uniform, 2.0, 1) < 1e-6);
+}
