@@ -26,6 +26,9 @@ const COLUMNS: usize = 12;
 const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
+/// Samples below which a cell is left as it is.
+const FEW: usize = 8;
+
 /// Halvings of a cell in each direction, at most.
 const DEEPEST: usize = 9;
 
@@ -105,18 +108,31 @@ pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
         let tall = cell.is_tall();
         let axis = usize::from(!tall);
         inside.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let cut = inside.get(inside.len() / 2).map_or(0.0, |m| m[axis]);
         let range = if tall { cell.z } else { cell.phi };
-        let splits = range[0] < cut && cut < range[1];
-        if inside.len() <= most || !splits {
+        let cut = match inside.len() {
+            few if few < FEW => None,
+            n if n > most => Some(inside[n / 2][axis]),
+            n => edge(range, inside[0][axis], inside[n - 1][axis]),
+        };
+        let Some(cut) = cut.filter(|c| range[0] < *c && *c < range[1]) else {
             done.push(cell);
             continue;
-        }
+        };
         let above = inside.split_off(inside.partition_point(|p| p[axis] < cut));
         let [a, b] = cell.halves(tall, cut);
         open.extend([(a, inside), (b, above)]);
     }
     done
+}
+
+/// Where to cut off a part without samples, if it is much longer than the part with samples: a
+/// lobe's flank must not hide in the corner of a large cell.
+fn edge(range: [f64; 2], first: f64, last: f64) -> Option<f64> {
+    let margin = last - first;
+    [(first - margin, first - range[0]), (last + margin, range[1] - last)]
+        .into_iter()
+        .find(|(_, empty)| *empty > 4.0 * margin)
+        .map(|(cut, _)| cut)
 }
 
 /// How many of `samples` fall into each cell.

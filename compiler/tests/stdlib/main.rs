@@ -8,25 +8,28 @@ mod library;
 mod sampling;
 mod statistics;
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use impasto_compiler::{MemoryLoader, check, diag};
 
-/// Does `job` for each item, on all cores. A panic of one is a panic of the test.
-fn parallel<T: Sync>(items: &[T], job: impl Fn(usize, &T) + Sync) {
+/// Does `job` for each item, on all cores, and fails with all faults that it found. The job gives
+/// the item's label and what is wrong with it.
+fn each_in_parallel<T: Sync>(items: &[T], job: impl Fn(usize, &T) -> (String, Vec<String>) + Sync) {
     let next = AtomicUsize::new(0);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(item) = items.get(i) else { break };
-                    job(i, item);
-                }
-            });
+    let faults = Mutex::new(Vec::new());
+    let work = || {
+        while let Some((i, item)) = Some(next.fetch_add(1, Relaxed)).and_then(|i| Some((i, items.get(i)?))) {
+            let (label, found) = job(i, item);
+            let lines = found.iter().map(|f| format!("{label}: {f}"));
+            faults.lock().expect("no panic while it is held").extend(lines);
         }
-    });
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+    let mut faults = faults.into_inner().expect("no panic while it was held");
+    faults.sort();
+    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
 }
 
 /// Checks a text as a file of its own and returns the rendered diagnostics.
