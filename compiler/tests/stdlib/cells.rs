@@ -27,10 +27,13 @@ const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
 /// Samples below which a cell is left as it is.
-const FEW: usize = 8;
+const FEW: usize = 4;
+
+/// Least width of a cell, well above the rounding of cosines near 1.
+const NARROWEST: f64 = 1e-12;
 
 /// Halvings of a cell in each direction, at most.
-const DEEPEST: usize = 9;
+const DEEPEST: usize = 14;
 
 /// Nodes and weights of Gauss and Legendre's rule with four points on [0, 1].
 const NODES: [(f64, f64); 4] = [
@@ -105,34 +108,49 @@ pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
     }
     let mut done = Vec::new();
     while let Some((cell, mut inside)) = open.pop() {
-        let tall = cell.is_tall();
-        let axis = usize::from(!tall);
-        inside.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let range = if tall { cell.z } else { cell.phi };
-        let cut = match inside.len() {
-            few if few < FEW => None,
-            n if n > most => Some(inside[n / 2][axis]),
-            n => edge(range, inside[0][axis], inside[n - 1][axis]),
-        };
-        let Some(cut) = cut.filter(|c| range[0] < *c && *c < range[1]) else {
+        let Some((tall, cut)) = cut(&cell, &mut inside, most) else {
             done.push(cell);
             continue;
         };
-        let above = inside.split_off(inside.partition_point(|p| p[axis] < cut));
+        let axis = usize::from(!tall);
+        let (below, above) = inside.iter().partition(|p| p[axis] < cut);
         let [a, b] = cell.halves(tall, cut);
-        open.extend([(a, inside), (b, above)]);
+        open.extend([(a, below), (b, above)]);
     }
     done
 }
 
-/// Where to cut off a part without samples, if it is much longer than the part with samples: a
-/// lobe's flank must not hide in the corner of a large cell.
-fn edge(range: [f64; 2], first: f64, last: f64) -> Option<f64> {
-    let margin = last - first;
-    [(first - margin, first - range[0]), (last + margin, range[1] - last)]
-        .into_iter()
-        .find(|(_, empty)| *empty > 4.0 * margin)
-        .map(|(cut, _)| cut)
+/// Along which side to cut a cell, and where; nothing for a cell that is fine.
+fn cut(cell: &Cell, inside: &mut [[f64; 2]], most: usize) -> Option<(bool, f64)> {
+    let tall = cell.is_tall();
+    for tall in [tall, !tall] {
+        let axis = usize::from(!tall);
+        let range = if tall { cell.z } else { cell.phi };
+        inside.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+        let cut = match &*inside {
+            few if few.len() < FEW => None,
+            many if many.len() > most => Some(many[many.len() / 2][axis]),
+            [first, .., last] => flank(range, first[axis], last[axis]),
+            _ => None,
+        };
+        let fits = |c: &f64| range[0] + NARROWEST < *c && *c < range[1] - NARROWEST;
+        if let Some(cut) = cut.filter(fits) {
+            return Some((tall, cut));
+        }
+    }
+    None
+}
+
+/// Where to cut a cell whose samples keep to a small part of it: half of what is empty goes. Cells
+/// become the finer the nearer to the samples, so no flank of a lobe hides in a corner.
+fn flank(range: [f64; 2], first: f64, last: f64) -> Option<f64> {
+    let margin = 2.0 * (last - first);
+    let (below, above) = (first - range[0], range[1] - last);
+    if below > margin {
+        Some(first - 0.5 * below)
+    } else {
+        (above > margin).then_some(last + 0.5 * above)
+    }
 }
 
 /// How many of `samples` fall into each cell.

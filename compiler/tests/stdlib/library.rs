@@ -3,8 +3,9 @@
 //!
 //! Lines of a BSDF's doc comment that tests read:
 //! `Try: name = value | value` (any Impasto constants; the default is tried anyway),
-//! `Albedo: within 0.02.` or `Albedo: exact.`, and `Radiance:`, which says that what passes is
-//! scaled by the squared ratio of the indices, given by the parameter `ior`.
+//! `Albedo: within 0.02.` or `Albedo: exact.`, `Precision: within 0.01.` (relative error in single
+//! precision, where it is large), `Not reciprocal`, and `Radiance:`, which says that what passes
+//! is scaled by the squared ratio of the indices, given by the parameter `ior`.
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
 use impasto_compiler::ir::{Closure, Const, FunctionId, Methods, Module};
@@ -20,6 +21,10 @@ pub struct Bsdf {
     pub delta: bool,
     /// How far `albedo` may be from the integral of `eval`.
     pub albedo_within: f64,
+    /// How far single precision may be off, where the documentation says so.
+    pub precision_within: Option<f64>,
+    /// Is it the same with the directions exchanged?
+    pub reciprocal: bool,
     /// Is transmitted radiance scaled by the indices?
     pub scales_radiance: bool,
     pub module: Module,
@@ -47,13 +52,18 @@ struct Tried {
 
 /// Every BSDF of `std::bsdf`, with its cases.
 pub fn bsdfs() -> Vec<Bsdf> {
+    bsdfs_with(&[])
+}
+
+/// Every BSDF of `std::bsdf`; its float parameters also try `values`.
+pub fn bsdfs_with(values: &[&str]) -> Vec<Bsdf> {
     let files: Vec<_> = impasto_stdlib::folder("bsdf").collect();
     assert!(files.len() >= 8, "only {} files in bsdf/", files.len());
-    files.into_iter().map(|file| bsdf(file.name, file.text)).collect()
+    files.into_iter().map(|file| bsdf(file.name, file.text, values)).collect()
 }
 
 /// The BSDF that a file of the library defines under its own name.
-fn bsdf(name: &str, text: &str) -> Bsdf {
+fn bsdf(name: &str, text: &str, extremes: &[&str]) -> Bsdf {
     let (ast, _) = parser::parse(FileId(0), text);
     let item = ast.items.iter().find(|i| i.name.node == name);
     let item = item.unwrap_or_else(|| panic!("bsdf/{name} does not define `{name}`"));
@@ -65,6 +75,9 @@ fn bsdf(name: &str, text: &str) -> Bsdf {
         let known = known.unwrap_or_else(|| panic!("{name} has no parameter `{}`", param.trim()));
         let values = values.split('|').map(|v| Some(v.trim().to_owned()));
         known.values = std::iter::once(None).chain(values).collect();
+    }
+    for (t, _) in tried.iter_mut().zip(&def.params).filter(|(_, p)| p.ty.node == "float") {
+        t.values.extend(extremes.iter().map(|v| Some((*v).to_owned())));
     }
     let calls = combinations(&tried);
     let docs = item.docs.join(" ");
@@ -142,7 +155,7 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
             panic!("one lobe")
         };
         let constant = |&a: &_| material.body.constant(a).cloned().expect("a constant argument");
-        let args: Vec<Const> = lobe.args.iter().map(constant).collect();
+        let args: Vec<Const> = lobe.args.iter().map(constant).map(rounded).collect();
         let ior = match ior.map(|i| &args[i]) {
             Some(Const::Float(v)) if v.len() == 1 => v[0],
             _ => 1.0,
@@ -153,7 +166,11 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
     Bsdf {
         name: name.to_owned(),
         delta,
-        albedo_within: promised_albedo(name, docs),
+        albedo_within: promise(docs, "Albedo:").unwrap_or_else(|| {
+            panic!("{name}: its documentation must say `Albedo: exact.` or `Albedo: within X.`")
+        }),
+        precision_within: promise(docs, "Precision:"),
+        reciprocal: !docs.contains("Not reciprocal"),
         scales_radiance: docs.contains("Radiance:"),
         sample,
         eval,
@@ -164,18 +181,22 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
     }
 }
 
-/// How exact the documentation says `albedo` is.
-fn promised_albedo(name: &str, docs: &str) -> f64 {
-    let promise = docs.split_once("Albedo:").map_or("", |(_, rest)| rest.trim_start());
-    if promise.starts_with("exact") {
-        return 0.0;
+/// A constant as a kernel has it, in single precision.
+fn rounded(c: Const) -> Const {
+    match c {
+        Const::Float(v) => Const::Float(v.into_iter().map(|x| f64::from(x as f32)).collect()),
+        other => other,
     }
-    let number = promise.strip_prefix("within ").map(|rest| {
-        rest.split(|c: char| !(c.is_ascii_digit() || c == '.')).next().unwrap_or("").trim_end_matches('.')
-    });
-    number.and_then(|n| n.parse().ok()).unwrap_or_else(|| {
-        panic!("{name}: its documentation must say `Albedo: exact.` or `Albedo: within X.`")
-    })
+}
+
+/// How exact the documentation says that something is: `exact` or `within X`.
+fn promise(docs: &str, topic: &str) -> Option<f64> {
+    let rest = docs.split_once(topic)?.1.trim_start();
+    if rest.starts_with("exact") {
+        return Some(0.0);
+    }
+    let number = rest.strip_prefix("within ")?.split(' ').next()?;
+    number.trim_end_matches([',', '.', ';']).parse().ok()
 }
 
 impl Bsdf {

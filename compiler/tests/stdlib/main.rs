@@ -3,10 +3,14 @@
 //! the library's folders, so a new file is tested without being named here.
 
 mod cells;
+mod core;
+mod delta;
 mod lanes;
 mod library;
+mod precision;
 mod sampling;
 mod statistics;
+mod symmetry;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

@@ -27,6 +27,11 @@ impl Numbers {
         low + (high - low) * self.unit()
     }
 
+    /// Four numbers in [0, 1), what a kernel gets.
+    pub fn four(&mut self) -> [f64; 4] {
+        std::array::from_fn(|_| self.unit())
+    }
+
     /// A direction, uniform over the sphere.
     pub fn direction(&mut self) -> [f64; 3] {
         direction(self.between(-1.0, 1.0), self.between(0.0, std::f64::consts::TAU))
