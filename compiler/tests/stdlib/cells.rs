@@ -62,9 +62,27 @@ impl Cell {
 
     fn halves(self, tall: bool, cut: f64) -> [Cell; 2] {
         if tall {
-            [Cell { z: [self.z[0], cut], ..self }, Cell { z: [cut, self.z[1]], ..self }]
+            [
+                Cell {
+                    z: [self.z[0], cut],
+                    ..self
+                },
+                Cell {
+                    z: [cut, self.z[1]],
+                    ..self
+                },
+            ]
         } else {
-            [Cell { phi: [self.phi[0], cut], ..self }, Cell { phi: [cut, self.phi[1]], ..self }]
+            [
+                Cell {
+                    phi: [self.phi[0], cut],
+                    ..self
+                },
+                Cell {
+                    phi: [cut, self.phi[1]],
+                    ..self
+                },
+            ]
         }
     }
 
@@ -180,7 +198,13 @@ pub fn integrate(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>)
     let mut totals = vec![[0.0; 4]; cells.len()];
     let mut open: Vec<(usize, Cell, Measures)> = Vec::new();
     let first = rule(cells, measure);
-    open.extend(cells.iter().zip(first).enumerate().map(|(i, (c, m))| (i, *c, m)));
+    open.extend(
+        cells
+            .iter()
+            .zip(first)
+            .enumerate()
+            .map(|(i, (c, m))| (i, *c, m)),
+    );
     for depth in 0..=DEEPEST {
         let quarters: Vec<Cell> = open.iter().flat_map(|(_, c, _)| c.quarters()).collect();
         let finer = rule(&quarters, measure);
@@ -188,7 +212,8 @@ pub fn integrate(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>)
         for (k, (i, _, coarse)) in open.iter().enumerate() {
             let parts = &finer[4 * k..4 * k + 4];
             let sum: Measures = std::array::from_fn(|c| parts.iter().map(|p| p[c]).sum());
-            let good = (0..4).all(|c| (sum[c] - coarse[c]).abs() <= RELATIVE * sum[c].abs() + ABSOLUTE);
+            let good =
+                (0..4).all(|c| (sum[c] - coarse[c]).abs() <= RELATIVE * sum[c].abs() + ABSOLUTE);
             if good || depth == DEEPEST {
                 (0..4).for_each(|c| totals[*i][c] += sum[c]);
             } else {
@@ -210,7 +235,9 @@ fn rule(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<M
         let points: Vec<[f64; 3]> = chunk.iter().flat_map(Cell::points).collect();
         let values = measure(&points);
         for (cell, values) in chunk.iter().zip(values.chunks(16)) {
-            let weights = NODES.iter().flat_map(|(_, s)| NODES.iter().map(move |(_, t)| s * t));
+            let weights = NODES
+                .iter()
+                .flat_map(|(_, s)| NODES.iter().map(move |(_, t)| s * t));
             let mut sum = [0.0; 4];
             for (w, v) in weights.zip(values) {
                 (0..4).for_each(|c| sum[c] += w * v[c] * cell.area());
@@ -224,7 +251,9 @@ fn rule(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<M
 #[test]
 fn cells_cover_the_sphere_once_and_integrate_it() {
     let mut n = super::statistics::Numbers::new(3);
-    let lobe: Vec<[f64; 3]> = (0..4000).map(|_| direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit())).collect();
+    let lobe: Vec<[f64; 3]> = (0..4000)
+        .map(|_| direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit()))
+        .collect();
     let cells = partition(&lobe, 50);
     assert!(cells.len() > 100);
     let area: f64 = cells.iter().map(Cell::area).sum();
@@ -235,7 +264,13 @@ fn cells_cover_the_sphere_once_and_integrate_it() {
     let value = |w: &[f64; 3]| [1.0, w[2].max(0.0), w[2] * w[2], sharp(w)];
     let sums = integrate(&cells, &|ws| ws.iter().map(value).collect());
     let sum: Measures = std::array::from_fn(|c| sums.iter().map(|s| s[c]).sum());
-    for (found, exact) in sum.iter().zip([2.0 * TAU, 0.5 * TAU, 2.0 * TAU / 3.0, TAU * 1e-5]) {
-        assert!((found / exact - 1.0).abs() < 1e-3, "{found} instead of {exact}");
+    for (found, exact) in sum
+        .iter()
+        .zip([2.0 * TAU, 0.5 * TAU, 2.0 * TAU / 3.0, TAU * 1e-5])
+    {
+        assert!(
+            (found / exact - 1.0).abs() < 1e-3,
+            "{found} instead of {exact}"
+        );
     }
 }

@@ -87,7 +87,10 @@ fn conductor(c: f64, n: f64, k: f64) -> f64 {
     let mul = |a: C, b: C| (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0);
     let sqrt = |a: C| {
         let m = a.0.hypot(a.1);
-        (((m + a.0) / 2.0).max(0.0).sqrt(), ((m - a.0) / 2.0).max(0.0).sqrt())
+        (
+            ((m + a.0) / 2.0).max(0.0).sqrt(),
+            ((m - a.0) / 2.0).max(0.0).sqrt(),
+        )
     };
     let ratio = |a: C, b: C| (a.0 * a.0 + a.1 * a.1) / (b.0 * b.0 + b.1 * b.1);
     let eta2 = mul((n, k), (n, k));
@@ -120,8 +123,12 @@ fn dielectrics_follow_fresnel_from_both_sides() {
                 assert!((double - exact).abs() < 1e-9, "{c}, {n}: {double}, {exact}");
                 let single = text.call::<f32>("d", &[&[c], &[n]])[0];
                 // Next to the edge of total reflection the slope is infinite.
-                let edge = (1.0 - (1.0 - c * c) * (if c < 0.0 { n * n } else { 1.0 / (n * n) })).abs();
-                assert!((single - exact).abs() < 1e-6 + 1e-7 / edge.sqrt(), "{c}, {n}: {single}, {exact}");
+                let edge =
+                    (1.0 - (1.0 - c * c) * (if c < 0.0 { n * n } else { 1.0 / (n * n) })).abs();
+                assert!(
+                    (single - exact).abs() < 1e-6 + 1e-7 / edge.sqrt(),
+                    "{c}, {n}: {single}, {exact}"
+                );
             }
         }
     }
@@ -147,15 +154,30 @@ fn dielectrics_hold_at_their_ends() {
 #[test]
 fn conductors_follow_fresnel() {
     let text = Text::new(FRESNEL);
-    for (n, k) in [(0.21, 3.67), (1.17, 2.4), (1.5, 0.0), (1.0, 0.0), (0.05, 0.0), (0.0, 2.0), (4.0, 9.0), (1.0, 1e-4)] {
+    for (n, k) in [
+        (0.21, 3.67),
+        (1.17, 2.4),
+        (1.5, 0.0),
+        (1.0, 0.0),
+        (0.05, 0.0),
+        (0.0, 2.0),
+        (4.0, 9.0),
+        (1.0, 1e-4),
+    ] {
         for i in 1..=100 {
             let c = f64::from(i) / 100.0;
             let exact = conductor(c, n, k);
             for c in [c, -c] {
                 let double = text.call::<f64>("m", &[&[c], &[n], &[k]])[0];
-                assert!((double - exact).abs() < 1e-7, "{c}, {n}, {k}: {double}, {exact}");
+                assert!(
+                    (double - exact).abs() < 1e-7,
+                    "{c}, {n}, {k}: {double}, {exact}"
+                );
                 let single = text.call::<f32>("m", &[&[c], &[n], &[k]])[0];
-                assert!((single - exact).abs() < 1e-4, "{c}, {n}, {k}: {single}, {exact}");
+                assert!(
+                    (single - exact).abs() < 1e-4,
+                    "{c}, {n}, {k}: {single}, {exact}"
+                );
                 assert!((0.0..=1.0).contains(&single), "{c}, {n}, {k}: {single}");
             }
         }
@@ -177,7 +199,10 @@ fn refraction_follows_snell() {
         assert_eq!(wi != [0.0; 3], passes, "{wo:?} into {ior}");
         if passes {
             assert!((length(&wi) - 1.0).abs() < 1e-9 && wi[2] * wo[2] < 0.0);
-            assert!((0..2).all(|c| (wi[c] * relative + wo[c]).abs() < 1e-9), "{wo:?} into {ior}: {wi:?}");
+            assert!(
+                (0..2).all(|c| (wi[c] * relative + wo[c]).abs() < 1e-9),
+                "{wo:?} into {ior}: {wi:?}"
+            );
         }
         // About another normal: the same angles to it, in one plane with it.
         let wi = text.call::<f64>("a", &[&wo, &m, &[ior]]);
@@ -186,7 +211,10 @@ fn refraction_follows_snell() {
         assert_eq!(wi != [0.0; 3], c * c > 1.0 - relative * relative);
         if wi != [0.0; 3] {
             assert!((length(&wi) - 1.0).abs() < 1e-9 && dot(&wi, &m) * c < 0.0);
-            let along = |w: &[f64]| { let d = dot(w, &m); (0..3).map(|i| w[i] - d * m[i]).collect::<Vec<_>>() };
+            let along = |w: &[f64]| {
+                let d = dot(w, &m);
+                (0..3).map(|i| w[i] - d * m[i]).collect::<Vec<_>>()
+            };
             let (o, i) = (along(&wo), along(&wi));
             assert!((0..3).all(|k| (i[k] * relative + o[k]).abs() < 1e-9));
         }
@@ -208,7 +236,12 @@ const FRAMES: &str = "
 /// Normals with trouble of their own, and others.
 fn normals() -> Vec<[f64; 3]> {
     let mut n = Numbers::new(2);
-    let mut normals = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]];
+    let mut normals = vec![
+        [0.0, 0.0, -1.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+    ];
     normals.extend([1e-4, 1e-8, -1e-8].map(|e| [e, 0.0, -(1.0 - e * e).sqrt()]));
     normals.extend((0..500).map(|_| n.direction()));
     normals
@@ -221,20 +254,51 @@ fn frames_are_orthonormal_around_any_normal_and_tangent() {
     for normal in normals() {
         let near = |e: f64| [normal[0] + e, normal[1] - e, normal[2]];
         let opposite = normal.map(|x| -x);
-        let tangents = [[0.0; 3], normal, opposite, near(1e-3), near(1e-2), near(1e-7), n.direction(), n.direction().map(|x| 1e-4 * x)];
+        let tangents = [
+            [0.0; 3],
+            normal,
+            opposite,
+            near(1e-3),
+            near(1e-2),
+            near(1e-7),
+            n.direction(),
+            n.direction().map(|x| 1e-4 * x),
+        ];
         for t in tangents {
             let f = text.call::<f32>("f", &[&normal, &t]);
             let (x, y, z) = (&f[0..3], &f[3..6], &f[6..9]);
-            for (a, b, expected) in [(x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (y, z, 0.0), (z, x, 0.0)] {
-                assert!((dot(a, b) - expected).abs() < 1e-6, "{normal:?}, {t:?}: {f:?}");
+            for (a, b, expected) in [
+                (x, x, 1.0),
+                (y, y, 1.0),
+                (z, z, 1.0),
+                (x, y, 0.0),
+                (y, z, 0.0),
+                (z, x, 0.0),
+            ] {
+                assert!(
+                    (dot(a, b) - expected).abs() < 1e-6,
+                    "{normal:?}, {t:?}: {f:?}"
+                );
             }
-            let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+            let cross = [
+                x[1] * y[2] - x[2] * y[1],
+                x[2] * y[0] - x[0] * y[2],
+                x[0] * y[1] - x[1] * y[0],
+            ];
             assert!(dot(&cross, z) > 0.99, "{normal:?}, {t:?}: left-handed");
-            assert!(dot(z, &normal) > 1.0 - 1e-6, "{normal:?}, {t:?}: z is not the normal");
+            assert!(
+                dot(z, &normal) > 1.0 - 1e-6,
+                "{normal:?}, {t:?}: z is not the normal"
+            );
             // A tangent of use lies in the plane of x and z, on the side of x.
-            let across = (1.0 - (dot(&t, &normal) / length(&t)).powi(2)).max(0.0).sqrt();
+            let across = (1.0 - (dot(&t, &normal) / length(&t)).powi(2))
+                .max(0.0)
+                .sqrt();
             if across > 0.01 {
-                assert!(dot(y, &t).abs() < 1e-5 * length(&t) / across && dot(x, &t) > 0.0, "{normal:?}, {t:?}: {f:?}");
+                assert!(
+                    dot(y, &t).abs() < 1e-5 * length(&t) / across && dot(x, &t) > 0.0,
+                    "{normal:?}, {t:?}: {f:?}"
+                );
             }
             let v = n.direction();
             let back = text.call::<f64>("round_trip", &[&normal, &t, &v]);
@@ -249,7 +313,11 @@ fn valid_normals_face_the_viewer_and_mirror_above_the_surface() {
     let mut n = Numbers::new(4);
     let mut kept = 0;
     for round in 0..20_000 {
-        let geometric = if round % 7 == 0 { [0.0, 0.0, -1.0] } else { n.direction() };
+        let geometric = if round % 7 == 0 {
+            [0.0, 0.0, -1.0]
+        } else {
+            n.direction()
+        };
         let mut wo = n.direction();
         if round % 5 == 0 {
             // Along the surface, to within a millionth.
@@ -263,16 +331,30 @@ fn valid_normals_face_the_viewer_and_mirror_above_the_surface() {
             1 => geometric.map(|x| -x),
             2 => wo.map(|x| -x),
             3 => geometric.map(|x| 5.0 * x),
-            4 => [wo[1] * geometric[2] - wo[2] * geometric[1], wo[2] * geometric[0] - wo[0] * geometric[2], wo[0] * geometric[1] - wo[1] * geometric[0]],
+            4 => [
+                wo[1] * geometric[2] - wo[2] * geometric[1],
+                wo[2] * geometric[0] - wo[0] * geometric[2],
+                wo[0] * geometric[1] - wo[1] * geometric[0],
+            ],
             _ => n.direction(),
         };
         let side = dot(&wo, &geometric).signum();
         let place = format!("n {shading:?}, ng {geometric:?}, wo {wo:?}");
         let found = text.call::<f32>("v", &[&shading, &geometric, &wo]);
-        assert!((length(&found) - 1.0).abs() < 1e-5, "{place}: {found:?} is not unit");
-        assert!(dot(&found, &wo) * side > 2e-4, "{place}: seen at {}", dot(&found, &wo) * side);
+        assert!(
+            (length(&found) - 1.0).abs() < 1e-5,
+            "{place}: {found:?} is not unit"
+        );
+        assert!(
+            dot(&found, &wo) * side > 2e-4,
+            "{place}: seen at {}",
+            dot(&found, &wo) * side
+        );
         let mirrored = reflect(&wo, &found);
-        assert!(dot(&mirrored, &geometric) * side > 0.0, "{place}: mirrors below the surface");
+        assert!(
+            dot(&mirrored, &geometric) * side > 0.0,
+            "{place}: mirrors below the surface"
+        );
 
         // What was fine stays as it is.
         let l = length(&shading);
@@ -280,10 +362,16 @@ fn valid_normals_face_the_viewer_and_mirror_above_the_surface() {
         let mirrored = reflect(&wo, &unit);
         if dot(&unit, &wo) * side > 0.02 && dot(&mirrored, &geometric) * side > 0.02 {
             kept += 1;
-            assert!((0..3).all(|c| (found[c] - unit[c]).abs() < 1e-5), "{place}: changed to {found:?}");
+            assert!(
+                (0..3).all(|c| (found[c] - unit[c]).abs() < 1e-5),
+                "{place}: changed to {found:?}"
+            );
         }
         if l == 0.0 && dot(&wo, &geometric).abs() > 0.01 {
-            assert!((0..3).all(|c| (found[c] - geometric[c]).abs() < 1e-5), "{place}: not the geometric normal");
+            assert!(
+                (0..3).all(|c| (found[c] - geometric[c]).abs() < 1e-5),
+                "{place}: not the geometric normal"
+            );
         }
     }
     assert!(kept > 2000, "only {kept} normals were fine");
@@ -300,10 +388,16 @@ fn a_valid_normal_moves_no_farther_than_it_must() {
         let n = [-tilt.sin(), 0.0, tilt.cos()];
         let found = text.call::<f64>("v", &[&n, &up, &wo]);
         let height = reflect(&wo, &found)[2];
-        assert!(height > 0.0 && height <= last + 1e-12, "a step at a tilt of {tilt}: {height} after {last}");
+        assert!(
+            height > 0.0 && height <= last + 1e-12,
+            "a step at a tilt of {tilt}: {height} after {last}"
+        );
         last = height;
     }
-    assert!(last < 0.02, "the mirror direction stays {last} above the surface");
+    assert!(
+        last < 0.02,
+        "the mirror direction stays {last} above the surface"
+    );
 }
 
 #[test]
@@ -311,7 +405,9 @@ fn transport_is_valid_when_frame_and_geometry_agree() {
     let text = Text::new(FRAMES);
     let up = [0.0, 0.0, 1.0];
     let (above, below) = ([0.6, 0.0, 0.8], [0.6, 0.0, -0.8]);
-    let ok = |local: [f64; 3], wi: [f64; 3]| text.call::<f32>("ok", &[&above, &local, &above, &wi, &up])[0] == 1.0;
+    let ok = |local: [f64; 3], wi: [f64; 3]| {
+        text.call::<f32>("ok", &[&above, &local, &above, &wi, &up])[0] == 1.0
+    };
     assert!(ok(above, above), "reflected by both");
     assert!(ok(below, below), "passed by both");
     assert!(!ok(above, below), "reflected into the object");
@@ -338,23 +434,44 @@ fn mappings_have_the_densities_they_state() {
         ("upper_half", &|w| upper(w, 1.0 / TAU)),
         ("sphere", &|_| 0.5 / TAU),
         ("power1", &|w| upper(w, 2.0 * w[2] / TAU)),
-        ("power900", &|w| upper(w, 901.0 * w[2].max(0.0).powi(900) / TAU)),
+        ("power900", &|w| {
+            upper(w, 901.0 * w[2].max(0.0).powi(900) / TAU)
+        }),
     ];
     for (name, density) in densities {
         let id = text.id(name);
         let sample = |u: &[[f64; 4]]| {
             let column = |c: usize| lanes::floats(u.iter().map(|u| u[c]).collect());
             let w = lanes::call(&text.module, id, vec![vec![column(0), column(1)]]);
-            (0..u.len()).map(|l| std::array::from_fn(|c| lanes::float_at(&w, c, l))).collect()
+            (0..u.len())
+                .map(|l| std::array::from_fn(|c| lanes::float_at(&w, c, l)))
+                .collect()
         };
-        let measure = |w: &[[f64; 3]]| -> Vec<Measures> { w.iter().map(|w| [density(w), 0.0, 0.0, 0.0]).collect() };
-        let d = Distribution { label: name.into(), sample: Box::new(sample), measure: Box::new(measure) };
+        let measure = |w: &[[f64; 3]]| -> Vec<Measures> {
+            w.iter().map(|w| [density(w), 0.0, 0.0, 0.0]).collect()
+        };
+        let d = Distribution {
+            label: name.into(),
+            sample: Box::new(sample),
+            measure: Box::new(measure),
+        };
         let outcome = examine(&d, 1 << 16, 5);
-        assert!(outcome.fit > 1e-3 && (outcome.total - 1.0).abs() < 1e-3, "{name}: p = {:e}, integral {}", outcome.fit, outcome.total);
-        for u in [0.0, 0.5, 1.0 - 1.0 / 16_777_216.0].map(|x| [0.0, 0.5, 1.0 - 1.0 / 16_777_216.0].map(|y| [x, y])).concat() {
+        assert!(
+            outcome.fit > 1e-3 && (outcome.total - 1.0).abs() < 1e-3,
+            "{name}: p = {:e}, integral {}",
+            outcome.fit,
+            outcome.total
+        );
+        for u in [0.0, 0.5, 1.0 - 1.0 / 16_777_216.0]
+            .map(|x| [0.0, 0.5, 1.0 - 1.0 / 16_777_216.0].map(|y| [x, y]))
+            .concat()
+        {
             let w = text.call::<f32>(name, &[&u]);
             assert!((length(&w) - 1.0).abs() < 1e-5, "{name} of {u:?}: {w:?}");
-            assert!(name == "sphere" || w[2] > 0.0, "{name} of {u:?} is on the horizon");
+            assert!(
+                name == "sphere" || w[2] > 0.0,
+                "{name} of {u:?} is on the horizon"
+            );
         }
     }
 }
@@ -374,9 +491,13 @@ fn facets_cover_the_surface_once() {
     let id = text.id("d");
     for alpha in [[1.0, 1.0], [0.3, 0.3], [0.05, 0.4], [0.01, 0.01]] {
         let measure = |m: &[[f64; 3]]| -> Vec<Measures> {
-            let columns = (0..3).map(|c| lanes::floats(m.iter().map(|m| m[c]).collect())).collect();
+            let columns = (0..3)
+                .map(|c| lanes::floats(m.iter().map(|m| m[c]).collect()))
+                .collect();
             let d = lanes::call(&text.module, id, vec![columns, lanes::uniform(&alpha)]);
-            let value = |(l, m): (usize, &[f64; 3])| [lanes::float_at(&d, 0, l) * m[2].max(0.0), 0.0, 0.0, 0.0];
+            let value = |(l, m): (usize, &[f64; 3])| {
+                [lanes::float_at(&d, 0, l) * m[2].max(0.0), 0.0, 0.0, 0.0]
+            };
             m.iter().enumerate().map(value).collect()
         };
         // Cells follow the distribution's own shape: normals whose slopes are alpha times those of a
@@ -386,13 +507,20 @@ fn facets_cover_the_surface_once() {
             .map(|_| {
                 let (t, phi) = (n.unit(), n.between(0.0, std::f64::consts::TAU));
                 let slope = (t / (1.0 - t)).sqrt();
-                let m = [alpha[0] * slope * phi.cos(), alpha[1] * slope * phi.sin(), 1.0];
+                let m = [
+                    alpha[0] * slope * phi.cos(),
+                    alpha[1] * slope * phi.sin(),
+                    1.0,
+                ];
                 let l = length(&m);
                 m.map(|x| x / l)
             })
             .collect();
         let cells = cells::partition(&facets, 100);
-        let sum: f64 = cells::integrate(&cells, &measure).iter().map(|m| m[0]).sum();
+        let sum: f64 = cells::integrate(&cells, &measure)
+            .iter()
+            .map(|m| m[0])
+            .sum();
         assert!((sum - 1.0).abs() < 2e-3, "{alpha:?}: {sum}");
     }
 }
@@ -406,8 +534,14 @@ fn sharp_facets_keep_their_precision() {
             let s = alpha * f64::from(i) * 0.05;
             let m = direction((1.0 - s * s).sqrt(), 0.4).map(|x| f64::from(x as f32));
             let alpha = f64::from(alpha as f32);
-            let [single, double] = [text.call::<f32>("d", &[&m, &[alpha, alpha]])[0], text.call::<f64>("d", &[&m, &[alpha, alpha]])[0]];
-            assert!((single / double - 1.0).abs() < 1e-5, "{alpha}, {i}: {single} instead of {double}");
+            let [single, double] = [
+                text.call::<f32>("d", &[&m, &[alpha, alpha]])[0],
+                text.call::<f64>("d", &[&m, &[alpha, alpha]])[0],
+            ];
+            assert!(
+                (single / double - 1.0).abs() < 1e-5,
+                "{alpha}, {i}: {single} instead of {double}"
+            );
         }
     }
     // Facets on edge.
@@ -420,11 +554,21 @@ fn roughness_gives_alpha_within_bounds() {
     let text = Text::new(GGX);
     let alpha = |r: f64, a: f64| text.call::<f32>("alpha", &[&[r], &[a]]);
     assert_eq!(alpha(0.0, 0.0), alpha(0.001, 0.0), "one floor");
-    assert!((alpha(0.5, 0.0)[0] - 0.25).abs() < 1e-6, "the square of roughness");
+    assert!(
+        (alpha(0.5, 0.0)[0] - 0.25).abs() < 1e-6,
+        "the square of roughness"
+    );
     let stretched = alpha(0.3, 1.0);
-    assert!((stretched[0] / stretched[1] - 10.0).abs() < 1e-4 && (stretched[0] * stretched[1] - 0.0081).abs() < 1e-6);
+    assert!(
+        (stretched[0] / stretched[1] - 10.0).abs() < 1e-4
+            && (stretched[0] * stretched[1] - 0.0081).abs() < 1e-6
+    );
     let turned = alpha(0.3, -1.0);
-    assert_eq!([turned[1], turned[0]], [stretched[0], stretched[1]], "axes exchanged");
+    assert_eq!(
+        [turned[1], turned[0]],
+        [stretched[0], stretched[1]],
+        "axes exchanged"
+    );
     let smooth = |a: [f64; 2]| text.call::<f32>("smooth", &[&a])[0] == 1.0;
     let floor = alpha(0.0, 0.0);
     assert!(smooth([floor[0], floor[1]]) && !smooth([floor[0], 1e-3]) && !smooth([2e-4, 2e-4]));
@@ -438,7 +582,10 @@ fn the_loss_of_single_scattering_matches_its_closed_form() {
     assert!((0.0..0.006).contains(&(2.0f64.ln() - loss)), "{loss}");
     for i in 0..=100 {
         for j in 0..=100 {
-            let loss = text.call::<f32>("loss", &[&[f64::from(i) * 0.01], &[1e-4f64.max(f64::from(j) * 0.01)]])[0];
+            let loss = text.call::<f32>(
+                "loss",
+                &[&[f64::from(i) * 0.01], &[1e-4f64.max(f64::from(j) * 0.01)]],
+            )[0];
             assert!((0.0..0.75).contains(&loss), "{i}, {j}: {loss}");
         }
     }

@@ -31,7 +31,12 @@ fn directions(bsdf: &Bsdf, case: &Case, wo: [f64; 3], seed: u64) -> (Vec<Found>,
                 known.times += 1.0;
             } else {
                 let [mass, value @ ..] = (d.measure)(&[wi])[0];
-                found.push(Found { wi, times: 1.0, mass, value });
+                found.push(Found {
+                    wi,
+                    times: 1.0,
+                    mass,
+                    value,
+                });
             }
         }
         assert!(found.len() < 8, "{}: more than a few directions", d.label);
@@ -65,22 +70,48 @@ fn masses_are_frequencies_and_values_are_the_albedo() {
         let mut faults = Vec::new();
         let mut fault = |holds: bool, text: String| faults.extend((!holds).then_some(text));
         for f in &found {
-            let Found { wi, times, mass, value } = f;
-            fault(is_specular(wo, *wi, case.ior), format!("{wi:?} is neither mirrored nor refracted"));
+            let Found {
+                wi,
+                times,
+                mass,
+                value,
+            } = f;
+            fault(
+                is_specular(wo, *wi, case.ior),
+                format!("{wi:?} is neither mirrored nor refracted"),
+            );
             let expected = mass * SAMPLES as f64;
             let most = 5.0 * (expected * (1.0 - mass).max(0.0)).sqrt() + 1e-6;
-            fault((times - expected).abs() <= most, format!("{wi:?}: {times} times, expected {expected}"));
-            fault(value.iter().all(|v| v.is_finite() && *v >= 0.0), format!("value {value:?}"));
-            fault(value.iter().all(|v| v / mass < 1.0 + 1e-9), format!("weight {value:?} / {mass}"));
+            fault(
+                (times - expected).abs() <= most,
+                format!("{wi:?}: {times} times, expected {expected}"),
+            );
+            fault(
+                value.iter().all(|v| v.is_finite() && *v >= 0.0),
+                format!("value {value:?}"),
+            );
+            fault(
+                value.iter().all(|v| v / mass < 1.0 + 1e-9),
+                format!("weight {value:?} / {mass}"),
+            );
         }
         // A direction of so little mass that it was not drawn may be missing.
         let masses: f64 = found.iter().map(|f| f.mass).sum::<f64>() + failed / SAMPLES as f64;
-        fault((masses - 1.0).abs() < 5e-4, format!("masses add up to {masses}"));
+        fault(
+            (masses - 1.0).abs() < 5e-4,
+            format!("masses add up to {masses}"),
+        );
         let said = super::sampling::albedo(bsdf, case, wo);
         for c in 0..3 {
             let sum: f64 = found.iter().map(|f| f.value[c]).sum();
-            fault((sum - said[c]).abs() < bsdf.albedo_within + 5e-4, format!("albedo {}, values {sum}", said[c]));
-            fault((0.0..=1.0 + 1e-12).contains(&said[c]), format!("albedo {}", said[c]));
+            fault(
+                (sum - said[c]).abs() < bsdf.albedo_within + 5e-4,
+                format!("albedo {}, values {sum}", said[c]),
+            );
+            fault(
+                (0.0..=1.0 + 1e-12).contains(&said[c]),
+                format!("albedo {}", said[c]),
+            );
         }
         (format!("{} from {degrees} degrees", case.label), faults)
     });
@@ -88,14 +119,21 @@ fn masses_are_frequencies_and_values_are_the_albedo() {
 
 #[test]
 fn what_goes_one_way_goes_the_other() {
-    for bsdf in super::library::bsdfs().iter().filter(|b| b.delta && b.reciprocal) {
+    for bsdf in super::library::bsdfs()
+        .iter()
+        .filter(|b| b.delta && b.reciprocal)
+    {
         for (i, case) in bsdf.cases.iter().enumerate() {
             for degrees in VIEWS {
                 let wo = view(degrees);
                 for f in directions(bsdf, case, wo, i as u64).0 {
                     let [_, back @ ..] = (distribution(bsdf, case, f.wi).measure)(&[wo])[0];
                     for (there, back) in f.value.iter().zip(back) {
-                        assert!((there - back).abs() < 1e-9, "{} from {degrees}: {there}, {back}", case.label);
+                        assert!(
+                            (there - back).abs() < 1e-9,
+                            "{} from {degrees}: {there}, {back}",
+                            case.label
+                        );
                     }
                 }
             }
@@ -106,12 +144,19 @@ fn what_goes_one_way_goes_the_other() {
 #[test]
 fn clear_glass_keeps_all_light() {
     let all = super::library::bsdfs();
-    let glass = all.iter().find(|b| b.name == "dielectric").expect("std::bsdf::dielectric");
+    let glass = all
+        .iter()
+        .find(|b| b.name == "dielectric")
+        .expect("std::bsdf::dielectric");
     for case in glass.cases.iter().filter(|c| !c.label.contains("tint")) {
         for degrees in VIEWS {
             let (found, failed) = directions(glass, case, view(degrees), 1);
             let sum: f64 = found.iter().map(|f| f.value[0]).sum();
-            assert!(failed == 0.0 && (sum - 1.0).abs() < 5e-4, "{} from {degrees}: {sum}", case.label);
+            assert!(
+                failed == 0.0 && (sum - 1.0).abs() < 5e-4,
+                "{} from {degrees}: {sum}",
+                case.label
+            );
         }
     }
 }

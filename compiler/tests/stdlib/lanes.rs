@@ -7,7 +7,9 @@
 use std::rc::Rc;
 
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type};
+use impasto_compiler::ir::{
+    Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type,
+};
 use impasto_compiler::ops::{self, Op};
 
 /// One component in every lane.
@@ -88,7 +90,13 @@ pub fn call(module: &Module, id: FunctionId, args: Vec<Lanes>) -> Lanes {
 /// Runs a function that need not be in the module.
 pub fn run(module: &Module, f: &Function, args: Vec<Lanes>) -> Lanes {
     let locals = f.locals.iter().map(|l| zero(module, l.ty)).collect();
-    let mut frame = Frame { module, f, params: args, locals, values: vec![None; f.exprs.len()] };
+    let mut frame = Frame {
+        module,
+        f,
+        params: args,
+        locals,
+        values: vec![None; f.exprs.len()],
+    };
     frame.block(&f.body, None);
     frame.get(f.value)
 }
@@ -114,57 +122,114 @@ struct Frame<'a> {
     values: Vec<Option<Lanes>>,
 }
 
+/// How a block ended, in all lanes alike.
+#[derive(PartialEq)]
+enum Flow {
+    Next,
+    Break,
+    Continue,
+}
+
 impl Frame<'_> {
-    fn block(&mut self, block: &Block, mask: Option<&[bool]>) {
+    fn block(&mut self, block: &Block, mask: Option<&[bool]>) -> Flow {
         for stmt in block {
-            match stmt {
-                Stmt::Eval(id) => {
-                    let value = self.eval(*id);
-                    self.values[id.index()] = Some(value);
-                }
-                Stmt::Store(local, part, value) => {
-                    let value = self.get(*value);
-                    let place = &mut self.locals[local.index()];
-                    match part {
-                        Some(part) => store(&mut place[usize::from(*part)], &value[0], mask),
-                        None => place.iter_mut().zip(&value).for_each(|(p, v)| store(p, v, mask)),
-                    }
-                }
-                Stmt::If(cond, then, otherwise) => {
-                    let cond = self.get(*cond);
-                    self.branch(cond[0].bools(), then, otherwise, mask);
-                }
-                Stmt::For { local, low, high, body } => {
-                    let (low, high) = (self.get(*low), self.get(*high));
-                    let (&[low], &[high]) = (low[0].ints(), high[0].ints()) else {
-                        panic!("{}: the bounds of a loop differ between lanes", self.f.name);
-                    };
-                    for i in low..high {
-                        self.locals[local.index()] = constant(&Const::Int(i));
-                        self.block(body, mask);
-                    }
-                }
-                Stmt::While { .. } | Stmt::Break | Stmt::Continue => {
-                    panic!("{}: lanes do not leave loops", self.f.name)
-                }
+            let flow = self.stmt(stmt, mask);
+            if flow != Flow::Next {
+                return flow;
             }
         }
+        Flow::Next
     }
 
-    fn branch(&mut self, cond: &[bool], then: &Block, otherwise: &Block, mask: Option<&[bool]>) {
+    fn stmt(&mut self, stmt: &Stmt, mask: Option<&[bool]>) -> Flow {
+        match stmt {
+            Stmt::Eval(id) => {
+                let value = self.eval(*id);
+                self.values[id.index()] = Some(value);
+            }
+            Stmt::Store(local, part, value) => {
+                let value = self.get(*value);
+                let place = &mut self.locals[local.index()];
+                match part {
+                    Some(part) => store(&mut place[usize::from(*part)], &value[0], mask),
+                    None => place
+                        .iter_mut()
+                        .zip(&value)
+                        .for_each(|(p, v)| store(p, v, mask)),
+                }
+            }
+            Stmt::If(cond, then, otherwise) => {
+                let cond = self.get(*cond);
+                return self.branch(cond[0].bools(), then, otherwise, mask);
+            }
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => {
+                let (low, high) = (self.get(*low), self.get(*high));
+                let (&[low], &[high]) = (low[0].ints(), high[0].ints()) else {
+                    panic!("{}: the bounds of a loop differ between lanes", self.f.name);
+                };
+                for i in low..high {
+                    self.locals[local.index()] = constant(&Const::Int(i));
+                    if self.block(body, mask) == Flow::Break {
+                        break;
+                    }
+                }
+            }
+            Stmt::While {
+                head,
+                test,
+                limit,
+                body,
+            } => {
+                for _ in 0..*limit {
+                    self.block(head, mask);
+                    let test = self.get(*test);
+                    let &[more] = test[0].bools() else {
+                        panic!("{}: lanes leave a loop apart", self.f.name);
+                    };
+                    if !more || self.block(body, mask) == Flow::Break {
+                        break;
+                    }
+                }
+            }
+            Stmt::Break => return Flow::Break,
+            Stmt::Continue => return Flow::Continue,
+        }
+        Flow::Next
+    }
+
+    fn branch(
+        &mut self,
+        cond: &[bool],
+        then: &Block,
+        otherwise: &Block,
+        mask: Option<&[bool]>,
+    ) -> Flow {
         if let [cond] = cond {
             return self.block(if *cond { then } else { otherwise }, mask);
         }
         let both = |wanted: bool| -> Vec<bool> {
             let lanes = cond.iter().enumerate();
-            lanes.map(|(l, c)| *c == wanted && mask.is_none_or(|m| m[l])).collect()
+            lanes
+                .map(|(l, c)| *c == wanted && mask.is_none_or(|m| m[l]))
+                .collect()
         };
         for (wanted, block) in [(true, then), (false, otherwise)] {
             let mask = both(wanted);
             if mask.contains(&true) {
-                self.block(block, Some(&mask));
+                let flow = self.block(block, Some(&mask));
+                assert!(
+                    flow == Flow::Next,
+                    "{}: lanes leave a loop apart",
+                    self.f.name
+                );
             }
         }
+        Flow::Next
     }
 
     fn get(&self, id: ExprId) -> Lanes {
@@ -192,9 +257,10 @@ impl Frame<'_> {
                 one if one.len() == 1 => vec![one[0].clone(); e.ty.width().unwrap_or(1)],
                 all => all,
             },
-            ExprKind::Swizzle(_, picked) => {
-                picked.iter().map(|&c| args[0][usize::from(c)].clone()).collect()
-            }
+            ExprKind::Swizzle(_, picked) => picked
+                .iter()
+                .map(|&c| args[0][usize::from(c)].clone())
+                .collect(),
             ExprKind::Call(callee, _) => call(self.module, *callee, args),
             ExprKind::Make(..) => args.concat(),
             ExprKind::Field(value, i) => {
@@ -226,7 +292,9 @@ fn store(place: &mut Column, value: &Column, mask: Option<&[bool]>) {
 
 fn masked<T: Copy>(mask: &[bool], new: &[T], old: &[T]) -> Vec<T> {
     let lanes = mask.iter().enumerate();
-    lanes.map(|(l, &m)| if m { at(new, l) } else { at(old, l) }).collect()
+    lanes
+        .map(|(l, &m)| if m { at(new, l) } else { at(old, l) })
+        .collect()
 }
 
 // ---- Ops ---------------------------------------------------------------------------------
@@ -275,7 +343,9 @@ fn map1(args: &[Lanes], f: impl Fn(f64) -> f64) -> Lanes {
 fn map2(args: &[Lanes], f: impl Fn(f64, f64) -> f64) -> Lanes {
     let width = args[0].len().max(args[1].len());
     let part = |k: usize, c: usize| args[k][if args[k].len() == 1 { 0 } else { c }].floats();
-    (0..width).map(|c| floats(zip(part(0, c), part(1, c), &f))).collect()
+    (0..width)
+        .map(|c| floats(zip(part(0, c), part(1, c), &f)))
+        .collect()
 }
 
 fn zip<T>(a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> T) -> Vec<T> {
@@ -287,7 +357,10 @@ fn zip<T>(a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> T) -> Vec<T> {
 }
 
 fn dot(a: &Lanes, b: &Lanes) -> Column {
-    let products = a.iter().zip(b).map(|(x, y)| zip(x.floats(), y.floats(), |x, y| x * y));
+    let products = a
+        .iter()
+        .zip(b)
+        .map(|(x, y)| zip(x.floats(), y.floats(), |x, y| x * y));
     floats(products.fold(vec![0.0], |sum, p| zip(&sum, &p, |s, x| s + x)))
 }
 
@@ -297,7 +370,11 @@ fn compare(args: &[Lanes], f: impl Fn(f64, f64) -> bool) -> Column {
 
 fn choose(cond: &[bool], a: &[f64], b: &[f64]) -> Column {
     let lanes = cond.len().max(a.len()).max(b.len());
-    floats((0..lanes).map(|l| if at(cond, l) { at(a, l) } else { at(b, l) }).collect())
+    floats(
+        (0..lanes)
+            .map(|l| if at(cond, l) { at(a, l) } else { at(b, l) })
+            .collect(),
+    )
 }
 
 /// Any op, lane by lane through the op table.
@@ -348,6 +425,53 @@ fn scatter(value: &Value<f64>, out: &mut Lanes) {
             Column::Float(v) => Rc::make_mut(v).push(value.components()[c]),
             Column::Int(v) => Rc::make_mut(v).push(value.as_int()),
             Column::Bool(v) => Rc::make_mut(v).push(value.as_bool()),
+        }
+    }
+}
+
+#[test]
+fn lanes_and_interpreter_agree() {
+    use super::statistics::Numbers;
+    use impasto_compiler::ir::interp::Interpreter;
+    for bsdf in super::library::bsdfs() {
+        let mut n = Numbers::new(1);
+        for case in &bsdf.cases {
+            let wo: Vec<[f64; 3]> = (0..50).map(|_| n.direction()).collect();
+            let other: Vec<[f64; 3]> = (0..50).map(|_| n.direction().map(f64::abs)).collect();
+            let column = |v: &[[f64; 3]]| -> Lanes {
+                (0..3)
+                    .map(|c| floats(v.iter().map(|v| v[c]).collect()))
+                    .collect()
+            };
+            let first: Vec<Lanes> = case.args.iter().map(constant).collect();
+            for (method, takes_two) in [
+                (bsdf.sample, true),
+                (bsdf.eval, true),
+                (bsdf.pdf, true),
+                (bsdf.albedo, false),
+            ] {
+                let mut args = first.clone();
+                args.push(column(&wo));
+                args.extend(takes_two.then(|| column(&other)));
+                let lanes = call(&bsdf.module, method, args);
+                for l in 0..wo.len() {
+                    let mut args: Vec<Value<f64>> = case.args.iter().map(Value::constant).collect();
+                    args.push(Value::vector(&wo[l]));
+                    args.extend(takes_two.then(|| Value::vector(&other[l])));
+                    let one = Interpreter::new(&bsdf.module, u64::MAX)
+                        .call(method, args)
+                        .expect("fuel");
+                    let found: Vec<f64> =
+                        (0..lanes.len()).map(|c| float_at(&lanes, c, l)).collect();
+                    assert_eq!(
+                        found,
+                        one.to_f64(),
+                        "{}: {:?}",
+                        case.label,
+                        bsdf.module.functions[method.index()].name
+                    );
+                }
+            }
         }
     }
 }

@@ -59,7 +59,10 @@ pub fn bsdfs() -> Vec<Bsdf> {
 pub fn bsdfs_with(values: &[&str]) -> Vec<Bsdf> {
     let files: Vec<_> = impasto_stdlib::folder("bsdf").collect();
     assert!(files.len() >= 8, "only {} files in bsdf/", files.len());
-    files.into_iter().map(|file| bsdf(file.name, file.text, values)).collect()
+    files
+        .into_iter()
+        .map(|file| bsdf(file.name, file.text, values))
+        .collect()
 }
 
 /// The BSDF that a file of the library defines under its own name.
@@ -67,17 +70,32 @@ fn bsdf(name: &str, text: &str, extremes: &[&str]) -> Bsdf {
     let (ast, _) = parser::parse(FileId(0), text);
     let item = ast.items.iter().find(|i| i.name.node == name);
     let item = item.unwrap_or_else(|| panic!("bsdf/{name} does not define `{name}`"));
-    let ItemKind::Closure(def) = &item.kind else { panic!("`{name}` is no bsdf") };
-    let mut tried: Vec<Tried> = def.params.iter().map(|p| untold(&p.name.node, &p.ty.node)).collect();
-    for line in item.docs.iter().filter_map(|l| l.trim().strip_prefix("Try:")) {
+    let ItemKind::Closure(def) = &item.kind else {
+        panic!("`{name}` is no bsdf")
+    };
+    let mut tried: Vec<Tried> = def
+        .params
+        .iter()
+        .map(|p| untold(&p.name.node, &p.ty.node))
+        .collect();
+    for line in item
+        .docs
+        .iter()
+        .filter_map(|l| l.trim().strip_prefix("Try:"))
+    {
         let (param, values) = line.split_once('=').expect("`Try: name = value | ...`");
         let known = tried.iter_mut().find(|t| t.name == param.trim());
         let known = known.unwrap_or_else(|| panic!("{name} has no parameter `{}`", param.trim()));
         let values = values.split('|').map(|v| Some(v.trim().to_owned()));
         known.values = std::iter::once(None).chain(values).collect();
     }
-    for (t, _) in tried.iter_mut().zip(&def.params).filter(|(_, p)| p.ty.node == "float") {
-        t.values.extend(extremes.iter().map(|v| Some((*v).to_owned())));
+    for (t, _) in tried
+        .iter_mut()
+        .zip(&def.params)
+        .filter(|(_, p)| p.ty.node == "float")
+    {
+        t.values
+            .extend(extremes.iter().map(|v| Some((*v).to_owned())));
     }
     let calls = combinations(&tried);
     let docs = item.docs.join(" ");
@@ -92,7 +110,10 @@ fn untold(name: &str, ty: &str) -> Tried {
         _ => &[],
     };
     let values = values.iter().map(|v| Some((*v).to_owned()));
-    Tried { name: name.to_owned(), values: std::iter::once(None).chain(values).collect() }
+    Tried {
+        name: name.to_owned(),
+        values: std::iter::once(None).chain(values).collect(),
+    }
 }
 
 /// Argument lists: all combinations, or when they are many, one parameter at a time and a
@@ -116,7 +137,13 @@ fn combinations(tried: &[Tried]) -> Vec<String> {
         });
         // A step that has no factor in common with the sizes goes through all digits.
         let diagonal = (0..MOST_CASES / 2).map(|i| digits((i * 7919 + 1) % all));
-        single.map(|mut c| { c.resize(sizes.len(), 0); c }).chain(diagonal).collect()
+        single
+            .map(|mut c| {
+                c.resize(sizes.len(), 0);
+                c
+            })
+            .chain(diagonal)
+            .collect()
     };
     chosen.sort();
     chosen.dedup();
@@ -125,43 +152,73 @@ fn combinations(tried: &[Tried]) -> Vec<String> {
 
 fn arguments(tried: &[Tried], chosen: &[usize]) -> String {
     let given = tried.iter().zip(chosen).filter_map(|(t, &v)| {
-        t.values[v].as_ref().map(|value| format!("{}: {value}", t.name))
+        t.values[v]
+            .as_ref()
+            .map(|value| format!("{}: {value}", t.name))
     });
     given.collect::<Vec<_>>().join(", ")
 }
 
 /// Has the compiler evaluate the argument lists, each in a material of its own.
 fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
-    let materials = calls.iter().enumerate().map(|(i, call)| {
-        format!("material case_{i} {{ surface = {name}({call}); }}\n")
-    });
+    let materials = calls
+        .iter()
+        .enumerate()
+        .map(|(i, call)| format!("material case_{i} {{ surface = {name}({call}); }}\n"));
     let text = format!("use std::bsdf::{name};\n{}", materials.collect::<String>());
     let mut files = MemoryLoader::default();
     files.add("cases.impasto", text);
     let checked = check("cases.impasto", &mut files);
     let problems = diag::render::text(&checked.sources, &checked.diagnostics, false);
-    assert!(!diag::has_errors(&checked.diagnostics), "{name}:\n{problems}");
+    assert!(
+        !diag::has_errors(&checked.diagnostics),
+        "{name}:\n{problems}"
+    );
 
     let module = checked.ir;
-    let def = module.closures.iter().find(|c| c.name == name).expect("the bsdf itself");
-    let Methods::Bsdf { sample, eval, pdf, albedo } = def.methods else {
+    let def = module
+        .closures
+        .iter()
+        .find(|c| c.name == name)
+        .expect("the bsdf itself");
+    let Methods::Bsdf {
+        sample,
+        eval,
+        pdf,
+        albedo,
+    } = def.methods
+    else {
         panic!("`{name}` is no bsdf")
     };
     let ior = def.params.iter().position(|p| p.name == "ior");
-    let cases = checked.checked.into_iter().zip(calls).map(|(mut material, call)| {
-        passes::fold_body(&module, &mut material.body);
-        let surface = material.surface.expect("a surface");
-        let Closure::Lobe(lobe) = &material.closures[surface.index()] else {
-            panic!("one lobe")
-        };
-        let constant = |&a: &_| material.body.constant(a).cloned().expect("a constant argument");
-        let args: Vec<Const> = lobe.args.iter().map(constant).map(rounded).collect();
-        let ior = match ior.map(|i| &args[i]) {
-            Some(Const::Float(v)) if v.len() == 1 => v[0],
-            _ => 1.0,
-        };
-        Case { label: format!("{name}({call})"), args, ior }
-    });
+    let cases = checked
+        .checked
+        .into_iter()
+        .zip(calls)
+        .map(|(mut material, call)| {
+            passes::fold_body(&module, &mut material.body);
+            let surface = material.surface.expect("a surface");
+            let Closure::Lobe(lobe) = &material.closures[surface.index()] else {
+                panic!("one lobe")
+            };
+            let constant = |&a: &_| {
+                material
+                    .body
+                    .constant(a)
+                    .cloned()
+                    .expect("a constant argument")
+            };
+            let args: Vec<Const> = lobe.args.iter().map(constant).map(rounded).collect();
+            let ior = match ior.map(|i| &args[i]) {
+                Some(Const::Float(v)) if v.len() == 1 => v[0],
+                _ => 1.0,
+            };
+            Case {
+                label: format!("{name}({call})"),
+                args,
+                ior,
+            }
+        });
     let cases = cases.collect();
     Bsdf {
         name: name.to_owned(),

@@ -7,6 +7,8 @@ mod core;
 mod delta;
 mod lanes;
 mod library;
+mod materials;
+mod noise;
 mod precision;
 mod sampling;
 mod statistics;
@@ -23,17 +25,27 @@ fn each_in_parallel<T: Sync>(items: &[T], job: impl Fn(usize, &T) -> (String, Ve
     let next = AtomicUsize::new(0);
     let faults = Mutex::new(Vec::new());
     let work = || {
-        while let Some((i, item)) = Some(next.fetch_add(1, Relaxed)).and_then(|i| Some((i, items.get(i)?))) {
+        while let Some((i, item)) =
+            Some(next.fetch_add(1, Relaxed)).and_then(|i| Some((i, items.get(i)?)))
+        {
             let (label, found) = job(i, item);
             let lines = found.iter().map(|f| format!("{label}: {f}"));
-            faults.lock().expect("no panic while it is held").extend(lines);
+            faults
+                .lock()
+                .expect("no panic while it is held")
+                .extend(lines);
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
     let mut faults = faults.into_inner().expect("no panic while it was held");
     faults.sort();
-    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+    assert!(
+        faults.is_empty(),
+        "{} faults:\n{}",
+        faults.len(),
+        faults.join("\n")
+    );
 }
 
 /// Checks a text as a file of its own and returns the rendered diagnostics.

@@ -51,7 +51,12 @@ fn worst(bsdf: &Bsdf, case: &Case, n: &mut Numbers) -> [f64; 2] {
         if wi.iter().all(|x| *x == 0.0) || wo[2].abs() < 1e-3 || wi[2].abs() < 1e-3 {
             continue;
         }
-        let both = |method| [call::<f64>(bsdf, case, method, &[&wo, &wi]), call::<f32>(bsdf, case, method, &[&wo, &wi])];
+        let both = |method| {
+            [
+                call::<f64>(bsdf, case, method, &[&wo, &wi]),
+                call::<f32>(bsdf, case, method, &[&wo, &wi]),
+            ]
+        };
         let ([value, value32], [pdf, pdf32]) = (both(bsdf.eval), both(bsdf.pdf));
         grow(0, pdf[0], pdf32[0]);
         for c in 0..3 {
@@ -65,7 +70,10 @@ fn worst(bsdf: &Bsdf, case: &Case, n: &mut Numbers) -> [f64; 2] {
 #[test]
 fn single_precision_is_near_double_precision() {
     let all = super::library::bsdfs();
-    let work: Vec<(&Bsdf, &Case)> = all.iter().flat_map(|b| b.cases.iter().map(move |c| (b, c))).collect();
+    let work: Vec<(&Bsdf, &Case)> = all
+        .iter()
+        .flat_map(|b| b.cases.iter().map(move |c| (b, c)))
+        .collect();
     let table: Mutex<BTreeMap<&str, [f64; 2]>> = Mutex::new(BTreeMap::new());
     super::each_in_parallel(&work, |i, (bsdf, case)| {
         let [value, weight] = worst(bsdf, case, &mut Numbers::new(i as u64));
@@ -75,7 +83,9 @@ fn single_precision_is_near_double_precision() {
         let mut faults = Vec::new();
         let most = bsdf.precision_within.unwrap_or(FINE);
         if value > most {
-            faults.push(format!("value or density off by {value:.1e}, more than {most:.1e}"));
+            faults.push(format!(
+                "value or density off by {value:.1e}, more than {most:.1e}"
+            ));
         }
         if weight > FINE {
             faults.push(format!("weight off by {weight:.1e}"));
@@ -95,7 +105,10 @@ const UNITS: [f64; 3] = [0.0, 0.5, 1.0 - 1.0 / 16_777_216.0];
 #[test]
 fn answers_at_the_ends_of_ranges_are_finite() {
     let all = super::library::bsdfs_with(&["-1.0", "0.0", "1e-20", "0.5", "1.0", "1e6"]);
-    let work: Vec<(&Bsdf, &Case)> = all.iter().flat_map(|b| b.cases.iter().map(move |c| (b, c))).collect();
+    let work: Vec<(&Bsdf, &Case)> = all
+        .iter()
+        .flat_map(|b| b.cases.iter().map(move |c| (b, c)))
+        .collect();
     super::each_in_parallel(&work, |_, (bsdf, case)| {
         let mut faults = ends::<f32>(bsdf, case);
         faults.extend(ends::<f64>(bsdf, case));
@@ -107,20 +120,27 @@ fn answers_at_the_ends_of_ranges_are_finite() {
 fn ends<F: Real>(bsdf: &Bsdf, case: &Case) -> Vec<String> {
     let bits = 8 * std::mem::size_of::<F>();
     let mut faults = Vec::new();
-    let mut fault = |holds: bool, text: String| faults.extend((!holds).then(|| format!("f{bits}: {text}")));
+    let mut fault =
+        |holds: bool, text: String| faults.extend((!holds).then(|| format!("f{bits}: {text}")));
     let fine = |v: &[f64]| v.iter().all(|x| x.is_finite() && *x >= 0.0);
     for z in COSINES {
         let wo = direction(z, 0.3);
         let albedo = call::<F>(bsdf, case, bsdf.albedo, &[&wo]);
         fault(fine(&albedo), format!("albedo {albedo:?} at cosine {z}"));
-        let mut toward: Vec<[f64; 3]> = COSINES.iter().flat_map(|&z| [direction(z, 0.3), direction(z, 3.3)]).collect();
+        let mut toward: Vec<[f64; 3]> = COSINES
+            .iter()
+            .flat_map(|&z| [direction(z, 0.3), direction(z, 3.3)])
+            .collect();
         toward.extend([wo, wo.map(|x| -x), [-wo[0], -wo[1], wo[2]], [1.0, 0.0, 0.0]]);
         for u in 0..27 {
             let u = [UNITS[u % 3], UNITS[u / 3 % 3], UNITS[u / 9]];
             let wi = call::<F>(bsdf, case, bsdf.sample, &[&wo, &u]);
             let length = wi.iter().map(|x| x * x).sum::<f64>().sqrt();
             let unit = (length - 1.0).abs() < 1e-5;
-            fault(unit || length == 0.0, format!("sampled {wi:?} at cosine {z} and {u:?}"));
+            fault(
+                unit || length == 0.0,
+                format!("sampled {wi:?} at cosine {z} and {u:?}"),
+            );
             toward.push([wi[0], wi[1], wi[2]]);
         }
         for wi in toward {
@@ -128,7 +148,10 @@ fn ends<F: Real>(bsdf: &Bsdf, case: &Case) -> Vec<String> {
                 let value = call::<F>(bsdf, case, method, &[&wo, &wi]);
                 fault(fine(&value), format!("{value:?} from {wo:?} to {wi:?}"));
                 let horizon = wi[2] == 0.0 && !bsdf.delta;
-                fault(!horizon || value.iter().all(|v| *v == 0.0), format!("{value:?} at the horizon"));
+                fault(
+                    !horizon || value.iter().all(|v| *v == 0.0),
+                    format!("{value:?} at the horizon"),
+                );
             }
         }
     }

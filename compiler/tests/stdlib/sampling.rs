@@ -55,13 +55,23 @@ pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distrib
     };
     let sample = move |u: &[[f64; 4]]| {
         let mut args = first();
-        args.push((0..3).map(|c| lanes::floats(u.iter().map(|u| u[c]).collect())).collect());
+        args.push(
+            (0..3)
+                .map(|c| lanes::floats(u.iter().map(|u| u[c]).collect()))
+                .collect(),
+        );
         let wi = lanes::call(&bsdf.module, bsdf.sample, args);
-        (0..u.len()).map(|l| std::array::from_fn(|c| lanes::float_at(&wi, c, l))).collect()
+        (0..u.len())
+            .map(|l| std::array::from_fn(|c| lanes::float_at(&wi, c, l)))
+            .collect()
     };
     let measure = move |wi: &[[f64; 3]]| {
         let mut args = first();
-        args.push((0..3).map(|c| lanes::floats(wi.iter().map(|w| w[c]).collect())).collect());
+        args.push(
+            (0..3)
+                .map(|c| lanes::floats(wi.iter().map(|w| w[c]).collect()))
+                .collect(),
+        );
         let pdf = lanes::call(&bsdf.module, bsdf.pdf, args.clone());
         let value = lanes::call(&bsdf.module, bsdf.eval, args);
         let answer = |(l, wi): (usize, &[f64; 3])| {
@@ -72,7 +82,11 @@ pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distrib
         wi.iter().enumerate().map(answer).collect()
     };
     Distribution {
-        label: format!("{} from {:.0} degrees", case.label, wo[2].acos().to_degrees()),
+        label: format!(
+            "{} from {:.0} degrees",
+            case.label,
+            wo[2].acos().to_degrees()
+        ),
         sample: Box::new(sample),
         measure: Box::new(measure),
     }
@@ -86,11 +100,22 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
     let mut greatest_weight: f64 = 0.0;
     for _ in 0..samples.div_ceil(BATCH) {
         let u: Vec<[f64; 4]> = (0..BATCH).map(|_| n.four()).collect();
-        let wi: Vec<[f64; 3]> = (d.sample)(&u).into_iter().filter(|w| *w != [0.0; 3]).collect();
+        let wi: Vec<[f64; 3]> = (d.sample)(&u)
+            .into_iter()
+            .filter(|w| *w != [0.0; 3])
+            .collect();
         for (w, m) in wi.iter().zip((d.measure)(&wi)) {
             let length = w.iter().map(|x| x * x).sum::<f64>().sqrt();
-            assert!((length - 1.0).abs() < 1e-6, "{}: sampled {w:?}, not unit", d.label);
-            assert!(m.iter().all(|x| x.is_finite() && *x >= 0.0), "{}: {m:?} at {w:?}", d.label);
+            assert!(
+                (length - 1.0).abs() < 1e-6,
+                "{}: sampled {w:?}, not unit",
+                d.label
+            );
+            assert!(
+                m.iter().all(|x| x.is_finite() && *x >= 0.0),
+                "{}: {m:?} at {w:?}",
+                d.label
+            );
             assert!(m[0] > 0.0, "{}: density 0 at the sampled {w:?}", d.label);
             for c in 0..3 {
                 let weight = m[c + 1] / m[0];
@@ -103,7 +128,8 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
     }
     let all = (samples.div_ceil(BATCH) * BATCH) as f64;
     let sampled_energy = sum.map(|s| s / all);
-    let deviation = |c: usize| ((squares[c] / all - sampled_energy[c].powi(2)).max(0.0) / all).sqrt();
+    let deviation =
+        |c: usize| ((squares[c] / all - sampled_energy[c].powi(2)).max(0.0) / all).sqrt();
 
     let (pilot, tested) = drawn.split_at(drawn.len() / 4);
     let cells = cells::partition(pilot, (pilot.len() / 128).max(16));
@@ -112,7 +138,10 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
     let found = cells::counts(&cells, tested);
     // Failed samples are one more cell.
     let failed = 0.75 * all - tested.len() as f64;
-    let expected = integrals.iter().map(|m| m[0]).chain([(1.0 - total).max(0.0)]);
+    let expected = integrals
+        .iter()
+        .map(|m| m[0])
+        .chain([(1.0 - total).max(0.0)]);
     let found = found.iter().map(|&n| n as f64).chain([failed.max(0.0)]);
     let pairs: Vec<(f64, f64)> = expected.map(|p| p * 0.75 * all).zip(found).collect();
     Outcome {
@@ -147,7 +176,11 @@ fn chi_squared(pairs: &[(f64, f64)]) -> f64 {
         // Found where next to nothing is expected.
         return 0.0;
     }
-    if cells < 2.0 { 1.0 } else { chi_squared_tail(statistic, cells - 1.0) }
+    if cells < 2.0 {
+        1.0
+    } else {
+        chi_squared_tail(statistic, cells - 1.0)
+    }
 }
 
 /// What is wrong with an outcome, if it is not that of a distribution that keeps energy. `tests`
@@ -158,7 +191,10 @@ pub fn faults(o: &Outcome, tests: usize) -> Vec<String> {
         faults.push(format!("the density integrates to {}", o.total));
     }
     if o.fit < sidak(SIGNIFICANCE, tests) {
-        faults.push(format!("samples do not follow the density: p = {:.1e}", o.fit));
+        faults.push(format!(
+            "samples do not follow the density: p = {:.1e}",
+            o.fit
+        ));
     }
     for c in 0..3 {
         let (exact, sampled) = (o.energy[c], o.sampled_energy[c]);
@@ -166,7 +202,9 @@ pub fn faults(o: &Outcome, tests: usize) -> Vec<String> {
             faults.push(format!("reflects {exact}"));
         }
         if (exact - sampled).abs() > 5.0 * o.error[c] + 2e-3 * exact + 1e-5 {
-            faults.push(format!("reflects {exact} by integration, {sampled} by sampling"));
+            faults.push(format!(
+                "reflects {exact} by integration, {sampled} by sampling"
+            ));
         }
     }
     faults
@@ -216,11 +254,25 @@ fn albedo_fault(bsdf: &Bsdf, case: &Case, wo: [f64; 3], outcome: &Outcome) -> Op
 #[test]
 fn the_test_sees_wrong_densities() {
     // A cosine lobe whose density is wrong by 3 %, lacks its cosine, or whose sample is uniform.
-    let cosine = |u: &[[f64; 4]]| u.iter().map(|u| direction((1.0 - u[0]).sqrt(), 6.283_185 * u[1])).collect();
-    let uniform = |u: &[[f64; 4]]| u.iter().map(|u| direction(1.0 - u[0], 6.283_185 * u[1])).collect();
+    let cosine = |u: &[[f64; 4]]| {
+        u.iter()
+            .map(|u| direction((1.0 - u[0]).sqrt(), 6.283_185 * u[1]))
+            .collect()
+    };
+    let uniform = |u: &[[f64; 4]]| {
+        u.iter()
+            .map(|u| direction(1.0 - u[0], 6.283_185 * u[1]))
+            .collect()
+    };
     let density = |scale: f64, power: i32| {
         move |w: &[[f64; 3]]| -> Vec<Measures> {
-            let at = |w: &[f64; 3]| if w[2] > 0.0 { scale * w[2].powi(power) / 6.283_185_307 } else { 0.0 };
+            let at = |w: &[f64; 3]| {
+                if w[2] > 0.0 {
+                    scale * w[2].powi(power) / 6.283_185_307
+                } else {
+                    0.0
+                }
+            };
             w.iter().map(|w| [at(w), at(w), at(w), at(w)]).collect()
         }
     };
@@ -229,7 +281,7 @@ fn the_test_sees_wrong_densities() {
             label: String::new(),
             sample: Box::new(sample),
             measure: Box::new(density(scale, power)),
-            };
+        };
         examine(&d, SAMPLES, 1).fit
     };
     assert!(fit(&cosine, 2.0, 1) > 1e-4);

@@ -12,7 +12,9 @@ impl Numbers {
 
     fn bits(&mut self) -> u32 {
         let old = self.0;
-        self.0 = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = old
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let mixed = (((old >> 18) ^ old) >> 27) as u32;
         mixed.rotate_right((old >> 59) as u32)
     }
@@ -34,7 +36,10 @@ impl Numbers {
 
     /// A direction, uniform over the sphere.
     pub fn direction(&mut self) -> [f64; 3] {
-        direction(self.between(-1.0, 1.0), self.between(0.0, std::f64::consts::TAU))
+        direction(
+            self.between(-1.0, 1.0),
+            self.between(0.0, std::f64::consts::TAU),
+        )
     }
 }
 
@@ -108,7 +113,10 @@ fn the_tail_of_chi_squared_matches_tables() {
         (149.449_254, 100.0, 0.001),
     ] {
         let found = chi_squared_tail(x, freedom);
-        assert!((found - tail).abs() < 1e-6 * tail.sqrt(), "{x}, {freedom}: {found}");
+        assert!(
+            (found - tail).abs() < 1e-6 * tail.sqrt(),
+            "{x}, {freedom}: {found}"
+        );
     }
     assert!((sidak(0.01, 100) - 1.004_983_1e-4).abs() < 1e-9);
 }

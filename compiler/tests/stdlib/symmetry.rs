@@ -11,7 +11,11 @@ const PAIRS: usize = 200;
 /// 5.2; `measure` has brought radiance to power already.
 fn symmetric(bsdf: &Bsdf, case: &Case, wo: [f64; 3], wi: [f64; 3]) -> [f64; 3] {
     let [_, value @ ..] = (distribution(bsdf, case, wo).measure)(&[wi])[0];
-    let index = if bsdf.scales_radiance && wi[2] < 0.0 { case.ior } else { 1.0 };
+    let index = if bsdf.scales_radiance && wi[2] < 0.0 {
+        case.ior
+    } else {
+        1.0
+    };
     value.map(|v| v / wi[2].abs() / (index * index))
 }
 
@@ -29,7 +33,11 @@ fn continuous_bsdfs_are_reciprocal() {
         for pair in 0..PAIRS {
             let wo = n.direction();
             let sampled = (distribution(bsdf, case, wo).sample)(&[n.four()])[0];
-            let wi = if pair % 2 == 0 { sampled } else { n.direction() };
+            let wi = if pair % 2 == 0 {
+                sampled
+            } else {
+                n.direction()
+            };
             if wi == [0.0; 3] || wi[2].abs() < 1e-6 || wo[2].abs() < 1e-6 {
                 continue;
             }
@@ -42,7 +50,9 @@ fn continuous_bsdfs_are_reciprocal() {
         let mut faults = Vec::new();
         // An index next to 1 is held off it by `rough_dielectric`, which the measure does not know.
         if worst > 1e-3 {
-            faults.push(format!("differs by {worst:.1e} when the directions are exchanged"));
+            faults.push(format!(
+                "differs by {worst:.1e} when the directions are exchanged"
+            ));
         }
         if compared < PAIRS / 2 {
             faults.push(format!("only {compared} pairs to compare"));
