@@ -102,15 +102,15 @@ fn masses_are_frequencies_and_values_are_the_albedo() {
             format!("masses add up to {masses}"),
         );
         let said = super::sampling::albedo(bsdf, case, wo);
-        for c in 0..3 {
+        for (c, said) in said.iter().enumerate() {
             let sum: f64 = found.iter().map(|f| f.value[c]).sum();
             fault(
-                (sum - said[c]).abs() < bsdf.albedo_within + 5e-4,
-                format!("albedo {}, values {sum}", said[c]),
+                (sum - said).abs() < bsdf.albedo_within + 5e-4,
+                format!("albedo {}, values {sum}", said),
             );
             fault(
-                (0.0..=1.0 + 1e-12).contains(&said[c]),
-                format!("albedo {}", said[c]),
+                (0.0..=1.0 + 1e-12).contains(said),
+                format!("albedo {}", said),
             );
         }
         (format!("{} from {degrees} degrees", case.label), faults)

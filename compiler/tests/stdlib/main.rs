@@ -3,16 +3,20 @@
 //! the library's folders, so a new file is tested without being named here.
 
 mod cells;
-mod core;
 mod delta;
+mod fresnel;
 mod lanes;
 mod library;
+mod mappings;
 mod materials;
 mod noise;
+mod normals;
 mod precision;
 mod sampling;
 mod statistics;
 mod symmetry;
+mod text;
+mod vectors;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};

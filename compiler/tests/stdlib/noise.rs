@@ -4,9 +4,9 @@ use impasto_compiler::ast::ItemKind;
 use impasto_compiler::parser;
 use impasto_compiler::source::FileId;
 
-use super::core::Text;
 use super::lanes::{self, Lanes};
 use super::statistics::Numbers;
+use super::text::Text;
 
 /// Coordinates about which noises are looked at; single precision has no fractions beyond 2^23.
 const PLACES: [f64; 7] = [0.0, 1.0, 1e3, 1e5, 1e7, 1e9, -1e9];

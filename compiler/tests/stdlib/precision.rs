@@ -33,7 +33,7 @@ fn rounded(w: [f64; 3]) -> [f64; 3] {
 fn view(n: &mut Numbers) -> [f64; 3] {
     let z = n.between(-1.0, 1.0);
     let z = if n.unit() < 0.3 { 0.02 * z } else { z };
-    rounded(direction(z, n.between(0.0, 6.28)))
+    rounded(direction(z, n.between(0.0, std::f64::consts::TAU)))
 }
 
 /// The worst relative error of `eval`, `pdf` and their quotient over pairs that `sample` makes.
@@ -68,6 +68,7 @@ fn worst(bsdf: &Bsdf, case: &Case, n: &mut Numbers) -> [f64; 2] {
 }
 
 #[test]
+#[expect(clippy::print_stdout, reason = "the table is read with --nocapture")]
 fn single_precision_is_near_double_precision() {
     let all = super::library::bsdfs();
     let work: Vec<(&Bsdf, &Case)> = all

@@ -1,6 +1,8 @@
 //! Holds every continuous BSDF to being a distribution: `sample` draws what `pdf` says, nothing
 //! that `eval` reflects is left out, no light is made, and `albedo` is the integral.
 
+use std::f64::consts::TAU;
+
 use super::cells::{self, Measures};
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case};
@@ -23,14 +25,20 @@ pub fn view(degrees: f64) -> [f64; 3] {
     direction(degrees.to_radians().cos(), 0.7)
 }
 
+/// Draws directions from uniform numbers; zero where it fails.
+pub type Sample<'a> = dyn Fn(&[[f64; 4]]) -> Vec<[f64; 3]> + 'a;
+
+/// Density and value toward directions.
+pub type Measure<'a> = dyn Fn(&[[f64; 3]]) -> Vec<Measures> + 'a;
+
 /// A distribution of directions seen from one side: a BSDF with its parameters and `wo`.
 pub struct Distribution<'a> {
     /// What it is, for messages.
     pub label: String,
-    /// Directions from uniform numbers; zero where it fails.
-    pub sample: Box<dyn Fn(&[[f64; 4]]) -> Vec<[f64; 3]> + 'a>,
-    /// Density and value toward directions.
-    pub measure: Box<dyn Fn(&[[f64; 3]]) -> Vec<Measures> + 'a>,
+    /// How it is sampled.
+    pub sample: Box<Sample<'a>>,
+    /// What it says about directions.
+    pub measure: Box<Measure<'a>>,
 }
 
 /// What sampling and integrating a distribution gave.
@@ -256,19 +264,19 @@ fn the_test_sees_wrong_densities() {
     // A cosine lobe whose density is wrong by 3 %, lacks its cosine, or whose sample is uniform.
     let cosine = |u: &[[f64; 4]]| {
         u.iter()
-            .map(|u| direction((1.0 - u[0]).sqrt(), 6.283_185 * u[1]))
+            .map(|u| direction((1.0 - u[0]).sqrt(), TAU * u[1]))
             .collect()
     };
     let uniform = |u: &[[f64; 4]]| {
         u.iter()
-            .map(|u| direction(1.0 - u[0], 6.283_185 * u[1]))
+            .map(|u| direction(1.0 - u[0], TAU * u[1]))
             .collect()
     };
     let density = |scale: f64, power: i32| {
         move |w: &[[f64; 3]]| -> Vec<Measures> {
             let at = |w: &[f64; 3]| {
                 if w[2] > 0.0 {
-                    scale * w[2].powi(power) / 6.283_185_307
+                    scale * w[2].powi(power) / TAU
                 } else {
                     0.0
                 }
@@ -276,7 +284,7 @@ fn the_test_sees_wrong_densities() {
             w.iter().map(|w| [at(w), at(w), at(w), at(w)]).collect()
         }
     };
-    let fit = |sample: &dyn Fn(&[[f64; 4]]) -> Vec<[f64; 3]>, scale, power| {
+    let fit = |sample: &Sample<'_>, scale, power| {
         let d = Distribution {
             label: String::new(),
             sample: Box::new(sample),
