@@ -146,8 +146,8 @@ fn clear_glass_keeps_all_light() {
     let all = super::library::bsdfs();
     let glass = all
         .iter()
-        .find(|b| b.name == "dielectric")
-        .expect("std::bsdf::dielectric");
+        .find(|b| b.name == "smooth_dielectric")
+        .expect("std::bsdf::smooth_dielectric");
     for case in glass.cases.iter().filter(|c| !c.label.contains("tint")) {
         for degrees in VIEWS {
             let (found, failed) = directions(glass, case, view(degrees), 1);

@@ -120,8 +120,8 @@ const BUMPED: [&str; 5] = [
     "diffuse(0.8",
     "blinn_phong(exponent: 40",
     "metal(roughness: 0.4",
-    "ggx_conductor(roughness: 0.5, anisotropy: 0.6",
-    "rough_dielectric(roughness: 0.4",
+    "conductor(roughness: 0.5, anisotropy: 0.6",
+    "dielectric(roughness: 0.4",
 ];
 const NORMALS: [&str; 4] = [
     "normal(0.3, 0.2, 1.0)",

@@ -48,7 +48,7 @@ fn continuous_bsdfs_are_reciprocal() {
             }
         }
         let mut faults = Vec::new();
-        // An index next to 1 is held off it by `rough_dielectric`, which the measure does not know.
+        // An index next to 1 is held off it by `dielectric`, which the measure does not know.
         if worst > 1e-3 {
             faults.push(format!(
                 "differs by {worst:.1e} when the directions are exchanged"

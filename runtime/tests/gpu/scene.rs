@@ -27,11 +27,11 @@ f 4 3 2 1\nf 5 6 7 8\nf 8 4 1 5\nf 3 7 6 2\nf 8 7 3 4\nf 1 2 6 5
 ";
 
 const MATERIALS: &str = "
-use std::bsdf::{dielectric, diffuse, mirror};
+use std::bsdf::{diffuse, mirror, smooth_dielectric};
 use std::edf::uniform;
 material glowing { surface = diffuse(0.7); emission = uniform(color(1)); }
 material dull { surface = diffuse(0.6); }
-material glass { surface = dielectric(ior: 1.5); }
+material glass { surface = smooth_dielectric(ior: 1.5); }
 material silver { surface = mirror(); }
 ";
 
