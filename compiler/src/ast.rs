@@ -389,6 +389,7 @@ impl BinaryOp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Unit {
+    Nanometre,
     Micrometre,
     Millimetre,
     Centimetre,
@@ -400,7 +401,8 @@ pub enum Unit {
 
 impl Unit {
     /// Every unit with its spelling and its size in metres or radians.
-    pub const ALL: [(Unit, &'static str, f64); 7] = [
+    pub const ALL: [(Unit, &'static str, f64); 8] = [
+        (Unit::Nanometre, "nm", 1e-9),
         (Unit::Micrometre, "um", 1e-6),
         (Unit::Millimetre, "mm", 1e-3),
         (Unit::Centimetre, "cm", 1e-2),

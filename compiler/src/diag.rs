@@ -99,7 +99,7 @@ codes! {
     TooManyArguments = "E0212", Error, "too many arguments",
         "More arguments were given than there are parameters, or one was given twice.";
     UnknownUnit = "E0213", Error, "unknown unit",
-        "Lengths are written in um, mm, cm, m or km, angles in deg or rad.";
+        "Lengths are written in nm, um, mm, cm, m or km, angles in deg or rad.";
     UnknownParameter = "E0214", Error, "unknown material parameter",
         "A scene sets a parameter that the material does not declare.";
     // E03xx: types and values

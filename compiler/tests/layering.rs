@@ -42,6 +42,7 @@ impl Asked {
             z(),
             Value::vector(&[1.0, 0.0, 0.0]),
             Value::vector(&[0.4, 0.6]),
+            Value::float(1.0),
         ];
         let args = vec![
             Value::Struct(point),

@@ -96,6 +96,7 @@ fn ask<F: Real>(
         z(),
         Value::vector(&[1.0, 0.0, 0.0]),
         Value::vector(&q.uv),
+        Value::float(1.0),
     ];
     let args = vec![
         Value::Struct(point),

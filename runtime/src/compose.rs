@@ -211,7 +211,7 @@ fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
     format!(
         "fn surface_point(hit: PathHit) -> SurfacePoint {{\n    \
          let barycentrics = vec2<f32>(hit.u, hit.v);\n    \
-         return SurfacePoint({}, {}, {geometric}, {}, {});\n}}\n",
+         return SurfacePoint({}, {}, {geometric}, {}, {}, 1.0);\n}}\n",
         pick(
             all.position,
             "hit_position(hit.primitive, barycentrics)",

@@ -30,7 +30,7 @@ const BODY: &str = "
     let wl = bitcast<vec4<f32>>(input[i * 5u + 3u]).xyz;
     let u = bitcast<vec4<f32>>(input[i * 5u + 4u]);
     let up = vec3<f32>(0.0, 0.0, 1.0);
-    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), q.xy);
+    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), q.xy, 1.0);
     let s = evaluate_material(0u, point, wo, wl, u);
     result[i * 3u] = bitcast<vec4<u32>>(vec4<f32>(s.wi, s.pdf));
     result[i * 3u + 1u] = bitcast<vec4<u32>>(vec4<f32>(s.throughput, s.light_pdf));
@@ -89,7 +89,14 @@ fn interpreted(program: &Program, rows: &[Row]) -> Vec<f64> {
     };
     let up = || Value::vector(&[0.0, 0.0, 1.0]);
     let along = Value::vector(&[1.0, 0.0, 0.0]);
-    let point = Value::Struct(vec![wide(0, 3), up(), up(), along, wide(1, 2)]);
+    let point = Value::Struct(vec![
+        wide(0, 3),
+        up(),
+        up(),
+        along,
+        wide(1, 2),
+        Value::float(1.0),
+    ]);
     let args = vec![point, wide(2, 3), wide(3, 3), wide(4, 4)];
     let mut run = Interpreter::<f32>::new(program.ir(), u64::MAX);
     let answer = run

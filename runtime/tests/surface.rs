@@ -413,7 +413,7 @@ fn material_code_and_scene_parts_share_no_names() {
     };
     let all = [&geometry, &surface, &texture.expect("it loads"), &material];
     let body = "
-        let point = SurfacePoint(vec3<f32>(0.0), vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0), vec2<f32>(0.0));
+        let point = SurfacePoint(vec3<f32>(0.0), vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0), vec2<f32>(0.0), 1.0);
         let s = evaluate_material(0u, point, vec3<f32>(0.0, 0.6, 0.8), vec3<f32>(0.0), vec4<f32>(0.5));
         result[0] = bitcast<vec4<u32>>(vec4<f32>(s.throughput, s.pdf));";
     let [r, g, b, pdf] = floats(run(&all, body, &[], 1, 1)[0]);

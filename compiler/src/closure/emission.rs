@@ -141,6 +141,7 @@ fn radiance(module: &Module, f: &Function, z: f64, azimuth: f64) -> Option<[f32;
         normal(),
         zero(),
         Value::vector(&[0.0; 2]),
+        Value::float(1.0),
     ]);
     let value = Interpreter::<f64>::new(module, 1 << 20)
         .run(f, vec![point, wo])

@@ -225,7 +225,9 @@ pub fn inputs(
                 "normal" => set.normal = true,
                 "geometric_normal" => set.geometric_normal = true,
                 "tangent" => set.tangent = true,
-                _ => set.uv = true,
+                "uv" => set.uv = true,
+                // Always provided, until kernels follow media.
+                _ => {}
             }
         }
     }

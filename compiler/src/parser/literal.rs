@@ -91,7 +91,7 @@ fn unit<'t>(text: &'t str, number: Span, inp: &mut Input<'t, '_>) -> UnitAfter {
 fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic {
     let digits = text.get(number.range()).unwrap_or("");
     let diagnostic = Diagnostic::new(Code::UnknownUnit, span, format!("`{name}` is not a unit"))
-        .expected("um, mm, cm, m or km after a length, deg or rad after an angle");
+        .expected("nm, um, mm, cm, m or km after a length, deg or rad after an angle");
     if name.starts_with('_') {
         return diagnostic.hint("the digits of a number are written without separators");
     }
@@ -107,6 +107,7 @@ fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic 
     let known = match name {
         "degree" | "degrees" => Some("deg"),
         "radian" | "radians" => Some("rad"),
+        "nanometer" | "nanometers" | "nanometre" | "nanometres" => Some("nm"),
         "micron" | "microns" | "micrometer" | "micrometre" => Some("um"),
         "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some("mm"),
         "meter" | "meters" | "metre" | "metres" => Some("m"),

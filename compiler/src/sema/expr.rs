@@ -15,7 +15,14 @@ use super::types::Ty;
 pub const DEFAULT_OF_PARAMETER: &str = "the default";
 
 /// Fields of `SurfacePoint` that a material sees as names.
-pub const INPUTS: [&str; 5] = ["position", "normal", "geometric_normal", "tangent", "uv"];
+pub const INPUTS: [&str; 6] = [
+    "position",
+    "normal",
+    "geometric_normal",
+    "tangent",
+    "uv",
+    "exterior_ior",
+];
 
 impl Body<'_, '_> {
     /// Checks an expression that must be a `ty`.

@@ -32,7 +32,9 @@ fn program(file: &str, loader: &mut dyn Loader) -> Program {
 /// A surface point with the normal up, flattened.
 fn point(position: [f64; 3], uv: [f64; 2]) -> Vec<f64> {
     let rest = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0];
-    position.into_iter().chain(rest).chain(uv).collect()
+    let exterior_ior = 1.0;
+    let around = position.into_iter().chain(rest).chain(uv);
+    around.chain([exterior_ior]).collect()
 }
 
 fn columns<const N: usize>(values: &[[f64; N]]) -> Lanes {

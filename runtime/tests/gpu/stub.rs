@@ -103,7 +103,7 @@ fn material_emission(material: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<
 ";
 
 const MATERIALS: &str = "
-struct SurfacePoint { position: vec3<f32>, normal: vec3<f32>, geometric_normal: vec3<f32>, tangent: vec3<f32>, uv: vec2<f32> }
+struct SurfacePoint { position: vec3<f32>, normal: vec3<f32>, geometric_normal: vec3<f32>, tangent: vec3<f32>, uv: vec2<f32>, exterior_ior: f32 }
 struct MaterialSample {
     wi: vec3<f32>,
     pdf: f32,
