@@ -72,6 +72,8 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
             file: binding.file,
             material: binding.material,
             params: binding.params,
+            // Kernels do not know instances yet.
+            bake: true,
         })
         .collect()
 }

@@ -9,18 +9,66 @@
 //!
 //! ```wgsl
 //! // Printed by the compiler (support functions and structs first):
-//! fn evaluate_material(material: u32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample
-//! fn material_emission(material: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // only if some emission varies
+//! fn evaluate_material(instance: u32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample
+//! fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // only if some emission varies
+//! fn material_of(instance: u32) -> u32   // apart from the others: `Program::lookup_wgsl`
 //! // Provided by the runtime when a material reads textures:
 //! fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32>
+//! // Provided by the runtime, where `Program::tables` has them:
+//! var<storage, read> material_instances: array<vec2<u32>>;    // material, first row of parameters
+//! var<storage, read> material_parameters: array<vec4<u32>>;   // bits of the values
 //! ```
+//!
+//! A *material* is code; an *instance* is a material with values for its parameters, what a scene
+//! binds to geometry. Instances that differ in values share the code, and the values lie in a table.
 
 /// The WGSL function that evaluates any material of a module.
 pub const EVALUATE: &str = "evaluate_material";
 /// The WGSL function that gives the emission of any material of a module.
 pub const EMISSION: &str = "material_emission";
+/// The WGSL function that gives the material of an instance.
+pub const MATERIAL_OF: &str = "material_of";
 /// The WGSL function the runtime provides: bilinear, wrapping lookup of texture `slot`.
 pub const TEXTURE_FETCH: &str = "texture_fetch";
+/// The buffer of instances: material and first row of parameters of each.
+pub const INSTANCES: &str = "material_instances";
+/// The buffer of parameter values.
+pub const PARAMETERS: &str = "material_parameters";
+
+/// A read-only storage buffer that material code reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// The WGSL variable.
+    pub name: &'static str,
+    /// Its WGSL type, an array.
+    pub wgsl_type: &'static str,
+    /// Its contents.
+    pub words: Vec<u32>,
+}
+
+/// What fills the inside of an object, the same everywhere in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// How much light is lost a metre (linear RGB, 1/m).
+    pub absorption: [f32; 3],
+    /// Index of refraction.
+    pub ior: f32,
+    /// Which medium counts where several overlap: the one with the highest.
+    pub priority: u32,
+}
+
+/// What the runtime must know of one instance of a material.
+#[derive(Clone, Debug)]
+pub struct InstanceInfo {
+    /// The binding's name.
+    pub name: String,
+    /// Its material, an index into the program's.
+    pub material: usize,
+    /// How it emits.
+    pub emission: Emission,
+    /// What fills the objects it covers; none where they are thin-walled or opaque.
+    pub medium: Option<Medium>,
+}
 
 /// How a material emits light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,17 +100,19 @@ pub struct TextureRef {
     pub space: TextureSpace,
 }
 
-/// What the runtime must know of one compiled material.
+/// What the runtime must know of one compiled material, whatever its instances.
 #[derive(Clone, Debug)]
 pub struct MaterialInfo {
-    /// Unique name in the program, a WGSL identifier: the binding's name.
+    /// Unique name in the program, a WGSL identifier: the material's name.
     pub name: String,
     /// Every lobe is discrete (or there is none): no light sample is worth a shadow ray.
     pub delta_only: bool,
-    /// Some lobe may scatter to the other side: paths need the medium identifier.
+    /// Some lobe may scatter to the other side.
+    pub crosses: bool,
+    /// It crosses into an interior: paths change their medium.
     pub transmissive: bool,
-    /// How it emits.
-    pub emission: Emission,
+    /// Some instance emits [`Emission::Varying`] light.
+    pub varying_emission: bool,
     /// Which fields of `SurfacePoint` it reads.
     pub inputs: InputSet,
     /// Slots of the textures it reads.

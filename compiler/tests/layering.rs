@@ -316,7 +316,10 @@ fn discrete_materials_answer_lights_with_nothing() {
 
 #[test]
 fn glass_changes_sides_and_says_so() {
-    let m = Asked::new("use std::bsdf::smooth_dielectric;", "smooth_dielectric(1.5)");
+    let m = Asked::new(
+        "use std::bsdf::smooth_dielectric;",
+        "smooth_dielectric(1.5)",
+    );
     assert!(m.program.infos()[0].transmissive);
     let sides: Vec<f64> = (0..5000)
         .map(|i| m.ask(direction(20.0, 0.3), [0.0; 3], point4(i)))

@@ -4,7 +4,7 @@
 //! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
 //! nothing else.
 
-use impasto_compiler::abi::{Emission, InputSet};
+use impasto_compiler::abi::InputSet;
 
 use crate::modules::{Composer, Kernel, Recipe};
 use crate::shader_part::{BufferData, ShaderPart};
@@ -147,7 +147,7 @@ impl Composer<'_> {
     fn fates(&self) -> String {
         let infos = self.materials;
         let smooth = |i: usize| !infos[i].delta_only;
-        let emits = |i: usize| infos[i].emission == Emission::Varying;
+        let emits = |i: usize| infos[i].varying_emission;
         let mut out = predicate("scatters_sampled_light", infos.len(), smooth);
         out += &predicate("needs_last_evaluation", infos.len(), emits);
         out

@@ -1,7 +1,7 @@
 //! What follows from a scene's materials and a plan before any text is written: what must
 //! exist, which queues there are, and where counters lie.
 
-use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::error::RuntimeError;
@@ -65,7 +65,7 @@ fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
             && world.max_depth > 1
             && materials.iter().any(|m| !m.delta_only),
         medium: materials.iter().any(|m| m.transmissive),
-        varying_emission: materials.iter().any(|m| m.emission == Emission::Varying),
+        varying_emission: materials.iter().any(|m| m.varying_emission),
     }
 }
 

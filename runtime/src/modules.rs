@@ -1,7 +1,7 @@
 //! Which kernels a plan needs: their stages, what feeds them, and the shells around stages.
 //! Their text is put together in `compose`.
 
-use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::compose::Binding;
@@ -123,7 +123,7 @@ impl Composer<'_> {
         Needs {
             shadow_rays: self.layout.needs.shadow_rays && infos.iter().any(|m| !m.delta_only),
             medium: infos.iter().any(|m| m.transmissive),
-            varying_emission: infos.iter().any(|m| m.emission == Emission::Varying),
+            varying_emission: infos.iter().any(|m| m.varying_emission),
         }
     }
 

@@ -108,7 +108,12 @@ impl<'g> Renderer<'g> {
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
-        let world = World::new(scene, &program.infos(), &program.textures())?;
+        let world = World::new(
+            scene,
+            &program.infos(),
+            &MaterialSource::instances(program),
+            &program.textures(),
+        )?;
         Self::from_world(gpu, &world, program, plan, options)
     }
 

@@ -4,7 +4,7 @@
 //! This is the boundary of the GPU side. A scene becomes a [`World`]; tests build small ones
 //! by hand, from a few lines of WGSL.
 
-use impasto_compiler::abi::{MaterialInfo, TextureRef};
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
 
 use crate::camera::CameraFrame;
 use crate::scene::{Scene, SceneError, SceneParts};
@@ -29,10 +29,12 @@ pub struct World {
 }
 
 impl World {
-    /// The world of a scene whose materials compiled to `materials`, reading `textures`.
+    /// The world of a scene whose bindings compiled to `instances` of `materials`, which read
+    /// `textures`.
     pub fn new(
         scene: &Scene,
         materials: &[MaterialInfo],
+        instances: &[InstanceInfo],
         textures: &[TextureRef],
     ) -> Result<Self, SceneError> {
         let (width, height) = (scene.film.width, scene.film.height);
@@ -42,7 +44,7 @@ impl World {
             camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
-            parts: SceneParts::build(scene, materials, textures)?,
+            parts: SceneParts::build(scene, materials, instances, textures)?,
             triangles: scene.mesh.len() as u64,
         })
     }
@@ -52,6 +54,12 @@ impl World {
 pub trait MaterialSource {
     /// What the runtime must know of each, in program order.
     fn infos(&self) -> Vec<MaterialInfo>;
+    /// Their instances, as triangles name them.
+    fn instances(&self) -> Vec<InstanceInfo>;
+    /// The buffers that the WGSL reads.
+    fn tables(&self) -> Vec<Table>;
+    /// WGSL of `material_of`, which gives the material of an instance.
+    fn lookup_wgsl(&self) -> String;
     /// WGSL that evaluates the materials with the given indices, ascending.
     fn wgsl(&self, members: &[usize]) -> String;
 }
@@ -59,6 +67,18 @@ pub trait MaterialSource {
 impl MaterialSource for impasto_compiler::Program {
     fn infos(&self) -> Vec<MaterialInfo> {
         self.infos()
+    }
+
+    fn instances(&self) -> Vec<InstanceInfo> {
+        self.instances().iter().map(|i| i.info.clone()).collect()
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        self.tables()
+    }
+
+    fn lookup_wgsl(&self) -> String {
+        self.lookup_wgsl()
     }
 
     fn wgsl(&self, members: &[usize]) -> String {

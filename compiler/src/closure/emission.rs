@@ -69,22 +69,21 @@ fn emit(module: &Module, b: &mut Builder, lobe: &Lobe, wo: ExprId) -> ExprId {
     b.call(module, emit, &args, lobe.span)
 }
 
-/// How a material emits, given its emission function.
+/// How an instance with the given uniforms emits, from its material's emission function.
 ///
 /// It is uniform if nothing it reads differs over the surface, and every direction of the front
 /// sees one radiance and every one of the back none. The former is seen from the code, the
 /// latter is tried on directions of every elevation.
-pub fn emission_kind(module: &Module, function: Option<&Function>) -> Emission {
+pub fn emission_kind(module: &Module, function: Option<&Function>, uniforms: &[Const]) -> Emission {
     let Some(f) = function else {
         return Emission::None;
     };
     if reads_point(module, f) {
         return Emission::Varying;
     }
-    let front = radiance(module, f, 1.0, 0.0);
-    let same = |z: f64, azimuth: f64, expected: [f32; 3]| {
-        radiance(module, f, z, azimuth) == Some(expected)
-    };
+    let radiance = |z: f64, azimuth: f64| radiance(module, f, uniforms, z, azimuth);
+    let front = radiance(1.0, 0.0);
+    let same = |z: f64, azimuth: f64, expected: [f32; 3]| radiance(z, azimuth) == Some(expected);
     let Some(expected) = front else {
         return Emission::Varying;
     };
@@ -130,7 +129,13 @@ fn is_evaluated(f: &Function, wanted: &crate::ir::Expr) -> bool {
 }
 
 /// The radiance toward a direction of cosine `z` on a surface whose normal is z.
-fn radiance(module: &Module, f: &Function, z: f64, azimuth: f64) -> Option<[f32; 3]> {
+fn radiance(
+    module: &Module,
+    f: &Function,
+    uniforms: &[Const],
+    z: f64,
+    azimuth: f64,
+) -> Option<[f32; 3]> {
     let s = (1.0 - z * z).max(0.0).sqrt();
     let wo = Value::vector(&[s * azimuth.cos(), s * azimuth.sin(), z]);
     let zero = || Value::vector(&[0.0; 3]);
@@ -144,6 +149,7 @@ fn radiance(module: &Module, f: &Function, z: f64, azimuth: f64) -> Option<[f32;
         Value::float(1.0),
     ]);
     let value = Interpreter::<f64>::new(module, 1 << 20)
+        .with_uniforms(uniforms)
         .run(f, vec![point, wo])
         .ok()?;
     match value.to_f64().as_slice() {

@@ -9,8 +9,10 @@ use std::fmt::Write;
 use super::helpers::Helpers;
 use super::names::unique;
 use crate::Program;
+use crate::abi::PARAMETERS;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
 use crate::ops::{Op, Shape, Wgsl};
+use crate::parameters::{Layout, Place};
 
 /// Operations that may stand in one expression before it gets a name.
 const MAX_INLINE: u32 = 7;
@@ -64,9 +66,18 @@ pub fn callees(f: &Function) -> BTreeSet<usize> {
     called.collect()
 }
 
-/// Prints a function under a name.
-pub fn print(program: &Program, f: &Function, name: &str, helpers: &mut Helpers, out: &mut String) {
+/// Prints a function under a name. One that reads uniforms gets the first row of its instance
+/// as its first parameter, and `layout` tells where they lie.
+pub fn print(
+    program: &Program,
+    f: &Function,
+    name: &str,
+    layout: Option<&Layout>,
+    helpers: &mut Helpers,
+    out: &mut String,
+) {
     let mut taken = called_names(program, f);
+    let row = layout.map(|_| unique(&mut taken, "row"));
     let params: Vec<String> = f
         .params
         .iter()
@@ -90,7 +101,7 @@ pub fn print(program: &Program, f: &Function, name: &str, helpers: &mut Helpers,
         taken,
         next: 0,
     };
-    printer.function(name, &counters);
+    printer.function(name, &counters, row.as_deref().zip(layout));
 }
 
 /// Names that the function's text refers to, which its own variables must not hide.
@@ -141,13 +152,18 @@ struct Printer<'a> {
 }
 
 impl Printer<'_> {
-    fn function(&mut self, name: &str, counters: &BTreeSet<LocalId>) {
+    fn function(
+        &mut self,
+        name: &str,
+        counters: &BTreeSet<LocalId>,
+        table: Option<(&str, &Layout)>,
+    ) {
         let ty = |t| type_name(self.program, t);
-        let params: Vec<String> = self
-            .params
-            .iter()
-            .zip(&self.f.params)
-            .map(|(n, p)| format!("{n}: {}", ty(p.ty)))
+        let own = self.params.iter().zip(&self.f.params);
+        let params: Vec<String> = table
+            .map(|(row, _)| format!("{row}: u32"))
+            .into_iter()
+            .chain(own.map(|(n, p)| format!("{n}: {}", ty(p.ty))))
             .collect();
         let result = ty(self.f.result);
         let origin = self.program.origin(self.f.span);
@@ -163,9 +179,33 @@ impl Printer<'_> {
                 let _ = writeln!(self.out, "    var {}: {};", self.locals[i], ty(local.ty));
             }
         }
+        if let Some((row, layout)) = table {
+            self.uniforms(row, layout);
+        }
         self.block(&self.f.body, 1);
         let value = self.operand(self.f.value);
         let _ = writeln!(self.out, "    return {value};\n}}\n");
+    }
+
+    /// Reads the uniforms that the function uses from the table.
+    fn uniforms(&mut self, row: &str, layout: &Layout) {
+        let mut read: BTreeMap<u32, String> = BTreeMap::new();
+        for id in used_uniforms(self.f) {
+            let e = self.f.expr(id);
+            let ExprKind::Uniform(i) = e.kind else {
+                continue;
+            };
+            let Some(place) = layout.places.get(i as usize) else {
+                continue;
+            };
+            let name = read.entry(i).or_insert_with(|| {
+                let name = unique(&mut self.taken, e.name.as_deref().unwrap_or("uniform"));
+                let text = uniform(row, *place, &type_name(self.program, place.ty));
+                let _ = writeln!(self.out, "    let {name} = {text};");
+                name
+            });
+            self.names[id.index()] = Some(name.clone());
+        }
     }
 
     fn block(&mut self, block: &[Stmt], depth: usize) {
@@ -326,8 +366,7 @@ impl Printer<'_> {
         let f = self.f;
         let expr = f.expr(id);
         match &expr.kind {
-            ExprKind::Const(_) | ExprKind::Param(_) => self.operand(id),
-            ExprKind::Uniform(_) => "0.0".into(),
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => self.operand(id),
             ExprKind::Load(local) => self.locals[local.index()].clone(),
             ExprKind::Op(op, args) => self.op(*op, args, expr.ty),
             ExprKind::Compose(args) => {
@@ -423,6 +462,58 @@ impl Printer<'_> {
         } else {
             fetch
         }
+    }
+}
+
+/// The uniforms that statements read, each expression once.
+fn used_uniforms(f: &Function) -> BTreeSet<ExprId> {
+    let mut used = BTreeSet::from([f.value]);
+    read_by(f, &f.body, &mut used);
+    used.retain(|&id| matches!(f.expr(id).kind, ExprKind::Uniform(_)));
+    used
+}
+
+/// The expressions that statements and what they evaluate read.
+fn read_by(f: &Function, block: &Block, out: &mut BTreeSet<ExprId>) {
+    for stmt in block {
+        match stmt {
+            Stmt::Eval(id) => out.extend(f.expr(*id).kind.operands()),
+            Stmt::Store(_, _, value) => drop(out.insert(*value)),
+            Stmt::If(cond, a, b) => {
+                out.insert(*cond);
+                read_by(f, a, out);
+                read_by(f, b, out);
+            }
+            Stmt::For {
+                low, high, body, ..
+            } => {
+                out.extend([*low, *high]);
+                read_by(f, body, out);
+            }
+            Stmt::While {
+                head, test, body, ..
+            } => {
+                read_by(f, head, out);
+                out.insert(*test);
+                read_by(f, body, out);
+            }
+            Stmt::Break | Stmt::Continue => {}
+        }
+    }
+}
+
+/// A value of the parameter table.
+fn uniform(row: &str, place: Place, ty: &str) -> String {
+    let row = match place.row {
+        0 => row.to_owned(),
+        n => format!("{row} + {n}u"),
+    };
+    let first = usize::from(place.word);
+    let letters = &"xyzw"[first..first + place.ty.width().unwrap_or(1)];
+    let words = format!("{PARAMETERS}[{row}].{letters}");
+    match place.ty {
+        Type::Bool => format!("{words} != 0u"),
+        _ => format!("bitcast<{ty}>({words})"),
     }
 }
 

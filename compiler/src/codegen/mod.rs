@@ -7,8 +7,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::Program;
-use crate::abi::{EMISSION, EVALUATE, Emission, TEXTURE_FETCH};
+use crate::abi::{EMISSION, EVALUATE, INSTANCES, MATERIAL_OF, TEXTURE_FETCH};
 use crate::ir::{ExprKind, Function, StructId, Type};
+use crate::parameters::Layout;
 
 mod function;
 mod helpers;
@@ -30,12 +31,21 @@ pub fn module(program: &Program, members: &[usize]) -> String {
             program,
             f,
             program.names.function(id),
+            None,
             &mut helpers,
             &mut body,
         );
     }
-    for (f, name) in &roots {
-        function::print(program, f, name, &mut helpers, &mut body);
+    for root in &roots {
+        let layout = Some(root.layout).filter(|l| l.rows > 0);
+        function::print(
+            program,
+            root.function,
+            &root.name,
+            layout,
+            &mut helpers,
+            &mut body,
+        );
     }
     let mut out = String::new();
     structs(program, &functions, &roots, &mut out);
@@ -45,14 +55,29 @@ pub fn module(program: &Program, members: &[usize]) -> String {
     out
 }
 
+/// A material's own function.
+struct Root<'p> {
+    function: &'p Function,
+    name: String,
+    /// Where its uniforms lie.
+    layout: &'p Layout,
+}
+
 /// The materials' own functions with their WGSL names.
-fn roots<'p>(program: &'p Program, members: &[usize]) -> Vec<(&'p Function, String)> {
+fn roots<'p>(program: &'p Program, members: &[usize]) -> Vec<Root<'p>> {
     let mut roots = Vec::new();
     for &member in members {
         let material = &program.materials[member];
-        roots.push((&material.evaluate, evaluate_name(&material.info.name)));
-        if let (Some(f), Emission::Varying) = (&material.emission, material.info.emission) {
-            roots.push((f, emission_name(&material.info.name)));
+        let mut add = |function, name| {
+            roots.push(Root {
+                function,
+                name,
+                layout: &material.layout,
+            });
+        };
+        add(&material.evaluate, evaluate_name(&material.info.name));
+        if let (Some(f), true) = (&material.emission, material.info.varying_emission) {
+            add(f, emission_name(&material.info.name));
         }
     }
     roots
@@ -69,9 +94,9 @@ fn emission_name(material: &str) -> String {
 }
 
 /// Functions that the roots call, directly or not, ascending (so callees come first).
-fn reachable(program: &Program, roots: &[(&Function, String)]) -> BTreeSet<usize> {
+fn reachable(program: &Program, roots: &[Root<'_>]) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
-    let mut pending: Vec<&Function> = roots.iter().map(|r| r.0).collect();
+    let mut pending: Vec<&Function> = roots.iter().map(|r| r.function).collect();
     while let Some(f) = pending.pop() {
         for callee in function::callees(f) {
             if found.insert(callee) {
@@ -83,17 +108,12 @@ fn reachable(program: &Program, roots: &[(&Function, String)]) -> BTreeSet<usize
 }
 
 /// The structs of the ABI, and those that the functions use, in order of definition.
-fn structs(
-    program: &Program,
-    functions: &BTreeSet<usize>,
-    roots: &[(&Function, String)],
-    out: &mut String,
-) {
+fn structs(program: &Program, functions: &BTreeSet<usize>, roots: &[Root<'_>], out: &mut String) {
     let mut used = BTreeSet::from([program.core.surface_point, program.core.material_sample]);
     let all = functions
         .iter()
         .map(|&id| &program.module.functions[id])
-        .chain(roots.iter().map(|r| r.0));
+        .chain(roots.iter().map(|r| r.function));
     for f in all {
         let types = f
             .exprs
@@ -132,55 +152,112 @@ fn use_struct(program: &Program, ty: Type, used: &mut BTreeSet<StructId>) {
 fn dispatch(program: &Program, members: &[usize], out: &mut String) {
     let _ = writeln!(
         out,
-        "fn {EVALUATE}(material: u32, point: SurfacePoint, wo: vec3f, wl: vec3f, u: vec4f) -> MaterialSample {{"
+        "fn {EVALUATE}(instance: u32, point: SurfacePoint, wo: vec3f, wl: vec3f, u: vec4f) -> MaterialSample {{"
     );
-    let cases = members
-        .iter()
-        .map(|&m| (m, evaluate_name(&program.materials[m].info.name)));
-    switch(
-        out,
-        &cases.collect::<Vec<_>>(),
-        "(point, wo, wl, u)",
-        "MaterialSample()",
-    );
-    let emitters: Vec<(usize, String)> = members
-        .iter()
-        .filter(|&&m| program.materials[m].info.emission == Emission::Varying)
-        .map(|&m| (m, emission_name(&program.materials[m].info.name)))
-        .collect();
+    let evaluate = Dispatch {
+        program,
+        name: evaluate_name,
+        args: "point, wo, wl, u",
+        otherwise: "MaterialSample()",
+    };
+    evaluate.print(members, members.len() == 1, out);
+    let emits = |m: &&usize| program.materials[**m].info.varying_emission;
+    let emitters: Vec<usize> = members.iter().filter(emits).copied().collect();
     if !emitters.is_empty() {
         let _ = writeln!(
             out,
-            "\nfn {EMISSION}(material: u32, point: SurfacePoint, wo: vec3f) -> vec3f {{"
+            "\nfn {EMISSION}(instance: u32, point: SurfacePoint, wo: vec3f) -> vec3f {{"
         );
-        let everyone = emitters.len() == members.len();
-        if everyone {
-            switch(out, &emitters, "(point, wo)", "vec3f()");
+        let emission = Dispatch {
+            program,
+            name: emission_name,
+            args: "point, wo",
+            otherwise: "vec3f()",
+        };
+        emission.print(&emitters, members.len() == 1, out);
+    }
+}
+
+/// A call of one function of the material of an instance.
+struct Dispatch<'p> {
+    program: &'p Program,
+    /// The function's name for a material's.
+    name: fn(&str) -> String,
+    args: &'p str,
+    /// What an instance of no such material gives.
+    otherwise: &'p str,
+}
+
+impl Dispatch<'_> {
+    /// A switch over materials, or a plain call where the instance can only be of one.
+    fn print(&self, materials: &[usize], only: bool, out: &mut String) {
+        let rows = |m: &usize| self.program.materials[*m].layout.rows > 0;
+        let (table, rows) = (
+            self.program.has_instance_table(),
+            materials.iter().any(rows),
+        );
+        let material = if table && (rows || !only) {
+            let _ = writeln!(out, "    let entry = {INSTANCES}[instance];");
+            "entry.x"
         } else {
-            cases_of(out, &emitters, "(point, wo)", "vec3f()");
+            "instance"
+        };
+        if only {
+            let _ = writeln!(out, "    return {};\n}}", self.call(materials[0]));
+            return;
         }
+        let _ = writeln!(out, "    switch {material} {{");
+        for &m in materials {
+            let _ = writeln!(out, "        case {m}u: {{ return {}; }}", self.call(m));
+        }
+        let otherwise = self.otherwise;
+        let _ = writeln!(
+            out,
+            "        default: {{ return {otherwise}; }}\n    }}\n}}"
+        );
+    }
+
+    fn call(&self, material: usize) -> String {
+        let material = &self.program.materials[material];
+        let row = if material.layout.rows > 0 {
+            "entry.y, "
+        } else {
+            ""
+        };
+        format!("{}({row}{})", (self.name)(&material.info.name), self.args)
     }
 }
 
-/// A switch over materials, or a plain call where there is only one.
-fn switch(out: &mut String, cases: &[(usize, String)], args: &str, otherwise: &str) {
-    match cases {
-        [(_, only)] => {
-            let _ = writeln!(out, "    return {only}{args};\n}}");
-        }
-        _ => cases_of(out, cases, args, otherwise),
-    }
+/// `material_of`, by table where there is one.
+pub fn lookup(program: &Program) -> String {
+    let value = if program.has_instance_table() {
+        format!("{INSTANCES}[instance].x")
+    } else {
+        "instance".to_owned()
+    };
+    format!("fn {MATERIAL_OF}(instance: u32) -> u32 {{\n    return {value};\n}}\n")
 }
 
-fn cases_of(out: &mut String, cases: &[(usize, String)], args: &str, otherwise: &str) {
-    out.push_str("    switch material {\n");
-    for (material, name) in cases {
-        let _ = writeln!(out, "        case {material}u: {{ return {name}{args}; }}");
+/// The WGSL of some materials with declarations of all that a kernel would provide, which makes
+/// it a module that can be checked by itself.
+pub fn complete(program: &Program, members: &[usize]) -> String {
+    let mut out = String::new();
+    for (i, table) in program.tables().iter().enumerate() {
+        let _ = writeln!(
+            out,
+            "@group(0) @binding({i}) var<storage, read> {}: {};",
+            table.name, table.wgsl_type
+        );
     }
-    let _ = writeln!(
-        out,
-        "        default: {{ return {otherwise}; }}\n    }}\n}}"
-    );
+    out.push_str(&module(program, members));
+    if out.contains(TEXTURE_FETCH) {
+        // Stands for the lookup that the runtime provides.
+        let _ = writeln!(
+            out,
+            "\nfn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{\n    return vec4f(uv, f32(slot), 1.0);\n}}"
+        );
+    }
+    out
 }
 
 /// Checks a module's text with naga, as every kernel that includes it will be checked.
@@ -188,22 +265,13 @@ fn cases_of(out: &mut String, cases: &[(usize, String)], args: &str, otherwise: 
 /// # Errors
 /// What naga says, with the place in the text.
 pub fn validate(wgsl: &str) -> Result<(), String> {
-    // The runtime provides the texture lookup; a stand-in completes the module here.
-    let complete = if wgsl.contains(TEXTURE_FETCH) {
-        format!(
-            "{wgsl}\nfn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{ return vec4f(uv, f32(slot), 1.0); }}\n"
-        )
-    } else {
-        wgsl.to_owned()
-    };
-    let module =
-        naga::front::wgsl::parse_str(&complete).map_err(|e| e.emit_to_string(&complete))?;
+    let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| e.emit_to_string(wgsl))?;
     let flags = naga::valid::ValidationFlags::all();
     let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty());
     validator
         .validate(&module)
         .map(|_| ())
-        .map_err(|e| e.emit_to_string(&complete))
+        .map_err(|e| e.emit_to_string(wgsl))
 }
 
 /// The fields of `SurfacePoint` that a material's functions read.

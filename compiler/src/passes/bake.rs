@@ -2,11 +2,11 @@
 
 use crate::ir::{Const, ExprKind, Function};
 
-/// Replaces every parameter by its value.
-pub fn bake(body: &mut Function, values: &[Const]) {
+/// Replaces every parameter that has a value by it.
+pub fn bake(body: &mut Function, values: &[Option<Const>]) {
     for expr in &mut body.exprs {
         if let ExprKind::Uniform(i) = expr.kind
-            && let Some(value) = values.get(i as usize)
+            && let Some(Some(value)) = values.get(i as usize)
         {
             expr.kind = ExprKind::Const(value.clone());
         }

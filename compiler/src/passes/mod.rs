@@ -7,8 +7,10 @@ use crate::ir::{self, Function, Module};
 mod bake;
 mod dead_code;
 mod fold;
+mod hoist;
 
 pub use bake::bake;
+pub use hoist::{HOIST_FUEL, Hoisted, hoist};
 
 /// A pass with its name.
 pub struct Pass {

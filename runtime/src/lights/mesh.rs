@@ -9,7 +9,7 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
     let mesh = &context.scene.mesh;
     let lights: Vec<Sampled> = (0..mesh.len())
         .filter_map(|triangle| {
-            let info = context.materials.get(mesh.materials[triangle] as usize)?;
+            let info = context.instances.get(mesh.materials[triangle] as usize)?;
             let Emission::Uniform(radiance) = info.emission else {
                 return None;
             };

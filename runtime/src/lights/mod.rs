@@ -5,7 +5,7 @@
 //! lacks leave no trace in its WGSL.
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::abi::{Emission, InstanceInfo};
 
 use crate::scene::{Mesh, Scene, SceneError};
 use crate::shader_part::{BufferData, ShaderPart};
@@ -38,10 +38,10 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// The lights of `scene`, whose triangles are stored in `order` and whose materials compiled
-    /// to `materials`.
-    pub fn build(scene: &Scene, order: &[u32], materials: &[MaterialInfo]) -> Lights {
-        let context = Context::new(scene, order, materials);
+    /// The lights of `scene`, whose triangles are stored in `order` and whose bindings compiled
+    /// to `instances`.
+    pub fn build(scene: &Scene, order: &[u32], instances: &[InstanceInfo]) -> Lights {
+        let context = Context::new(scene, order, instances);
         let mut kinds = Vec::new();
         let mut count = 0;
         for kind in KINDS {
@@ -63,8 +63,8 @@ impl Lights {
 }
 
 /// Is there anything in the scene that could give light? An all-black picture is hardly meant.
-pub fn check(scene: &Scene, materials: &[MaterialInfo]) -> Result<(), SceneError> {
-    let emissive = materials.iter().any(|m| m.emission != Emission::None);
+pub fn check(scene: &Scene, instances: &[InstanceInfo]) -> Result<(), SceneError> {
+    let emissive = instances.iter().any(|i| i.emission != Emission::None);
     if emissive || !scene.lights.is_empty() || scene.environment.is_some() {
         return Ok(());
     }
@@ -78,7 +78,7 @@ pub fn check(scene: &Scene, materials: &[MaterialInfo]) -> Result<(), SceneError
 /// What the kinds read.
 struct Context<'a> {
     scene: &'a Scene,
-    materials: &'a [MaterialInfo],
+    instances: &'a [InstanceInfo],
     /// Triangle of the mesh to primitive.
     primitives: Vec<u32>,
     /// Radius of a sphere around the mesh: what a light at infinity shines on.
@@ -86,14 +86,14 @@ struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    fn new(scene: &'a Scene, order: &[u32], materials: &'a [MaterialInfo]) -> Self {
+    fn new(scene: &'a Scene, order: &[u32], instances: &'a [InstanceInfo]) -> Self {
         let mut primitives = vec![0; order.len()];
         for (primitive, &triangle) in order.iter().enumerate() {
             primitives[triangle as usize] = primitive as u32;
         }
         Context {
             scene,
-            materials,
+            instances,
             primitives,
             radius: bounding_radius(&scene.mesh),
         }

@@ -8,7 +8,7 @@
 //! | `lights` | `sample_light`, `light_hit`, `light_escape`, `power_heuristic` | `surface` |
 //! | `texture` | `texture_fetch` | |
 
-use impasto_compiler::abi::{MaterialInfo, TextureRef};
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 
 use super::surface::{geometry_part, surface_part};
 use super::{Scene, SceneError};
@@ -38,15 +38,17 @@ pub struct SceneParts {
 }
 
 impl SceneParts {
-    /// The parts of `scene`, whose materials compiled to `materials`, which read `textures`.
+    /// The parts of `scene`, whose bindings compiled to `instances` of `materials`, which read
+    /// `textures`.
     pub fn build(
         scene: &Scene,
         materials: &[MaterialInfo],
+        instances: &[InstanceInfo],
         textures: &[TextureRef],
     ) -> Result<SceneParts, SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let bvh = Bvh::build(&scene.mesh);
-        let lights = Lights::build(scene, bvh.order(), materials);
+        let lights = Lights::build(scene, bvh.order(), instances);
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
         Ok(SceneParts {
             geometry: geometry_part(&scene.mesh, bvh.order(), &lights.of_triangle),

@@ -1,0 +1,532 @@
+//! A compiled program: materials as code, instances as values, and what the renderer must know of
+//! both; and the builder that takes checked materials there.
+//!
+//! Instances of one material share its code. A parameter on which all of them agree is a constant
+//! in it; the others are uniforms, and what depends on uniforms only is computed here, once an
+//! instance, and read by the kernel from the parameter table (see [`crate::parameters`]).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
+use crate::closure;
+use crate::codegen;
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{self, Const, ExprKind, Function, Module, Type};
+use crate::ops::Op;
+use crate::parameters::Layout;
+use crate::passes::{self, Hoisted};
+use crate::sema::Checker;
+use crate::source::{SourceMap, Span};
+
+/// Compiled materials and their instances.
+#[derive(Clone, Debug)]
+pub struct Program {
+    pub(crate) module: Module,
+    pub(crate) names: codegen::Names,
+    pub(crate) core: closure::Core,
+    pub(crate) materials: Vec<CompiledMaterial>,
+    instances: Vec<Instance>,
+    /// Textures that some material may read, as indices of `module.textures`.
+    textures: BTreeSet<usize>,
+    /// Which lookups occur: with and without color conversion.
+    spaces: BTreeSet<TextureSpace>,
+    /// Line of each span that generated code mentions, by file.
+    sources: SourceMap,
+}
+
+/// A material with its functions.
+#[derive(Clone, Debug)]
+pub struct CompiledMaterial {
+    /// What the renderer must know.
+    pub info: MaterialInfo,
+    /// `(point, wo, wl, u) -> MaterialSample`
+    pub evaluate: Function,
+    /// `(point, wo) -> radiance`, when it emits.
+    pub emission: Option<Function>,
+    /// Where the uniforms of both functions lie in the rows of an instance.
+    pub layout: Layout,
+}
+
+/// An instance of a material.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What the renderer must know.
+    pub info: InstanceInfo,
+    /// The values of the material's uniforms.
+    pub uniforms: Vec<Const>,
+    /// Its first row in the parameter table.
+    pub row: u32,
+}
+
+impl Program {
+    /// What the renderer must know of each material, in the order of their first requests.
+    pub fn materials(&self) -> impl ExactSizeIterator<Item = &MaterialInfo> {
+        self.materials.iter().map(|m| &m.info)
+    }
+
+    /// As [`Program::materials`], copied.
+    pub fn infos(&self) -> Vec<MaterialInfo> {
+        self.materials().cloned().collect()
+    }
+
+    /// The instances, in the order of the requests.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// The materials with their functions, for interpreters and analyses.
+    pub fn compiled(&self) -> &[CompiledMaterial] {
+        &self.materials
+    }
+
+    /// The IR of the functions that materials call.
+    pub fn ir(&self) -> &Module {
+        &self.module
+    }
+
+    /// The textures to provide; a texture's position is its slot.
+    pub fn textures(&self) -> Vec<TextureRef> {
+        let both = |&t: &usize| self.spaces.iter().map(move |&space| (t, space));
+        let slots = self.textures.iter().flat_map(both);
+        slots
+            .map(|(t, space)| TextureRef {
+                path: self.module.textures[t].clone(),
+                space,
+            })
+            .collect()
+    }
+
+    /// The WGSL of some materials: structs, the functions they reach, one function a material,
+    /// `evaluate_material`, and `material_emission` if some emission varies.
+    pub fn wgsl(&self, members: &[usize]) -> String {
+        codegen::module(self, members)
+    }
+
+    /// The WGSL of `material_of`, which kernels need to sort instances by material.
+    pub fn lookup_wgsl(&self) -> String {
+        codegen::lookup(self)
+    }
+
+    /// The WGSL of all materials with declarations of all that a kernel would provide.
+    pub fn complete_wgsl(&self) -> String {
+        let all: Vec<usize> = (0..self.materials.len()).collect();
+        codegen::complete(self, &all)
+    }
+
+    /// The buffers that the code reads; none if every material has one instance.
+    pub fn tables(&self) -> Vec<Table> {
+        let mut tables = Vec::new();
+        if self.has_instance_table() {
+            let rows = self.instances.iter();
+            let words = rows.flat_map(|i| [i.info.material as u32, i.row]).collect();
+            tables.push(Table {
+                name: abi::INSTANCES,
+                wgsl_type: "array<vec2<u32>>",
+                words,
+            });
+        }
+        let parameters: Vec<u32> = self
+            .instances
+            .iter()
+            .flat_map(|i| self.row_words(i))
+            .collect();
+        if !parameters.is_empty() {
+            tables.push(Table {
+                name: abi::PARAMETERS,
+                wgsl_type: "array<vec4<u32>>",
+                words: parameters,
+            });
+        }
+        tables
+    }
+
+    /// Must the material of an instance be looked up?
+    pub(crate) fn has_instance_table(&self) -> bool {
+        let mut materials = self.instances.iter().enumerate();
+        materials.any(|(i, instance)| instance.info.material != i)
+    }
+
+    /// The words of an instance in the parameter table; texture indices become slots.
+    fn row_words(&self, instance: &Instance) -> Vec<u32> {
+        self.materials[instance.info.material]
+            .layout
+            .pack(&instance.uniforms)
+    }
+
+    /// The first slot of texture `t`.
+    pub(crate) fn first_slot(&self, t: usize) -> u32 {
+        let rank = self.textures.iter().take_while(|&&x| x < t).count();
+        (rank * self.spaces.len().max(1)) as u32
+    }
+
+    /// What a kind of lookup adds to the first slot.
+    pub(crate) fn slot_offset(&self, op: Op) -> u32 {
+        u32::from(op == Op::ImageData && self.spaces.len() > 1)
+    }
+
+    fn resolve_texture_slots(&mut self) {
+        for i in 0..self.materials.len() {
+            let read = std::mem::take(&mut self.materials[i].info.textures);
+            let per_texture = self.spaces.len();
+            let slots = read
+                .iter()
+                .filter(|t| self.textures.contains(t))
+                .flat_map(|&t| {
+                    let first = self.first_slot(t) as usize;
+                    first..first + per_texture
+                });
+            self.materials[i].info.textures = slots.collect();
+        }
+    }
+
+    /// `car_paint.impasto:12`: where a span is, without folders, which differ between machines.
+    pub(crate) fn origin(&self, span: Span) -> String {
+        let text = self.sources.file_line(span);
+        match text.rsplit_once('/') {
+            Some((_, name)) if !text.starts_with("std/") => name.to_owned(),
+            _ => text,
+        }
+    }
+}
+
+/// Values for a material's parameters, and who wants them.
+#[derive(Clone, Debug)]
+pub(crate) struct Setting {
+    name: String,
+    values: Vec<Const>,
+}
+
+impl Setting {
+    /// The instance `name`, with a value for every parameter.
+    pub(crate) fn new(name: &str, values: Vec<Const>) -> Self {
+        Self {
+            name: name.to_owned(),
+            values,
+        }
+    }
+}
+
+/// Collects lowered materials.
+pub(crate) struct ProgramBuilder {
+    core: closure::Core,
+    /// The checker's module with its functions optimised, as far as materials needed them yet.
+    module: Module,
+    /// Expressions of each function with its calls put in line.
+    sizes: Vec<u64>,
+    materials: Vec<CompiledMaterial>,
+    instances: Vec<Instance>,
+    names: BTreeMap<String, u32>,
+    textures: BTreeSet<usize>,
+}
+
+impl ProgramBuilder {
+    pub(crate) fn new(checker: &mut Checker) -> Option<Self> {
+        let core = closure::Core {
+            valid_normal: checker.core_function("valid_normal")?,
+            frame: checker.core_function("frame")?,
+            to_local: checker.core_function("to_local")?,
+            to_world: checker.core_function("to_world")?,
+            transport_valid: checker.core_function("transport_valid")?,
+            surface_point: checker.core_struct("SurfacePoint")?,
+            material_sample: checker.core_struct("MaterialSample")?,
+        };
+        Some(Self {
+            core,
+            module: Module::default(),
+            sizes: Vec::new(),
+            materials: Vec::new(),
+            instances: Vec::new(),
+            names: BTreeMap::from([("material".to_owned(), 1)]),
+            textures: BTreeSet::new(),
+        })
+    }
+
+    /// Lowers a material, with the given settings as its instances.
+    pub(crate) fn add(
+        &mut self,
+        checker: &mut Checker,
+        mut material: ir::Material,
+        settings: &[Setting],
+    ) {
+        self.optimise_functions(&checker.ir);
+        let agreed = agreed(settings);
+        passes::bake(&mut material.body, &agreed);
+        passes::fold_body(&self.module, &mut material.body);
+        let lowered = match self.lower(&material) {
+            Ok(lowered) => lowered,
+            Err(problem) => return checker.diagnostics.push(problem),
+        };
+        let read = texture_values(&material, settings, &checker.literal_textures);
+        self.textures.extend(read.iter().copied());
+        match self.instances(&material, &lowered, settings) {
+            Ok(instances) => self.instances.extend(instances),
+            Err(problem) => return checker.diagnostics.push(problem),
+        }
+        self.finish_material(&material, lowered, read, settings.len());
+    }
+
+    /// Takes over the functions that were checked since the last material.
+    fn optimise_functions(&mut self, checked: &Module) {
+        self.module.structs.clone_from(&checked.structs);
+        self.module.closures.clone_from(&checked.closures);
+        self.module.textures.clone_from(&checked.textures);
+        for f in &checked.functions[self.module.functions.len()..] {
+            let mut f = f.clone();
+            passes::run(&self.module, &mut f);
+            self.sizes.push(self.size(&f));
+            self.module.functions.push(f);
+        }
+    }
+
+    /// Expressions of a function with its calls put in line.
+    fn size(&self, f: &Function) -> u64 {
+        codegen::evaluated(f).into_iter().fold(0u64, |n, id| {
+            let inner = match f.expr(id).kind {
+                ExprKind::Call(callee, _) => self.sizes.get(callee.index()).copied().unwrap_or(0),
+                _ => 1,
+            };
+            n.saturating_add(inner)
+        })
+    }
+
+    /// The functions of a material whose agreed parameters are constants.
+    fn lower(&mut self, material: &ir::Material) -> Result<Lowered, Diagnostic> {
+        let module = &self.module;
+        let lobes = material
+            .surface
+            .map_or(Vec::new(), |root| closure::lobes(material, root));
+        if lobes.len() > closure::MAX_LOBES {
+            let message = format!("`{}` has {} lobes", material.name, lobes.len());
+            return Err(Diagnostic::new(Code::TooManyLobes, material.span, message)
+                .expected(format!("at most {}", closure::MAX_LOBES)));
+        }
+        let mut evaluate = closure::evaluate(module, &self.core, material, &material.name, &lobes);
+        passes::run(module, &mut evaluate);
+        let mut emission = closure::emission(module, &self.core, material, &material.name);
+        if let Some(f) = &mut emission {
+            passes::run(module, f);
+        }
+        let size = self.size(&evaluate);
+        if size > MAX_SIZE {
+            return Err(too_large(material, size));
+        }
+        let crosses = closure::transmissive(module, material, &lobes);
+        let mut hoisted = vec![passes::hoist(module, &mut evaluate)];
+        if let Some(f) = &mut emission {
+            let own = passes::hoist(module, f);
+            shift_uniforms(f, hoisted[0].values.len() as u32);
+            hoisted.push(own);
+        }
+        Ok(Lowered {
+            evaluate,
+            emission,
+            hoisted,
+            crosses,
+            delta_only: closure::delta_only(module, &lobes),
+            lobes: lobes.len(),
+        })
+    }
+
+    /// The instances of the next material.
+    fn instances(
+        &self,
+        material: &ir::Material,
+        lowered: &Lowered,
+        settings: &[Setting],
+    ) -> Result<Vec<Instance>, Diagnostic> {
+        let mut instances = Vec::with_capacity(settings.len());
+        for setting in settings {
+            let mut uniforms = Vec::new();
+            for part in &lowered.hoisted {
+                let values = part.evaluate(&self.module, &setting.values);
+                uniforms.extend(values.map_err(|_| too_long(material, &setting.name))?);
+            }
+            let emission =
+                closure::emission_kind(&self.module, lowered.emission.as_ref(), &uniforms);
+            instances.push(Instance {
+                info: InstanceInfo {
+                    name: setting.name.clone(),
+                    material: self.materials.len(),
+                    emission,
+                    medium: None,
+                },
+                uniforms,
+                row: 0,
+            });
+        }
+        // Where one instance must be evaluated as it is hit, the code for it is there for all.
+        if instances
+            .iter()
+            .any(|i| i.info.emission == Emission::Varying)
+        {
+            let emitting = instances
+                .iter_mut()
+                .filter(|i| i.info.emission != Emission::None);
+            emitting.for_each(|i| i.info.emission = Emission::Varying);
+        }
+        Ok(instances)
+    }
+
+    fn finish_material(
+        &mut self,
+        material: &ir::Material,
+        lowered: Lowered,
+        textures: Vec<usize>,
+        instances: usize,
+    ) {
+        let own = &self.instances[self.instances.len() - instances..];
+        let varying = own.iter().any(|i| i.info.emission == Emission::Varying);
+        let name = codegen::unique_material_name(&mut self.names, &material.name);
+        let types: Vec<Type> = lowered.hoisted.iter().flat_map(Hoisted::types).collect();
+        let (mut evaluate, mut emission) = (lowered.evaluate, lowered.emission);
+        evaluate.name.clone_from(&name);
+        emission.iter_mut().for_each(|f| f.name.clone_from(&name));
+        let read_by = emission.as_ref().filter(|_| varying);
+        let functions: Vec<&Function> = std::iter::once(&evaluate).chain(read_by).collect();
+        let info = MaterialInfo {
+            name,
+            delta_only: lowered.delta_only,
+            crosses: lowered.crosses,
+            transmissive: lowered.crosses,
+            varying_emission: varying,
+            inputs: codegen::inputs(&self.module.structs, &functions),
+            textures,
+            lobes: lowered.lobes,
+        };
+        self.materials.push(CompiledMaterial {
+            info,
+            evaluate,
+            emission,
+            layout: Layout::new(&types),
+        });
+    }
+
+    /// Puts the instance that was added as number `i` at `places[i]`.
+    pub(crate) fn order_instances(&mut self, places: &[usize]) {
+        let mut placed: Vec<(usize, Instance)> = places
+            .iter()
+            .copied()
+            .zip(self.instances.drain(..))
+            .collect();
+        placed.sort_by_key(|(place, _)| *place);
+        self.instances.extend(placed.into_iter().map(|(_, i)| i));
+    }
+
+    pub(crate) fn finish(mut self, checker: &Checker) -> Program {
+        self.optimise_functions(&checker.ir);
+        let mut row = 0;
+        for instance in &mut self.instances {
+            instance.row = row;
+            row += self.materials[instance.info.material].layout.rows;
+        }
+        let spaces = texture_spaces(&self.module, &self.materials);
+        if spaces.is_empty() {
+            self.textures.clear();
+        }
+        let mut program = Program {
+            names: codegen::Names::new(
+                &self.module,
+                &checker.sources,
+                &[self.core.surface_point, self.core.material_sample],
+            ),
+            module: self.module,
+            core: self.core,
+            materials: self.materials,
+            instances: self.instances,
+            textures: self.textures,
+            spaces,
+            sources: checker.sources.clone(),
+        };
+        program.resolve_texture_slots();
+        program
+    }
+}
+
+/// A material's functions with what was found out on the way.
+struct Lowered {
+    evaluate: Function,
+    emission: Option<Function>,
+    /// What the host computes for the uniforms of `evaluate`, then for those of `emission`.
+    hoisted: Vec<Hoisted>,
+    crosses: bool,
+    delta_only: bool,
+    lobes: usize,
+}
+
+/// Makes room for `first` uniforms before those of a function.
+fn shift_uniforms(f: &mut Function, first: u32) {
+    for e in &mut f.exprs {
+        if let ExprKind::Uniform(i) = &mut e.kind {
+            *i += first;
+        }
+    }
+}
+
+/// The values of the parameters on which all settings agree.
+fn agreed(settings: &[Setting]) -> Vec<Option<Const>> {
+    let Some((first, others)) = settings.split_first() else {
+        return Vec::new();
+    };
+    let same = |(i, value): (usize, &Const)| {
+        let agree = others.iter().all(|s| s.values.get(i) == Some(value));
+        agree.then(|| value.clone())
+    };
+    first.values.iter().enumerate().map(same).collect()
+}
+
+/// Textures that a material may read: its texture parameters, and those its file names.
+fn texture_values(
+    material: &ir::Material,
+    settings: &[Setting],
+    literal: &BTreeSet<usize>,
+) -> Vec<usize> {
+    let textures: BTreeSet<usize> = settings
+        .iter()
+        .flat_map(|s| material.params.iter().zip(&s.values))
+        .filter(|(p, _)| p.surface_type == "texture")
+        .filter_map(|(_, v)| match v {
+            Const::Int(t) => usize::try_from(*t).ok(),
+            _ => None,
+        })
+        .chain(literal.iter().copied())
+        .collect();
+    textures.into_iter().collect()
+}
+
+/// The lookups that occur in materials and what they call.
+fn texture_spaces(module: &Module, materials: &[CompiledMaterial]) -> BTreeSet<TextureSpace> {
+    let own = materials
+        .iter()
+        .flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
+    let all = own
+        .chain(&module.functions)
+        .flat_map(|f| codegen::evaluated(f).into_iter().map(move |id| f.expr(id)));
+    all.filter_map(|e| match e.kind {
+        ExprKind::Op(Op::Image, _) => Some(TextureSpace::Color),
+        ExprKind::Op(Op::ImageData, _) => Some(TextureSpace::Data),
+        _ => None,
+    })
+    .collect()
+}
+
+/// Most expressions of a material after its calls are put in line, as a GPU driver does.
+const MAX_SIZE: u64 = 400_000;
+
+/// A material whose calls multiply beyond what a driver can compile.
+fn too_large(material: &ir::Material, size: u64) -> Diagnostic {
+    let message = format!(
+        "`{}` grows to {size} operations once its calls are expanded",
+        material.name
+    );
+    Diagnostic::new(Code::TooLarge, material.span, message)
+        .expected(format!("at most {MAX_SIZE}"))
+        .hint("call functions in a loop instead of writing the calls out, or share results with `let`")
+}
+
+/// A material whose parameters take too long to work with.
+fn too_long(material: &ir::Material, instance: &str) -> Diagnostic {
+    let message = format!("what depends only on the parameters of `{instance}` takes too long");
+    Diagnostic::new(Code::TooLarge, material.span, message)
+        .expected(format!("at most {} operations", passes::HOIST_FUEL))
+        .hint("shorten loops whose length depends on a parameter")
+}
