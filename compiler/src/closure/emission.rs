@@ -1,72 +1,78 @@
 //! Builds a material's `emission` function, and finds out whether it is the same everywhere.
 
-use super::{Core, children};
+use super::view::View;
+use super::{Core, children, lobes};
 use crate::abi::Emission;
-use crate::ir::build::Builder;
 use crate::ir::interp::Interpreter;
 use crate::ir::value::Value;
 use crate::ir::{
-    Closure, ClosureId, Const, ExprId, ExprKind, Function, Lobe, Local, Material, Methods, Module,
-    Type,
+    Closure, ClosureId, Const, ExprId, ExprKind, Function, Lobe, Material, Methods, Module, Type,
 };
 use crate::ops::Op;
 
 /// The function `(point, wo) -> radiance`, if the material emits.
 pub fn emission(module: &Module, core: &Core, m: &Material, name: &str) -> Option<Function> {
     let root = m.emission?;
-    let mut body = m.body.clone();
-    body.name = name.to_owned();
-    body.params.push(Local {
-        name: "wo".into(),
-        ty: Type::Vec3,
-    });
-    let mut b = Builder::resume(body);
-    let point = b.param(0, m.span);
-    let fields = &module.structs[core.surface_point.index()].fields;
-    let index = fields.iter().position(|(n, _)| n == "geometric_normal")?;
-    let normal = b.field(module, point, index, m.span);
-    let zero = b.constant(Const::Float(vec![0.0; 3]), m.span);
+    let mut view = View::new(module, core, m, &[]);
+    let (normal, zero) = (view.point("geometric_normal"), view.color(0.0));
     // Emission has no tangent frame of its own: about the normal it is symmetric or takes any.
-    let frame = b.call(module, core.frame, &[normal, zero], m.span);
-    let wo = b.param(1, m.span);
-    let wo = b.call(module, core.to_local, &[frame, wo], m.span);
-    let value = sum(module, m, &mut b, root, wo);
-    let value = b.op(Op::Max, &[value, zero], m.span);
-    Some(b.finish(value))
+    let frame = view.call(core.frame, &[normal, zero]);
+    let wo = view.wo();
+    let wo = view.call(core.to_local, &[frame, wo]);
+    let value = view.radiance(root, wo);
+    let value = view.op(Op::Max, &[value, zero]);
+    let mut f = view.finish(value);
+    name.clone_into(&mut f.name);
+    Some(f)
 }
 
-fn sum(module: &Module, m: &Material, b: &mut Builder, id: ClosureId, wo: ExprId) -> ExprId {
-    let kept = children(m, id);
-    match m.closures[id.index()].clone() {
-        Closure::Lobe(lobe) => emit(module, b, &lobe, wo),
-        _ if kept.is_empty() => b.constant(Const::Float(vec![0.0; 3]), m.span),
-        Closure::Weight(w, a) => {
-            let inner = sum(module, m, b, a, wo);
-            b.op(Op::Mul, &[inner, w], m.span)
-        }
-        _ if kept.len() == 1 => sum(module, m, b, kept[0], wo),
-        Closure::Add(x, y) | Closure::Layer(x, y) => {
-            let (x, y) = (sum(module, m, b, x, wo), sum(module, m, b, y, wo));
-            b.op(Op::Add, &[x, y], m.span)
-        }
-        Closure::Mix(x, y, t) => {
-            let (x, y) = (sum(module, m, b, x, wo), sum(module, m, b, y, wo));
-            b.op(Op::Mix, &[x, y, t], m.span)
-        }
-        Closure::Select(c, x, y) => {
-            let (x, y) = (sum(module, m, b, x, wo), sum(module, m, b, y, wo));
-            b.op(Op::Select, &[c, x, y], m.span)
+impl View<'_> {
+    /// The radiance of a tree of edfs toward `wo`, given in the frame of emission.
+    fn radiance(&mut self, id: ClosureId, wo: ExprId) -> ExprId {
+        let kept = children(self.m, id);
+        match self.m.closures[id.index()].clone() {
+            Closure::Lobe(lobe) => self.emit(&lobe, wo),
+            _ if kept.is_empty() => self.color(0.0),
+            Closure::Weight(w, a) => {
+                let inner = self.radiance(a, wo);
+                self.op(Op::Mul, &[inner, w])
+            }
+            Closure::Layer(top, under) => {
+                let under = self.radiance(under, wo);
+                let paths = lobes(self.m, top);
+                let (_, albedo) = self.lobes(top, &paths);
+                let (one, zero) = (self.float(1.0), self.float(0.0));
+                let passed = self.op(Op::Sub, &[one, albedo]);
+                let passed = self.op(Op::Max, &[passed, zero]);
+                self.op(Op::Mul, &[under, passed])
+            }
+            _ if kept.len() == 1 => self.radiance(kept[0], wo),
+            Closure::Add(x, y) => {
+                let (x, y) = (self.radiance(x, wo), self.radiance(y, wo));
+                self.op(Op::Add, &[x, y])
+            }
+            Closure::Mix(x, y, t) => {
+                let (x, y) = (self.radiance(x, wo), self.radiance(y, wo));
+                self.op(Op::Mix, &[x, y, t])
+            }
+            Closure::Select(c, x, y) => {
+                let (x, y) = (self.radiance(x, wo), self.radiance(y, wo));
+                self.op(Op::Select, &[c, x, y])
+            }
         }
     }
-}
 
-fn emit(module: &Module, b: &mut Builder, lobe: &Lobe, wo: ExprId) -> ExprId {
-    let Methods::Edf { emit } = module.closures[lobe.def.index()].methods else {
-        return wo;
-    };
-    let mut args = lobe.args.clone();
-    args.push(wo);
-    b.call(module, emit, &args, lobe.span)
+    fn emit(&mut self, lobe: &Lobe, wo: ExprId) -> ExprId {
+        let Methods::Edf { emit } = self.module.closures[lobe.def.index()].methods else {
+            return wo;
+        };
+        self.span = lobe.span;
+        let mut args = lobe.args.clone();
+        args.push(wo);
+        let value = self.call(emit, &args);
+        self.span = self.m.span;
+        value
+    }
 }
 
 /// How an instance with the given uniforms emits, from its material's emission function.

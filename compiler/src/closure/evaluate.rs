@@ -1,21 +1,11 @@
 //! Builds a material's `evaluate` function: patterns, lobe weights, sampling, value and density.
 
-use std::collections::BTreeMap;
-
-use super::{Core, Path, children, delta_only};
-use crate::ir::build::Builder;
-use crate::ir::{
-    Closure, ClosureId, Const, ExprId, Function, LocalId, Material, Methods, Module, Stmt, Type,
-};
+use super::view::{Ready, View};
+use super::{Core, Path, delta_only};
+use crate::ir::{Const, ExprId, Function, LocalId, Material, Module, Stmt, Type};
 use crate::ops::Op;
-use crate::source::Span;
 
-/// Least albedo by which a lobe is chosen, so that none that contributes is never sampled.
-const LEAST_ALBEDO: f64 = 1e-3;
-
-/// Parameters of the function, in order.
-const POINT: usize = 0;
-const WO: usize = 1;
+/// Parameters of the function after `point` and `wo`.
 const WL: usize = 2;
 const U: usize = 3;
 
@@ -27,42 +17,12 @@ pub fn evaluate(
     name: &str,
     paths: &[Path<'_>],
 ) -> Function {
-    let mut body = m.body.clone();
-    body.name = name.to_owned();
-    body.params.extend(
-        [("wo", Type::Vec3), ("wl", Type::Vec3), ("u", Type::Vec4)].map(|(name, ty)| {
-            crate::ir::Local {
-                name: name.into(),
-                ty,
-            }
-        }),
-    );
-    let mut lower = Lower {
-        module,
-        core,
-        m,
-        b: Builder::resume(body),
-        span: m.span,
-    };
-    let value = lower.function(paths);
-    lower.b.finish(value)
-}
-
-/// What decides a frame: the normal and tangent that a lobe asks for, if it does.
-type FrameKey = (Option<ExprId>, Option<ExprId>);
-
-/// What evaluation needs of a lobe.
-struct Ready<'a> {
-    path: &'a Path<'a>,
-    delta: bool,
-    methods: [crate::ir::FunctionId; 4],
-    frame: ExprId,
-    wo: ExprId,
-    albedo: ExprId,
-    /// Color by which its value counts.
-    weight: ExprId,
-    /// Probability of being chosen, before division by the total.
-    share: ExprId,
+    let params = [("wl", Type::Vec3), ("u", Type::Vec4)];
+    let mut view = View::new(module, core, m, &params);
+    let value = view.answer(paths);
+    let mut f = view.finish(value);
+    name.clone_into(&mut f.name);
+    f
 }
 
 /// The results, as variables.
@@ -74,16 +34,8 @@ struct Results {
     light_throughput: LocalId,
 }
 
-struct Lower<'a> {
-    module: &'a Module,
-    core: &'a Core,
-    m: &'a Material,
-    b: Builder,
-    span: Span,
-}
-
-impl Lower<'_> {
-    fn function(&mut self, paths: &[Path<'_>]) -> ExprId {
+impl View<'_> {
+    fn answer(&mut self, paths: &[Path<'_>]) -> ExprId {
         let results = Results {
             wi: self.b.local("wi", Type::Vec3),
             pdf: self.b.local("pdf", Type::Float),
@@ -91,153 +43,24 @@ impl Lower<'_> {
             light_pdf: self.b.local("light_pdf", Type::Float),
             light_throughput: self.b.local("light_throughput", Type::Vec3),
         };
-        let ready = self.prepare(paths);
-        if !ready.is_empty() {
-            let total = self.sum(ready.iter().map(|l| l.share).collect());
-            self.sample(&ready, total, &results);
-            if !delta_only(self.module, paths) {
-                self.directions(&ready, total, &results);
+        if let Some(root) = self.m.surface {
+            let (ready, _) = self.lobes(root, paths);
+            if let Some(total) = self.total(&ready) {
+                self.sample(&ready, total, &results);
+                if !delta_only(self.module, paths) {
+                    self.directions(&ready, total, &results);
+                }
             }
         }
         self.result(&results)
     }
 
-    // ---- Lobes -------------------------------------------------------------------------
-
-    /// Frames, albedos and weights of all lobes.
-    fn prepare<'a>(&mut self, paths: &'a [Path<'a>]) -> Vec<Ready<'a>> {
-        let mut frames = BTreeMap::new();
-        let mut ready: Vec<Ready<'a>> = Vec::new();
-        for path in paths {
-            let def = &self.module.closures[path.lobe.def.index()];
-            let Methods::Bsdf {
-                sample,
-                eval,
-                pdf,
-                albedo,
-            } = def.methods
-            else {
-                continue;
-            };
-            self.span = path.lobe.span;
-            let (frame, wo) = self.frame(path, &mut frames);
-            let mut args = path.lobe.args.clone();
-            args.push(wo);
-            let albedo_value = self.call(albedo, &args);
-            let (one, zero) = (self.float(1.0), self.float(0.0));
-            let albedo_value = self.op(Op::Clamp, &[albedo_value, zero, one]);
-            self.b.name(albedo_value, &format!("{}_albedo", def.name));
-            ready.push(Ready {
-                path,
-                delta: def.delta,
-                methods: [sample, eval, pdf, albedo],
-                frame,
-                wo,
-                albedo: albedo_value,
-                weight: albedo_value,
-                share: albedo_value,
-            });
-        }
-        self.span = self.m.span;
-        if let Some(root) = self.m.surface {
-            let white = self.b.constant(Const::Float(vec![1.0; 3]), self.span);
-            self.weights(root, white, &mut ready);
-        }
-        for lobe in &mut ready {
-            let least = self.float(LEAST_ALBEDO);
-            let floor = self.op(Op::Max, &[lobe.albedo, least]);
-            let product = self.op(Op::Mul, &[lobe.weight, floor]);
-            lobe.share = self.op(Op::MaxComponent, &[product]);
-        }
-        ready
-    }
-
-    /// The frame of a lobe and `wo` in it; lobes with the same normal and tangent share them.
-    fn frame(
-        &mut self,
-        path: &Path<'_>,
-        known: &mut BTreeMap<FrameKey, (ExprId, ExprId)>,
-    ) -> (ExprId, ExprId) {
-        let key = (path.lobe.normal, path.lobe.tangent);
-        if let Some(found) = known.get(&key) {
-            return *found;
-        }
-        let normal = path.lobe.normal.unwrap_or_else(|| self.point("normal"));
-        let tangent = path.lobe.tangent.unwrap_or_else(|| self.point("tangent"));
-        let (geometric, wo) = (self.point("geometric_normal"), self.param(WO));
-        let normal = self.call(self.core.valid_normal, &[normal, geometric, wo]);
-        let frame = self.call(self.core.frame, &[normal, tangent]);
-        let wo_local = self.call(self.core.to_local, &[frame, wo]);
-        known.insert(key, (frame, wo_local));
-        (frame, wo_local)
-    }
-
-    /// Hands weights down the tree; gives the albedo of the node.
-    fn weights(&mut self, id: ClosureId, weight: ExprId, ready: &mut [Ready<'_>]) -> ExprId {
-        let kept = children(self.m, id);
-        let black = self.b.constant(Const::Float(vec![0.0; 3]), self.span);
-        match self.m.closures[id.index()].clone() {
-            Closure::Lobe(_) => match ready.iter_mut().find(|l| l.path.id == id) {
-                Some(lobe) => {
-                    lobe.weight = weight;
-                    lobe.albedo
-                }
-                None => black,
-            },
-            _ if kept.is_empty() => black,
-            Closure::Weight(w, a) => {
-                let inner = self.op(Op::Mul, &[weight, w]);
-                let albedo = self.weights(a, inner, ready);
-                self.op(Op::Mul, &[albedo, w])
-            }
-            Closure::Layer(a, b) => {
-                let top = self.weights(a, weight, ready);
-                let one = self.float(1.0);
-                let passed = self.op(Op::Sub, &[one, top]);
-                let zero = self.float(0.0);
-                let passed = self.op(Op::Max, &[passed, zero]);
-                let under = self.op(Op::Mul, &[weight, passed]);
-                let base = self.weights(b, under, ready);
-                let base = self.op(Op::Mul, &[passed, base]);
-                self.op(Op::Add, &[top, base])
-            }
-            Closure::Add(a, b) => {
-                let (a, b) = (
-                    self.weights(a, weight, ready),
-                    self.weights(b, weight, ready),
-                );
-                let sum = self.op(Op::Add, &[a, b]);
-                let one = self.float(1.0);
-                self.op(Op::Min, &[sum, one])
-            }
-            Closure::Mix(_, _, _) | Closure::Select(..) if kept.len() == 1 => {
-                self.weights(kept[0], weight, ready)
-            }
-            Closure::Mix(a, b, t) => self.blend(a, b, t, weight, ready),
-            Closure::Select(c, a, b) => {
-                let (one, zero) = (self.float(1.0), self.float(0.0));
-                let t = self.op(Op::Select, &[c, zero, one]);
-                self.blend(a, b, t, weight, ready)
-            }
-        }
-    }
-
-    fn blend(
-        &mut self,
-        a: ClosureId,
-        b: ClosureId,
-        t: ExprId,
-        weight: ExprId,
-        ready: &mut [Ready<'_>],
-    ) -> ExprId {
-        let one = self.float(1.0);
-        let rest = self.op(Op::Sub, &[one, t]);
-        let (wa, wb) = (
-            self.op(Op::Mul, &[weight, rest]),
-            self.op(Op::Mul, &[weight, t]),
-        );
-        let (ea, eb) = (self.weights(a, wa, ready), self.weights(b, wb, ready));
-        self.op(Op::Mix, &[ea, eb, t])
+    /// The sum of all shares; nothing without lobes.
+    fn total(&mut self, ready: &[Ready<'_>]) -> Option<ExprId> {
+        let shares = ready.iter().map(|lobe| lobe.share);
+        let total = shares.reduce(|sum, share| self.op(Op::Add, &[sum, share]))?;
+        self.b.name(total, "total");
+        Some(total)
     }
 
     // ---- Sampling ----------------------------------------------------------------------
@@ -303,7 +126,7 @@ impl Lower<'_> {
             let throughput = self.op(Op::Mul, &[weighted, total]);
             let throughput = self.op(Op::Div, &[throughput, chance]);
             let valid = self.valid(lobe, local, wi);
-            let black = self.b.constant(Const::Float(vec![0.0; 3]), self.span);
+            let black = self.color(0.0);
             let throughput = self.op(Op::Select, &[valid, throughput, black]);
             self.b.store(results.throughput, throughput);
         } else {
@@ -316,7 +139,7 @@ impl Lower<'_> {
 
     /// Do the lobe's frame and the geometry agree on reflection or transmission?
     fn valid(&mut self, lobe: &Ready<'_>, local: ExprId, wi: ExprId) -> ExprId {
-        let (wo, geometric) = (self.param(WO), self.point("geometric_normal"));
+        let (wo, geometric) = (self.wo(), self.point("geometric_normal"));
         self.call(
             self.core.transport_valid,
             &[lobe.wo, local, wo, wi, geometric],
@@ -383,6 +206,9 @@ impl Lower<'_> {
             let [_, eval, pdf, _] = lobe.methods;
             let local = self.call(self.core.to_local, &[lobe.frame, wi]);
             let valid = self.valid(lobe, local, wi);
+            // What has no weight here costs no evaluation.
+            let counts = self.op(Op::Greater, &[lobe.share, zero]);
+            let valid = self.op(Op::And, &[valid, counts]);
             self.b.open();
             let mut args = lobe.path.lobe.args.clone();
             args.extend([lobe.wo, local]);
@@ -412,7 +238,7 @@ impl Lower<'_> {
 
     fn result(&mut self, results: &Results) -> ExprId {
         let wi = self.b.load(results.wi, self.span);
-        let (wo, geometric) = (self.param(WO), self.point("geometric_normal"));
+        let (wo, geometric) = (self.wo(), self.point("geometric_normal"));
         let (a, b) = (
             self.op(Op::Dot, &[wo, geometric]),
             self.op(Op::Dot, &[wi, geometric]),
@@ -438,39 +264,5 @@ impl Lower<'_> {
             transmitted,
         ];
         self.b.make(self.core.material_sample, &fields, self.span)
-    }
-
-    // ---- Shorthands --------------------------------------------------------------------
-
-    fn sum(&mut self, values: Vec<ExprId>) -> ExprId {
-        let mut values = values.into_iter();
-        let first = values.next().unwrap_or(ExprId(0));
-        let total = values.fold(first, |sum, v| self.op(Op::Add, &[sum, v]));
-        self.b.name(total, "total");
-        total
-    }
-
-    fn op(&mut self, op: Op, args: &[ExprId]) -> ExprId {
-        self.b.op(op, args, self.span)
-    }
-
-    fn call(&mut self, f: crate::ir::FunctionId, args: &[ExprId]) -> ExprId {
-        self.b.call(self.module, f, args, self.span)
-    }
-
-    fn float(&mut self, x: f64) -> ExprId {
-        self.b.float(x, self.span)
-    }
-
-    fn param(&mut self, index: usize) -> ExprId {
-        self.b.param(index, self.span)
-    }
-
-    /// A field of the surface point.
-    fn point(&mut self, name: &str) -> ExprId {
-        let point = self.param(POINT);
-        let fields = &self.module.structs[self.core.surface_point.index()].fields;
-        let index = fields.iter().position(|(n, _)| n == name).unwrap_or(0);
-        self.b.field(self.module, point, index, self.span)
     }
 }

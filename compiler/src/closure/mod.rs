@@ -15,6 +15,7 @@ use crate::ir::{
 
 mod emission;
 mod evaluate;
+mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
