@@ -73,7 +73,7 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
             material: binding.material,
             params: binding.params,
             // Kernels do not know instances yet.
-            bake: true,
+            parameters: compiler::Parameters::Baked,
         })
         .collect()
 }

@@ -86,9 +86,20 @@ pub struct MaterialRequest {
     pub material: Option<String>,
     /// Parameters that differ from their defaults: name, and value as source text.
     pub params: Vec<(String, String)>,
-    /// Compile it to code of its own, with the values of all parameters as constants, even if
-    /// other requests ask for the same material with other values.
-    pub bake: bool,
+    /// Where the values of parameters go.
+    pub parameters: Parameters,
+}
+
+/// Where the values of an instance's parameters go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Parameters {
+    /// Those on which all instances of the material agree into the code, the others into a table.
+    #[default]
+    Agreed,
+    /// All into code of its own, which only instances with the same values share.
+    Baked,
+    /// All into the table: the code holds for any values.
+    Table,
 }
 
 impl MaterialRequest {
@@ -99,7 +110,7 @@ impl MaterialRequest {
             file: file.into(),
             material: None,
             params: Vec::new(),
-            bake: false,
+            parameters: Parameters::default(),
         }
     }
 }
@@ -197,7 +208,12 @@ fn generate_all(
     let Some(mut builder) = builder else { return };
     for m in materials {
         let defaults = m.params.iter().map(|p| p.default.clone()).collect();
-        builder.add(checker, m.clone(), &[Setting::new(&m.name, defaults)]);
+        let setting = Setting {
+            name: m.name.clone(),
+            values: defaults,
+            open: false,
+        };
+        builder.add(checker, m.clone(), &[setting]);
     }
     validate(checker, &builder.finish(checker));
 }
@@ -251,7 +267,8 @@ fn wanted(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Wanted> {
         let values = checker.parameter_values(module, material, &request.params, &origin);
         let Some(values) = values else { continue };
         // Requests for constants share code with those for the same constants.
-        let constants = request.bake.then(|| format!("{values:?}"));
+        let baked = request.parameters == Parameters::Baked;
+        let constants = baked.then(|| format!("{values:?}"));
         let at = *places.entry((key.0, key.1, constants)).or_insert_with(|| {
             found.push(Wanted {
                 material: material.clone(),
@@ -259,7 +276,11 @@ fn wanted(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Wanted> {
             });
             found.len() - 1
         });
-        let setting = Setting::new(&request.name, values);
+        let setting = Setting {
+            name: request.name.clone(),
+            values,
+            open: request.parameters == Parameters::Table,
+        };
         found[at].settings.push((place, setting));
     }
     found
@@ -267,7 +288,7 @@ fn wanted(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Wanted> {
 
 /// Has naga check the code of all materials together.
 fn validate(checker: &mut Checker, program: &Program) {
-    if let Err(problem) = codegen::validate(&program.complete_wgsl()) {
+    if let Err(problem) = codegen::validate(&program.complete_wgsl(codegen::Target::Native)) {
         checker
             .diagnostics
             .push(Diagnostic::without_span(Code::InvalidWgsl, problem));

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
 use crate::closure;
-use crate::codegen;
+use crate::codegen::{self, Target};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{self, Const, ExprKind, Function, Module, Type};
 use crate::ops::Op;
@@ -107,10 +107,11 @@ impl Program {
         codegen::lookup(self)
     }
 
-    /// The WGSL of all materials with declarations of all that a kernel would provide.
-    pub fn complete_wgsl(&self) -> String {
+    /// The WGSL of all materials as a module of its own, with declarations of all that a kernel
+    /// would provide.
+    pub fn complete_wgsl(&self, target: Target) -> String {
         let all: Vec<usize> = (0..self.materials.len()).collect();
-        codegen::complete(self, &all)
+        codegen::complete(self, &all, target)
     }
 
     /// The buffers that the code reads; none if every material has one instance.
@@ -140,10 +141,11 @@ impl Program {
         tables
     }
 
-    /// Must the material of an instance be looked up?
+    /// Must the material of an instance, or where its parameters lie, be looked up?
     pub(crate) fn has_instance_table(&self) -> bool {
         let mut materials = self.instances.iter().enumerate();
         materials.any(|(i, instance)| instance.info.material != i)
+            || self.materials.iter().any(|m| m.layout.rows > 0)
     }
 
     /// The words of an instance in the parameter table; texture indices become slots.
@@ -192,18 +194,12 @@ impl Program {
 /// Values for a material's parameters, and who wants them.
 #[derive(Clone, Debug)]
 pub(crate) struct Setting {
-    name: String,
-    values: Vec<Const>,
-}
-
-impl Setting {
-    /// The instance `name`, with a value for every parameter.
-    pub(crate) fn new(name: &str, values: Vec<Const>) -> Self {
-        Self {
-            name: name.to_owned(),
-            values,
-        }
-    }
+    /// The instance's name.
+    pub name: String,
+    /// A value for every parameter.
+    pub values: Vec<Const>,
+    /// Must the code hold for other values as well?
+    pub open: bool,
 }
 
 /// Collects lowered materials.
@@ -462,14 +458,14 @@ fn shift_uniforms(f: &mut Function, first: u32) {
     }
 }
 
-/// The values of the parameters on which all settings agree.
+/// The values of the parameters on which all settings agree for good.
 fn agreed(settings: &[Setting]) -> Vec<Option<Const>> {
     let Some((first, others)) = settings.split_first() else {
         return Vec::new();
     };
     let same = |(i, value): (usize, &Const)| {
         let agree = others.iter().all(|s| s.values.get(i) == Some(value));
-        agree.then(|| value.clone())
+        (agree && !settings.iter().any(|s| s.open)).then(|| value.clone())
     };
     first.values.iter().enumerate().map(same).collect()
 }

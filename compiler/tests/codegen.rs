@@ -142,7 +142,7 @@ fn materials_of_one_name_are_kept_apart() {
     let names: Vec<String> = program.infos().into_iter().map(|i| i.name).collect();
     assert_eq!(names.len(), 2, "the last two are one material");
     assert_ne!(names[0], names[1]);
-    codegen::validate(&program.complete_wgsl()).expect("valid");
+    codegen::validate(&program.complete_wgsl(codegen::Target::Native)).expect("valid");
     assert!(
         !program.wgsl(&[0]).contains("0.1"),
         "one member's module has the other's code"

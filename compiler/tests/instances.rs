@@ -3,7 +3,7 @@
 use impasto_compiler::abi::{self, Emission};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile, diag};
+use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag};
 
 const PAINT: &str = "
 use std::bsdf::{blinn_phong, diffuse, mirror};
@@ -142,7 +142,9 @@ fn baking_gives_each_setting_code_of_its_own() {
         request("b", "paint.impasto", "gloss = 20.0"),
         request("c", "paint.impasto", "gloss = 10.0"),
     ];
-    requests.iter_mut().for_each(|r| r.bake = true);
+    requests
+        .iter_mut()
+        .for_each(|r| r.parameters = Parameters::Baked);
     let baked = program(&[("paint.impasto", PAINT)], &requests);
     assert_eq!(
         baked.materials().len(),
@@ -154,6 +156,21 @@ fn baking_gives_each_setting_code_of_its_own() {
     assert!(!baked.wgsl(&[0, 1]).contains(abi::PARAMETERS));
     let alone = paints(&["gloss = 20.0"]);
     assert_eq!(answers(&baked, 1), answers(&alone, 0));
+}
+
+#[test]
+fn code_can_be_asked_for_that_holds_for_any_values() {
+    let mut requests = vec![request("a", "paint.impasto", "gloss = 10.0")];
+    requests[0].parameters = Parameters::Table;
+    let open = program(&[("paint.impasto", PAINT)], &requests);
+    assert_eq!(open.tables().len(), 2);
+    for name in ["tint", "gloss", "amount", "coated", "seed"] {
+        assert!(
+            open.wgsl(&[0]).contains(&format!("let {name} = ")),
+            "{name}"
+        );
+    }
+    assert_eq!(answers(&open, 0), answers(&paints(&["gloss = 10.0"]), 0));
 }
 
 #[test]

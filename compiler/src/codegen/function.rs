@@ -8,6 +8,7 @@ use std::fmt::Write;
 
 use super::helpers::Helpers;
 use super::names::unique;
+use super::type_name;
 use crate::Program;
 use crate::abi::PARAMETERS;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
@@ -16,20 +17,6 @@ use crate::parameters::{Layout, Place};
 
 /// Operations that may stand in one expression before it gets a name.
 const MAX_INLINE: u32 = 7;
-
-/// The WGSL name of a type.
-pub fn type_name(program: &Program, ty: Type) -> String {
-    match ty {
-        Type::Bool => "bool".into(),
-        Type::Int => "i32".into(),
-        Type::Float => "f32".into(),
-        Type::Vec2 => "vec2f".into(),
-        Type::Vec3 => "vec3f".into(),
-        Type::Vec4 => "vec4f".into(),
-        Type::Mat3 => "mat3x3f".into(),
-        Type::Struct(id) => program.names.structure(id).to_owned(),
-    }
-}
 
 /// Every expression that a function evaluates.
 pub fn evaluated(f: &Function) -> Vec<ExprId> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::function::type_name;
+use super::type_name;
 use crate::Program;
 use crate::ir::Type;
 use crate::ops::{Op, Wgsl};

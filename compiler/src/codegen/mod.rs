@@ -7,17 +7,20 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::Program;
-use crate::abi::{EMISSION, EVALUATE, INSTANCES, MATERIAL_OF, TEXTURE_FETCH};
 use crate::ir::{ExprKind, Function, StructId, Type};
 use crate::parameters::Layout;
 
+mod dispatch;
 mod function;
 mod helpers;
 mod names;
+mod target;
 
-pub use function::{evaluated, type_name};
+pub use dispatch::lookup;
+pub use function::evaluated;
 use helpers::Helpers;
 pub use names::{Names, identifier, unique as unique_material_name};
+pub use target::{Target, complete, enables};
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {
@@ -51,7 +54,7 @@ pub fn module(program: &Program, members: &[usize]) -> String {
     structs(program, &functions, &roots, &mut out);
     helpers.print(program, &mut out);
     out.push_str(&body);
-    dispatch(program, members, &mut out);
+    dispatch::dispatch(program, members, &mut out);
     out
 }
 
@@ -81,6 +84,20 @@ fn roots<'p>(program: &'p Program, members: &[usize]) -> Vec<Root<'p>> {
         }
     }
     roots
+}
+
+/// The WGSL name of a type.
+fn type_name(program: &Program, ty: Type) -> String {
+    match ty {
+        Type::Bool => "bool".into(),
+        Type::Int => "i32".into(),
+        Type::Float => "f32".into(),
+        Type::Vec2 => "vec2f".into(),
+        Type::Vec3 => "vec3f".into(),
+        Type::Vec4 => "vec4f".into(),
+        Type::Mat3 => "mat3x3f".into(),
+        Type::Struct(id) => program.names.structure(id).to_owned(),
+    }
 }
 
 /// The WGSL function of a material.
@@ -146,118 +163,6 @@ fn use_struct(program: &Program, ty: Type, used: &mut BTreeSet<StructId>) {
             use_struct(program, *field, used);
         }
     }
-}
-
-/// The functions that the kernels call.
-fn dispatch(program: &Program, members: &[usize], out: &mut String) {
-    let _ = writeln!(
-        out,
-        "fn {EVALUATE}(instance: u32, point: SurfacePoint, wo: vec3f, wl: vec3f, u: vec4f) -> MaterialSample {{"
-    );
-    let evaluate = Dispatch {
-        program,
-        name: evaluate_name,
-        args: "point, wo, wl, u",
-        otherwise: "MaterialSample()",
-    };
-    evaluate.print(members, members.len() == 1, out);
-    let emits = |m: &&usize| program.materials[**m].info.varying_emission;
-    let emitters: Vec<usize> = members.iter().filter(emits).copied().collect();
-    if !emitters.is_empty() {
-        let _ = writeln!(
-            out,
-            "\nfn {EMISSION}(instance: u32, point: SurfacePoint, wo: vec3f) -> vec3f {{"
-        );
-        let emission = Dispatch {
-            program,
-            name: emission_name,
-            args: "point, wo",
-            otherwise: "vec3f()",
-        };
-        emission.print(&emitters, members.len() == 1, out);
-    }
-}
-
-/// A call of one function of the material of an instance.
-struct Dispatch<'p> {
-    program: &'p Program,
-    /// The function's name for a material's.
-    name: fn(&str) -> String,
-    args: &'p str,
-    /// What an instance of no such material gives.
-    otherwise: &'p str,
-}
-
-impl Dispatch<'_> {
-    /// A switch over materials, or a plain call where the instance can only be of one.
-    fn print(&self, materials: &[usize], only: bool, out: &mut String) {
-        let rows = |m: &usize| self.program.materials[*m].layout.rows > 0;
-        let (table, rows) = (
-            self.program.has_instance_table(),
-            materials.iter().any(rows),
-        );
-        let material = if table && (rows || !only) {
-            let _ = writeln!(out, "    let entry = {INSTANCES}[instance];");
-            "entry.x"
-        } else {
-            "instance"
-        };
-        if only {
-            let _ = writeln!(out, "    return {};\n}}", self.call(materials[0]));
-            return;
-        }
-        let _ = writeln!(out, "    switch {material} {{");
-        for &m in materials {
-            let _ = writeln!(out, "        case {m}u: {{ return {}; }}", self.call(m));
-        }
-        let otherwise = self.otherwise;
-        let _ = writeln!(
-            out,
-            "        default: {{ return {otherwise}; }}\n    }}\n}}"
-        );
-    }
-
-    fn call(&self, material: usize) -> String {
-        let material = &self.program.materials[material];
-        let row = if material.layout.rows > 0 {
-            "entry.y, "
-        } else {
-            ""
-        };
-        format!("{}({row}{})", (self.name)(&material.info.name), self.args)
-    }
-}
-
-/// `material_of`, by table where there is one.
-pub fn lookup(program: &Program) -> String {
-    let value = if program.has_instance_table() {
-        format!("{INSTANCES}[instance].x")
-    } else {
-        "instance".to_owned()
-    };
-    format!("fn {MATERIAL_OF}(instance: u32) -> u32 {{\n    return {value};\n}}\n")
-}
-
-/// The WGSL of some materials with declarations of all that a kernel would provide, which makes
-/// it a module that can be checked by itself.
-pub fn complete(program: &Program, members: &[usize]) -> String {
-    let mut out = String::new();
-    for (i, table) in program.tables().iter().enumerate() {
-        let _ = writeln!(
-            out,
-            "@group(0) @binding({i}) var<storage, read> {}: {};",
-            table.name, table.wgsl_type
-        );
-    }
-    out.push_str(&module(program, members));
-    if out.contains(TEXTURE_FETCH) {
-        // Stands for the lookup that the runtime provides.
-        let _ = writeln!(
-            out,
-            "\nfn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{\n    return vec4f(uv, f32(slot), 1.0);\n}}"
-        );
-    }
-    out
 }
 
 /// Checks a module's text with naga, as every kernel that includes it will be checked.
