@@ -130,4 +130,5 @@ pub struct InputSet {
     pub geometric_normal: bool,
     pub tangent: bool,
     pub uv: bool,
+    pub exterior_ior: bool,
 }

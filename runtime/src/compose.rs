@@ -205,6 +205,7 @@ fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
         geometric_normal: a.geometric_normal || b.geometric_normal,
         tangent: a.tangent || b.tangent,
         uv: a.uv || b.uv,
+        exterior_ior: a.exterior_ior || b.exterior_ior,
     });
     let geometric = "hit_geometric_normal(hit.primitive)";
     let pick = |used, value, other| if used { value } else { other };

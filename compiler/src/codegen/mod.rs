@@ -199,8 +199,7 @@ pub fn inputs(
                 "geometric_normal" => set.geometric_normal = true,
                 "tangent" => set.tangent = true,
                 "uv" => set.uv = true,
-                // Always provided, until kernels follow media.
-                _ => {}
+                _ => set.exterior_ior = true,
             }
         }
     }
