@@ -77,7 +77,7 @@ codes! {
     UnknownName = "E0201", Error, "unknown name",
         "No variable, parameter, function or closure of that name is in scope. Names from other modules need a `use`.";
     UnknownType = "E0202", Error, "unknown type",
-        "Types are bool, int, float, length, angle, vec2, vec3, vec4, color, point, vector, normal, mat3, texture, bsdf, edf and structs in scope.";
+        "Types are bool, int, float, length, angle, vec2, vec3, vec4, color, point, vector, normal, mat3, texture, bsdf, edf, medium and structs in scope.";
     UnknownModule = "E0203", Error, "unknown module",
         "A `use` names a folder of the standard library (`std::bsdf`, `std::noise`, ...) or a file beside the importing one.";
     UnknownImport = "E0204", Error, "nothing of that name in the module",
@@ -91,7 +91,7 @@ codes! {
     UnknownField = "E0208", Error, "unknown field",
         "The value has no field or component of that name. Vectors have x, y, z, w; colors r, g, b; structs their fields.";
     UnknownOutput = "E0209", Error, "unknown output",
-        "A material assigns `surface` and, when it emits light, `emission`.";
+        "A material assigns `surface` and, when it needs them, `emission`, `interior` and `opacity`.";
     UnknownArgument = "E0210", Error, "unknown argument",
         "The function has no parameter of that name.";
     MissingArgument = "E0211", Error, "missing argument",
@@ -124,7 +124,7 @@ codes! {
     MissingOutput = "E0310", Error, "no surface",
         "A material must assign `surface` or `emission` exactly once.";
     ClosureUse = "E0311", Error, "a closure cannot be used here",
-        "Closures (bsdf, edf) are combined with layer, mix, `*` and `+`, named with `let` and assigned to outputs. They cannot be stored in `var`, structs or loops.";
+        "Closures (bsdf, edf, medium) are combined with layer, mix, `*` and `+`, named with `let` and assigned to outputs. They cannot be stored in `var`, structs or loops.";
     TooManyLobes = "E0312", Error, "too many lobes",
         "A material may have at most 64 lobes after layering.";
     Unsupported = "E0313", Error, "not supported here",
@@ -133,6 +133,8 @@ codes! {
         "Parameters and constants must be finite numbers.";
     TooLarge = "E0315", Error, "material too large",
         "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way.";
+    VaryingMedium = "E0316", Error, "a medium that varies",
+        "What fills an object is the same everywhere in it: `interior` depends on parameters and constants only, not on the point of the surface or on textures.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";

@@ -353,6 +353,19 @@ pub struct MaterialParam {
     pub span: Span,
 }
 
+/// The medium inside an object. Its expressions depend on parameters only, not on the point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interior {
+    /// Light lost a metre, three floats from 0, in 1/m.
+    pub absorption: ExprId,
+    /// Index of refraction, a float from 0.1 to 10.
+    pub ior: ExprId,
+    /// Where several media overlap, the one with the highest counts: an int from 0 to 1000.
+    pub priority: ExprId,
+    /// Where it was written.
+    pub span: Span,
+}
+
 /// A checked material, before its closures are lowered.
 #[derive(Clone, Debug)]
 pub struct Material {
@@ -370,6 +383,11 @@ pub struct Material {
     pub surface: Option<ClosureId>,
     /// What emits light.
     pub emission: Option<ClosureId>,
+    /// What fills the objects that it covers; thin-walled without.
+    pub interior: Option<Interior>,
+    /// Share of the light that meets the surface at all, a float from 0 to 1; 1 when absent.
+    /// The rest goes straight through: `mix(transparent(), surface, opacity)`.
+    pub opacity: Option<ExprId>,
     /// Where it is defined.
     pub span: Span,
 }

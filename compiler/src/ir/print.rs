@@ -46,6 +46,14 @@ pub fn material(module: &Module, m: &Material) -> String {
             printer.closure(&mut out, m, root, 2);
         }
     }
+    if let Some(medium) = &m.interior {
+        let parts = [medium.absorption, medium.ior, medium.priority];
+        let parts = parts.map(|id| printer.operand(id)).join(", ");
+        let _ = writeln!(out, "    interior = medium({parts})");
+    }
+    if let Some(opacity) = m.opacity {
+        let _ = writeln!(out, "    opacity = {}", printer.operand(opacity));
+    }
     out.push_str("}\n");
     out
 }

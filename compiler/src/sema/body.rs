@@ -6,9 +6,10 @@ use crate::ir::build::Builder;
 use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
 use crate::source::Span;
 
+use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::types::Ty;
-use super::{Checker, Param, Signature};
+use super::{Checked, Checker, Param, Signature};
 
 /// What an expression turned out to be.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,8 @@ pub enum Operand {
     Value(ExprId, Ty),
     /// A closure of a material.
     Closure(ClosureId, Ty),
+    /// A medium of a material, by its position in [`Body::media`].
+    Medium(usize),
 }
 
 impl Operand {
@@ -24,6 +27,7 @@ impl Operand {
     pub fn ty(self) -> Ty {
         match self {
             Operand::Value(_, ty) | Operand::Closure(_, ty) => ty,
+            Operand::Medium(_) => Ty::Medium,
         }
     }
 }
@@ -55,6 +59,17 @@ pub struct Entry {
     pub watched: bool,
 }
 
+/// What the text being checked may say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A function of values, a method or a constant.
+    Values,
+    /// A function that returns a closure: closures may be made and combined.
+    Closures,
+    /// A material: closures, the surface's inputs, and outputs to assign.
+    Material,
+}
+
 /// A function, method or material being checked.
 pub struct Body<'c, 'l> {
     /// The compilation.
@@ -69,17 +84,16 @@ pub struct Body<'c, 'l> {
     pub turns: u64,
     /// Enclosing loops.
     pub loops: usize,
-    /// Closures; only a material has any.
+    /// What may be said here.
+    pub place: Place,
+    /// Calls that were replaced by what they call.
+    pub expansion: Expansion,
+    /// Closures, where the place has any.
     pub closures: Vec<ir::Closure>,
-    /// Present in a material.
-    pub material: Option<MaterialState>,
-}
-
-/// What only a material has.
-#[derive(Default)]
-pub struct MaterialState {
-    /// The outputs assigned so far.
-    pub outputs: Vec<(&'static str, ClosureId, Span)>,
+    /// Media, where the place has closures.
+    pub media: Vec<ir::Interior>,
+    /// The outputs of a material assigned so far: name, value, place.
+    pub outputs: Vec<(&'static str, Operand, Span)>,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -93,8 +107,11 @@ impl<'c, 'l> Body<'c, 'l> {
             scopes,
             turns: 1,
             loops: 0,
+            place: Place::Values,
+            expansion: Expansion::default(),
             closures: Vec::new(),
-            material: None,
+            media: Vec::new(),
+            outputs: Vec::new(),
         }
     }
 
@@ -223,8 +240,10 @@ impl<'c, 'l> Body<'c, 'l> {
                 wrong.hint("take a component, as in `.x`, or `luminance(...)` of a color")
             }
             (Ty::Float, Ty::Int) => wrong.hint("`int(...)` drops the fraction"),
-            (Ty::Bsdf, Ty::Edf) => wrong.hint("assign a bsdf to `surface`"),
-            (Ty::Edf, Ty::Bsdf) => wrong.hint("assign an edf to `emission`"),
+            (Ty::Bsdf, t) if t.is_closure() => wrong.hint("assign a bsdf to `surface`"),
+            (Ty::Edf, t) if t.is_closure() => wrong.hint("assign an edf to `emission`"),
+            (Ty::Medium, t) if t.is_closure() => wrong.hint("assign a medium to `interior`"),
+            (_, Ty::Medium) => wrong.hint("`medium(absorption: ..., ior: ...)` makes a medium"),
             (f, t) if f.ir().is_some() && t.ir().is_some() && f.ir() == t.ir() => {
                 wrong.hint(format!("convert it: `{wanted}(...)`"))
             }
@@ -244,11 +263,26 @@ impl Checker<'_> {
         module: ModuleId,
         item: &ast::Item,
         f: &ast::Function,
-    ) -> Option<FunctionId> {
+    ) -> Option<Checked> {
         let params = self.params(module, &f.params)?;
         let result = self.type_name(module, &f.result)?;
-        if result.is_closure() || params.iter().any(|p| p.ty.is_closure()) {
-            self.closure_in_data(f.result.span);
+        if result.is_closure() {
+            return self.closure_function(module, item, f, Signature { params, result });
+        }
+        if let Some((p, _)) = f
+            .params
+            .iter()
+            .zip(&params)
+            .find(|(_, t)| t.ty.is_closure())
+        {
+            let message = format!(
+                "`{}` has a value, which no closure can become",
+                item.name.node
+            );
+            let wrong = Diagnostic::new(Code::ClosureUse, p.ty.span, message)
+                .expected("parameters of value types")
+                .hint("a function that returns a bsdf or edf may take closures");
+            self.report(wrong);
             return None;
         }
         let names = f
@@ -267,7 +301,7 @@ impl Checker<'_> {
             &f.body,
         )?;
         self.signatures.insert(id, Signature { params, result });
-        Some(id)
+        Some(Checked::Function(id))
     }
 
     /// Types and defaults of parameters.
@@ -275,6 +309,13 @@ impl Checker<'_> {
         let mut typed: Vec<Param> = Vec::new();
         for p in params {
             let ty = self.type_name(module, &p.ty)?;
+            if let Some(default) = p.default.as_ref().filter(|_| ty.is_closure()) {
+                let wrong =
+                    Diagnostic::new(Code::ClosureUse, default.span, "a closure has no default")
+                        .expected("a parameter without a default");
+                self.report(wrong);
+                return None;
+            }
             let default = match &p.default {
                 Some(expr) => Some(self.constant(module, expr, ty, "the default")?),
                 None => None,
@@ -350,7 +391,7 @@ impl Body<'_, '_> {
         };
         match value {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) => None,
+            Operand::Closure(..) | Operand::Medium(_) => None,
         }
     }
 

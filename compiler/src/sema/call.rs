@@ -17,7 +17,7 @@ impl Body<'_, '_> {
             return match self.cx.demand(item, Some(callee.span)) {
                 Some(Checked::Function(id)) => {
                     let signature = self.cx.signatures[&id].clone();
-                    let args = self.arguments(callee, args, &signature.params)?;
+                    let args = self.value_arguments(callee, args, &signature.params)?;
                     let turns = self
                         .turns
                         .saturating_mul(self.cx.ir.functions[id.index()].turns);
@@ -29,13 +29,16 @@ impl Body<'_, '_> {
                 }
                 Some(Checked::Struct(id)) => {
                     let fields = self.cx.fields[id.index()].clone();
-                    let args = self.arguments(callee, args, &fields)?;
+                    let args = self.value_arguments(callee, args, &fields)?;
                     Some(Operand::Value(
                         self.builder.make(id, &args, span),
                         Ty::Struct(id),
                     ))
                 }
                 Some(Checked::Closure(id, ty)) => self.lobe(callee, args, id, ty, span),
+                Some(Checked::ClosureFunction(signature)) => {
+                    self.inline(callee, item, &signature, args, span)
+                }
                 Some(Checked::Const(..)) => self.not_callable(callee, "a constant"),
                 _ if matches!(self.cx.item(item).kind, ItemKind::Material(_)) => {
                     self.not_callable(callee, "a material")
@@ -49,6 +52,7 @@ impl Body<'_, '_> {
         }
         match callee.node.as_str() {
             "layer" => self.layer(args, span),
+            "medium" => self.medium(callee, args, span),
             "mix" if args.iter().any(|a| self.is_closure(&a.value)) => {
                 self.mix_closures(args, span)
             }
@@ -75,14 +79,29 @@ impl Body<'_, '_> {
         self.report(wrong)
     }
 
+    /// As [`Body::arguments`], where no parameter is a closure.
+    pub fn value_arguments(
+        &mut self,
+        callee: &Name,
+        args: &[Arg],
+        params: &[Param],
+    ) -> Option<Vec<ExprId>> {
+        let operands = self.arguments(callee, args, params)?;
+        let value = |operand| match operand {
+            Operand::Value(id, _) => Some(id),
+            Operand::Closure(..) | Operand::Medium(_) => None,
+        };
+        operands.into_iter().map(value).collect()
+    }
+
     /// Matches arguments with parameters: by position, then by name; defaults fill the rest.
     pub fn arguments(
         &mut self,
         callee: &Name,
         args: &[Arg],
         params: &[Param],
-    ) -> Option<Vec<ExprId>> {
-        let mut given: Vec<Option<ExprId>> = vec![None; params.len()];
+    ) -> Option<Vec<Operand>> {
+        let mut given: Vec<Option<Operand>> = vec![None; params.len()];
         let mut filled: Vec<bool> = vec![false; params.len()];
         let mut ok = true;
         for (position, arg) in args.iter().enumerate() {
@@ -105,25 +124,28 @@ impl Body<'_, '_> {
             }
             filled[index] = true;
             let what = format!("`{}` of `{}`", params[index].name, callee.node);
-            given[index] = self.value_as(&arg.value, params[index].ty, &what);
+            given[index] = self.expr_as(&arg.value, params[index].ty, &what);
             ok &= given[index].is_some();
         }
         self.fill_defaults(callee, &mut given, &filled, params);
-        let complete: Option<Vec<ExprId>> = given.into_iter().collect();
+        let complete: Option<Vec<Operand>> = given.into_iter().collect();
         complete.filter(|_| ok)
     }
 
     fn fill_defaults(
         &mut self,
         callee: &Name,
-        given: &mut [Option<ExprId>],
+        given: &mut [Option<Operand>],
         filled: &[bool],
         params: &[Param],
     ) {
         let mut missing = Vec::new();
         for (i, param) in params.iter().enumerate().filter(|(i, _)| !filled[*i]) {
             match &param.default {
-                Some(default) => given[i] = Some(self.constant(default.clone(), callee.span)),
+                Some(default) => {
+                    let id = self.constant(default.clone(), callee.span);
+                    given[i] = Some(Operand::Value(id, param.ty));
+                }
                 None => missing.push(param),
             }
         }
@@ -182,7 +204,7 @@ impl Body<'_, '_> {
             }
             match self.expr(&arg.value) {
                 Some(Operand::Value(id, ty)) => values.push((id, ty, arg.value.span)),
-                Some(Operand::Closure(..)) => {
+                Some(Operand::Closure(..) | Operand::Medium(_)) => {
                     let message = format!("`{callee}` does not work on closures");
                     let wrong = Diagnostic::new(Code::ClosureUse, arg.value.span, message)
                         .expected("a value")
@@ -290,7 +312,7 @@ impl Body<'_, '_> {
                 .map(|op| op.info().text.to_owned()),
         );
         names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
-        names.extend(["layer", "srgb"].map(String::from));
+        names.extend(["layer", "medium", "srgb"].map(String::from));
         let unknown = Diagnostic::new(
             Code::UnknownName,
             callee.span,
@@ -511,7 +533,7 @@ pub fn makes_closure(
     is_closure: impl Fn(&crate::ast::Expr) -> bool,
 ) -> bool {
     match callee {
-        "layer" => true,
+        "layer" | "medium" => true,
         "mix" => args.iter().any(|a| is_closure(&a.value)),
         _ => false,
     }

@@ -6,7 +6,7 @@ use crate::ir::{self, Closure, ClosureDefId, ClosureId, Const, ExprId, FunctionI
 use crate::ops::Op;
 use crate::source::Span;
 
-use super::body::{Binding, Body, Operand};
+use super::body::{Binding, Body, Operand, Place};
 use super::call::{makes_closure, tail};
 use super::modules::ModuleId;
 use super::types::Ty;
@@ -192,16 +192,10 @@ impl Body<'_, '_> {
         ty: Ty,
         span: Span,
     ) -> Option<Operand> {
-        if self.material.is_none() {
-            let wrong = Diagnostic::new(
-                Code::ClosureUse,
-                span,
-                format!(
-                    "`{}` makes a closure, and functions have values",
-                    callee.node
-                ),
-            )
-            .expected("closures only in materials");
+        if self.place == Place::Values {
+            let message = format!("`{}` makes a closure, which is no value", callee.node);
+            let wrong = Diagnostic::new(Code::ClosureUse, span, message)
+                .expected("closures in materials, and in functions that return one");
             return self.report(wrong);
         }
         let params = self.cx.closure_params[def.index()].clone();
@@ -219,7 +213,7 @@ impl Body<'_, '_> {
                 _ => own.push(arg.clone()),
             }
         }
-        let args = self.arguments(callee, &own, &params)?;
+        let args = self.value_arguments(callee, &own, &params)?;
         Some(self.add_closure(
             Closure::Lobe(Lobe {
                 def,
@@ -250,15 +244,17 @@ impl Body<'_, '_> {
                     ok = false;
                 }
                 Some(Operand::Closure(id, ty)) => all.push((id, ty, at)),
-                Some(Operand::Value(_, ty)) => {
-                    let message = format!(
-                        "`{what}` combines closures, and this is {}",
-                        self.cx.a_type(ty)
-                    );
-                    let wrong = Diagnostic::new(Code::TypeMismatch, at, message)
-                        .expected("a bsdf")
-                        .hint("a weight is multiplied: `w * diffuse(...)`");
-                    self.report::<()>(wrong);
+                Some(other) => {
+                    let found = self.cx.a_type(other.ty());
+                    let message = format!("`{what}` combines bsdfs and edfs, and this is {found}");
+                    let wrong =
+                        Diagnostic::new(Code::TypeMismatch, at, message).expected("a bsdf or edf");
+                    self.report::<()>(match other {
+                        Operand::Value(..) => {
+                            wrong.hint("a weight is multiplied: `w * diffuse(...)`")
+                        }
+                        _ => wrong.hint("a medium is assigned to `interior`"),
+                    });
                     ok = false;
                 }
                 None => ok = false,
@@ -267,21 +263,12 @@ impl Body<'_, '_> {
         ok.then_some(all)
     }
 
-    /// `layer(a, b, ...)`, top first.
+    /// `layer(a, b, ...)`, top first. With an edf at the bottom, it is emission seen through the
+    /// layers above.
     pub fn layer(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
-        self.require_material("layer", span)?;
+        self.require_closures("layer", span)?;
         let closures = self.closures_of("layer", args)?;
-        if let Some((_, _, at)) = closures.iter().find(|c| c.1 == Ty::Edf) {
-            let wrong = Diagnostic::new(
-                Code::TypeMismatch,
-                *at,
-                "`layer` stacks bsdfs, and this is an edf",
-            )
-            .expected("a bsdf")
-            .hint("emission is assigned to `emission`");
-            return self.report(wrong);
-        }
-        let Some((&(bottom, ..), above)) =
+        let Some((&(bottom, ty, _), above)) =
             closures.split_last().filter(|(_, above)| !above.is_empty())
         else {
             let few = Diagnostic::new(
@@ -292,19 +279,28 @@ impl Body<'_, '_> {
             .expected("`layer(top, ..., bottom)`");
             return self.report(few);
         };
+        if let Some((_, _, at)) = above.iter().find(|c| c.1 == Ty::Edf) {
+            let wrong = Diagnostic::new(
+                Code::TypeMismatch,
+                *at,
+                "an edf covers nothing, so it cannot lie above another layer",
+            )
+            .expected("a bsdf; an edf only at the bottom of `layer`")
+            .hint("emission from under a coat is `emission = layer(coat, edf);`");
+            return self.report(wrong);
+        }
         let mut stack = bottom;
         for &(top, ..) in above.iter().rev() {
-            if let Operand::Closure(id, _) = self.add_closure(Closure::Layer(top, stack), Ty::Bsdf)
-            {
+            if let Operand::Closure(id, _) = self.add_closure(Closure::Layer(top, stack), ty) {
                 stack = id;
             }
         }
-        Some(Operand::Closure(stack, Ty::Bsdf))
+        Some(Operand::Closure(stack, ty))
     }
 
     /// `mix(a, b, t)` of closures.
     pub fn mix_closures(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
-        self.require_material("mix", span)?;
+        self.require_closures("mix", span)?;
         let named_weight = args
             .iter()
             .position(|a| a.name.as_ref().is_some_and(|n| n.node == "t"));
@@ -333,16 +329,13 @@ impl Body<'_, '_> {
         Some(self.add_closure(Closure::Mix(*x, *y, weight), *xt))
     }
 
-    fn require_material(&mut self, what: &str, span: Span) -> Option<()> {
-        if self.material.is_some() {
+    fn require_closures(&mut self, what: &str, span: Span) -> Option<()> {
+        if self.place != Place::Values {
             return Some(());
         }
-        let wrong = Diagnostic::new(
-            Code::ClosureUse,
-            span,
-            format!("`{what}` combines closures, and only materials have them"),
-        )
-        .expected("a value");
+        let message = format!("`{what}` combines closures, which are no values");
+        let wrong = Diagnostic::new(Code::ClosureUse, span, message)
+            .expected("closures in materials, and in functions that return one");
         self.report(wrong)
     }
 
@@ -454,6 +447,13 @@ impl Body<'_, '_> {
                 self.same_kind(xt, yt, at)?;
                 Some(self.add_closure(Closure::Select(cond, x, y), xt))
             }
+            (Operand::Medium(x), (Operand::Medium(y), _)) => {
+                Some(self.choose_medium(cond, x, y, span))
+            }
+            (a, (b, at)) if a.ty().is_closure() && b.ty().is_closure() => {
+                self.same_kind(a.ty(), b.ty(), at)?;
+                None
+            }
             (_, (_, at)) => {
                 let wrong = Diagnostic::new(
                     Code::TypeMismatch,
@@ -491,11 +491,15 @@ impl Body<'_, '_> {
                 let entry = entries.find(|e| e.name == *name);
                 matches!(
                     entry.map(|e| e.binding),
-                    Some(Binding::Fixed(Operand::Closure(..)))
+                    Some(Binding::Fixed(Operand::Closure(..) | Operand::Medium(_)))
                 )
             }
             ExprKind::Call { callee, args } => match self.cx.lookup(self.module, &callee.node) {
-                Some(item) => matches!(self.cx.item(item).kind, ItemKind::Closure(_)),
+                Some(item) => match &self.cx.item(item).kind {
+                    ItemKind::Closure(_) => true,
+                    ItemKind::Function(f) => returns_closure(f),
+                    _ => false,
+                },
                 None => makes_closure(&callee.node, args, |e| self.is_closure(e)),
             },
             ExprKind::Binary(BinaryOp::Mul | BinaryOp::Add | BinaryOp::Sub, a, b) => {
@@ -512,4 +516,10 @@ impl Body<'_, '_> {
             _ => false,
         }
     }
+}
+
+/// Does a function return a closure? Seen from its text.
+fn returns_closure(f: &ast::Function) -> bool {
+    let mut closures = super::types::NAMED.iter().filter(|(_, ty)| ty.is_closure());
+    closures.any(|(name, _)| *name == f.result.node)
 }

@@ -7,7 +7,7 @@ use crate::ops::Op;
 use crate::source::Span;
 
 use super::Checked;
-use super::body::{Binding, Body, Operand};
+use super::body::{Binding, Body, Operand, Place};
 use super::stmt::component;
 use super::types::Ty;
 
@@ -45,7 +45,7 @@ impl Body<'_, '_> {
     pub fn value_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<ExprId> {
         match self.expr_as(expr, ty, what)? {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) => None,
+            Operand::Closure(..) | Operand::Medium(_) => None,
         }
     }
 
@@ -56,6 +56,7 @@ impl Body<'_, '_> {
 
     fn expr_inner(&mut self, expr: &Expr) -> Option<Operand> {
         let span = expr.span;
+        self.step(span)?;
         let value = |id, ty| Some(Operand::Value(id, ty));
         match &expr.kind {
             ExprKind::Error => None,
@@ -143,7 +144,7 @@ impl Body<'_, '_> {
             Some(Binding::Broken) => return None,
             None => {}
         }
-        if self.material.is_some() && INPUTS.contains(&name) {
+        if self.place == Place::Material && INPUTS.contains(&name) {
             return self.input(name, span);
         }
         let Some(item) = self.cx.lookup(self.module, name) else {
@@ -178,7 +179,7 @@ impl Body<'_, '_> {
 
     fn unknown_name<T>(&mut self, name: &str, span: Span) -> Option<T> {
         let unknown = Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"));
-        if self.material.is_none() && INPUTS.contains(&name) {
+        if self.place != Place::Material && INPUTS.contains(&name) {
             let unknown = unknown
                 .expected("a parameter, variable or constant")
                 .hint(format!(
@@ -191,7 +192,7 @@ impl Body<'_, '_> {
             self.cx
                 .visible(self.module, |k| matches!(k, ast::ItemKind::Const(_))),
         );
-        if self.material.is_some() {
+        if self.place == Place::Material {
             names.extend(INPUTS.map(String::from));
         }
         let unknown = unknown
@@ -302,7 +303,7 @@ impl Body<'_, '_> {
             .expected("`if condition { a } else { b }`");
             return self.report(missing);
         };
-        if self.material.is_some()
+        if self.place != Place::Values
             && (self.is_closure_block(&branch.then) || self.is_closure_block(otherwise))
         {
             return self.if_closure(cond?, &branch.then, otherwise, span);

@@ -7,13 +7,10 @@ use crate::ir::{self, Const, ExprKind, Material, MaterialParam, Type};
 use crate::parser;
 use crate::source::Span;
 
-use super::body::{Binding, Body, MaterialState, Operand};
+use super::body::{Binding, Body, Operand, Place};
 use super::modules::{ItemRef, ModuleId, list};
 use super::types::{NAMED, Ty};
 use super::{Checker, expr};
-
-/// The outputs of a material with their types.
-const OUTPUTS: [(&str, Ty); 2] = [("surface", Ty::Bsdf), ("emission", Ty::Edf)];
 
 impl Checker<'_> {
     /// The material called `name` in a file, or its only one.
@@ -76,36 +73,31 @@ impl Checker<'_> {
             module,
             Builder::new(item.name.node.as_str(), vec![input], item.span),
         );
-        body.material = Some(MaterialState::default());
+        body.place = Place::Material;
         body.bind_params(&material.params, &params);
         let ok = body.scoped(|cx| cx.statements(&material.body));
         let scope = body.scopes.pop().unwrap_or_default();
         body.report_unused(scope);
-        let outputs = body.material.take().unwrap_or_default().outputs;
-        if outputs.is_empty() && ok {
-            let missing = Diagnostic::new(
-                Code::MissingOutput,
-                item.name.span,
-                format!("`{}` assigns no output", item.name.node),
-            )
-            .expected("`surface = ...;` or `emission = ...;`");
-            body.report::<()>(missing);
-        }
-        if !ok || outputs.is_empty() {
+        if !ok {
             return None;
         }
+        let outputs = body.take_outputs(&item.name)?;
         let closures = std::mem::take(&mut body.closures);
         let value = body.builder.float(0.0, item.span);
         let function = body.builder.finish(value);
-        let output = |name: &str| outputs.iter().find(|o| o.0 == name).map(|o| o.1);
+        if let Some(interior) = &outputs.interior {
+            self.check_interior(&function, interior)?;
+        }
         Some(Material {
             name: item.name.node.clone(),
             docs: item.docs.clone(),
             params: params.into_iter().collect::<Option<Vec<_>>>()?,
             body: function,
             closures,
-            surface: output("surface"),
-            emission: output("emission"),
+            surface: outputs.surface,
+            emission: outputs.emission,
+            interior: outputs.interior,
+            opacity: outputs.opacity,
             span: item.span,
         })
     }
@@ -317,52 +309,5 @@ impl Body<'_, '_> {
             let watched = binding.is_some();
             self.bind(&p.name, binding.unwrap_or(Binding::Broken), watched);
         }
-    }
-
-    /// `surface = ...;` or `emission = ...;`
-    pub(super) fn output(
-        &mut self,
-        name: &str,
-        at: Span,
-        op: Option<ast::BinaryOp>,
-        value: &Expr,
-    ) -> Option<()> {
-        let Some((name, ty)) = OUTPUTS.iter().find(|(n, _)| *n == name) else {
-            let names = OUTPUTS.map(|(n, _)| n);
-            let mut known = self.local_names();
-            known.extend(names.map(String::from));
-            let unknown = Diagnostic::new(
-                Code::UnknownOutput,
-                at,
-                format!("`{name}` is neither a variable nor an output"),
-            )
-            .expected(format!("one of {}, or a `var`", list(names)))
-            .did_you_mean(name, known.iter().map(String::as_str));
-            self.expr(value);
-            return self.report(unknown);
-        };
-        if op.is_some() || self.scopes.len() > 2 {
-            let wrong = Diagnostic::new(
-                Code::NotAssignable,
-                at,
-                format!("`{name}` is assigned once, outside branches and loops"),
-            )
-            .expected(format!("`{name} = ...;` directly in the material"))
-            .hint("choose between closures with `if c { a } else { b }` or `mix(a, b, t)`");
-            return self.report(wrong);
-        }
-        let operand = self.expr_as(value, *ty, &format!("`{name}`"))?;
-        let Operand::Closure(id, _) = operand else {
-            return None;
-        };
-        let outputs = &mut self.material.as_mut()?.outputs;
-        if let Some((_, _, first)) = outputs.iter().find(|o| o.0 == *name) {
-            let twice = Diagnostic::new(Code::Duplicate, at, format!("`{name}` is assigned twice"))
-                .expected("one assignment")
-                .label(*first, "first assigned here");
-            return self.report(twice);
-        }
-        outputs.push((name, id, at));
-        Some(())
     }
 }

@@ -5,6 +5,7 @@
 //! IR under construction; `body::Body` checks one function or material.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use crate::Loader;
 use crate::ast::{self, ItemKind, TypeName};
@@ -17,10 +18,14 @@ mod call;
 mod closure;
 mod constant;
 mod expr;
+mod inline;
 mod material;
+mod medium;
 mod modules;
+mod outputs;
 mod stmt;
 pub mod types;
+mod varying;
 
 pub use modules::{ItemRef, ModuleId, std_path};
 use modules::{Loading, ModuleData};
@@ -49,6 +54,8 @@ pub struct Checker<'a> {
     fields: Vec<Vec<Param>>,
     /// Signatures of `ir.closures`.
     closure_params: Vec<Vec<Param>>,
+    /// Expressions and statements that calls of closure functions were replaced by.
+    expanded: u64,
 }
 
 /// How far an item is checked.
@@ -59,6 +66,8 @@ enum Checked {
     Function(FunctionId),
     Struct(StructId),
     Closure(ClosureDefId, Ty),
+    /// A function that returns a closure.
+    ClosureFunction(Arc<Signature>),
     Const(Const, Ty),
 }
 
@@ -94,6 +103,7 @@ impl<'a> Checker<'a> {
             signatures: BTreeMap::new(),
             fields: Vec::new(),
             closure_params: Vec::new(),
+            expanded: 0,
         };
         checker.add_std_sources();
         checker.load_core();
@@ -159,9 +169,7 @@ impl<'a> Checker<'a> {
         let definition = &ast.items[item.index];
         // Definitions may ask for each other in a long chain.
         let checked = stacker::maybe_grow(256 << 10, 2 << 20, || match &definition.kind {
-            ItemKind::Function(f) => self
-                .function(item.module, definition, f)
-                .map(Checked::Function),
+            ItemKind::Function(f) => self.function(item.module, definition, f),
             ItemKind::Struct(fields) => self.structure(item.module, definition, fields),
             ItemKind::Closure(c) => self.closure_def(item.module, definition, c),
             ItemKind::Const(c) => self.constant_item(item.module, c),
@@ -256,13 +264,9 @@ impl<'a> Checker<'a> {
     }
 
     fn closure_in_data(&mut self, span: Span) {
-        let wrong = Diagnostic::new(
-            Code::ClosureUse,
-            span,
-            "closures cannot be stored or passed",
-        )
-        .expected("a value type")
-        .hint("combine closures in the material, with `let`, `layer` and `mix`");
+        let wrong = Diagnostic::new(Code::ClosureUse, span, "closures cannot be stored")
+            .expected("a value type")
+            .hint("combine closures in the material, with `let`, `layer` and `mix`");
         self.report(wrong);
     }
 

@@ -6,7 +6,7 @@ use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
 use crate::ops::Op;
 use crate::source::Span;
 
-use super::body::{Binding, Body, Operand};
+use super::body::{Binding, Body, Operand, Place};
 use super::types::{Ty, arithmetic};
 
 /// Most turns that nested loops may take together.
@@ -24,6 +24,7 @@ impl Body<'_, '_> {
     }
 
     fn statement(&mut self, stmt: &Stmt) -> Option<()> {
+        self.step(stmt.span)?;
         match &stmt.kind {
             StmtKind::Let {
                 mutable,
@@ -69,7 +70,7 @@ impl Body<'_, '_> {
             None => operand,
         };
         match operand {
-            Operand::Closure(..) if mutable => {
+            Operand::Closure(..) | Operand::Medium(_) if mutable => {
                 let wrong = Diagnostic::new(
                     Code::ClosureUse,
                     name.span,
@@ -79,7 +80,7 @@ impl Body<'_, '_> {
                 .hint("name it with `let`; choose between closures with `if` or `mix`");
                 self.report(wrong)
             }
-            Operand::Closure(..) => Some(Binding::Fixed(operand)),
+            Operand::Closure(..) | Operand::Medium(_) => Some(Binding::Fixed(operand)),
             Operand::Value(id, ty) if mutable => {
                 let local = self.builder.local(&name.node, ty.ir()?);
                 self.builder.store(local, id);
@@ -101,8 +102,7 @@ impl Body<'_, '_> {
     ) -> Option<()> {
         match &place.kind {
             ExprKind::Name(name) => {
-                if self.scopes.iter().flatten().all(|e| e.name != *name) && self.material.is_some()
-                {
+                if self.place == Place::Material && self.means_output(name) {
                     return self.output(name, place.span, op, value);
                 }
                 let (local, ty) = self.variable(name, place.span)?;
@@ -153,7 +153,7 @@ impl Body<'_, '_> {
         };
         match self.coerce(new, place_ty, value.span, "the value")? {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) => None,
+            Operand::Closure(..) | Operand::Medium(_) => None,
         }
     }
 

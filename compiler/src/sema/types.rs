@@ -27,12 +27,13 @@ pub enum Ty {
     Struct(StructId),
     Bsdf,
     Edf,
+    Medium,
     /// The type of what did not check; it fits everywhere, so that one mistake is reported once.
     Error,
 }
 
 /// The types that can be named, with their names.
-pub const NAMED: [(&str, Ty); 16] = [
+pub const NAMED: [(&str, Ty); 17] = [
     ("bool", Ty::Bool),
     ("int", Ty::Int),
     ("float", Ty::Float),
@@ -49,6 +50,7 @@ pub const NAMED: [(&str, Ty); 16] = [
     ("texture", Ty::Texture),
     ("bsdf", Ty::Bsdf),
     ("edf", Ty::Edf),
+    ("medium", Ty::Medium),
 ];
 
 impl Ty {
@@ -63,7 +65,7 @@ impl Ty {
             Ty::Vec4 => ir::Type::Vec4,
             Ty::Mat3 => ir::Type::Mat3,
             Ty::Struct(id) => ir::Type::Struct(id),
-            Ty::Bsdf | Ty::Edf | Ty::Error => return None,
+            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Error => return None,
         })
     }
 
@@ -82,9 +84,9 @@ impl Ty {
         self.is_geometric() || matches!(self, Ty::Vec2 | Ty::Vec4 | Ty::Color)
     }
 
-    /// A closure type.
+    /// A type of what is combined and assigned to outputs, but is no value; closures for short.
     pub fn is_closure(self) -> bool {
-        matches!(self, Ty::Bsdf | Ty::Edf)
+        matches!(self, Ty::Bsdf | Ty::Edf | Ty::Medium)
     }
 
     /// Can a value of this type be given where `to` is needed?

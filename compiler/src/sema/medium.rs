@@ -1,0 +1,139 @@
+//! Checking media: what fills the objects that a material covers.
+//!
+//! A path is in a medium between surfaces, where there is no point to evaluate a pattern at. So
+//! a medium depends on the material's parameters only, and an instance has one everywhere.
+
+use crate::ast::{Arg, Name};
+use crate::diag::{Code, Diagnostic};
+use crate::ir::{Const, ExprId, Function, Interior};
+use crate::ops::Op;
+use crate::source::Span;
+
+use super::body::{Body, Operand, Place};
+use super::types::Ty;
+use super::varying::{self, Cause};
+use super::{Checker, Param};
+
+/// Greatest priority.
+const MAX_PRIORITY: i32 = 1000;
+/// Indices of refraction that matter has, and for which Fresnel's formulas stay exact in single
+/// precision; `sound_ior` of the library is the same range.
+const IOR: (f64, f64) = (0.1, 10.0);
+
+impl Body<'_, '_> {
+    /// `medium(absorption: color = 0, ior: float = 1, priority: int = 0)`
+    pub fn medium(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
+        if self.place == Place::Values {
+            let wrong = Diagnostic::new(Code::ClosureUse, span, "a medium is not a value")
+                .expected("`interior = medium(...);` in a material");
+            return self.report(wrong);
+        }
+        let param = |name: &str, ty, default| Param {
+            name: name.into(),
+            ty,
+            default: Some(default),
+        };
+        let params = [
+            param("absorption", Ty::Color, Const::Float(vec![0.0; 3])),
+            param("ior", Ty::Float, Const::Float(vec![1.0])),
+            param("priority", Ty::Int, Const::Int(0)),
+        ];
+        let values = self.value_arguments(callee, args, &params)?;
+        let [absorption, ior, priority] = values.as_slice() else {
+            return None;
+        };
+        let absorption = self.limited(*absorption, "absorption", (0.0, f64::INFINITY), " 1/m")?;
+        let ior = self.limited(*ior, "ior", IOR, "")?;
+        let greatest = (0.0, f64::from(MAX_PRIORITY));
+        let priority = self.limited(*priority, "priority", greatest, "")?;
+        self.media.push(Interior {
+            absorption,
+            ior,
+            priority,
+            span,
+        });
+        Some(Operand::Medium(self.media.len() - 1))
+    }
+
+    /// `id` kept between `low` and `high`; a constant outside is an error.
+    fn limited(
+        &mut self,
+        id: ExprId,
+        name: &str,
+        (low, high): (f64, f64),
+        unit: &str,
+    ) -> Option<ExprId> {
+        let span = self.builder.function().expr(id).span;
+        let components = match self.builder.function().constant(id) {
+            Some(Const::Float(v)) => v.clone(),
+            Some(Const::Int(i)) => vec![f64::from(*i)],
+            _ => return Some(self.clamped(id, (low, high), span)),
+        };
+        let Some(bad) = components.iter().find(|x| !(low..=high).contains(*x)) else {
+            return Some(id);
+        };
+        let message = format!("the {name} of the medium is {}{unit}", *bad as f32);
+        let outside = Diagnostic::new(Code::OutOfRange, span, message);
+        self.report(if high.is_finite() {
+            outside.expected(format!("{low} to {high}"))
+        } else {
+            outside.expected(format!("at least {low}"))
+        })
+    }
+
+    fn clamped(&mut self, id: ExprId, (low, high): (f64, f64), span: Span) -> ExprId {
+        let int = self.builder.ty(id) == crate::ir::Type::Int;
+        let mut limit = |x: f64| match int {
+            true => self.constant(Const::Int(x as i32), span),
+            false => self.builder.float(x, span),
+        };
+        let (least, most) = (limit(low), limit(high));
+        if high.is_finite() {
+            self.builder.op(Op::Clamp, &[id, least, most], span)
+        } else {
+            self.builder.op(Op::Max, &[id, least], span)
+        }
+    }
+
+    /// The medium of an `if`: the first where `cond` holds, else the second.
+    pub fn choose_medium(&mut self, cond: ExprId, a: usize, b: usize, span: Span) -> Operand {
+        let (a, b) = (self.media[a], self.media[b]);
+        let mut select = |x, y| self.builder.op(Op::Select, &[cond, x, y], span);
+        let chosen = Interior {
+            absorption: select(a.absorption, b.absorption),
+            ior: select(a.ior, b.ior),
+            priority: select(a.priority, b.priority),
+            span,
+        };
+        self.media.push(chosen);
+        Operand::Medium(self.media.len() - 1)
+    }
+}
+
+impl Checker<'_> {
+    /// Reports what of the interior of a material with this `body` differs from point to point.
+    pub(super) fn check_interior(&mut self, body: &Function, interior: &Interior) -> Option<()> {
+        let parts = [
+            ("absorption", interior.absorption),
+            ("ior", interior.ior),
+            ("priority", interior.priority),
+        ];
+        let causes = varying::causes(&self.ir, body);
+        let mut ok = Some(());
+        for (name, id) in parts {
+            let Some(cause) = causes.of(id) else { continue };
+            let (span, what) = match cause {
+                Cause::Input(span, input) => (*span, format!("`{input}`")),
+                Cause::Texture(span) => (*span, "a texture".into()),
+            };
+            let message = format!("the {name} of the interior depends on {what}");
+            let varies = Diagnostic::new(Code::VaryingMedium, span, message)
+                .expected("parameters and constants only")
+                .hint("a path crosses the inside between surfaces, where it is at no point of one; vary the surface instead")
+                .label(interior.span, "the medium that needs it");
+            self.report(varies);
+            ok = None;
+        }
+        ok
+    }
+}
