@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use impasto::compiler::codegen::Target;
 use impasto::compiler::source::SourceMap;
-use impasto::compiler::{self, Loader, MaterialRequest, diag, lexer, parser};
+use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
 use impasto::files;
 use impasto::{FileLoader, Program};
 
@@ -20,6 +21,13 @@ pub(super) struct EmitArgs {
     /// Which material of the file; needed for IR and WGSL where it has several
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
+    /// What the WGSL is for
+    #[arg(long, default_value = "native")]
+    target: TargetName,
+    /// Keep parameters as values of a table, as instances with different values share them, in
+    /// place of their defaults
+    #[arg(long)]
+    table: bool,
     /// Where to write it; `-` is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     out: String,
@@ -35,6 +43,23 @@ enum What {
     Ir,
     /// The generated WGSL
     Wgsl,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum TargetName {
+    /// The renderer, and other users of wgpu
+    Native,
+    /// WebGPU in a browser: a module of its own, with its textures as bindings
+    Webgpu,
+}
+
+impl From<TargetName> for Target {
+    fn from(name: TargetName) -> Self {
+        match name {
+            TargetName::Native => Target::Native,
+            TargetName::Webgpu => Target::WebGpu,
+        }
+    }
 }
 
 pub(super) fn run(args: &EmitArgs, global: &Global) -> Outcome {
@@ -106,11 +131,10 @@ fn ir(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Strin
     }
 }
 
-/// The WGSL of one material, or of all that the file defines, with default parameters.
+/// The WGSL of one material, or of all that the file defines.
 fn wgsl(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<String, Failure> {
     let program = compiled(args, loader, global)?;
-    let all: Vec<usize> = (0..program.materials().len()).collect();
-    Ok(program.wgsl(&all))
+    Ok(program.complete_wgsl(args.target.into()))
 }
 
 fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Program, Failure> {
@@ -123,8 +147,13 @@ fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result
 /// A request for each material to print. A file without any is asked for its material all the
 /// same: the compiler knows what to say.
 fn requests(args: &EmitArgs, loader: &mut FileLoader) -> Vec<MaterialRequest> {
+    let parameters = match args.table {
+        true => Parameters::Table,
+        false => Parameters::Agreed,
+    };
     let request = |name: &str, material| MaterialRequest {
         material,
+        parameters,
         ..MaterialRequest::new(name, &args.file)
     };
     if let Some(name) = &args.material {

@@ -93,6 +93,9 @@ impl<'m> View<'m> {
             let floor = self.op(Op::Max, &[lobe.albedo, least]);
             let product = self.op(Op::Mul, &[lobe.weight, floor]);
             lobe.share = self.op(Op::MaxComponent, &[product]);
+            let name = &self.module.closures[lobe.path.lobe.def.index()].name;
+            self.b.name(lobe.weight, &format!("{name}_weight"));
+            self.b.name(lobe.share, &format!("{name}_share"));
         }
         (ready, albedo)
     }
@@ -141,7 +144,9 @@ impl<'m> View<'m> {
         let (geometric, wo) = (self.point("geometric_normal"), self.wo());
         let normal = self.call(self.core.valid_normal, &[normal, geometric, wo]);
         let frame = self.call(self.core.frame, &[normal, tangent]);
+        self.b.name(frame, "frame");
         let wo_local = self.call(self.core.to_local, &[frame, wo]);
+        self.b.name(wo_local, "wo_local");
         self.frames.insert(key, (frame, wo_local));
         (frame, wo_local)
     }

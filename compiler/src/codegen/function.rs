@@ -171,7 +171,8 @@ impl Printer<'_> {
         }
         self.block(&self.f.body, 1);
         let value = self.operand(self.f.value);
-        let _ = writeln!(self.out, "    return {value};\n}}\n");
+        self.line_of(self.f.value, 1, &format!("return {value};"));
+        self.out.push_str("}\n\n");
     }
 
     /// Reads the uniforms that the function uses from the table.
@@ -203,6 +204,12 @@ impl Printer<'_> {
         let _ = writeln!(self.out, "{}{text}", "    ".repeat(depth));
     }
 
+    /// A line with where the expression `id` of the source stands that it comes from.
+    fn line_of(&mut self, id: ExprId, depth: usize, text: &str) {
+        let origin = self.program.origin(self.f.expr(id).span);
+        self.line(depth, &format!("{text} // {origin}"));
+    }
+
     fn stmt(&mut self, stmt: &Stmt, depth: usize) {
         match stmt {
             Stmt::Eval(id) => self.eval(*id, depth),
@@ -213,27 +220,23 @@ impl Printer<'_> {
                     self.locals[local.index()],
                     self.operand(*value)
                 );
-                self.line(depth, &text);
+                self.line_of(*value, depth, &text);
             }
-            Stmt::If(cond, then, otherwise) => {
-                let cond = self.operand(*cond);
-                self.branch(&format!("if {cond} {{"), then, otherwise, depth);
-            }
+            Stmt::If(cond, then, otherwise) => self.branch("", *cond, then, otherwise, depth),
             Stmt::For {
                 local,
                 low,
                 high,
                 body,
             } => {
+                let bound = high;
                 let (name, low, high) = (
                     self.locals[local.index()].clone(),
                     self.operand(*low),
                     self.operand(*high),
                 );
-                self.line(
-                    depth,
-                    &format!("for (var {name} = {low}; {name} < {high}; {name}++) {{"),
-                );
+                let head = format!("for (var {name} = {low}; {name} < {high}; {name}++) {{");
+                self.line_of(*bound, depth, &head);
                 self.block(body, depth + 1);
                 self.line(depth, "}");
             }
@@ -244,13 +247,11 @@ impl Printer<'_> {
                 body,
             } => {
                 let turn = unique(&mut self.taken, "turns");
-                self.line(
-                    depth,
-                    &format!("for (var {turn} = 0i; {turn} < {limit}i; {turn}++) {{"),
-                );
+                let first = format!("for (var {turn} = 0i; {turn} < {limit}i; {turn}++) {{");
+                self.line_of(*test, depth, &first);
                 self.block(head, depth + 1);
-                let test = self.operand(*test);
-                self.line(depth + 1, &format!("if !({test}) {{ break; }}"));
+                let text = format!("if !({}) {{ break; }}", self.operand(*test));
+                self.line_of(*test, depth + 1, &text);
                 self.block(body, depth + 1);
                 self.line(depth, "}");
             }
@@ -259,16 +260,24 @@ impl Printer<'_> {
         }
     }
 
-    fn branch(&mut self, head: &str, then: &Block, otherwise: &Block, depth: usize) {
-        self.line(depth, head);
+    /// `if`, or `before` with `if`, and what follows.
+    fn branch(
+        &mut self,
+        before: &str,
+        cond: ExprId,
+        then: &Block,
+        otherwise: &Block,
+        depth: usize,
+    ) {
+        let head = format!("{before}if {} {{", self.operand(cond));
+        self.line_of(cond, depth, &head);
         self.block(then, depth + 1);
         // A branch whose only content is another continues the chain on one level.
         match otherwise.split_last() {
             None => self.line(depth, "}"),
             Some((Stmt::If(cond, a, b), before)) if self.prints_nothing(before) => {
                 self.block(before, depth);
-                let cond = self.operand(*cond);
-                self.branch(&format!("}} else if {cond} {{"), a, b, depth);
+                self.branch("} else ", *cond, a, b, depth);
             }
             _ => {
                 self.line(depth, "} else {");
@@ -299,11 +308,7 @@ impl Printer<'_> {
                 format!("v{}", self.next)
             }
         };
-        let comment = match &expr.name {
-            Some(_) => format!(" // {}", self.program.origin(expr.span)),
-            None => String::new(),
-        };
-        self.line(depth, &format!("let {name} = {text};{comment}"));
+        self.line_of(id, depth, &format!("let {name} = {text};"));
         self.names[id.index()] = Some(name);
     }
 
