@@ -5,8 +5,13 @@
 //! interpretation, code generation and cost all read this table; a row that lacks a column does
 //! not compile.
 
+mod meaning;
+
 use crate::ir::Type;
-use crate::ir::value::{Floats, Real, Value};
+use crate::ir::value::{Real, Value};
+use meaning::*;
+
+pub use meaning::{Kernel, Operands};
 
 /// What operands an op takes and what it gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,9 +115,18 @@ macro_rules! ops {
             }
         }
 
-        /// Applies `op` to operands that fit its shape. Texture ops are the interpreter's.
-        pub fn evaluate<F: Real>(op: Op, args: &[Value<F>]) -> Value<F> {
-            match op { $(Op::$name => { let f: fn(&[Value<F>]) -> Value<F> = $eval; f(args) })* }
+        /// What `op` does to `width` components; 0 stands for ints and bools.
+        pub fn kernel<F: Real>(op: Op, width: usize) -> Kernel<F> {
+            match op {
+                $(Op::$name => {
+                    fn run<F: Real, const W: usize>(f: &mut [F], i: &mut [i32], at: &Operands) {
+                        apply(Args::<F, W> { floats: f, ints: i, at }, $eval);
+                    }
+                    let kernels: [Kernel<F>; 5] =
+                        [run::<F, 0>, run::<F, 1>, run::<F, 2>, run::<F, 3>, run::<F, 4>];
+                    kernels[width.min(4)]
+                })*
+            }
         }
     };
     (@function) => { true };
@@ -156,7 +170,7 @@ ops! {
     Mix "mix" function Float(3), Alu(2), Builtin("mix"), None,
         |a| float3(a, |x, y, t| x * (F::of(1.0) - t) + y * t);
     Step "step" function Float(2), Alu(1), Builtin("step"), None,
-        |a| float2(a, |edge, x| F::of(f64::from(u8::from(edge <= x))));
+        |a| float2(a, |edge, x| unit(edge <= x));
     Smoothstep "smoothstep" function Float(3), Alu(6),
         Helper("smooth_ramp", "(low: T, high: T, x: T) -> T { let d = high - low; let t = saturate((x - low) / select(d, T(1), d == T(0))); return select(t * t * (T(3) - T(2) * t), step(low, x), d == T(0)); }"), None,
         |a| float3(a, smoothstep);
@@ -210,39 +224,39 @@ ops! {
         |a| float1(a, |x| x.map(srgb_decode));
     // Geometry
     Dot "dot" function Reduce(2), Alu(2), Builtin("dot"), None,
-        |a| one(sum(a[0].components(), a[1].components()));
+        |a| reduce2(a, |v, w| sum(&v, &w));
     Length "length" function Reduce(1), Special(2), Builtin("length"), None,
-        |a| one(sum(a[0].components(), a[0].components()).sqrt());
+        |a| reduce1(a, |v| sum(&v, &v).sqrt());
     Distance "distance" function Reduce(2), Special(2), Builtin("distance"), None,
-        |a| { let d = float2(a, |x, y| x - y); one(sum(d.components(), d.components()).sqrt()) };
+        |a| reduce2(a, distance);
     Normalize "normalize" function Vector(1), Special(2),
         Helper("safe_normalize", "(v: T) -> T { let d = dot(v, v); return select(T(0), v * inverseSqrt(max(d, 1.1754944e-38)), d > 1.1754944e-38); }"), None,
-        |a| normalize(&a[0]);
+        normalize;
     Reflect "reflect" function Vector(2), Alu(3), Builtin("reflect"), None,
-        |a| reflect(&a[0], &a[1]);
-    Cross "cross" function Cross, Alu(3), Builtin("cross"), None, |a| cross(a[0].components(), a[1].components());
+        reflect;
+    Cross "cross" function Cross, Alu(3), Builtin("cross"), None, cross;
     MaxComponent "max_component" function Reduce(1), Alu(1),
         Helper("max_component", ""), None,
-        |a| one(a[0].components().iter().copied().fold(F::of(f64::MIN), high_of));
+        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MIN), high_of));
     MinComponent "min_component" function Reduce(1), Alu(1),
         Helper("min_component", ""), None,
-        |a| one(a[0].components().iter().copied().fold(F::of(f64::MAX), low_of));
+        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MAX), low_of));
     Luminance "luminance" function Reduce(1), Alu(2),
         Helper("luminance", "(c: T) -> f32 { return dot(c, vec3<f32>(0.2126, 0.7152, 0.0722)); }"), None,
-        |a| one(sum(a[0].components(), &[F::of(0.2126), F::of(0.7152), F::of(0.0722)]));
+        |a| reduce1(a, |v| sum(&v, &[F::of(0.2126), F::of(0.7152), F::of(0.0722)]));
     MatVec "transform" operator MatVec, Alu(5), Infix("*"), None, mat_vec;
     // Choice
     Select "select" function Select, Alu(1), Builtin("select"), None,
-        |a| if a[0].as_bool() { a[1].clone() } else { a[2].clone() };
-    Less "lt" operator Compare, Alu(1), Infix("<"), None, |a| compare(a, |o| o.is_lt());
-    LessEqual "le" operator Compare, Alu(1), Infix("<="), None, |a| compare(a, |o| o.is_le());
-    Greater "gt" operator Compare, Alu(1), Infix(">"), None, |a| compare(a, |o| o.is_gt());
-    GreaterEqual "ge" operator Compare, Alu(1), Infix(">="), None, |a| compare(a, |o| o.is_ge());
-    Equal "eq" operator Equal, Alu(1), Infix("=="), None, |a| Value::Bool(equal(a));
-    NotEqual "ne" operator Equal, Alu(1), Infix("!="), None, |a| Value::Bool(!equal(a));
-    And "and" operator Bool(2), Integer(1), Infix("&"), None, |a| Value::Bool(a[0].as_bool() & a[1].as_bool());
-    Or "or" operator Bool(2), Integer(1), Infix("|"), None, |a| Value::Bool(a[0].as_bool() | a[1].as_bool());
-    Not "not" operator Bool(1), Integer(1), Prefix("!"), None, |a| Value::Bool(!a[0].as_bool());
+        choose;
+    Less "lt" operator Compare, Alu(1), Infix("<"), None, |a| test(a, |x, y| x < y, |x, y| x < y);
+    LessEqual "le" operator Compare, Alu(1), Infix("<="), None, |a| test(a, |x, y| x <= y, |x, y| x <= y);
+    Greater "gt" operator Compare, Alu(1), Infix(">"), None, |a| test(a, |x, y| x > y, |x, y| x > y);
+    GreaterEqual "ge" operator Compare, Alu(1), Infix(">="), None, |a| test(a, |x, y| x >= y, |x, y| x >= y);
+    Equal "eq" operator Equal, Alu(1), Infix("=="), None, |a| test(a, |x, y| x == y, |x, y| x == y);
+    NotEqual "ne" operator Equal, Alu(1), Infix("!="), None, |a| test(a, |x, y| x != y, |x, y| x != y);
+    And "and" operator Bool(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y);
+    Or "or" operator Bool(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y);
+    Not "not" operator Bool(1), Integer(1), Prefix("!"), None, |a| int1(a, |x| x ^ 1);
     // Integers
     BitAnd "bit_and" operator Int(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y);
     BitOr "bit_or" operator Int(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y);
@@ -252,22 +266,22 @@ ops! {
     ShiftRight "shift_right" operator Int(2), Integer(1), Helper("shift_right", "(a: T, b: T) -> T { return a >> (u32(b) & 31u); }"), None,
         |a| int2(a, |x, y| x.wrapping_shr(y as u32));
     Hash1 "hash" function Int(1), Integer(8), Helper("hash", HASH1), None,
-        |a| Value::Int(pcg(a[0].as_int() as u32) as i32);
+        |a| hash(a, 1);
     Hash2 "hash" function Int(2), Integer(16), Helper("hash2", HASH2), None,
-        |a| Value::Int(hash_all(a) as i32);
+        |a| hash(a, 2);
     Hash3 "hash" function Int(3), Integer(24), Helper("hash3", HASH3), None,
-        |a| Value::Int(hash_all(a) as i32);
+        |a| hash(a, 3);
     ToFloat "to_float" operator IntToFloat, Integer(1), Builtin("f32"), None,
-        |a| Value::float(f64::from(a[0].as_int()));
+        |a| to_float(a, f64::from);
     ToInt "to_int" operator FloatToInt, Integer(1),
         Helper("to_int", "(x: T) -> i32 { return i32(clamp(x, -2147483648.0, 2147483520.0)); }"), None,
-        |a| Value::Int(a[0].as_float().f64().clamp(-2_147_483_648.0, 2_147_483_520.0) as i32);
+        |a| to_int(a, |x| x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32);
     UnitFloat "unit_float" function IntToFloat, Integer(2),
         Helper("unit_float", "(i: T) -> f32 { return f32(bitcast<u32>(i) >> 8u) * 5.9604645e-8; }"), None,
-        |a| Value::float(f64::from(a[0].as_int() as u32 >> 8) / 16_777_216.0);
+        |a| to_float(a, |i| f64::from(i as u32 >> 8) / 16_777_216.0);
     // Textures: a texture is an index
-    Image "image" function Lookup(3), Texture, Builtin("texture_fetch"), None, |_| Value::vector(&[0.5; 3]);
-    ImageData "image_data" function Lookup(4), Texture, Builtin("texture_fetch"), None, |_| Value::vector(&[0.5; 4]);
+    Image "image" function Lookup(3), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5);
+    ImageData "image_data" function Lookup(4), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5);
 }
 
 const HASH1: &str = "(a: T) -> i32 { let s = bitcast<u32>(a) * 747796405u + 2891336453u; let w = ((s >> ((s >> 28u) + 4u)) ^ s) * 277803737u; return bitcast<i32>((w >> 22u) ^ w); }";
@@ -321,6 +335,26 @@ impl Op {
     }
 }
 
+impl Op {
+    /// How many components [`kernel`] works on for operands of types `args`; 0 for ints.
+    pub fn components(self, args: &[Type]) -> usize {
+        match self.info().shape {
+            Shape::Lookup(n) => n,
+            _ => args.iter().filter_map(|a| a.width()).max().unwrap_or(0),
+        }
+    }
+
+    /// Where [`kernel`] finds operands of types `args` that lie at `from`.
+    pub fn operands(self, args: &[Type], to: u32, from: [u32; 3]) -> Operands {
+        let step = |k: usize| u8::from(args.get(k) != Some(&Type::Float));
+        Operands {
+            to,
+            from,
+            step: [step(0), step(1), step(2)],
+        }
+    }
+}
+
 /// The widest of float types that combine: all scalars or of one width.
 fn widest(args: &[Type]) -> Option<Type> {
     let widths: Option<Vec<usize>> = args.iter().map(|a| a.width()).collect();
@@ -332,171 +366,80 @@ fn widest(args: &[Type]) -> Option<Type> {
         .then(|| Type::of_width(widest))
 }
 
-fn one<F: Real>(x: F) -> Value<F> {
-    Value::Floats(Floats::new(&[x]))
-}
-
-fn is_zero<F: Real>(x: F) -> bool {
-    x == F::of(0.0)
-}
-
-fn low_of<F: Real>(a: F, b: F) -> F {
-    if b < a { b } else { a }
-}
-
-fn high_of<F: Real>(a: F, b: F) -> F {
-    if a < b { b } else { a }
-}
-
-fn by_component<F: Real>(args: &[Value<F>], f: impl Fn(&dyn Fn(usize) -> F) -> F) -> Value<F> {
-    let width = args
-        .iter()
-        .map(|a| a.components().len())
-        .max()
-        .unwrap_or(1)
-        .max(1);
-    let mut out = [F::of(0.0); 4];
-    for (i, slot) in out.iter_mut().enumerate().take(width) {
-        *slot = f(&|k| match &args[k] {
-            Value::Floats(v) => v.get(i),
-            _ => F::of(0.0),
-        });
+/// Applies `op` to bools, ints, floats and vectors that fit its shape; what does not fit gives
+/// zero. Matrices, and textures that are there, are the interpreter's.
+pub fn evaluate<F: Real>(op: Op, args: &[Value<F>]) -> Value<F> {
+    let mut types = [Type::Mat3; 3];
+    for (ty, arg) in types.iter_mut().zip(args) {
+        *ty = arg.plain_type().unwrap_or(Type::Mat3);
     }
-    Value::Floats(Floats::new(&out[..width]))
-}
-
-fn float1<F: Real>(a: &[Value<F>], f: impl Fn(F) -> F) -> Value<F> {
-    by_component(a, |x| f(x(0)))
-}
-
-fn float2<F: Real>(a: &[Value<F>], f: impl Fn(F, F) -> F) -> Value<F> {
-    by_component(a, |x| f(x(0), x(1)))
-}
-
-fn float3<F: Real>(a: &[Value<F>], f: impl Fn(F, F, F) -> F) -> Value<F> {
-    by_component(a, |x| f(x(0), x(1), x(2)))
-}
-
-fn number1<F: Real>(a: &[Value<F>], f: impl Fn(F) -> F, g: impl Fn(i32) -> i32) -> Value<F> {
-    match a {
-        [Value::Int(x)] => Value::Int(g(*x)),
-        _ => float1(a, f),
-    }
-}
-
-fn number2<F: Real>(
-    a: &[Value<F>],
-    f: impl Fn(F, F) -> F,
-    g: impl Fn(i32, i32) -> i32,
-) -> Value<F> {
-    match a {
-        [Value::Int(x), Value::Int(y)] => Value::Int(g(*x, *y)),
-        _ => float2(a, f),
-    }
-}
-
-fn number3<F: Real>(
-    a: &[Value<F>],
-    f: impl Fn(F, F, F) -> F,
-    g: impl Fn(i32, i32, i32) -> i32,
-) -> Value<F> {
-    match a {
-        [Value::Int(x), Value::Int(y), Value::Int(z)] => Value::Int(g(*x, *y, *z)),
-        _ => float3(a, f),
-    }
-}
-
-fn int2<F: Real>(a: &[Value<F>], f: impl Fn(i32, i32) -> i32) -> Value<F> {
-    Value::Int(f(a[0].as_int(), a[1].as_int()))
-}
-
-fn compare<F: Real>(a: &[Value<F>], test: impl Fn(std::cmp::Ordering) -> bool) -> Value<F> {
-    let ordering = match a {
-        [Value::Int(x), Value::Int(y)] => Some(x.cmp(y)),
-        _ => a[0].as_float().partial_cmp(&a[1].as_float()),
+    let types = &types[..args.len().min(3)];
+    let fits = args.len() == types.len() && !types.contains(&Type::Mat3);
+    let Some(ty) = op.result(types).filter(|_| fits) else {
+        return Value::float(0.0);
     };
-    Value::Bool(ordering.is_some_and(test))
-}
-
-fn equal<F: Real>(a: &[Value<F>]) -> bool {
-    match a {
-        [Value::Int(x), Value::Int(y)] => x == y,
-        [Value::Bool(x), Value::Bool(y)] => x == y,
-        _ => a[0].as_float() == a[1].as_float(),
+    let mut floats = [F::of(0.0); 16];
+    let mut ints = [0; 4];
+    // The result, then the operands, in steps of the widest.
+    for (k, arg) in args.iter().enumerate() {
+        match arg {
+            Value::Bool(b) => ints[k + 1] = i32::from(*b),
+            Value::Int(i) => ints[k + 1] = *i,
+            other => {
+                let v = other.components();
+                floats[4 * k + 4..][..v.len()].copy_from_slice(v);
+            }
+        }
     }
-}
-
-fn sum<F: Real>(a: &[F], b: &[F]) -> F {
-    a.iter().zip(b).fold(F::of(0.0), |s, (x, y)| s + *x * *y)
-}
-
-fn cross<F: Real>(a: &[F], b: &[F]) -> Value<F> {
-    let c = |i: usize, j: usize| a[i] * b[j] - a[j] * b[i];
-    Value::Floats(Floats::new(&[c(1, 2), c(2, 0), c(0, 1)]))
-}
-
-fn normalize<F: Real>(v: &Value<F>) -> Value<F> {
-    let squared = sum(v.components(), v.components());
-    if squared > F::of(TINY) {
-        let inverse = F::of(1.0) / squared.sqrt();
-        float1(std::slice::from_ref(v), |x| x * inverse)
-    } else {
-        float1(std::slice::from_ref(v), |_| F::of(0.0))
-    }
-}
-
-fn reflect<F: Real>(v: &Value<F>, n: &Value<F>) -> Value<F> {
-    let twice = F::of(2.0) * sum(v.components(), n.components());
-    by_component(&[v.clone(), n.clone()], |x| x(0) - twice * x(1))
-}
-
-fn mat_vec<F: Real>(a: &[Value<F>]) -> Value<F> {
-    let (Value::Mat3(m), Value::Floats(v)) = (&a[0], &a[1]) else {
-        return one(F::of(0.0));
+    let from = |k: usize| match types.get(k) {
+        Some(Type::Bool | Type::Int) => k as u32 + 1,
+        _ => 4 * k as u32 + 4,
     };
-    let row = |r: usize| m[0][r] * v.get(0) + m[1][r] * v.get(1) + m[2][r] * v.get(2);
-    Value::Floats(Floats::new(&[row(0), row(1), row(2)]))
-}
-
-fn smoothstep<F: Real>(low: F, high: F, x: F) -> F {
-    let d = high - low;
-    if is_zero(d) {
-        return F::of(f64::from(u8::from(low <= x)));
-    }
-    let t = low_of(high_of((x - low) / d, F::of(0.0)), F::of(1.0));
-    t * t * (F::of(3.0) - F::of(2.0) * t)
-}
-
-fn power(x: f64, y: f64) -> f64 {
-    if y == 0.0 {
-        1.0
-    } else if x > 0.0 {
-        (y * x.max(TINY).log2()).min(127.0).exp2()
-    } else {
-        0.0
+    let at = op.operands(types, 0, [from(0), from(1), from(2)]);
+    kernel::<F>(op, op.components(types))(&mut floats, &mut ints, &at);
+    match ty {
+        Type::Bool => Value::Bool(ints[0] != 0),
+        Type::Int => Value::Int(ints[0]),
+        _ => Value::floats(&floats[..ty.width().unwrap_or(1)]),
     }
 }
 
-fn srgb_decode(c: f64) -> f64 {
-    if c <= 0.04045 {
-        c / 12.92
-    } else {
-        ((c + 0.055) / 1.055).powf(2.4)
+/// Operations by the class of hardware they keep busy, each component counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counts {
+    /// Float arithmetic.
+    pub alu: u64,
+    /// Divisions, roots and transcendentals.
+    pub special: u64,
+    /// Integer and bit arithmetic.
+    pub integer: u64,
+    /// Texture lookups.
+    pub texture: u64,
+    /// Calls of functions.
+    pub calls: u64,
+    /// Turns of loops.
+    pub turns: u64,
+}
+
+impl Counts {
+    /// Counts one `op` over `components`.
+    pub fn op(&mut self, op: Op, components: usize) {
+        let times = components.max(1) as u64;
+        match op.info().class {
+            CostClass::Alu(n) => self.alu += u64::from(n) * times,
+            CostClass::Special(n) => self.special += u64::from(n) * times,
+            CostClass::Integer(n) => self.integer += u64::from(n) * times,
+            CostClass::Texture => self.texture += 1,
+        }
     }
-}
 
-/// The PCG output permutation as a hash (Jarzynski and Olano 2020).
-fn pcg(a: u32) -> u32 {
-    let s = a.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let w = ((s >> ((s >> 28) + 4)) ^ s).wrapping_mul(277_803_737);
-    (w >> 22) ^ w
-}
-
-fn hash_all<F: Real>(args: &[Value<F>]) -> u32 {
-    args.iter()
-        .fold(None, |h: Option<u32>, a| {
-            let a = a.as_int() as u32;
-            Some(pcg(h.map_or(a, |h| h.wrapping_add(a))))
-        })
-        .unwrap_or(0)
+    /// Adds `other`, `times` over.
+    pub fn add(&mut self, other: &Counts, times: u64) {
+        self.alu += other.alu * times;
+        self.special += other.special * times;
+        self.integer += other.integer * times;
+        self.texture += other.texture * times;
+        self.calls += other.calls * times;
+        self.turns += other.turns * times;
+    }
 }

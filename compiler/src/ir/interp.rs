@@ -1,17 +1,22 @@
 //! The interpreter: runs IR on the CPU in f32 or f64.
 //!
 //! In f64 it is the oracle of the numerics tests; in f32 it rounds where the GPU rounds. It also
-//! evaluates what must be known before rendering (parameter values, uniform emission). Work is
-//! bounded by a number of evaluated expressions, so no input can make it hang.
+//! evaluates what must be known before rendering (parameter values, uniform emission). A function
+//! is turned into flat code when it is first called. Work is bounded by a number of evaluated
+//! expressions, so no input can make it hang, and calls need no native stack.
 
-use super::value::{Floats, Real, Value};
-use super::{Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt};
-use crate::ops::{self, Op};
+mod code;
+mod lower;
+
+use self::code::{Code, Ins, Numbers, Place};
+use super::value::{Real, Value};
+use super::{Const, Function, FunctionId, Module};
+use crate::ops::{Counts, Op, Operands};
 
 /// Looks up a texture: index, u, v, color or data; gives RGBA.
 pub type TextureLookup<'a> = dyn Fn(usize, f64, f64, Op) -> [f64; 4] + 'a;
 
-/// Runs functions of one module.
+/// Runs functions of one module. Keep it for many calls: the code it makes of a function stays.
 pub struct Interpreter<'a, F> {
     module: &'a Module,
     /// Values of the material's parameters.
@@ -21,23 +26,38 @@ pub struct Interpreter<'a, F> {
     fuel: u64,
     /// Expressions evaluated so far.
     executed: u64,
+    codes: Vec<Code<F>>,
+    /// Index in `codes` of the module's functions, once they were called.
+    known: Vec<Option<usize>>,
+    /// Functions that `run` was given. They live as long as the module does, so that an address
+    /// stands for one function.
+    others: Vec<(&'a Function, usize)>,
+    /// The frames of all calls.
+    stack: Numbers<F>,
 }
 
 /// The work limit was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfFuel;
 
-/// How a block ended.
-enum Flow {
-    Next,
-    Break,
-    Continue,
+/// A call that waits for the one it made.
+struct Waiting {
+    code: usize,
+    next: usize,
+    base: Place,
+    /// Where the result goes.
+    to: Place,
 }
 
-struct Frame<F> {
-    params: Vec<Value<F>>,
-    locals: Vec<Value<F>>,
-    values: Vec<Option<Value<F>>>,
+/// Why a function's code stopped.
+enum Stop {
+    Call {
+        callee: u32,
+        frame: Place,
+        to: Place,
+        next: usize,
+    },
+    Return,
 }
 
 impl<'a, F: Real> Interpreter<'a, F> {
@@ -49,12 +69,20 @@ impl<'a, F: Real> Interpreter<'a, F> {
             texture: None,
             fuel,
             executed: 0,
+            codes: Vec::new(),
+            known: vec![None; module.functions.len()],
+            others: Vec::new(),
+            stack: Numbers::new(),
         }
     }
 
-    /// Sets the material's parameters.
+    /// Sets the material's parameters; zero without them.
     pub fn with_uniforms(mut self, uniforms: &[Const]) -> Self {
         self.uniforms = uniforms.iter().map(Value::constant).collect();
+        // Their values are part of the code.
+        self.codes.clear();
+        self.others.clear();
+        self.known.fill(None);
         self
     }
 
@@ -64,198 +92,204 @@ impl<'a, F: Real> Interpreter<'a, F> {
         self
     }
 
-    /// Expressions evaluated so far.
+    /// Expressions evaluated so far, turns of loops included.
     pub fn executed(&self) -> u64 {
         self.executed
     }
 
+    /// What was executed so far, by class.
+    pub fn counts(&self) -> Counts {
+        let mut counts = Counts::default();
+        for run in self.codes.iter().flat_map(|c| &c.runs) {
+            counts.add(&run.counts, run.times);
+        }
+        counts
+    }
+
     /// Calls function `id`.
     pub fn call(&mut self, id: FunctionId, args: Vec<Value<F>>) -> Result<Value<F>, OutOfFuel> {
-        self.run(&self.module.functions[id.index()], args)
+        let code = self.known_code(id);
+        self.start(code, &self.module.functions[id.index()], &args)
     }
 
     /// Calls a function that need not be in the module.
-    pub fn run(&mut self, f: &Function, args: Vec<Value<F>>) -> Result<Value<F>, OutOfFuel> {
-        let locals = f
-            .locals
-            .iter()
-            .map(|l| Value::zero(l.ty, &self.module.structs))
-            .collect();
-        let mut frame = Frame {
-            params: args,
-            locals,
-            values: vec![None; f.exprs.len()],
+    pub fn run(&mut self, f: &'a Function, args: Vec<Value<F>>) -> Result<Value<F>, OutOfFuel> {
+        let known = self.others.iter().find(|(g, _)| std::ptr::eq(*g, f));
+        let code = match known {
+            Some((_, code)) => *code,
+            None => {
+                let code = self.lower(f);
+                self.others.push((f, code));
+                code
+            }
         };
-        self.block(f, &mut frame, &f.body)?;
-        Ok(self.get(f, &frame, f.value))
+        self.start(code, f, &args)
     }
 
-    fn block(
+    fn known_code(&mut self, id: FunctionId) -> usize {
+        if let Some(code) = self.known[id.index()] {
+            return code;
+        }
+        let code = self.lower(&self.module.functions[id.index()]);
+        self.known[id.index()] = Some(code);
+        code
+    }
+
+    fn lower(&mut self, f: &Function) -> usize {
+        self.codes
+            .push(lower::lower(self.module, f, &self.uniforms));
+        self.codes.len() - 1
+    }
+
+    fn start(
         &mut self,
+        code: usize,
         f: &Function,
-        frame: &mut Frame<F>,
-        block: &Block,
-    ) -> Result<Flow, OutOfFuel> {
-        for stmt in block {
-            match self.stmt(f, frame, stmt)? {
-                Flow::Next => {}
-                other => return Ok(other),
-            }
-        }
-        Ok(Flow::Next)
-    }
-
-    fn stmt(&mut self, f: &Function, frame: &mut Frame<F>, stmt: &Stmt) -> Result<Flow, OutOfFuel> {
-        match stmt {
-            Stmt::Eval(id) => {
-                let value = self.eval(f, frame, *id)?;
-                frame.values[id.index()] = Some(value);
-            }
-            Stmt::Store(local, part, value) => {
-                let value = self.get(f, frame, *value);
-                store(&mut frame.locals[local.index()], *part, value);
-            }
-            Stmt::If(cond, then, otherwise) => {
-                let taken = if self.get(f, frame, *cond).as_bool() {
-                    then
-                } else {
-                    otherwise
-                };
-                return self.block(f, frame, taken);
-            }
-            Stmt::For {
-                local,
-                low,
-                high,
-                body,
-            } => {
-                let (low, high) = (
-                    self.get(f, frame, *low).as_int(),
-                    self.get(f, frame, *high).as_int(),
-                );
-                for i in low..high {
-                    self.burn()?;
-                    frame.locals[local.index()] = Value::Int(i);
-                    if let Flow::Break = self.block(f, frame, body)? {
-                        break;
-                    }
-                }
-            }
-            Stmt::While {
-                head,
-                test,
-                limit,
-                body,
-            } => {
-                for _ in 0..*limit {
-                    self.burn()?;
-                    self.block(f, frame, head)?;
-                    if !self.get(f, frame, *test).as_bool() {
-                        break;
-                    }
-                    if let Flow::Break = self.block(f, frame, body)? {
-                        break;
-                    }
-                }
-            }
-            Stmt::Break => return Ok(Flow::Break),
-            Stmt::Continue => return Ok(Flow::Continue),
-        }
-        Ok(Flow::Next)
-    }
-
-    fn burn(&mut self) -> Result<(), OutOfFuel> {
-        self.executed += 1;
-        if self.executed > self.fuel {
-            Err(OutOfFuel)
-        } else {
-            Ok(())
-        }
-    }
-
-    /// The value of an expression that is free or was evaluated.
-    fn get(&self, f: &Function, frame: &Frame<F>, id: ExprId) -> Value<F> {
-        match &f.expr(id).kind {
-            ExprKind::Const(c) => Value::constant(c),
-            ExprKind::Param(i) => frame.params[*i as usize].clone(),
-            ExprKind::Uniform(i) => self.uniforms[*i as usize].clone(),
-            _ => match &frame.values[id.index()] {
-                Some(value) => value.clone(),
-                None => Value::zero(f.ty(id), &self.module.structs),
-            },
-        }
-    }
-
-    fn eval(
-        &mut self,
-        f: &Function,
-        frame: &mut Frame<F>,
-        id: ExprId,
+        args: &[Value<F>],
     ) -> Result<Value<F>, OutOfFuel> {
-        self.burn()?;
-        let e = f.expr(id);
-        let args: Vec<Value<F>> = e
-            .kind
-            .operands()
-            .iter()
-            .map(|&a| self.get(f, frame, a))
-            .collect();
-        Ok(match &e.kind {
-            ExprKind::Op(op @ (Op::Image | Op::ImageData), _) => self.texture(*op, &args),
-            ExprKind::Op(op, _) => ops::evaluate(*op, &args),
-            ExprKind::Load(local) => frame.locals[local.index()].clone(),
-            ExprKind::Compose(_) => compose(e.ty, &args),
-            ExprKind::Swizzle(_, components) => {
-                let v = args[0].components();
-                let picked: Vec<F> = components.iter().map(|&c| v[usize::from(c)]).collect();
-                Value::Floats(Floats::new(&picked))
-            }
-            ExprKind::Call(callee, _) => self.call(*callee, args)?,
-            ExprKind::Make(..) => Value::Struct(args),
-            ExprKind::Field(_, i) => args[0]
-                .field(*i as usize)
-                .cloned()
-                .unwrap_or(Value::float(0.0)),
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => {
-                self.get(f, frame, id)
-            }
-        })
+        let structs = &self.module.structs;
+        let mut given = Numbers::new();
+        for (i, param) in f.params.iter().enumerate() {
+            given.push(args.get(i), param.ty, structs);
+        }
+        self.stack.reserve(given.len());
+        self.stack.put(Place::default(), &given);
+        self.execute(code)?;
+        let mut at = self.codes[code].result.0;
+        Ok(self.stack.read(f.result, structs, &mut at))
     }
 
-    fn texture(&self, op: Op, args: &[Value<F>]) -> Value<F> {
-        let Some(texture) = self.texture else {
-            return ops::evaluate(op, args);
-        };
-        let uv = args[1].to_f64();
-        let rgba = texture(args[0].as_int().max(0) as usize, uv[0], uv[1], op);
-        Value::vector(if op == Op::Image { &rgba[..3] } else { &rgba })
+    /// Runs code whose arguments begin the stack, and what it calls.
+    fn execute(&mut self, mut code: usize) -> Result<(), OutOfFuel> {
+        let mut waiting: Vec<Waiting> = Vec::new();
+        let (mut base, mut next) = (Place::default(), 0);
+        self.enter(code, base);
+        loop {
+            match self.step(code, base, next)? {
+                Stop::Call {
+                    callee,
+                    frame,
+                    to,
+                    next,
+                } => {
+                    waiting.push(Waiting {
+                        code,
+                        next,
+                        base,
+                        to: base.plus(to),
+                    });
+                    code = self.known_code(FunctionId(callee));
+                    base = base.plus(frame);
+                    self.enter(code, base);
+                }
+                Stop::Return => {
+                    let Some(caller) = waiting.pop() else {
+                        return Ok(());
+                    };
+                    let (result, size) = self.codes[code].result;
+                    self.stack.copy(base.plus(result), caller.to, size);
+                    Waiting {
+                        code,
+                        next,
+                        base,
+                        ..
+                    } = caller;
+                    continue;
+                }
+            }
+            next = 0;
+        }
+    }
+
+    /// Prepares the frame at `base`.
+    fn enter(&mut self, code: usize, base: Place) {
+        let code = &self.codes[code];
+        self.stack.reserve(base.plus(code.size));
+        self.stack.put(base.plus(code.image_at), &code.image);
+    }
+
+    /// Runs code from instruction `next` on, up to a call or its end.
+    fn step(&mut self, code: usize, base: Place, mut next: usize) -> Result<Stop, OutOfFuel> {
+        let Code {
+            instructions, runs, ..
+        } = &mut self.codes[code];
+        let floats = &mut self.stack.floats[base.floats as usize..];
+        let ints = &mut self.stack.ints[base.ints as usize..];
+        while let Some(ins) = instructions.get(next) {
+            next += 1;
+            match ins {
+                Ins::Op(kernel, at) => kernel(floats, ints, at),
+                Ins::Float { from, to } => floats[*to as usize] = floats[*from as usize],
+                Ins::Floats { from, to, count } => {
+                    floats.copy_within(range(*from, *count), *to as usize);
+                }
+                Ins::Ints { from, to, count } => {
+                    ints.copy_within(range(*from, *count), *to as usize);
+                }
+                Ins::Fill { from, to, count } => {
+                    let x = floats[*from as usize];
+                    floats[range(*to, *count)].fill(x);
+                }
+                Ins::Set { to, value } => ints[*to as usize] = *value,
+                Ins::Run(index) => {
+                    let run = &mut runs[*index as usize];
+                    run.times += 1;
+                    self.executed += u64::from(run.executed);
+                    if self.executed > self.fuel {
+                        return Err(OutOfFuel);
+                    }
+                }
+                Ins::Jump(to) => next = *to as usize,
+                Ins::Unless(cond, to) => {
+                    if ints[*cond as usize] == 0 {
+                        next = *to as usize;
+                    }
+                }
+                Ins::Below { counter, end, exit } => {
+                    if ints[*counter as usize] >= ints[*end as usize] {
+                        next = *exit as usize;
+                    }
+                }
+                Ins::Next { counter, top } => {
+                    ints[*counter as usize] += 1;
+                    next = *top as usize;
+                }
+                Ins::Texture(op, kernel, at) => match self.texture {
+                    Some(texture) => fetch(texture, *op, floats, ints, at),
+                    None => kernel(floats, ints, at),
+                },
+                Ins::Call { callee, frame, to } => {
+                    return Ok(Stop::Call {
+                        callee: *callee,
+                        frame: *frame,
+                        to: *to,
+                        next,
+                    });
+                }
+                Ins::Return => return Ok(Stop::Return),
+            }
+        }
+        Ok(Stop::Return)
     }
 }
 
-fn store<F: Real>(place: &mut Value<F>, part: Option<u8>, value: Value<F>) {
-    match (part, place) {
-        (Some(part), Value::Floats(v)) => v.as_mut_slice()[usize::from(part)] = value.as_float(),
-        (_, place) => *place = value,
-    }
+fn range(start: u32, count: u32) -> std::ops::Range<usize> {
+    start as usize..(start + count) as usize
 }
 
-fn compose<F: Real>(ty: super::Type, parts: &[Value<F>]) -> Value<F> {
-    let components: Vec<F> = parts
-        .iter()
-        .flat_map(|p| p.components().iter().copied())
-        .collect();
-    if ty == super::Type::Mat3 {
-        let column = |c: usize| {
-            [
-                components[3 * c],
-                components[3 * c + 1],
-                components[3 * c + 2],
-            ]
-        };
-        return Value::Mat3([column(0), column(1), column(2)]);
-    }
-    match components.as_slice() {
-        [x] => Value::Floats(Floats::new(&vec![*x; ty.width().unwrap_or(1)])),
-        all => Value::Floats(Floats::new(all)),
+/// Looks up a texture: its index is an int, its coordinates two floats.
+fn fetch<F: Real>(
+    texture: &TextureLookup<'_>,
+    op: Op,
+    floats: &mut [F],
+    ints: &[i32],
+    at: &Operands,
+) {
+    let [index, uv, _] = at.from.map(|i| i as usize);
+    let (u, v) = (floats[uv].f64(), floats[uv + 1].f64());
+    let rgba = texture(ints[index].max(0) as usize, u, v, op);
+    let components = if op == Op::Image { 3 } else { 4 };
+    for (c, x) in rgba.into_iter().take(components).enumerate() {
+        floats[at.to as usize + c] = F::of(x);
     }
 }

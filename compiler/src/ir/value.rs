@@ -74,20 +74,6 @@ impl<F: Real> Floats<F> {
     pub fn as_slice(&self) -> &[F] {
         &self.data[..usize::from(self.width)]
     }
-
-    /// The components, to be changed.
-    pub fn as_mut_slice(&mut self) -> &mut [F] {
-        &mut self.data[..usize::from(self.width)]
-    }
-
-    /// Component `i`; the only one where there is but one.
-    pub fn get(&self, i: usize) -> F {
-        if self.width == 1 {
-            self.data[0]
-        } else {
-            self.data[i]
-        }
-    }
 }
 
 /// A value of any IR type.
@@ -115,6 +101,21 @@ impl<F: Real> Value<F> {
     pub fn vector(components: &[f64]) -> Self {
         let rounded: Vec<F> = components.iter().map(|&x| F::of(x)).collect();
         Value::Floats(Floats::new(&rounded))
+    }
+
+    /// A vector, or a float for one component.
+    pub fn floats(components: &[F]) -> Self {
+        Value::Floats(Floats::new(components))
+    }
+
+    /// The type of a bool, int, float or vector.
+    pub fn plain_type(&self) -> Option<Type> {
+        match self {
+            Value::Bool(_) => Some(Type::Bool),
+            Value::Int(_) => Some(Type::Int),
+            Value::Floats(v) => Some(Type::of_width(v.as_slice().len())),
+            Value::Mat3(_) | Value::Struct(_) => None,
+        }
     }
 
     /// The value of a constant.
