@@ -29,6 +29,7 @@ pub mod diag;
 pub mod ir;
 pub mod lexer;
 pub mod ops;
+pub mod oracle;
 pub mod parameters;
 pub mod parser;
 pub mod partition;
