@@ -14,6 +14,7 @@ use crate::source::Span;
 
 pub mod build;
 pub mod interp;
+pub mod parse;
 pub mod print;
 pub mod value;
 pub mod verify;
@@ -240,11 +241,12 @@ pub type Block = Vec<Stmt>;
 pub enum Stmt {
     /// Evaluates an expression here.
     Eval(ExprId),
-    /// Assigns a variable, or one component of it.
+    /// Assigns a variable, or one component of it. Variables begin as zero.
     Store(LocalId, Option<u8>, ExprId),
     /// A branch.
     If(ExprId, Block, Block),
-    /// Sets the int `local` to `low`, `low + 1`, ... below `high`.
+    /// Sets the int `local` to `low`, `low + 1`, ... below `high`. Only the body reads it, and
+    /// nothing else assigns it.
     For {
         /// The loop variable.
         local: LocalId,
@@ -255,7 +257,8 @@ pub enum Stmt {
         /// What is repeated.
         body: Block,
     },
-    /// Repeats `body` while `test` (evaluated anew by `head`) holds, at most `limit` times.
+    /// Repeats `body` while `test` (evaluated anew by `head`) holds, at most `limit` times. What
+    /// `head` evaluates is there in `body` too; `head` does not leave the loop otherwise.
     While {
         /// Evaluates the test.
         head: Block,

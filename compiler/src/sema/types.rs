@@ -53,6 +53,14 @@ pub const NAMED: [(&str, Ty); 17] = [
     ("medium", Ty::Medium),
 ];
 
+/// The name in [`NAMED`] of the type `name`, if its values are stored as `ty`.
+pub fn surface_type(name: &str, ty: ir::Type) -> Option<&'static str> {
+    let mut named = NAMED.iter();
+    named
+        .find(|(n, t)| *n == name && t.ir() == Some(ty))
+        .map(|(n, _)| *n)
+}
+
 impl Ty {
     /// The machine type of values of this type; closures have none.
     pub fn ir(self) -> Option<ir::Type> {
