@@ -16,19 +16,19 @@ pub use hoist::{HOIST_FUEL, Hoisted, hoist};
 pub struct Pass {
     /// Its name in messages.
     pub name: &'static str,
-    /// What it does to a function; must not change what the function computes.
-    pub run: fn(&mut Function),
+    /// What it does to a function over a module; must not change what the function computes.
+    pub run: fn(&Module, &mut Function),
 }
 
 /// The passes in the order they run, over every function that reaches code generation.
 pub const PIPELINE: &[Pass] = &[
     Pass {
         name: "fold",
-        run: fold::fold,
+        run: |_, f| fold::fold(f),
     },
     Pass {
         name: "dead_code",
-        run: dead_code::remove,
+        run: |_, f| dead_code::remove(f),
     },
 ];
 
@@ -39,7 +39,7 @@ pub const PIPELINE: &[Pass] = &[
 pub fn run(module: &Module, function: &mut Function) {
     verify(module, function, "lowering");
     for pass in PIPELINE {
-        (pass.run)(function);
+        (pass.run)(module, function);
         verify(module, function, pass.name);
     }
 }

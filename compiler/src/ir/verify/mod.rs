@@ -94,6 +94,7 @@ impl<'a> Verifier<'a> {
             self.at = e.span;
             self.free(&e.kind, e.ty)?;
         }
+        self.at = f.span;
         self.block(&f.body)?;
         self.at = f.span;
         self.used(f.value)?;

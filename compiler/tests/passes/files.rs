@@ -1,0 +1,116 @@
+//! The files of cases: reading them, running their passes, comparing, rewriting.
+
+use std::path::{Path, PathBuf};
+
+use impasto_compiler::ir::parse::{Parsed, parse};
+use impasto_compiler::ir::{Module, print, verify};
+use impasto_compiler::passes::PIPELINE;
+use impasto_compiler::source::FileId;
+
+use crate::{RULE, meaning};
+
+/// A file of `cases/`.
+pub struct Case {
+    pub name: String,
+    path: PathBuf,
+    pub passes: Vec<String>,
+    /// Up to the rule.
+    input: String,
+    expected: String,
+}
+
+/// Every case, by name.
+pub fn cases() -> Vec<Case> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/passes/cases");
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "ir"))
+        .collect();
+    paths.sort();
+    paths.into_iter().map(read).collect()
+}
+
+fn read(path: PathBuf) -> Case {
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let head = text.lines().next().unwrap_or_default();
+    let Some(passes) = head.strip_prefix("// pass: ") else {
+        panic!("{name}: the first line is not `// pass: NAME`");
+    };
+    let passes = passes.split(',').map(|p| p.trim().to_owned()).collect();
+    let (input, expected) = text.split_once(RULE).unwrap_or((&text, ""));
+    Case {
+        passes,
+        input: input.to_owned(),
+        expected: expected.to_owned(),
+        name,
+        path,
+    }
+}
+
+/// Runs a case; an error says how what came out differs.
+pub fn check(case: &Case) -> Result<(), String> {
+    let before = parse(FileId(0), &case.input).map_err(|e| e.to_string())?;
+    let mut after = before.clone();
+    for pass in &case.passes {
+        apply(pass, &mut after)?;
+    }
+    meaning::same(&before.module, &after.module)?;
+    let text = print::module(&after.module, &after.materials);
+    parse(FileId(0), &text).map_err(|e| format!("what came out cannot be read: {e}\n{text}"))?;
+    if text == case.expected {
+        return Ok(());
+    }
+    if std::env::var_os("IMPASTO_BLESS").is_some() {
+        let whole = format!("{}{RULE}{text}", case.input);
+        return std::fs::write(&case.path, whole).map_err(|e| e.to_string());
+    }
+    let lines = difference(&case.expected, &text);
+    Err(format!("`-` is expected, `+` came out\n{lines}"))
+}
+
+/// Runs one pass over every function, as the compiler does: callees first.
+fn apply(pass: &str, parsed: &mut Parsed) -> Result<(), String> {
+    let Some(row) = PIPELINE.iter().find(|p| p.name == pass) else {
+        return Err(format!("there is no pass `{pass}`"));
+    };
+    let module: &mut Module = &mut parsed.module;
+    for i in 0..module.functions.len() {
+        let mut f = module.functions[i].clone();
+        (row.run)(module, &mut f);
+        let text = print::function(module, &f);
+        verify::function(module, &f).map_err(|e| format!("after {pass}: {e}\n{text}"))?;
+        module.functions[i] = f;
+    }
+    Ok(())
+}
+
+/// Lines of both texts; those that only one has are marked.
+fn difference(old: &str, new: &str) -> String {
+    let (old, new): (Vec<&str>, Vec<&str>) = (old.lines().collect(), new.lines().collect());
+    // common[i][j] is the length of the longest common subsequence of old[i..] and new[j..].
+    let mut common = vec![vec![0; new.len() + 1]; old.len() + 1];
+    for i in (0..old.len()).rev() {
+        for j in (0..new.len()).rev() {
+            common[i][j] = if old[i] == new[j] {
+                common[i + 1][j + 1] + 1
+            } else {
+                common[i + 1][j].max(common[i][j + 1])
+            };
+        }
+    }
+    let (mut i, mut j, mut out) = (0, 0, String::new());
+    while i < old.len() || j < new.len() {
+        let (mark, line) = match (old.get(i), new.get(j)) {
+            (Some(a), Some(b)) if a == b => (' ', a),
+            (Some(a), Some(_)) if common[i + 1][j] >= common[i][j + 1] => ('-', a),
+            (Some(a), None) => ('-', a),
+            (_, b) => ('+', b.unwrap()),
+        };
+        out.push_str(&format!("{mark} {line}\n"));
+        i += usize::from(mark != '+');
+        j += usize::from(mark != '-');
+    }
+    out
+}
