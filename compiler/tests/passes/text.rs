@@ -218,6 +218,18 @@ fn what_is_no_ir_is_refused_with_its_place() {
             24,
             "the default of `a`",
         ),
+        (
+            "material m() { opacity = 1.0 opacity = 1.0 }",
+            1,
+            30,
+            "`opacity` is there twice",
+        ),
+        (
+            "material m() { opacity = true }",
+            1,
+            26,
+            "operand of an output",
+        ),
         ("fn f() -> int { return é }", 1, 24, "unknown character"),
         ("texture \"a", 1, 9, "does not end"),
     ];

@@ -3,8 +3,8 @@
 use super::body::Body;
 use super::{MAX_NESTING, Parser, Result, Token, Wrong};
 use crate::ir::{
-    Closure, ClosureId, Const, Expr, ExprId, ExprKind, Function, Interior, Lobe, Material, MaterialParam,
-    Type,
+    Closure, ClosureId, Const, Expr, ExprId, ExprKind, Function, Interior, Lobe, Material,
+    MaterialParam, Type,
 };
 use crate::sema::types::surface_type;
 use crate::source::Span;
