@@ -126,13 +126,13 @@ codes! {
     ClosureUse = "E0311", Error, "a closure cannot be used here",
         "Closures (bsdf, edf, medium) are combined with layer, mix, `*` and `+`, named with `let` and assigned to outputs. They cannot be stored in `var`, structs or loops.";
     TooManyLobes = "E0312", Error, "too many lobes",
-        "A material may have at most 64 lobes after layering.";
+        "A material may have at most 64 lobes after layering, not counting those whose weight is the constant zero; 1024 counting them.";
     Unsupported = "E0313", Error, "not supported here",
         "The construct is part of the language's plan but cannot be used in this place yet.";
     NotFinite = "E0314", Error, "not a finite number",
         "Parameters and constants must be finite numbers.";
     TooLarge = "E0315", Error, "material too large",
-        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way.";
+        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way. Calls of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions a material; closures lie at most 256 levels within each other.";
     VaryingMedium = "E0316", Error, "a medium that varies",
         "What fills an object is the same everywhere in it: `interior` depends on parameters and constants only, not on the point of the surface or on textures.";
     // E09xx: generated code

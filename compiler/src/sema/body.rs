@@ -6,6 +6,7 @@ use crate::ir::build::Builder;
 use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
 use crate::source::Span;
 
+use super::closure::TreeSize;
 use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::types::Ty;
@@ -80,6 +81,8 @@ pub struct Body<'c, 'l> {
     pub builder: Builder,
     /// Names, innermost scope last.
     pub scopes: Vec<Vec<Entry>>,
+    /// So many outer scopes whose variables cannot be assigned here.
+    pub fixed_scopes: usize,
     /// Turns of the enclosing loops together.
     pub turns: u64,
     /// Enclosing loops.
@@ -90,6 +93,8 @@ pub struct Body<'c, 'l> {
     pub expansion: Expansion,
     /// Closures, where the place has any.
     pub closures: Vec<ir::Closure>,
+    /// How large the tree below each closure is.
+    pub tree_sizes: Vec<TreeSize>,
     /// Media, where the place has closures.
     pub media: Vec<ir::Interior>,
     /// The outputs of a material assigned so far: name, value, place.
@@ -105,11 +110,13 @@ impl<'c, 'l> Body<'c, 'l> {
             module,
             builder,
             scopes,
+            fixed_scopes: 0,
             turns: 1,
             loops: 0,
             place: Place::Values,
             expansion: Expansion::default(),
             closures: Vec::new(),
+            tree_sizes: Vec::new(),
             media: Vec::new(),
             outputs: Vec::new(),
         }

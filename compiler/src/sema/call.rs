@@ -53,6 +53,7 @@ impl Body<'_, '_> {
         match callee.node.as_str() {
             "layer" => self.layer(args, span),
             "medium" => self.medium(callee, args, span),
+            "gradient" => self.gradient(args, span),
             "mix" if args.iter().any(|a| self.is_closure(&a.value)) => {
                 self.mix_closures(args, span)
             }
@@ -312,7 +313,7 @@ impl Body<'_, '_> {
                 .map(|op| op.info().text.to_owned()),
         );
         names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
-        names.extend(["layer", "medium", "srgb"].map(String::from));
+        names.extend(["gradient", "layer", "medium", "srgb"].map(String::from));
         let unknown = Diagnostic::new(
             Code::UnknownName,
             callee.span,

@@ -21,6 +21,22 @@ const BSDF_METHODS: [(&str, &[Ty], Ty); 4] = [
 ];
 const EDF_METHODS: [(&str, &[Ty], Ty); 1] = [("emit", &[Ty::Vector], Ty::Color)];
 
+/// Most lobes of a tree before those that cannot contribute are left out.
+const MAX_WRITTEN_LOBES: u64 = 1024;
+/// Most closures within each other.
+const MAX_TREE_DEPTH: u32 = 256;
+
+/// How large the tree below a closure is.
+#[derive(Clone, Copy, Debug)]
+pub struct TreeSize {
+    lobes: u64,
+    depth: u32,
+}
+
+impl TreeSize {
+    const ONE: TreeSize = TreeSize { lobes: 1, depth: 1 };
+}
+
 impl Checker<'_> {
     /// Checks a bsdf or edf.
     pub(super) fn closure_def(
@@ -179,8 +195,50 @@ impl Checker<'_> {
 
 impl Body<'_, '_> {
     fn add_closure(&mut self, closure: Closure, ty: Ty) -> Operand {
+        self.tree_sizes.push(self.tree_size(&closure));
         self.closures.push(closure);
         Operand::Closure(ClosureId(self.closures.len() as u32 - 1), ty)
+    }
+
+    fn tree_size(&self, closure: &Closure) -> TreeSize {
+        let (a, b) = match closure {
+            Closure::Lobe(_) => return TreeSize::ONE,
+            Closure::Weight(_, a) => (*a, None),
+            Closure::Layer(a, b)
+            | Closure::Add(a, b)
+            | Closure::Mix(a, b, _)
+            | Closure::Select(_, a, b) => (*a, Some(*b)),
+        };
+        // Arguments of a definition that is checked on its own are no nodes.
+        let of = |id: ClosureId| self.tree_sizes.get(id.index()).copied();
+        let a = of(a).unwrap_or(TreeSize::ONE);
+        let b = b.map(|b| of(b).unwrap_or(TreeSize::ONE));
+        TreeSize {
+            lobes: a.lobes.saturating_add(b.map_or(0, |b| b.lobes)),
+            depth: a.depth.max(b.map_or(0, |b| b.depth)) + 1,
+        }
+    }
+
+    /// Reports a tree that is too large to be walked. A closure that a `let` names may stand in it
+    /// any number of times, so that few lines make a huge one.
+    pub fn check_tree(&mut self, root: ClosureId, span: Span) -> Option<()> {
+        let size = self.tree_sizes.get(root.index())?;
+        let (lobes, depth) = (size.lobes, size.depth);
+        if lobes > MAX_WRITTEN_LOBES {
+            let message = format!("this is made of {lobes} lobes");
+            let many = Diagnostic::new(Code::TooManyLobes, span, message).expected(format!(
+                "at most {} after those of weight zero are left out",
+                crate::closure::MAX_LOBES
+            ));
+            return self.report(many);
+        }
+        if depth > MAX_TREE_DEPTH {
+            let message = format!("closures lie {depth} levels within each other");
+            let deep = Diagnostic::new(Code::TooLarge, span, message)
+                .expected(format!("at most {MAX_TREE_DEPTH} levels"));
+            return self.report(deep);
+        }
+        Some(())
     }
 
     /// A call of a bsdf or edf.
@@ -432,7 +490,8 @@ impl Body<'_, '_> {
         Some(self.add_closure(Closure::Weight(w, c), ty))
     }
 
-    /// An `if` between closures. Both sides' patterns are computed: they are pure.
+    /// An `if` between closures. Both sides' patterns are computed, so neither may assign what
+    /// is seen outside.
     pub fn if_closure(
         &mut self,
         cond: ExprId,
@@ -440,8 +499,10 @@ impl Body<'_, '_> {
         otherwise: &ast::Block,
         span: Span,
     ) -> Option<Operand> {
+        let outside = std::mem::replace(&mut self.fixed_scopes, self.scopes.len());
         let a = self.scoped(|cx| cx.block_value(then, span));
         let b = self.scoped(|cx| cx.block_value(otherwise, span));
+        self.fixed_scopes = outside;
         match (a?.0, b?) {
             (Operand::Closure(x, xt), (Operand::Closure(y, yt), at)) => {
                 self.same_kind(xt, yt, at)?;

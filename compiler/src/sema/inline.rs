@@ -23,7 +23,7 @@ const MAX_DEPTH: usize = 32;
 /// Most expressions and statements that such calls may put into one material or function.
 const MAX_STEPS: u64 = 50_000;
 /// Most of them in all of a compilation.
-const MAX_STEPS_IN_ALL: u64 = 5_000_000;
+const MAX_STEPS_IN_ALL: u64 = 3_000_000;
 
 /// How much of the bodies of called functions was checked.
 #[derive(Default)]
@@ -38,6 +38,7 @@ pub struct Expansion {
 struct Caller {
     module: ModuleId,
     scopes: Vec<Vec<Entry>>,
+    fixed_scopes: usize,
     place: Place,
     loops: usize,
 }
@@ -164,6 +165,7 @@ impl Body<'_, '_> {
         Caller {
             module: std::mem::replace(&mut self.module, module),
             scopes: std::mem::replace(&mut self.scopes, vec![Vec::new()]),
+            fixed_scopes: std::mem::take(&mut self.fixed_scopes),
             place: std::mem::replace(&mut self.place, Place::Closures),
             loops: std::mem::take(&mut self.loops),
         }
@@ -173,6 +175,7 @@ impl Body<'_, '_> {
         self.expansion.depth -= 1;
         self.module = caller.module;
         self.scopes = caller.scopes;
+        self.fixed_scopes = caller.fixed_scopes;
         self.place = caller.place;
         self.loops = caller.loops;
     }
@@ -196,14 +199,17 @@ impl Body<'_, '_> {
         if self.expansion.depth == 0 {
             return Some(());
         }
-        self.expansion.steps += 1;
-        self.cx.expanded += 1;
-        if self.expansion.steps <= MAX_STEPS && self.cx.expanded <= MAX_STEPS_IN_ALL {
+        // Names are looked for one by one, so that work grows with what is in scope.
+        let names: usize = self.scopes.iter().map(Vec::len).sum();
+        let work = 1 + names as u64 / 32;
+        let within = |steps: u64, all: u64| steps <= MAX_STEPS && all <= MAX_STEPS_IN_ALL;
+        let before = within(self.expansion.steps, self.cx.expanded);
+        self.expansion.steps += work;
+        self.cx.expanded += work;
+        if within(self.expansion.steps, self.cx.expanded) {
             return Some(());
         }
-        let first = self.expansion.steps == MAX_STEPS + 1
-            || (self.expansion.steps <= MAX_STEPS && self.cx.expanded == MAX_STEPS_IN_ALL + 1);
-        if first {
+        if before {
             let message = "calls of functions that return closures expand to too much";
             let large = Diagnostic::new(Code::TooLarge, span, message)
                 .expected(format!(

@@ -18,6 +18,7 @@ mod call;
 mod closure;
 mod constant;
 mod expr;
+mod gradient;
 mod inline;
 mod material;
 mod medium;

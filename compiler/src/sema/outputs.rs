@@ -71,6 +71,9 @@ impl Body<'_, '_> {
                 .label(*first, "first assigned here");
             return self.report(twice);
         }
+        if let Operand::Closure(root, _) = operand {
+            self.check_tree(root, value.span)?;
+        }
         if let Operand::Value(id, ty) = operand {
             operand = Operand::Value(self.builder.op(Op::Saturate, &[id], value.span), ty);
         }

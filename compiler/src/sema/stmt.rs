@@ -158,7 +158,18 @@ impl Body<'_, '_> {
     }
 
     fn variable(&mut self, name: &str, span: Span) -> Option<(LocalId, Ty)> {
+        let declared = self
+            .scopes
+            .iter()
+            .rposition(|s| s.iter().any(|e| e.name == name));
         match self.local(name) {
+            Some(Binding::Variable(..)) if declared.is_some_and(|s| s < self.fixed_scopes) => {
+                let message = format!("`{name}` is assigned where a closure is chosen");
+                let wrong = Diagnostic::new(Code::NotAssignable, span, message)
+                    .expected("variables of the branch itself")
+                    .hint("both branches are computed; assign it by an `if` of its own before");
+                self.report(wrong)
+            }
             Some(Binding::Variable(local, ty)) => Some((local, ty)),
             Some(Binding::Broken) => None,
             Some(_) => {

@@ -30,6 +30,10 @@ impl Causes {
     pub fn of(&self, id: ExprId) -> Option<&Cause> {
         self.exprs.get(&id)
     }
+
+    fn count(&self) -> usize {
+        self.exprs.len() + self.locals.len()
+    }
 }
 
 /// Finds what varies in a body whose first parameter is the surface point.
@@ -39,16 +43,16 @@ pub fn causes(module: &Module, f: &Function) -> Causes {
         locals: BTreeMap::new(),
     };
     // A loop carries what it assigns to its start, so more than one round may be needed; each
-    // but the last finds another variable.
+    // but the last finds something.
     loop {
-        let before = found.locals.len();
+        let before = found.count();
         Walk {
             module,
             f,
             found: &mut found,
         }
         .block(&f.body, None);
-        if found.locals.len() == before {
+        if found.count() == before {
             return found;
         }
     }

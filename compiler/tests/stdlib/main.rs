@@ -2,6 +2,7 @@
 //! distribution that conserves energy, every noise stays in range. Everything is walked from
 //! the library's folders, so a new file is tested without being named here.
 
+mod bumps;
 mod cells;
 mod delta;
 mod fresnel;
