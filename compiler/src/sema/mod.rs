@@ -149,7 +149,9 @@ impl<'a> Checker<'a> {
     /// The bsdf or edf that the file `name` of a folder of the library defines.
     pub fn library_closure(&mut self, folder: &str, name: &str) -> Option<ClosureDefId> {
         let files = impasto_stdlib::files().iter();
-        let file = files.copied().find(|f| f.folder == folder && f.name == name)?;
+        let file = files
+            .copied()
+            .find(|f| f.folder == folder && f.name == name)?;
         let module = self.std_module(&file)?;
         let ast = self.ast(module);
         let index = ast.items.iter().position(|item| item.name.node == name)?;
