@@ -72,8 +72,10 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
             file: binding.file,
             material: binding.material,
             params: binding.params,
-            // Kernels do not know instances yet.
-            parameters: compiler::Parameters::Baked,
+            parameters: match binding.bake {
+                true => compiler::Parameters::Baked,
+                false => compiler::Parameters::Agreed,
+            },
         })
         .collect()
 }

@@ -4,7 +4,7 @@
 //! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
 //! nothing else.
 
-use impasto_compiler::abi::InputSet;
+use impasto_compiler::abi::{InputSet, MATERIAL_OF, MaterialInfo};
 
 use crate::modules::{Composer, Kernel, Recipe};
 use crate::shader_part::{BufferData, ShaderPart};
@@ -59,7 +59,8 @@ impl Composer<'_> {
         let mut parts: Vec<Part> = stages
             .iter()
             .flat_map(|s| s.stage().parts)
-            .copied()
+            .filter(|(_, need)| self.layout.needs.met(*need))
+            .map(|(part, _)| *part)
             .collect();
         parts.sort_unstable();
         parts.dedup();
@@ -73,6 +74,9 @@ impl Composer<'_> {
             text += &preprocess(id.stage().body, &self.flags(*id, members));
         }
         text += &recipe.shell;
+        if mentions(&without_comments(&text), MATERIAL_OF) {
+            text += &self.source.lookup_wgsl();
+        }
         let (declarations, bindings) = self.declarations(&text);
         Kernel {
             recipe,
@@ -82,14 +86,22 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 3] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 7] {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
         };
+        let has = |holds: fn(&MaterialInfo) -> bool| self.infos(members).into_iter().any(holds);
         [
             ("shadow_rays", needs.shadow_rays),
-            ("medium", needs.medium),
+            ("media", needs.media),
+            ("changes_medium", needs.media && has(|m| m.transmissive)),
+            (
+                "exterior_ior",
+                needs.media && has(|m| m.inputs.exterior_ior),
+            ),
+            ("absorption", needs.absorption),
+            ("overlap", needs.overlap),
             ("varying_emission", needs.varying_emission),
         ]
     }
@@ -113,6 +125,10 @@ impl Composer<'_> {
         ] {
             out += &format!("const {name}: u32 = {value}u;\n");
         }
+        if self.layout.needs.media {
+            let [a, b, c, d] = world.parts.media.camera;
+            out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
+        }
         out + &self.layout.counters.constants() + &state::constants()
     }
 
@@ -127,6 +143,10 @@ impl Composer<'_> {
             Part::Geometry => parts.geometry.wgsl.clone(),
             Part::Surface => parts.surface.wgsl.clone(),
             Part::Lights => parts.lights.wgsl.clone(),
+            Part::Media => {
+                let part = parts.media.part.as_ref();
+                part.map_or_else(String::new, |part| part.wgsl.clone())
+            }
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
         }
@@ -143,7 +163,7 @@ impl Composer<'_> {
         out
     }
 
-    /// What the logic stage must know of every material, as functions of its index.
+    /// What the logic stage must know of every material, as functions of an instance.
     fn fates(&self) -> String {
         let infos = self.materials;
         let smooth = |i: usize| !infos[i].delta_only;
@@ -182,17 +202,19 @@ impl Composer<'_> {
         (out, bindings)
     }
 
-    /// The buffers of all parts of the scene.
+    /// The buffers of all parts of the scene, and the tables of its materials.
     pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
         let parts = &self.world.parts;
-        let parts: [Option<&ShaderPart>; 5] = [
+        let parts: [Option<&ShaderPart>; 6] = [
             Some(&parts.geometry),
             Some(&parts.bvh),
             Some(&parts.surface),
             Some(&parts.lights),
+            parts.media.part.as_ref(),
             parts.texture.as_ref(),
         ];
-        parts.into_iter().flatten().flat_map(|part| &part.buffers)
+        let parts = parts.into_iter().flatten();
+        parts.flat_map(|part| &part.buffers).chain(self.tables)
     }
 }
 
@@ -210,9 +232,9 @@ fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
     let geometric = "hit_geometric_normal(hit.primitive)";
     let pick = |used, value, other| if used { value } else { other };
     format!(
-        "fn surface_point(hit: PathHit) -> SurfacePoint {{\n    \
+        "fn surface_point(hit: PathHit, exterior_ior: f32) -> SurfacePoint {{\n    \
          let barycentrics = vec2<f32>(hit.u, hit.v);\n    \
-         return SurfacePoint({}, {}, {geometric}, {}, {}, 1.0);\n}}\n",
+         return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior);\n}}\n",
         pick(
             all.position,
             "hit_position(hit.primitive, barycentrics)",

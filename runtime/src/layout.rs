@@ -6,7 +6,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::error::RuntimeError;
 use crate::queues::{Counters, Queues};
-use crate::state::{self, MAX_MATERIALS, Needs};
+use crate::state::{self, Needs};
 use crate::world::World;
 
 /// The layout of one plan.
@@ -60,11 +60,14 @@ impl Layout {
 
 /// What a scene and its materials need.
 fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
+    let media = &world.parts.media;
     Needs {
         shadow_rays: world.parts.has_sampled_lights
             && world.max_depth > 1
             && materials.iter().any(|m| !m.delta_only),
-        medium: materials.iter().any(|m| m.transmissive),
+        media: media.part.is_some(),
+        absorption: media.absorb,
+        overlap: media.overlap,
         varying_emission: materials.iter().any(|m| m.varying_emission),
     }
 }
@@ -77,11 +80,6 @@ fn check_plan(plan: &Plan, count: usize) -> Result<(), RuntimeError> {
             reason,
         })
     };
-    if count > MAX_MATERIALS {
-        return refuse(format!(
-            "{count} materials, at most {MAX_MATERIALS} are possible"
-        ));
-    }
     let mut planned: Vec<usize> = plan
         .kernels
         .iter()

@@ -14,6 +14,7 @@ pub mod gpu;
 mod image_file;
 mod layout;
 pub mod lights;
+pub mod media;
 mod modules;
 pub mod output;
 mod parallel;

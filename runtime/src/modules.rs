@@ -1,12 +1,13 @@
 //! Which kernels a plan needs: their stages, what feeds them, and the shells around stages.
 //! Their text is put together in `compose`.
 
-use impasto_compiler::abi::MaterialInfo;
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::compose::Binding;
 use crate::layout::Layout;
 use crate::queues::Queues;
+use crate::shader_part::BufferData;
 use crate::stages::{STAGES, StageId};
 use crate::state::{Need, Needs};
 use crate::text::{case_labels, preprocess};
@@ -72,6 +73,8 @@ pub(crate) struct Composer<'a> {
     pub world: &'a World,
     pub source: &'a dyn MaterialSource,
     pub materials: &'a [MaterialInfo],
+    pub instances: &'a [InstanceInfo],
+    pub tables: &'a [BufferData],
     pub plan: &'a Plan,
     pub layout: Layout,
     pub sizes: Sizes,
@@ -117,13 +120,26 @@ impl Composer<'_> {
             .collect()
     }
 
+    /// The instances of some materials.
+    fn instances_of(&self, members: &[usize]) -> Vec<usize> {
+        let instances = self.instances.iter().enumerate();
+        let members = instances.filter(|(_, i)| members.contains(&i.material));
+        members.map(|(index, _)| index).collect()
+    }
+
     /// The needs of a kernel that evaluates `members` only.
     pub(crate) fn needs_of(&self, members: &[usize]) -> Needs {
         let infos = self.infos(members);
+        let all = self.layout.needs;
+        let has = |holds: fn(&&&MaterialInfo) -> bool| infos.iter().find(holds).is_some();
+        let shadow_rays = all.shadow_rays && has(|m| !m.delta_only);
+        let absorption = all.absorption && shadow_rays;
         Needs {
-            shadow_rays: self.layout.needs.shadow_rays && infos.iter().any(|m| !m.delta_only),
-            medium: infos.iter().any(|m| m.transmissive),
-            varying_emission: infos.iter().any(|m| m.varying_emission),
+            shadow_rays,
+            media: all.media && (absorption || has(|m| m.transmissive || m.inputs.exterior_ior)),
+            absorption,
+            overlap: false,
+            varying_emission: has(|m| m.varying_emission),
         }
     }
 
@@ -139,8 +155,8 @@ impl Composer<'_> {
         let mut run = "logic(slot);".to_string();
         if !members.is_empty() {
             stages.push(StageId::Material);
-            run += " if wanted_material != NOTHING && wanted_work == NOTHING { \
-                     material(slot, wanted_material); }";
+            run += " if wanted_instance != NOTHING && wanted_work == NOTHING { \
+                     material(slot, wanted_instance); }";
         }
         let shell = self.shell(&Shell {
             run,
@@ -164,13 +180,13 @@ impl Composer<'_> {
         let kernels = self.plan.kernels.iter().enumerate();
         let queued = kernels.filter(|(_, k)| k.form != Form::Inline);
         queued.enumerate().map(|(position, (counter, planned))| {
-            let material = match planned.materials[..] {
+            let instance = match self.instances_of(&planned.materials)[..] {
                 [only] => format!("{only}u"),
-                _ => "primitive_material(load_hit(slot).primitive)".to_string(),
+                _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
             };
             let queue = self.layout.queues.material(position);
             let shell = self.shell(&Shell {
-                run: format!("material(slot, {material});"),
+                run: format!("material(slot, {instance});"),
                 consumes: Some(queue),
                 sorts: false,
                 casts: true,
@@ -262,9 +278,17 @@ impl Composer<'_> {
         out + &preprocess(include_str!("kernels/shell.wgsl"), &flags)
     }
 
-    /// The queue of a material; `NOTHING` if it is evaluated where it was found.
+    /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.
     fn material_queue(&self) -> String {
         let queued = self.plan.kernels.iter().filter(|k| k.form != Form::Inline);
+        let queues = queued.clone().count();
+        if queues == 0 || queues == 1 && self.plan.kernels.len() == 1 {
+            let queue = match queues {
+                0 => "NOTHING".to_string(),
+                _ => format!("{}u", self.layout.queues.material(0)),
+            };
+            return format!("fn material_queue(instance: u32) -> u32 {{ return {queue}; }}\n");
+        }
         let mut cases: Vec<String> = queued
             .enumerate()
             .map(|(i, kernel)| {
@@ -277,7 +301,7 @@ impl Composer<'_> {
             .collect();
         cases.push("default: { return NOTHING; }".to_string());
         format!(
-            "fn material_queue(material: u32) -> u32 {{ switch material {{ {} }} }}\n",
+            "fn material_queue(instance: u32) -> u32 {{ switch material_of(instance) {{ {} }} }}\n",
             cases.join(" ")
         )
     }

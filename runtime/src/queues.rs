@@ -63,9 +63,13 @@ pub(crate) enum Scalar {
     WorkSample,
     /// Slots that found no work left.
     Retired,
+    /// Media that paths entered while in as many as a stack holds.
+    MediaOverflow,
+    /// Paths that crossed too many boundaries in a row that were none.
+    LostPaths,
 }
 
-const SCALARS: [(Scalar, &str); 8] = [
+const SCALARS: [(Scalar, &str); 10] = [
     (Scalar::Overflow, "OVERFLOW"),
     (Scalar::FilmNonfinite, "FILM_NONFINITE"),
     (Scalar::FilmClamped, "FILM_CLAMPED"),
@@ -74,6 +78,8 @@ const SCALARS: [(Scalar, &str); 8] = [
     (Scalar::WorkPixel, "WORK_PIXEL"),
     (Scalar::WorkSample, "WORK_SAMPLE"),
     (Scalar::Retired, "RETIRED"),
+    (Scalar::MediaOverflow, "MEDIA_OVERFLOW"),
+    (Scalar::LostPaths, "LOST_PATHS"),
 ];
 
 /// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
@@ -158,8 +164,8 @@ mod tests {
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
         assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
-        assert_eq!(counters.nonfinite(0), 8 + 4 * 6);
-        assert_eq!(counters.len(), 8 + 4 * 6 + 4);
+        assert_eq!(counters.nonfinite(0), 10 + 4 * 6);
+        assert_eq!(counters.len(), 10 + 4 * 6 + 4);
         words[counters.items() + 2] = 5;
         words[counters.items() + 3] = 1;
         assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);

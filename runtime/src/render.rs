@@ -19,10 +19,11 @@ use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
 use crate::pool::{self, Pace};
 use crate::queues::{Queues, Scalar};
-use crate::report::Report;
+use crate::report::{MaterialReport, Report};
 use crate::resources::Resources;
 use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
+use crate::shader_part::BufferData;
 use crate::state;
 use crate::status::{Flight, Status};
 use crate::world::{MaterialSource, World};
@@ -93,7 +94,7 @@ struct Facts {
     triangles: u64,
     max_depth: u32,
     pool: u32,
-    material_names: Vec<String>,
+    materials: Vec<MaterialReport>,
     compile_seconds: f64,
 }
 
@@ -127,13 +128,16 @@ impl<'g> Renderer<'g> {
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
         check_settings(world, options)?;
-        let materials = source.infos();
+        let (materials, instances) = (source.infos(), source.instances());
+        let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
         let layout = Layout::new(world, &materials, plan)?;
         let sizes = pool::sizes(gpu, world, &layout, options)?;
         let composer = Composer {
             world,
             source,
             materials: &materials,
+            instances: &instances,
+            tables: &tables,
             plan,
             layout,
             sizes,
@@ -154,7 +158,7 @@ impl<'g> Renderer<'g> {
             triangles: world.triangles,
             max_depth: world.max_depth,
             pool: sizes.pool,
-            material_names: materials.iter().map(|m| m.name.clone()).collect(),
+            materials: MaterialReport::of(&materials, &instances),
             compile_seconds: begin.elapsed().as_secs_f64(),
         };
         Ok(Self {
@@ -295,7 +299,7 @@ impl<'g> Renderer<'g> {
             strategy: &self.facts.strategy,
             triangles: self.facts.triangles,
             pool: self.facts.pool,
-            material_names: &self.facts.material_names,
+            materials: &self.facts.materials,
             compile_seconds: self.facts.compile_seconds,
             wall_seconds,
         }

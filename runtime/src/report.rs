@@ -1,6 +1,7 @@
 //! The report of a render: what ran, on what, how long, and what was dropped. Scripts read it
 //! as JSON; the names of fields are a promise.
 
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use serde::Serialize;
 
 use crate::film::Film;
@@ -30,6 +31,12 @@ pub struct Report {
     pub seed: u32,
     /// Triangles of the scene.
     pub triangles: u64,
+    /// Materials: each is a shader, compiled once.
+    pub material_count: usize,
+    /// Instances of materials: what the scene binds to geometry, each with its own parameters.
+    pub instance_count: usize,
+    /// The materials, in the order of the program.
+    pub materials: Vec<MaterialReport>,
     /// Paths finished. Fewer than pixels times samples if the render was stopped.
     pub paths: u64,
     /// Time the GPU was busy, without building pipelines.
@@ -58,6 +65,38 @@ pub struct Report {
     pub clamped_samples: u64,
     /// Requests lost because a queue was full; anything but 0 is a defect.
     pub queue_overflow: u64,
+    /// Media that paths entered while in as many as they can follow, and then ignored.
+    pub media_overflow: u64,
+    /// Paths given up because they crossed too many hidden boundaries in a row.
+    pub lost_paths: u64,
+}
+
+/// A material of a report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct MaterialReport {
+    /// Its name.
+    pub name: String,
+    /// Its lobes, after layering.
+    pub lobes: usize,
+    /// The names of its instances.
+    pub instances: Vec<String>,
+}
+
+impl MaterialReport {
+    pub(crate) fn of(materials: &[MaterialInfo], instances: &[InstanceInfo]) -> Vec<Self> {
+        let report = |material: &MaterialInfo| Self {
+            name: material.name.clone(),
+            lobes: material.lobes,
+            instances: Vec::new(),
+        };
+        let mut reports: Vec<Self> = materials.iter().map(report).collect();
+        for instance in instances {
+            if let Some(report) = reports.get_mut(instance.material) {
+                report.instances.push(instance.name.clone());
+            }
+        }
+        reports
+    }
 }
 
 /// The GPU of a report.
@@ -99,7 +138,7 @@ pub(crate) struct Inputs<'a> {
     pub strategy: &'a str,
     pub triangles: u64,
     pub pool: u32,
-    pub material_names: &'a [String],
+    pub materials: &'a [MaterialReport],
     pub compile_seconds: f64,
     pub wall_seconds: f64,
 }
@@ -127,6 +166,9 @@ impl Inputs<'_> {
             first_sample: self.options.first_sample,
             seed: self.options.seed,
             triangles: self.triangles,
+            material_count: self.materials.len(),
+            instance_count: self.materials.iter().map(|m| m.instances.len()).sum(),
+            materials: self.materials.to_vec(),
             paths,
             gpu_seconds,
             timing: if self.timed { "timestamps" } else { "wall" },
@@ -140,6 +182,8 @@ impl Inputs<'_> {
             nonfinite_samples: dropped + scalar(Scalar::FilmNonfinite),
             clamped_samples: scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
+            media_overflow: scalar(Scalar::MediaOverflow),
+            lost_paths: scalar(Scalar::LostPaths),
             adapter: AdapterReport {
                 name: self.gpu.name,
                 backend: self.gpu.backend,
@@ -150,7 +194,7 @@ impl Inputs<'_> {
 
     fn kernel(&self, kernel: &Kernel, seconds: f64, status: &Status, paths: u64) -> KernelReport {
         let (recipe, counters) = (&kernel.recipe, self.layout.counters);
-        let name = |index: &usize| self.material_names.get(*index).cloned();
+        let name = |index: &usize| self.materials.get(*index).map(|m| m.name.clone());
         let nonfinite = counters.nonfinite(recipe.counter);
         KernelReport {
             name: recipe.name.clone(),

@@ -5,6 +5,8 @@
 //! the buffers of the parts that the kernel includes. What a scene lacks is absent from both
 //! text and buffers, so a kernel pays for what it uses.
 
+use impasto_compiler::abi::Table;
+
 /// Contents of one read-only storage buffer.
 ///
 /// Integers and floats that share a buffer are stored as `u32` and bit-cast in WGSL, since the
@@ -31,6 +33,12 @@ impl BufferData {
             wgsl_type,
             bytes: bytemuck::cast_slice(values).to_vec(),
         }
+    }
+}
+
+impl From<&Table> for BufferData {
+    fn from(table: &Table) -> Self {
+        Self::new(table.name, table.wgsl_type, &table.words)
     }
 }
 

@@ -6,7 +6,7 @@
 //! from the table (which text a kernel is composed of, which queues there are) is derived in
 //! `modules` and `queues`. A new stage is one file in `kernels/` and one row here.
 
-use crate::state::Need;
+use crate::state::Need::{self, Absorption, Always, Media, Overlap, ShadowRays};
 
 /// The stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,6 +40,8 @@ pub(crate) enum Part {
     Surface,
     /// Sampling and evaluation of lights.
     Lights,
+    /// The media that paths are in.
+    Media,
     /// Ray casts.
     Traversal,
     /// Generated material code with what it reads.
@@ -55,8 +57,8 @@ pub(crate) struct Stage {
     pub name: &'static str,
     /// The WGSL function.
     pub body: &'static str,
-    /// The texts it needs.
-    pub parts: &'static [Part],
+    /// The texts it needs, each with what must exist for it.
+    pub parts: &'static [(Part, Need)],
     /// When it exists.
     pub need: Need,
 }
@@ -69,48 +71,55 @@ pub(crate) const STAGES: [Stage; 5] = [
         name: "logic",
         body: include_str!("kernels/logic.wgsl"),
         parts: &[
-            Part::Random,
-            Part::Numbers,
-            Part::Film,
-            Part::Geometry,
-            Part::Surface,
-            Part::Lights,
+            (Part::Random, Always),
+            (Part::Numbers, Always),
+            (Part::Film, Always),
+            (Part::Geometry, Always),
+            (Part::Surface, Always),
+            (Part::Lights, Always),
+            (Part::Media, Absorption),
         ],
-        need: Need::Always,
+        need: Always,
     },
     Stage {
         id: StageId::NewPath,
         name: "new_path",
         body: include_str!("kernels/new_path.wgsl"),
-        parts: &[Part::Random, Part::Camera],
-        need: Need::Always,
+        parts: &[(Part::Random, Always), (Part::Camera, Always)],
+        need: Always,
     },
     Stage {
         id: StageId::Material,
         name: "material",
         body: include_str!("kernels/material.wgsl"),
         parts: &[
-            Part::Random,
-            Part::Numbers,
-            Part::Geometry,
-            Part::Surface,
-            Part::Materials,
+            (Part::Random, Always),
+            (Part::Numbers, Always),
+            (Part::Geometry, Always),
+            (Part::Surface, Always),
+            (Part::Media, Media),
+            (Part::Materials, Always),
         ],
-        need: Need::Always,
+        need: Always,
     },
     Stage {
         id: StageId::Shadow,
         name: "shadow",
         body: include_str!("kernels/shadow.wgsl"),
-        parts: &[Part::Geometry, Part::Traversal],
-        need: Need::ShadowRays,
+        parts: &[(Part::Geometry, Always), (Part::Traversal, Always)],
+        need: ShadowRays,
     },
     Stage {
         id: StageId::Extension,
         name: "extension",
         body: include_str!("kernels/extension.wgsl"),
-        parts: &[Part::Geometry, Part::Traversal],
-        need: Need::Always,
+        parts: &[
+            (Part::Geometry, Always),
+            (Part::Traversal, Always),
+            (Part::Surface, Overlap),
+            (Part::Media, Overlap),
+        ],
+        need: Always,
     },
 ];
 

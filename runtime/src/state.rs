@@ -19,6 +19,12 @@ pub(crate) enum Need {
     Always,
     /// A light that can be sampled, and a material that light can be sampled for.
     ShadowRays,
+    /// A medium that some result depends on.
+    Media,
+    /// A medium that absorbs light.
+    Absorption,
+    /// Media of different priority, of which one may hide the boundaries of another.
+    Overlap,
 }
 
 /// What a scene has, from which it follows what must exist.
@@ -26,8 +32,12 @@ pub(crate) enum Need {
 pub(crate) struct Needs {
     /// Light is sampled somewhere.
     pub shadow_rays: bool,
-    /// A material transmits, so that paths carry the medium they are in.
-    pub medium: bool,
+    /// Paths carry the media they are in.
+    pub media: bool,
+    /// A medium absorbs light.
+    pub absorption: bool,
+    /// Media differ in priority.
+    pub overlap: bool,
     /// A material emits light that depends on the point or direction.
     pub varying_emission: bool,
 }
@@ -38,6 +48,9 @@ impl Needs {
         match need {
             Need::Always => true,
             Need::ShadowRays => self.shadow_rays,
+            Need::Media => self.media,
+            Need::Absorption => self.absorption,
+            Need::Overlap => self.overlap,
         }
     }
 }
@@ -48,6 +61,7 @@ pub(crate) enum Type {
     U32,
     F32,
     Vec3,
+    Words,
 }
 
 impl Type {
@@ -56,20 +70,25 @@ impl Type {
             Type::U32 => "u32",
             Type::F32 => "f32",
             Type::Vec3 => "vec3<f32>",
+            Type::Words => "vec4<u32>",
         }
     }
 
     /// How many of a field's four words it takes.
     fn words(self) -> usize {
-        if self == Type::Vec3 { 3 } else { 1 }
+        match self {
+            Type::U32 | Type::F32 => 1,
+            Type::Vec3 => 3,
+            Type::Words => 4,
+        }
     }
 
     /// The same number of words as unsigned integers.
     fn words_type(self) -> &'static str {
-        if self == Type::Vec3 {
-            "vec3<u32>"
-        } else {
-            "u32"
+        match self {
+            Type::U32 | Type::F32 => "u32",
+            Type::Vec3 => "vec3<u32>",
+            Type::Words => "vec4<u32>",
         }
     }
 }
@@ -89,11 +108,11 @@ pub(crate) struct Field {
     pub writers: &'static [StageId],
 }
 
-use Need::{Always, ShadowRays};
-use Type::{F32, U32, Vec3};
+use Need::{Always, Media, ShadowRays};
+use Type::{F32, U32, Vec3, Words};
 
 /// Every field there is, in the order of memory.
-pub(crate) const FIELDS: [Field; 9] = [
+pub(crate) const FIELDS: [Field; 10] = [
     // The extension ray: from the camera or the last vertex.
     Field {
         name: "ray_origin",
@@ -124,8 +143,8 @@ pub(crate) const FIELDS: [Field; 9] = [
         name: "throughput",
         components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
         need: Always,
-        readers: &[Logic, Material],
-        writers: &[NewPath, Logic, Material],
+        readers: &[Logic, Material, Extension],
+        writers: &[NewPath, Logic, Material, Extension],
     },
     // Radiance gathered so far; the flags are declared in `constants`.
     Field {
@@ -134,6 +153,14 @@ pub(crate) const FIELDS: [Field; 9] = [
         need: Always,
         readers: &[Logic, Material],
         writers: &[NewPath, Logic, Material],
+    },
+    // The media it is in; see `kernels/media.wgsl`.
+    Field {
+        name: "media",
+        components: &[("stack", Words)],
+        need: Media,
+        readers: &[Logic, Material, Extension],
+        writers: &[NewPath, Material, Extension],
     },
     // The sample of a light: where it is, and the ray that asks whether it is seen.
     Field {
@@ -169,13 +196,11 @@ pub(crate) const FIELDS: [Field; 9] = [
     },
 ];
 
-/// Bits of `flags` that count path segments; the rest are flags and the medium.
+/// Bits of `flags` that count path segments; the rest are flags.
 const DEPTH_BITS: u32 = 13;
 /// The longest path that can be asked for, in segments. One number more is in use, by the
 /// evaluation of a last vertex that only emits.
 pub(crate) const MAX_DEPTH: u32 = (1 << DEPTH_BITS) - 2;
-/// How many materials a program may have: the medium is stored as material + 1 in 16 bits.
-pub(crate) const MAX_MATERIALS: usize = 0xffff;
 
 /// The WGSL constants that say what the bits of `flags` mean.
 pub(crate) fn constants() -> String {
@@ -187,9 +212,7 @@ pub(crate) fn constants() -> String {
          const PATH_LIT: u32 = {}u;\n\
          const PATH_LIVE: u32 = {}u;\n\
          // No work is left for the slot.\n\
-         const PATH_RETIRED: u32 = {}u;\n\
-         // 0 outside of everything, else the material that was entered last, plus 1.\n\
-         const MEDIUM_SHIFT: u32 = 16u;\n",
+         const PATH_RETIRED: u32 = {}u;\n",
         bit(0) - 1,
         bit(0),
         bit(1),
@@ -265,7 +288,7 @@ fn load(field: &Field, region: usize, storage: Storage) -> String {
         let swizzle = &"xyzw"[first..first + component.words()];
         first += component.words();
         match component {
-            Type::U32 => format!("words.{swizzle}"),
+            Type::U32 | Type::Words => format!("words.{swizzle}"),
             _ => format!("bitcast<{}>(words.{swizzle})", component.wgsl()),
         }
     };
@@ -284,7 +307,7 @@ fn store(field: &Field, region: usize, storage: Storage) -> String {
         return format!("fn store_{name}(slot: u32, value: {ty}) {{ state_{name} = value; }}\n");
     }
     let part = |(component, ty): &(&str, Type)| match ty {
-        Type::U32 => format!("value.{component}"),
+        Type::U32 | Type::Words => format!("value.{component}"),
         _ => format!("bitcast<{}>(value.{component})", ty.words_type()),
     };
     let parts: Vec<String> = field.components.iter().map(part).collect();
@@ -302,7 +325,9 @@ mod tests {
 
     const EVERYTHING: Needs = Needs {
         shadow_rays: true,
-        medium: true,
+        media: true,
+        absorption: true,
+        overlap: true,
         varying_emission: true,
     };
     const EVERY_STAGE: [StageId; 5] = [Logic, NewPath, Material, Shadow, Extension];
@@ -346,9 +371,10 @@ mod tests {
     #[test]
     fn a_scene_without_sampled_lights_stores_no_shadow_rays() {
         assert_eq!(path_bytes(Needs::default()), 80);
-        assert_eq!(path_bytes(EVERYTHING), 144);
+        assert_eq!(path_bytes(EVERYTHING), 160);
         let text = accessors(Needs::default(), &EVERY_STAGE, Storage::Memory);
         assert!(!text.contains("shadow"), "{text}");
+        assert!(!text.contains("media"), "{text}");
     }
 
     /// A stage listed as a reader or writer that does not access the field would make kernels

@@ -42,17 +42,19 @@ pub(crate) fn without_comments(text: &str) -> String {
     lines.join("\n")
 }
 
-/// A function of a material's index that is true for the given ones of `count` materials.
+/// A function of an instance that is true if its material is a given one of `count`. Where all
+/// are alike, nothing is looked up.
 pub(crate) fn predicate(name: &str, count: usize, holds: impl Fn(usize) -> bool) -> String {
     let members: Vec<usize> = (0..count).filter(|i| holds(*i)).collect();
     let body = match members.len() {
         0 => "return false;".to_string(),
+        n if n == count => "return true;".to_string(),
         _ => format!(
-            "switch material {{ case {}: {{ return true; }} default: {{ return false; }} }}",
+            "switch material_of(instance) {{ case {}: {{ return true; }} default: {{ return false; }} }}",
             case_labels(&members)
         ),
     };
-    format!("fn {name}(material: u32) -> bool {{ {body} }}\n")
+    format!("fn {name}(instance: u32) -> bool {{ {body} }}\n")
 }
 
 /// `0u, 2u, 5u`
@@ -72,6 +74,16 @@ mod tests {
         assert_eq!(with(true, true), "a\nb\nc\ne\n");
         assert_eq!(with(true, false), "a\nb\nd\ne\n");
         assert_eq!(with(false, true), "a\ne\n");
+    }
+
+    #[test]
+    fn predicates_look_up_what_differs() {
+        let none = predicate("p", 3, |_| false);
+        assert_eq!(none, "fn p(instance: u32) -> bool { return false; }\n");
+        let all = predicate("p", 3, |_| true);
+        assert_eq!(all, "fn p(instance: u32) -> bool { return true; }\n");
+        let some = predicate("p", 3, |i| i != 1);
+        assert!(some.contains("switch material_of(instance) { case 0u, 2u: { return true; }"));
     }
 
     #[test]

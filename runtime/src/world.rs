@@ -29,7 +29,7 @@ pub struct World {
 }
 
 impl World {
-    /// The world of a scene whose bindings compiled to `instances` of `materials`, which read
+    /// The world of a scene whose bindings compiled to `instances` of `materials`, reading
     /// `textures`.
     pub fn new(
         scene: &Scene,
@@ -50,18 +50,18 @@ impl World {
     }
 }
 
-/// Compiled materials.
+/// Compiled materials, each the code of any number of instances.
 pub trait MaterialSource {
-    /// What the runtime must know of each, in program order.
+    /// What the runtime must know of each material, in program order.
     fn infos(&self) -> Vec<MaterialInfo>;
-    /// Their instances, as triangles name them.
+    /// What it must know of each instance, in the order of the scene's bindings.
     fn instances(&self) -> Vec<InstanceInfo>;
-    /// The buffers that the WGSL reads.
+    /// The buffers that the materials' code reads.
     fn tables(&self) -> Vec<Table>;
-    /// WGSL of `material_of`, which gives the material of an instance.
-    fn lookup_wgsl(&self) -> String;
-    /// WGSL that evaluates the materials with the given indices, ascending.
+    /// WGSL that evaluates any instance of the materials with the given indices, ascending.
     fn wgsl(&self, members: &[usize]) -> String;
+    /// WGSL of `material_of`, the material of an instance.
+    fn lookup_wgsl(&self) -> String;
 }
 
 impl MaterialSource for impasto_compiler::Program {
@@ -77,11 +77,11 @@ impl MaterialSource for impasto_compiler::Program {
         self.tables()
     }
 
-    fn lookup_wgsl(&self) -> String {
-        self.lookup_wgsl()
-    }
-
     fn wgsl(&self, members: &[usize]) -> String {
         self.wgsl(members)
+    }
+
+    fn lookup_wgsl(&self) -> String {
+        self.lookup_wgsl()
     }
 }

@@ -73,7 +73,7 @@ fn build(positions: Vec<[Vec3; 3]>) -> Built {
 
 fn cast(built: &Built, rays: &[Ray]) -> Vec<Hit> {
     let no_lights = vec![u32::MAX; built.mesh.len()];
-    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights);
+    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights, &[]);
     let input: Vec<Row> = rays
         .iter()
         .flat_map(|r| {
@@ -436,7 +436,7 @@ fn leaving_rays(built: &Built, random: &mut Random, count: usize) -> Vec<(Ray, b
         })
         .collect();
     let no_lights = vec![u32::MAX; built.mesh.len()];
-    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights);
+    let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights, &[]);
     let surface = surface_part(&built.mesh, built.bvh.order(), false);
     let body = "
         let at = input[i];

@@ -5,7 +5,7 @@ mod support;
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, MaterialInfo};
+use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::lights;
 use impasto_runtime::scene::Scene;
 use support::light_scenes::{
@@ -302,11 +302,11 @@ fn extreme_random_numbers_give_finite_samples() {
 
 #[test]
 fn only_a_scene_without_any_light_is_refused() {
-    let varying = MaterialInfo {
+    let varying = InstanceInfo {
         emission: Emission::Varying,
         ..emissive([0.0; 3])
     };
-    let none = MaterialInfo {
+    let none = InstanceInfo {
         emission: Emission::None,
         ..emissive([0.0; 3])
     };

@@ -27,7 +27,7 @@ fn parts(triangles: &[Triangle]) -> [ShaderPart; 2] {
     };
     let order: Vec<u32> = (0..mesh.len() as u32).collect();
     [
-        geometry_part(&mesh, &order, &order),
+        geometry_part(&mesh, &order, &order, &[]),
         surface_part(&mesh, &order, true),
     ]
 }

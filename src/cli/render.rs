@@ -9,7 +9,9 @@ use std::time::Instant;
 
 use clap::Args;
 use impasto::compiler::{self, Loader};
+use impasto::runtime::media::MAX_NESTED;
 use impasto::runtime::output;
+use impasto::runtime::report::{MaterialReport, Report};
 use impasto::runtime::scene::FilmSettings;
 use impasto::{
     FileLoader, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene, Strategy, files,
@@ -245,6 +247,12 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
         report.paths_per_second * 1e-6,
         report.adapter.name,
     ));
+    global.note(&format!(
+        "{} for {}: {}",
+        super::count(report.material_count, "material"),
+        super::count(report.instance_count, "instance"),
+        material_list(report),
+    ));
     if report.nonfinite_samples > 0 {
         let lost = report.nonfinite_samples;
         global.note(&format!(
@@ -257,7 +265,36 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
             "warning: {lost} entries did not fit a queue; please report this"
         ));
     }
+    if report.media_overflow > 0 {
+        let times = report.media_overflow;
+        global.note(&format!(
+            "warning: {times} times a path entered a medium inside of {MAX_NESTED} others, which is \
+             more than it can follow"
+        ));
+    }
+    if report.lost_paths > 0 {
+        let lost = report.lost_paths;
+        global.note(&format!(
+            "warning: {lost} paths crossed too many hidden boundaries in a row and were ended"
+        ));
+    }
 }
+
+/// The names of materials, each with how often it is used if that is more than once.
+fn material_list(report: &Report) -> String {
+    let entry = |material: &MaterialReport| match material.instances.len() {
+        1 => material.name.clone(),
+        n => format!("{} x {n}", material.name),
+    };
+    let mut names: Vec<String> = report.materials.iter().take(LISTED).map(entry).collect();
+    if report.material_count > LISTED {
+        names.push(format!("{} more", report.material_count - LISTED));
+    }
+    names.join(", ")
+}
+
+/// How many materials the summary names.
+const LISTED: usize = 12;
 
 /// A progress bar on standard error; invisible where that is no terminal.
 fn progress_bar(global: &Global) -> ProgressBar {

@@ -1,8 +1,6 @@
 // The scene's triangles, in the order of the BVH's leaves: a primitive is an index into it.
-// triangles[3p + k] is corner k in .xyz; .w of corner 0 is the material, of corner 1 the light.
-
-// Material of the triangles of quad lights.
-const NO_MATERIAL: u32 = 0xffffffffu;
+// triangles[3p + k] is corner k in .xyz; .w of corner 0 is the instance of a material, of corner 1
+// the light, of corner 2 the medium.
 
 struct Triangle {
     a: vec3<f32>,
@@ -18,7 +16,8 @@ fn triangle_vertices(primitive: u32) -> Triangle {
     );
 }
 
-fn primitive_material(primitive: u32) -> u32 {
+// What the scene binds to the primitive: an instance of a material; NOTHING for a quad light.
+fn primitive_instance(primitive: u32) -> u32 {
     return triangles[3u * primitive].w;
 }
 
@@ -26,6 +25,13 @@ fn primitive_material(primitive: u32) -> u32 {
 fn primitive_light(primitive: u32) -> u32 {
     return triangles[3u * primitive + 1u].w;
 }
+#if media
+
+// The medium that the primitive bounds; 0 for what is thin-walled or opaque.
+fn primitive_medium(primitive: u32) -> u32 {
+    return triangles[3u * primitive + 2u].w;
+}
+#endif
 
 // The vector area b - a cross c - a, scaled to unit length. Scaling the edges first keeps the
 // squares of very small and very large triangles in range.

@@ -18,7 +18,7 @@ fn logic(slot: u32) {
     let pixel = load_ray_origin(slot).pixel;
     let vertex = path.flags & DEPTH_MASK;
     var carried = load_throughput(slot);
-    var material = NOTHING;
+    var instance = NOTHING;
     var hit = PathHit(0.0, 0.0, 0.0, NOTHING);
 
 #if shadow_rays
@@ -29,28 +29,32 @@ fn logic(slot: u32) {
     // A throughput of zero says that scattering failed and no ray was cast.
     if any(carried.throughput > vec3<f32>(0.0)) {
         hit = load_hit(slot);
+#if absorption
+        carried.throughput *= transmittance(load_media(slot).stack, hit.t);
+        store_throughput(slot, carried);
+#endif
         if hit.primitive == NOTHING {
             path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
         } else {
             path.radiance += carried.throughput
                 * light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
-            material = primitive_material(hit.primitive);
+            instance = primitive_instance(hit.primitive);
         }
     }
-    if vertex >= MAX_DEPTH && !needs_last_evaluation(material) {
-        material = NOTHING;
+    if instance != NOTHING && vertex >= MAX_DEPTH && !needs_last_evaluation(instance) {
+        instance = NOTHING;
     }
-    if material != NOTHING && vertex >= ROULETTE_START {
+    if instance != NOTHING && vertex >= ROULETTE_START {
         let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_ROULETTE)).x;
         let survival = survival_probability(carried.throughput);
         if u < survival {
             carried.throughput /= survival;
             store_throughput(slot, carried);
         } else {
-            material = NOTHING;
+            instance = NOTHING;
         }
     }
-    if material == NOTHING {
+    if instance == NOTHING {
         film_add(pixel, path.radiance);
         request_new_path();
         return;
@@ -58,14 +62,14 @@ fn logic(slot: u32) {
 
     path.flags = (path.flags & ~PATH_LIT) + 1u;
 #if shadow_rays
-    if vertex < MAX_DEPTH && scatters_sampled_light(material) {
+    if vertex < MAX_DEPTH && scatters_sampled_light(instance) {
         let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
         let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LIGHT));
         path.flags |= choose_light(slot, position, u);
     }
 #endif
     store_radiance(slot, path);
-    request_material(material);
+    request_material(instance);
 }
 
 // At least the chance of the smallest random number, and a multiple of it: then the number

@@ -1,19 +1,28 @@
 // The shell around generated material code: the surface point in, the next rays out.
 
-fn material(slot: u32, index: u32) {
+fn material(slot: u32, instance: u32) {
     var path = load_radiance(slot);
     let hit = load_hit(slot);
     let origin = load_ray_origin(slot);
     let arrived = load_ray_direction(slot);
     let carried = load_throughput(slot);
-    let point = surface_point(hit);
     let side = hit_geometric_normal(hit.primitive);
     let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
     let wo = -arrived.direction;
+#if media
+    let media = load_media(slot).stack;
+    let medium = primitive_medium(hit.primitive);
+    let inside = dot(side, wo) < 0.0;
+#endif
+#if exterior_ior
+    let point = surface_point(hit, exterior_index(media, medium, inside));
+#else
+    let point = surface_point(hit, 1.0);
+#endif
     let vertex = (path.flags & DEPTH_MASK) - 1u;
 
 #if varying_emission
-    path.radiance += carried.throughput * material_emission(index, point, wo);
+    path.radiance += carried.throughput * material_emission(instance, point, wo);
     store_radiance(slot, path);
     if vertex >= MAX_DEPTH {
         store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));
@@ -30,7 +39,7 @@ fn material(slot: u32, index: u32) {
     }
 #endif
     let u = random_numbers(origin.pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
-    let scattered = checked_sample(evaluate_material(index, point, wo, wl, u));
+    let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u));
 
     let weight = carried.throughput * scattered.throughput;
     store_throughput(slot, PathThroughput(weight, scattered.pdf));
@@ -40,16 +49,20 @@ fn material(slot: u32, index: u32) {
         store_ray_direction(slot, PathRayDirection(scattered.wi, arrived.sample));
         request_extension();
     }
-#if medium
+#if changes_medium
     if scattered.transmitted > 0.5 {
-        let entered = select(0u, index + 1u, dot(side, wo) > 0.0);
-        path.flags = (path.flags & ((1u << MEDIUM_SHIFT) - 1u)) | (entered << MEDIUM_SHIFT);
-        store_radiance(slot, path);
+        store_media(slot, PathMedia(cross_boundary(media, medium, inside)));
     }
 #endif
 #if shadow_rays
     if lit {
-        let reach = carried.throughput * scattered.light_throughput;
+        var reach = carried.throughput * scattered.light_throughput;
+#if absorption
+        // The way to the light is in one medium: boundaries, like everything, cast shadows.
+        let stays = (dot(side, wl) < 0.0) == inside;
+        let way = select(media_beyond(media, medium, inside), media, stays);
+        reach *= transmittance(way, light.distance);
+#endif
         store_light_throughput(slot, PathLightThroughput(reach, scattered.light_pdf));
         if any(reach > vec3<f32>(0.0)) {
             let start = leave_surface(position, side, wl);

@@ -1,14 +1,14 @@
 // The megakernel: the stages of the wavefront in a loop, with state in registers. A thread
 // takes one path from its camera to its end, which MAX_DEPTH bounds.
 
-var<private> wanted_material: u32 = NOTHING;
+var<private> wanted_instance: u32 = NOTHING;
 var<private> wants_extension: bool = false;
 
 // The loop ends instead: what the path gathered is in the film.
 fn request_new_path() {}
 
-fn request_material(material: u32) {
-    wanted_material = material;
+fn request_material(instance: u32) {
+    wanted_instance = instance;
 }
 
 fn request_extension() {
@@ -42,11 +42,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             wants_extension = false;
             extension(item);
         }
-        wanted_material = NOTHING;
+        wanted_instance = NOTHING;
         logic(item);
-        if wanted_material == NOTHING {
+        if wanted_instance == NOTHING {
             return;
         }
-        material(item, wanted_material);
+        material(item, wanted_instance);
     }
 }

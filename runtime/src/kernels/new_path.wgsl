@@ -18,5 +18,8 @@ fn new_path(slot: u32, item: u32) {
     store_hit(slot, PathHit(0.0, 0.0, 0.0, NOTHING));
     store_throughput(slot, PathThroughput(vec3<f32>(1.0), 0.0));
     store_radiance(slot, PathRadiance(vec3<f32>(0.0), PATH_LIVE + 1u));
+#if media
+    store_media(slot, PathMedia(CAMERA_MEDIA));
+#endif
     request_extension();
 }

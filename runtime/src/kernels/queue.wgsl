@@ -4,15 +4,15 @@
 
 #if sorts
 var<private> wanted_work: u32 = NOTHING;
-var<private> wanted_material: u32 = NOTHING;
+var<private> wanted_instance: u32 = NOTHING;
 
 fn request_new_path() {
     wanted_work = QUEUE_NEW_PATH;
 }
 
-fn request_material(material: u32) {
-    wanted_material = material;
-    wanted_work = material_queue(material);
+fn request_material(instance: u32) {
+    wanted_instance = instance;
+    wanted_work = material_queue(instance);
 }
 #endif
 #if casts

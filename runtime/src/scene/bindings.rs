@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::diag::nearest;
 
-use super::description::{GeometrySpec, MaterialSpec, ParamSpec};
+use super::description::{CameraMedium, GeometrySpec, MaterialSpec, ParamSpec};
 use super::document::list;
 use super::{MaterialBinding, SceneError};
 
@@ -29,8 +29,8 @@ pub(super) struct Bindings<'d> {
     by_content: HashMap<Content, u32>,
 }
 
-/// What makes two bindings the same material: file, item and parameters.
-type Content = (String, Option<String>, Vec<(String, String)>);
+/// What makes two bindings the same material: file, item, parameters and how they are compiled.
+type Content = (String, Option<String>, Vec<(String, String)>, bool);
 
 impl<'d> Bindings<'d> {
     pub(super) fn new(specs: &'d [MaterialSpec]) -> Self {
@@ -66,6 +66,18 @@ impl<'d> Bindings<'d> {
         Ok(each
             .map(|(&spec, name)| self.instantiate(spec, name, library))
             .collect())
+    }
+
+    /// Indices of the materials that the camera is in. Nothing else need use them.
+    pub(super) fn of_camera(&mut self, media: &[CameraMedium]) -> Result<Vec<u32>, SceneError> {
+        let index = |medium: &CameraMedium| match self.find(&medium.name) {
+            Some(spec) => Ok(self.instantiate(spec, &medium.name, &Library::default())),
+            None => {
+                let hint = self.suggestion(&medium.name);
+                Err(medium.no_such_material.clone().hint(hint))
+            }
+        };
+        media.iter().map(index).collect()
     }
 
     /// The materials in order of first use.
@@ -137,18 +149,19 @@ impl<'d> Bindings<'d> {
             .iter()
             .filter_map(|(key, value)| Some((key.clone(), value.source(mtl)?)))
             .collect();
-        let content = (spec.file.clone(), spec.material.clone(), params);
+        let content = (spec.file.clone(), spec.material.clone(), params, spec.bake);
         if let Some(&known) = self.by_content.get(&content) {
             return known;
         }
         let index = self.resolved.len() as u32;
         self.by_content.insert(content.clone(), index);
-        let (file, material, params) = content;
+        let (file, material, params, bake) = content;
         self.resolved.push(MaterialBinding {
             name: self.unique_name(spec, name),
             file,
             material,
             params,
+            bake,
         });
         index
     }

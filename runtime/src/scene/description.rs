@@ -7,6 +7,7 @@ use toml::de::DeValue;
 use super::document::{Document, Table, Value, numbers};
 use super::mtl::MtlValue;
 use super::{Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, SceneError};
+use crate::media::MAX_NESTED;
 
 /// Pixels a side of the largest film.
 const MAX_FILM: u32 = 16_384;
@@ -16,12 +17,21 @@ const MAX_DEPTH: u32 = 65_535;
 pub(super) struct Description {
     pub(super) name: Option<String>,
     pub(super) camera: Camera,
+    /// Materials whose interiors the camera is in, outermost first.
+    pub(super) camera_media: Vec<CameraMedium>,
     pub(super) film: FilmSettings,
     pub(super) integrator: Integrator,
     pub(super) geometry: Vec<GeometrySpec>,
     pub(super) materials: Vec<MaterialSpec>,
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<EnvironmentSpec>,
+}
+
+/// A material that the camera is in.
+pub(super) struct CameraMedium {
+    pub(super) name: String,
+    /// The error for a material of that name that does not exist, without hint.
+    pub(super) no_such_material: SceneError,
 }
 
 /// A `[[geometry]]` entry.
@@ -43,6 +53,7 @@ pub(super) struct MaterialSpec {
     pub(super) file: String,
     pub(super) material: Option<String>,
     pub(super) params: Vec<(String, ParamSpec)>,
+    pub(super) bake: bool,
 }
 
 /// Where a parameter's value comes from.
@@ -71,9 +82,11 @@ impl Description {
         let parsed = document.parse()?;
         let mut root = Table::new(document, "the scene", &parsed);
         let name = root.get("name").map(|v| v.string().map(str::to_owned));
+        let (camera, camera_media) = camera(&mut root)?;
         let description = Description {
             name: name.transpose()?,
-            camera: camera(&mut root)?,
+            camera,
+            camera_media,
             film: film(&mut root)?,
             integrator: integrator(&mut root)?,
             geometry: geometry(&mut root)?,
@@ -86,7 +99,7 @@ impl Description {
     }
 }
 
-fn camera(root: &mut Table) -> Result<Camera, SceneError> {
+fn camera(root: &mut Table) -> Result<(Camera, Vec<CameraMedium>), SceneError> {
     let hint = "add a [camera] table with `position`, `look_at` and `fov`";
     let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
     let mut table = value.table("[camera]")?;
@@ -101,6 +114,7 @@ fn camera(root: &mut Table) -> Result<Camera, SceneError> {
     let aperture = optional(&mut table, "aperture", aperture, 0.0)?;
     let focus = |v: &Value| v.float_where("a distance above 0", |v| v > 0.0);
     let focus = optional(&mut table, "focus", focus, position.distance(look_at))?;
+    let media = table.get("medium").map(|v| camera_media(&v)).transpose()?;
     let camera = Camera {
         position,
         look_at,
@@ -120,7 +134,23 @@ fn camera(root: &mut Table) -> Result<Camera, SceneError> {
             .hint("choose an `up` that is not parallel to `look_at` - `position`"));
     }
     table.finish()?;
-    Ok(camera)
+    Ok((camera, media.unwrap_or_default()))
+}
+
+/// One name, or several from the outermost medium inwards.
+fn camera_media(value: &Value) -> Result<Vec<CameraMedium>, SceneError> {
+    let expected = format!("the name of a material, or an array of at most {MAX_NESTED}");
+    let names: Option<Vec<&str>> = match value.item() {
+        DeValue::Array(items) => items.iter().map(|i| i.get_ref().as_str()).collect(),
+        item => item.as_str().map(|name| vec![name]),
+    };
+    let names = names.filter(|names| names.len() <= MAX_NESTED);
+    let names = names.ok_or_else(|| value.mismatch(&expected))?;
+    let medium = |name: &str| CameraMedium {
+        name: name.to_owned(),
+        no_such_material: value.error(format!("no material is called `{name}`")),
+    };
+    Ok(names.into_iter().map(medium).collect())
 }
 
 fn film(root: &mut Table) -> Result<FilmSettings, SceneError> {
@@ -203,6 +233,7 @@ fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
     let mut table = value.table(&title)?;
     let file = table.require("file")?.string()?.to_owned();
     let item = table.get("material").map(|v| v.string().map(str::to_owned));
+    let bake = optional(&mut table, "bake", Value::boolean, false)?;
     let mut params = Vec::new();
     if let Some(value) = table.get("params") {
         let entries = value.table(format!("{title} params"))?.named();
@@ -216,6 +247,7 @@ fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
         file,
         material: item.transpose()?,
         params,
+        bake,
     })
 }
 

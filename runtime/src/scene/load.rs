@@ -34,7 +34,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let description = Description::read(&Document::new(path, &text))?;
     let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let mut warnings = Vec::new();
-    let (mesh, materials) = geometry(path, &base, &description, &mut warnings)?;
+    let (mesh, materials, camera_media) = geometry(path, &base, &description, &mut warnings)?;
     let environment = description.environment.as_ref();
     let environment = environment
         .map(|e| load_environment(e, &base, &mut warnings))
@@ -43,6 +43,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         name: description.name.unwrap_or_else(|| default_name(path)),
         base,
         camera: description.camera,
+        camera_media,
         film: description.film,
         integrator: description.integrator,
         mesh,
@@ -67,12 +68,13 @@ struct Source {
     library: Library,
 }
 
+/// The triangles, the materials they use, and those that the camera is in.
 fn geometry(
     path: &Path,
     base: &Path,
     description: &Description,
     warnings: &mut Vec<String>,
-) -> Result<(Mesh, Vec<MaterialBinding>), SceneError> {
+) -> Result<(Mesh, Vec<MaterialBinding>, Vec<u32>), SceneError> {
     let sources = load_sources(base, &description.geometry)?;
     let mut bindings = Bindings::new(&description.materials);
     let mut mesh = Mesh::default();
@@ -93,7 +95,8 @@ fn geometry(
         return Err(error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`"));
     }
     mesh.simplify();
-    Ok((mesh, bindings.finish(warnings)))
+    let camera_media = bindings.of_camera(&description.camera_media)?;
+    Ok((mesh, bindings.finish(warnings), camera_media))
 }
 
 /// Every OBJ file that entries name, read once, by the name they use.

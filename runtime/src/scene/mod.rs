@@ -32,6 +32,9 @@ pub struct Scene {
     pub base: PathBuf,
     /// Where it is seen from.
     pub camera: Camera,
+    /// The materials whose interiors the camera is in, outermost first, as indices into
+    /// [`Scene::materials`].
+    pub camera_media: Vec<u32>,
     /// The picture.
     pub film: FilmSettings,
     /// How long paths get.
@@ -103,6 +106,8 @@ pub struct MaterialBinding {
     pub material: Option<String>,
     /// Parameters with Impasto constant expressions, such as `("flake_size", "0.6 mm")`.
     pub params: Vec<(String, String)>,
+    /// Is it compiled to code of its own, with its parameters as constants?
+    pub bake: bool,
 }
 
 /// A light that is neither a surface with an emissive material nor the environment.

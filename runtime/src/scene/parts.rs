@@ -2,10 +2,11 @@
 //!
 //! | part | provides | needs |
 //! |---|---|---|
-//! | `geometry` | `triangle_vertices`, `primitive_material` | |
+//! | `geometry` | `triangle_vertices`, `primitive_instance` | |
 //! | `bvh` | `Hit`, `NO_PRIMITIVE`, `trace_closest`, `trace_any` | `geometry` |
 //! | `surface` | `hit_position`, `hit_normal`, ..., `offset_origin` | `geometry` |
 //! | `lights` | `sample_light`, `light_hit`, `light_escape`, `power_heuristic` | `surface` |
+//! | `media` | `active_medium`, `media_beyond`, `transmittance`, ... | `geometry` |
 //! | `texture` | `texture_fetch` | |
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
@@ -14,13 +15,14 @@ use super::surface::{geometry_part, surface_part};
 use super::{Scene, SceneError};
 use crate::bvh::Bvh;
 use crate::lights::Lights;
+use crate::media::Media;
 use crate::shader_part::ShaderPart;
 use crate::texture;
 
 /// Everything a kernel may include to read the scene.
 #[derive(Clone, Debug)]
 pub struct SceneParts {
-    /// Corners and material of each triangle.
+    /// Corners, instance and medium of each triangle.
     pub geometry: ShaderPart,
     /// Ray casts.
     pub bvh: ShaderPart,
@@ -30,6 +32,8 @@ pub struct SceneParts {
     /// materials with `Emission::Uniform` (and of quad lights); that of `Emission::Varying` is
     /// left to `material_emission`.
     pub lights: ShaderPart,
+    /// What fills objects.
+    pub media: Media,
     /// Texture lookups; absent if no material reads a texture.
     pub texture: Option<ShaderPart>,
     /// Can any light be sampled? If not, no shadow ray is worth casting
@@ -48,13 +52,20 @@ impl SceneParts {
     ) -> Result<SceneParts, SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let bvh = Bvh::build(&scene.mesh);
+        let media = Media::build(materials, instances, &scene.camera_media)?;
         let lights = Lights::build(scene, bvh.order(), instances);
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
         Ok(SceneParts {
-            geometry: geometry_part(&scene.mesh, bvh.order(), &lights.of_triangle),
+            geometry: geometry_part(
+                &scene.mesh,
+                bvh.order(),
+                &lights.of_triangle,
+                &media.of_instance,
+            ),
             bvh: bvh.part(),
             surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
             lights: lights.part,
+            media,
             texture,
             has_sampled_lights: lights.has_sampled,
         })

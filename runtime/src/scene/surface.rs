@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 
 use super::Mesh;
 use crate::shader_part::{BufferData, ShaderPart};
+use crate::text::preprocess;
 use crate::wgsl;
 
 /// How far rays start off the surface they leave, relative to the largest coordinate of the
@@ -15,23 +16,27 @@ const OFFSET: f32 = 1.0 / (1 << 19) as f32;
 /// coordinate.
 const OFFSET_FLOOR: f32 = 1.0 / (1 << 23) as f32;
 
-/// `triangle_vertices`, `primitive_material` and `primitive_light`, for the triangles of `mesh`
-/// in `order`; `lights` gives each triangle's index in the light table.
-pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32]) -> ShaderPart {
+/// `triangle_vertices`, `primitive_instance` and `primitive_light`, for the triangles of `mesh`
+/// in `order`; `lights` gives each triangle's index in the light table, `media` the word of
+/// each instance's medium, or nothing where paths follow none.
+pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) -> ShaderPart {
     let rows: Vec<[[u32; 4]; 3]> = order
         .iter()
         .map(|&index| {
             let index = index as usize;
-            let extra = [mesh.materials[index], lights[index], 0];
+            let instance = mesh.materials[index];
+            let medium = media.get(instance as usize).copied().unwrap_or(0);
+            let extra = [instance, lights[index], medium];
             [0, 1, 2].map(|k| {
                 let [x, y, z] = mesh.positions[index][k].to_array().map(f32::to_bits);
                 [x, y, z, extra[k]]
             })
         })
         .collect();
+    let flags = [("media", !media.is_empty())];
     let triangles = BufferData::new("triangles", "array<vec4<u32>>", &rows);
     ShaderPart {
-        wgsl: include_str!("../kernels/geometry.wgsl").to_owned(),
+        wgsl: preprocess(include_str!("../kernels/geometry.wgsl"), &flags),
         buffers: vec![triangles],
     }
 }

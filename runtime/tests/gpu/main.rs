@@ -9,6 +9,8 @@ mod film;
 mod furnace;
 mod info;
 mod lights;
+mod media;
+mod planes;
 mod plans;
 mod scene;
 mod stub;

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use impasto_compiler::partition::{Form, Strategy};
-use impasto_compiler::{Loader, MaterialRequest, Program, compile};
+use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile};
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{self, Scene};
 
@@ -61,6 +61,10 @@ fn load(toml: &str) -> (Scene, Program) {
         file: binding.file.clone(),
         material: binding.material.clone(),
         params: binding.params.clone(),
+        parameters: match binding.bake {
+            true => Parameters::Baked,
+            false => Parameters::Agreed,
+        },
     };
     let requests: Vec<_> = scene.materials.iter().map(request).collect();
     let compilation = compile(&requests, &mut Folder(folder.path()));
@@ -138,7 +142,7 @@ fn glass_under_an_even_sky_is_invisible() {
         .report
         .kernels
         .iter()
-        .find(|k| k.name == "material_block");
+        .find(|k| k.name == "material_glass");
     assert!(extended.is_some_and(|k| k.items > rendering.report.paths / 4));
     let (mean, _) = mean(red(&rendering));
     assert!((mean - 2.0).abs() < 0.02, "{mean}");

@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, InputSet, MaterialInfo};
+use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
+use impasto_runtime::media::Media;
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{Camera, SceneParts};
 use impasto_runtime::shader_part::{BufferData, ShaderPart};
@@ -47,11 +48,9 @@ pub fn materials(kinds: &[Kind]) -> Materials {
     let info = |(index, kind): (usize, &Kind)| MaterialInfo {
         name: format!("m{index}"),
         delta_only: *kind == Kind::Mirror,
+        crosses: false,
         transmissive: false,
-        emission: match kind {
-            Kind::Glowing(..) => Emission::Varying,
-            _ => Emission::None,
-        },
+        varying_emission: matches!(kind, Kind::Glowing(..)),
         inputs: InputSet {
             normal: true,
             ..InputSet::default()
@@ -65,9 +64,38 @@ pub fn materials(kinds: &[Kind]) -> Materials {
     }
 }
 
+/// `material_of` where every material has one instance, in their order.
+pub const IDENTITY: &str = "fn material_of(instance: u32) -> u32 { return instance; }\n";
+
+/// One instance a material.
+pub fn each_once(materials: &[MaterialInfo]) -> Vec<InstanceInfo> {
+    let instance = |(material, info): (usize, &MaterialInfo)| InstanceInfo {
+        name: info.name.clone(),
+        material,
+        emission: match info.varying_emission {
+            true => Emission::Varying,
+            false => Emission::None,
+        },
+        medium: None,
+    };
+    materials.iter().enumerate().map(instance).collect()
+}
+
 impl MaterialSource for Materials {
     fn infos(&self) -> Vec<MaterialInfo> {
         self.infos.clone()
+    }
+
+    fn instances(&self) -> Vec<InstanceInfo> {
+        each_once(&self.infos)
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        Vec::new()
+    }
+
+    fn lookup_wgsl(&self) -> String {
+        IDENTITY.to_string()
     }
 
     fn wgsl(&self, members: &[usize]) -> String {
@@ -196,7 +224,7 @@ impl Default for Room {
 }
 
 const GEOMETRY: &str = "
-fn primitive_material(primitive: u32) -> u32 { return wall_materials[primitive]; }
+fn primitive_instance(primitive: u32) -> u32 { return wall_materials[primitive]; }
 ";
 
 const TRAVERSAL: &str = "
@@ -361,6 +389,7 @@ impl Room {
                 bvh: text(geometry + TRAVERSAL),
                 surface: text(SURFACE.to_string()),
                 lights: text(constants + LIGHTS),
+                media: Media::default(),
                 texture: None,
                 has_sampled_lights: self.strategies != Strategies::Scattering,
             },

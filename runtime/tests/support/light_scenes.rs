@@ -2,7 +2,7 @@
 #![allow(dead_code)] // each test binary uses its part
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, InputSet, MaterialInfo};
+use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::{
     Camera, DistantLight, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator,
     Light, Mesh, NO_MATERIAL, QuadLight, Scene, SceneParts,
@@ -23,6 +23,7 @@ pub(crate) fn dark_scene() -> Scene {
             aperture: 0.0,
             focus: 1.0,
         },
+        camera_media: Vec::new(),
         film: FilmSettings {
             width: 1,
             height: 1,
@@ -76,15 +77,12 @@ pub(crate) fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3], radiance: f32) ->
     }
 }
 
-pub(crate) fn emissive(radiance: [f32; 3]) -> MaterialInfo {
-    MaterialInfo {
+pub(crate) fn emissive(radiance: [f32; 3]) -> InstanceInfo {
+    InstanceInfo {
         name: "lamp".into(),
-        delta_only: false,
-        transmissive: false,
+        material: 0,
         emission: Emission::Uniform(radiance),
-        inputs: InputSet::default(),
-        textures: Vec::new(),
-        lobes: 1,
+        medium: None,
     }
 }
 
@@ -123,7 +121,7 @@ pub(crate) fn uniform_environment(sample: bool) -> Option<Environment> {
 }
 
 /// The scenes that the general tests walk through, with what their materials emit.
-pub(crate) fn scenes() -> Vec<(&'static str, Scene, Vec<MaterialInfo>)> {
+pub(crate) fn scenes() -> Vec<(&'static str, Scene, Vec<InstanceInfo>)> {
     let mut scenes = Vec::new();
     let mut triangle = dark_scene();
     push_triangle(
@@ -211,7 +209,7 @@ pub(crate) fn scenes() -> Vec<(&'static str, Scene, Vec<MaterialInfo>)> {
 }
 
 /// Several kinds at once, which hide one another.
-pub(crate) fn mixed_scene() -> (Scene, Vec<MaterialInfo>) {
+pub(crate) fn mixed_scene() -> (Scene, Vec<InstanceInfo>) {
     let mut scene = turned(
         map_scene(8, 4, |x, y| Vec3::splat((x + 3 * y) as f32 * 0.1)),
         10.0,
@@ -244,8 +242,8 @@ pub(crate) fn turned(mut scene: Scene, degrees: f32) -> Scene {
     scene
 }
 
-pub(crate) fn parts(scene: &Scene, materials: &[MaterialInfo]) -> SceneParts {
-    SceneParts::build(scene, materials, &[]).expect("the parts build")
+pub(crate) fn parts(scene: &Scene, instances: &[InstanceInfo]) -> SceneParts {
+    SceneParts::build(scene, &[], instances, &[]).expect("the parts build")
 }
 
 pub(crate) fn evaluate(
