@@ -26,7 +26,6 @@ pub mod ast;
 pub mod closure;
 pub mod codegen;
 pub mod diag;
-mod interior;
 pub mod ir;
 pub mod lexer;
 pub mod ops;
