@@ -181,21 +181,24 @@ fn media_have_defaults_and_keep_to_their_ranges() {
         "material m {
              param ior: float = 1.5;
              param level: int = 3;
+             param dense: color = 0.5;
              surface = diffuse(0.5);
-             interior = medium(color(1.0, 2.0, 3.0), ior, level);
+             interior = medium(dense, ior, level);
          }
+         material plain { surface = diffuse(0.5); interior = medium(color(1.0, 2.0, 3.0)); }
          material empty { surface = diffuse(0.5); interior = medium(); }
          material none { surface = diffuse(0.5); }",
     );
-    let [m, empty, none] = checked.checked.as_slice() else {
-        panic!("three materials");
+    let [m, plain, empty, none] = checked.checked.as_slice() else {
+        panic!("four materials");
     };
-    let medium = m.interior.expect("an interior");
-    let white = Const::Float(vec![1.0, 2.0, 3.0]);
-    assert_eq!(constant(m, medium.absorption), Some(&white));
+    let medium = plain.interior.expect("an interior");
+    let given = Const::Float(vec![1.0, 2.0, 3.0]);
+    assert_eq!(constant(plain, medium.absorption), Some(&given));
     let text = impasto_compiler::ir::print::material(&checked.ir, m);
     assert!(text.contains("clamp $0, 0.1, 10.0"), "{text}");
     assert!(text.contains("clamp $1, 0, 1000"), "{text}");
+    assert!(text.contains("max $2, 0.0") && !text.contains("inf"), "{text}");
     let medium = empty.interior.expect("an interior");
     let parts = [medium.absorption, medium.ior, medium.priority].map(|id| constant(empty, id));
     let (zero, one) = (Const::Float(vec![0.0; 3]), Const::Float(vec![1.0]));

@@ -87,8 +87,9 @@ impl Body<'_, '_> {
             true => self.constant(Const::Int(x as i32), span),
             false => self.builder.float(x, span),
         };
-        let (least, most) = (limit(low), limit(high));
+        let least = limit(low);
         if high.is_finite() {
+            let most = limit(high);
             self.builder.op(Op::Clamp, &[id, least, most], span)
         } else {
             self.builder.op(Op::Max, &[id, least], span)
