@@ -8,7 +8,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
-use crate::closure;
 use crate::codegen::{self, Target};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{self, Const, ExprKind, Function, Module, Type};
@@ -17,6 +16,7 @@ use crate::parameters::Layout;
 use crate::passes::{self, Hoisted};
 use crate::sema::Checker;
 use crate::source::{SourceMap, Span};
+use crate::{closure, interior};
 
 /// Compiled materials and their instances.
 #[derive(Clone, Debug)]
@@ -225,6 +225,7 @@ impl ProgramBuilder {
             transport_valid: checker.core_function("transport_valid")?,
             surface_point: checker.core_struct("SurfacePoint")?,
             material_sample: checker.core_struct("MaterialSample")?,
+            transparent: None,
         };
         Some(Self {
             core,
@@ -244,6 +245,13 @@ impl ProgramBuilder {
         mut material: ir::Material,
         settings: &[Setting],
     ) {
+        if material.opacity.is_some() {
+            let Some(transparent) = checker.library_closure("bsdf", "transparent") else {
+                return;
+            };
+            self.core.transparent = Some(transparent);
+            closure::cut_out(&mut material, transparent);
+        }
         self.optimise_functions(&checker.ir);
         let agreed = agreed(settings);
         passes::bake(&mut material.body, &agreed);
@@ -337,6 +345,8 @@ impl ProgramBuilder {
                 let values = part.evaluate(&self.module, &setting.values);
                 uniforms.extend(values.map_err(|_| too_long(material, &setting.name))?);
             }
+            let medium = interior::medium(&self.module, material, &setting.values);
+            let medium = medium.map_err(|_| too_long(material, &setting.name))?;
             let emission =
                 closure::emission_kind(&self.module, lowered.emission.as_ref(), &uniforms);
             instances.push(Instance {
@@ -344,7 +354,7 @@ impl ProgramBuilder {
                     name: setting.name.clone(),
                     material: self.materials.len(),
                     emission,
-                    medium: None,
+                    medium,
                 },
                 uniforms,
                 row: 0,
@@ -383,7 +393,7 @@ impl ProgramBuilder {
             name,
             delta_only: lowered.delta_only,
             crosses: lowered.crosses,
-            transmissive: lowered.crosses,
+            transmissive: lowered.crosses && material.interior.is_some(),
             varying_emission: varying,
             inputs: codegen::inputs(&self.module.structs, &functions),
             textures,

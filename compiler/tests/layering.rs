@@ -6,101 +6,7 @@
 
 mod common;
 
-use impasto_compiler::Program;
-use impasto_compiler::ir::interp::Interpreter;
-use impasto_compiler::ir::value::Value;
-
-/// A compiled material, asked as a kernel asks it.
-struct Asked {
-    program: Program,
-}
-
-/// What it answered.
-#[derive(Debug)]
-struct Answer {
-    wi: [f64; 3],
-    pdf: f64,
-    throughput: [f64; 3],
-    light_pdf: f64,
-    light_throughput: [f64; 3],
-    transmitted: f64,
-}
-
-impl Asked {
-    /// Compiles `uses` and a material whose surface is `surface`.
-    fn new(uses: &str, surface: &str) -> Self {
-        Self {
-            program: common::program(&format!("{uses}\nmaterial m {{ surface = {surface}; }}")),
-        }
-    }
-
-    fn ask(&self, wo: [f64; 3], wl: [f64; 3], u: [f64; 4]) -> Answer {
-        let z = || Value::vector(&[0.0, 0.0, 1.0]);
-        let point = vec![
-            Value::vector(&[0.3, -1.2, 0.7]),
-            z(),
-            z(),
-            Value::vector(&[1.0, 0.0, 0.0]),
-            Value::vector(&[0.4, 0.6]),
-            Value::float(1.0),
-        ];
-        let args = vec![
-            Value::Struct(point),
-            Value::vector(&wo),
-            Value::vector(&wl),
-            Value::vector(&u),
-        ];
-        let mut run = Interpreter::<f64>::new(self.program.ir(), u64::MAX);
-        let result = run
-            .run(&self.program.compiled()[0].evaluate, args)
-            .expect("fuel");
-        let vector = |i: usize| -> [f64; 3] {
-            result
-                .field(i)
-                .expect("field")
-                .to_f64()
-                .try_into()
-                .expect("vec3")
-        };
-        let float = |i: usize| result.field(i).expect("field").as_float();
-        Answer {
-            wi: vector(0),
-            pdf: float(1),
-            throughput: vector(2),
-            light_pdf: float(3),
-            light_throughput: vector(4),
-            transmitted: float(5),
-        }
-    }
-
-    /// The mean of the sampled throughput: the material's albedo as a renderer sees it.
-    fn sampled_albedo(&self, wo: [f64; 3], n: usize) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for i in 0..n {
-            let answer = self.ask(wo, [0.0; 3], point4(i));
-            (0..3).for_each(|c| sum[c] += answer.throughput[c]);
-        }
-        sum.map(|s| s / n as f64)
-    }
-}
-
-/// The R4 sequence: four well-spread numbers (Roberts 2018).
-fn point4(i: usize) -> [f64; 4] {
-    let g = 1.167_303_978_261_418_7_f64;
-    std::array::from_fn(|d| (0.5 + (i as f64 + 1.0) / g.powi(d as i32 + 1)).fract())
-}
-
-fn direction(theta_degrees: f64, phi: f64) -> [f64; 3] {
-    let t = theta_degrees.to_radians();
-    [t.sin() * phi.cos(), t.sin() * phi.sin(), t.cos()]
-}
-
-fn near(a: f64, b: f64, tolerance: f64, what: &str) {
-    assert!(
-        (a - b).abs() <= tolerance,
-        "{what}: {a} is not {b} (within {tolerance})"
-    );
-}
+use common::asked::{Asked, direction, near, point4};
 
 const USES: &str = "use std::bsdf::{diffuse, specular, mirror, blinn_phong};";
 
@@ -316,9 +222,9 @@ fn discrete_materials_answer_lights_with_nothing() {
 
 #[test]
 fn glass_changes_sides_and_says_so() {
-    let m = Asked::new(
-        "use std::bsdf::smooth_dielectric;",
-        "smooth_dielectric(1.5)",
+    let m = Asked::material(
+        "use std::bsdf::smooth_dielectric;
+        material m { surface = smooth_dielectric(1.5); interior = medium(ior: 1.5); }",
     );
     assert!(m.program.infos()[0].transmissive);
     let sides: Vec<f64> = (0..5000)

@@ -32,6 +32,8 @@ struct Results {
     throughput: LocalId,
     light_pdf: LocalId,
     light_throughput: LocalId,
+    /// 0 if the path went where there is no surface, else 1; absent where nothing asks.
+    met: Option<LocalId>,
 }
 
 impl View<'_> {
@@ -42,7 +44,14 @@ impl View<'_> {
             throughput: self.b.local("throughput", Type::Vec3),
             light_pdf: self.b.local("light_pdf", Type::Float),
             light_throughput: self.b.local("light_throughput", Type::Vec3),
+            met: self
+                .asks_for_gaps(paths)
+                .then(|| self.b.local("met", Type::Float)),
         };
+        if let Some(met) = results.met {
+            let one = self.float(1.0);
+            self.b.store(met, one);
+        }
         if let Some(root) = self.m.surface {
             let (ready, _) = self.lobes(root, paths);
             if let Some(total) = self.total(&ready) {
@@ -53,6 +62,15 @@ impl View<'_> {
             }
         }
         self.result(&results)
+    }
+
+    /// Must going through a gap of the surface be told from going through the surface?
+    fn asks_for_gaps(&self, paths: &[Path<'_>]) -> bool {
+        self.m.interior.is_some() && paths.iter().any(|p| self.is_gap(p))
+    }
+
+    fn is_gap(&self, path: &Path<'_>) -> bool {
+        self.core.transparent == Some(path.lobe.def)
     }
 
     /// The sum of all shares; nothing without lobes.
@@ -116,6 +134,10 @@ impl View<'_> {
         let local = self.call(sample, &args);
         let wi = self.call(self.core.to_world, &[lobe.frame, local]);
         self.b.store(results.wi, wi);
+        if let Some(met) = results.met.filter(|_| self.is_gap(lobe.path)) {
+            let zero = self.float(0.0);
+            self.b.store(met, zero);
+        }
         if lobe.delta {
             args.pop();
             args.push(local);
@@ -236,17 +258,29 @@ impl View<'_> {
         self.b.store(local, new);
     }
 
-    fn result(&mut self, results: &Results) -> ExprId {
-        let wi = self.b.load(results.wi, self.span);
+    /// 1 if the path changes its medium: there is one to change to, and `wi` is on the other side.
+    fn transmitted(&mut self, wi: ExprId, results: &Results) -> ExprId {
+        let zero = self.float(0.0);
+        if self.m.interior.is_none() {
+            return zero;
+        }
         let (wo, geometric) = (self.wo(), self.point("geometric_normal"));
         let (a, b) = (
             self.op(Op::Dot, &[wo, geometric]),
             self.op(Op::Dot, &[wi, geometric]),
         );
         let product = self.op(Op::Mul, &[a, b]);
-        let (zero, one) = (self.float(0.0), self.float(1.0));
         let crossed = self.op(Op::Less, &[product, zero]);
-        let transmitted = self.op(Op::Select, &[crossed, one, zero]);
+        let met = match results.met {
+            Some(met) => self.b.load(met, self.span),
+            None => self.float(1.0),
+        };
+        self.op(Op::Select, &[crossed, met, zero])
+    }
+
+    fn result(&mut self, results: &Results) -> ExprId {
+        let wi = self.b.load(results.wi, self.span);
+        let transmitted = self.transmitted(wi, results);
         let rest = [
             results.pdf,
             results.throughput,

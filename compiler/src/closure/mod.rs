@@ -15,10 +15,12 @@ use crate::ir::{
 
 mod emission;
 mod evaluate;
+mod opacity;
 mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
+pub use opacity::cut_out;
 
 /// Most lobes of a material.
 pub const MAX_LOBES: usize = 64;
@@ -34,6 +36,8 @@ pub struct Core {
     pub transport_valid: FunctionId,
     pub surface_point: crate::ir::StructId,
     pub material_sample: crate::ir::StructId,
+    /// The bsdf of what is not there; known once a material has an opacity.
+    pub transparent: Option<ClosureDefId>,
 }
 
 /// A lobe with the way to it from the root.

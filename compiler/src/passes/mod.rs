@@ -10,6 +10,7 @@ mod fold;
 mod hoist;
 
 pub use bake::bake;
+pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted, hoist};
 
 /// A pass with its name.

@@ -146,6 +146,21 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// The bsdf or edf that the file `name` of a folder of the library defines.
+    pub fn library_closure(&mut self, folder: &str, name: &str) -> Option<ClosureDefId> {
+        let files = impasto_stdlib::files().iter();
+        let file = files
+            .copied()
+            .find(|f| f.folder == folder && f.name == name)?;
+        let module = self.std_module(&file)?;
+        let ast = self.ast(module);
+        let index = ast.items.iter().position(|item| item.name.node == name)?;
+        match self.demand(ItemRef { module, index }, None)? {
+            Checked::Closure(id, _) => Some(id),
+            _ => None,
+        }
+    }
+
     /// Notes a problem.
     fn report(&mut self, diagnostic: Diagnostic) {
         self.diagnostics.push(diagnostic);

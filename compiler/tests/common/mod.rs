@@ -1,5 +1,7 @@
 //! Compiling texts in tests.
 
+pub mod asked;
+
 use impasto_compiler::{Compilation, MaterialRequest, MemoryLoader, Program, compile, diag};
 
 /// Compiles the only material of `text` with parameters.
