@@ -8,6 +8,7 @@
 //! renderers do not run it.
 
 use crate::Program;
+use crate::ir::Function;
 use crate::ir::interp::{Interpreter, OutOfFuel};
 use crate::ir::value::Value;
 
@@ -68,9 +69,10 @@ impl<'p> Stack<'p> {
     /// If a material takes too long to evaluate.
     pub fn albedo(&self, cos_o: f64, walks: u32, seed: u64) -> Result<Estimate, OutOfFuel> {
         let mut numbers = Numbers::new(seed);
+        let mut layers = [self.top, self.bottom.unwrap_or(self.top)].map(|i| self.layer(i));
         let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
         for _ in 0..walks {
-            let escaped = self.walk(cos_o, &mut numbers)?;
+            let escaped = self.walk(cos_o, &mut layers, &mut numbers)?;
             for c in 0..3 {
                 sum[c] += escaped[c];
                 squares[c] += escaped[c] * escaped[c];
@@ -86,44 +88,54 @@ impl<'p> Stack<'p> {
     }
 
     /// What leaves upward of light that follows one path backward from the viewer.
-    fn walk(&self, cos_o: f64, numbers: &mut Numbers) -> Result<[f64; 3], OutOfFuel> {
+    fn walk(
+        &self,
+        cos_o: f64,
+        layers: &mut [Layer<'p>; 2],
+        numbers: &mut Numbers,
+    ) -> Result<[f64; 3], OutOfFuel> {
         let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
         // Points against the way the path goes: toward where the light is going.
         let mut wo = [sin_o, 0.0, cos_o];
         let mut weight = [1.0; 3];
-        let mut layer = self.top;
         let mut at_top = true;
         for _ in 0..MOST_MEETINGS {
-            let scattered = self.scatter(layer, wo, numbers)?;
+            let scattered = layers[usize::from(!at_top)].scatter(wo, numbers)?;
             for c in 0..3 {
                 weight[c] *= scattered.throughput[c];
             }
             let up = scattered.wi[2] > 0.0;
-            let Some(bottom) = self.bottom else {
-                return Ok(if up { weight } else { [0.0; 3] });
-            };
             if at_top && up {
                 return Ok(weight);
             }
-            // Down from the top meets the bottom, up from the bottom meets the top.
-            if !(at_top ^ up) || !survives(&mut weight, numbers) {
+            // Down from the top meets the bottom if there is one, up from the bottom the top.
+            let lost = at_top == up || self.bottom.is_none();
+            if lost || !survives(&mut weight, numbers) {
                 return Ok([0.0; 3]);
             }
             at_top = !at_top;
-            layer = if at_top { self.top } else { bottom };
             wo = scattered.wi.map(|x| -x);
         }
         Ok([0.0; 3])
     }
 
-    fn scatter(
-        &self,
-        instance: usize,
-        wo: [f64; 3],
-        numbers: &mut Numbers,
-    ) -> Result<Scattered, OutOfFuel> {
+    fn layer(&self, instance: usize) -> Layer<'p> {
         let instance = &self.program.instances()[instance];
-        let evaluate = &self.program.compiled()[instance.info.material].evaluate;
+        Layer {
+            evaluate: &self.program.compiled()[instance.info.material].evaluate,
+            run: Interpreter::new(self.program.ir(), FUEL).with_uniforms(&instance.uniforms),
+        }
+    }
+}
+
+/// An instance that can be asked.
+struct Layer<'p> {
+    evaluate: &'p Function,
+    run: Interpreter<'p, f64>,
+}
+
+impl Layer<'_> {
+    fn scatter(&mut self, wo: [f64; 3], numbers: &mut Numbers) -> Result<Scattered, OutOfFuel> {
         let up = || Value::vector(&[0.0, 0.0, 1.0]);
         let point = Value::Struct(vec![
             Value::vector(&[0.0; 3]),
@@ -140,9 +152,7 @@ impl<'p> Stack<'p> {
             Value::vector(&[0.0; 3]),
             Value::vector(&u),
         ];
-        let sample = Interpreter::<f64>::new(self.program.ir(), FUEL)
-            .with_uniforms(&instance.uniforms)
-            .run(evaluate, args)?;
+        let sample = self.run.run(self.evaluate, args)?;
         let field = |i: usize| {
             let value = sample.field(i).map(Value::to_f64).unwrap_or_default();
             std::array::from_fn(|c| value.get(c).copied().unwrap_or(0.0))
@@ -154,8 +164,8 @@ impl<'p> Stack<'p> {
     }
 }
 
-/// Operations that one meeting with a layer may take.
-const FUEL: u64 = 1 << 24;
+/// Operations that a layer may take in all: hours.
+const FUEL: u64 = 1 << 42;
 
 /// Ends a walk of small weight at random, and makes up for those that go on.
 fn survives(weight: &mut [f64; 3], numbers: &mut Numbers) -> bool {

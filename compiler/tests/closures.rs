@@ -198,7 +198,10 @@ fn media_have_defaults_and_keep_to_their_ranges() {
     let text = impasto_compiler::ir::print::material(&checked.ir, m);
     assert!(text.contains("clamp $0, 0.1, 10.0"), "{text}");
     assert!(text.contains("clamp $1, 0, 1000"), "{text}");
-    assert!(text.contains("max $2, 0.0") && !text.contains("inf"), "{text}");
+    assert!(
+        text.contains("max $2, 0.0") && !text.contains("inf"),
+        "{text}"
+    );
     let medium = empty.interior.expect("an interior");
     let parts = [medium.absorption, medium.ior, medium.priority].map(|id| constant(empty, id));
     let (zero, one) = (Const::Float(vec![0.0; 3]), Const::Float(vec![1.0]));
