@@ -8,7 +8,7 @@
 //! is scaled by the squared ratio of the indices, given by the parameter `ior`.
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
-use impasto_compiler::ir::{Closure, Const, FunctionId, Methods, Module};
+use impasto_compiler::ir::{Closure, ClosureId, Const, FunctionId, Material, Methods, Module};
 use impasto_compiler::source::FileId;
 use impasto_compiler::{MemoryLoader, check, diag, parser, passes};
 
@@ -67,11 +67,31 @@ pub fn bsdfs_with(values: &[&str]) -> Vec<Bsdf> {
 
 /// The BSDF that a file of the library defines under its own name.
 fn bsdf(name: &str, text: &str, extremes: &[&str]) -> Bsdf {
+    let documented = documented(name, text, extremes);
+    build(
+        name,
+        documented.kind == ClosureKind::DeltaBsdf,
+        &documented.docs,
+        &documented.calls,
+    )
+}
+
+/// What a file says of the closure that it defines under its own name.
+pub struct Documented {
+    kind: ClosureKind,
+    /// Its doc comment in one line.
+    pub docs: String,
+    /// Argument lists to try.
+    pub calls: Vec<String>,
+}
+
+/// Reads a file of the library; its float parameters also try `extremes`.
+pub fn documented(name: &str, text: &str, extremes: &[&str]) -> Documented {
     let (ast, _) = parser::parse(FileId(0), text);
     let item = ast.items.iter().find(|i| i.name.node == name);
-    let item = item.unwrap_or_else(|| panic!("bsdf/{name} does not define `{name}`"));
+    let item = item.unwrap_or_else(|| panic!("{name} does not define `{name}`"));
     let ItemKind::Closure(def) = &item.kind else {
-        panic!("`{name}` is no bsdf")
+        panic!("`{name}` is no closure")
     };
     let mut tried: Vec<Tried> = def
         .params
@@ -97,9 +117,11 @@ fn bsdf(name: &str, text: &str, extremes: &[&str]) -> Bsdf {
         t.values
             .extend(extremes.iter().map(|v| Some((*v).to_owned())));
     }
-    let calls = combinations(&tried);
-    let docs = item.docs.join(" ");
-    build(name, def.kind == ClosureKind::DeltaBsdf, &docs, &calls)
+    Documented {
+        kind: def.kind,
+        docs: item.docs.join(" "),
+        calls: combinations(&tried),
+    }
 }
 
 /// What to try of a parameter that the documentation does not mention.
@@ -196,19 +218,8 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
         .into_iter()
         .zip(calls)
         .map(|(mut material, call)| {
-            passes::fold_body(&module, &mut material.body);
             let surface = material.surface.expect("a surface");
-            let Closure::Lobe(lobe) = &material.closures[surface.index()] else {
-                panic!("one lobe")
-            };
-            let constant = |&a: &_| {
-                material
-                    .body
-                    .constant(a)
-                    .cloned()
-                    .expect("a constant argument")
-            };
-            let args: Vec<Const> = lobe.args.iter().map(constant).map(rounded).collect();
+            let args = arguments_of(&module, &mut material, surface);
             let ior = match ior.map(|i| &args[i]) {
                 Some(Const::Float(v)) if v.len() == 1 => v[0],
                 _ => 1.0,
@@ -236,6 +247,17 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
         cases,
         module,
     }
+}
+
+/// The arguments of `closure`, a lobe of `material` with constant arguments.
+pub fn arguments_of(module: &Module, material: &mut Material, closure: ClosureId) -> Vec<Const> {
+    passes::fold_body(module, &mut material.body);
+    let Closure::Lobe(lobe) = &material.closures[closure.index()] else {
+        panic!("one lobe")
+    };
+    let body = &material.body;
+    let constant = |&a: &_| body.constant(a).cloned().expect("a constant argument");
+    lobe.args.iter().map(constant).map(rounded).collect()
 }
 
 /// A constant as a kernel has it, in single precision.

@@ -31,6 +31,7 @@ impl Text {
         let params = self.module.functions[id.index()].params.iter();
         let typed = params.zip(args).map(|(p, v)| match p.ty {
             Type::Int => Value::Int(v[0] as i32),
+            Type::Bool => Value::Bool(v[0] != 0.0),
             _ => Value::vector(v),
         });
         let mut run = Interpreter::<F>::new(&self.module, u64::MAX);
