@@ -27,7 +27,7 @@ mod vectors;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use impasto_compiler::{MemoryLoader, check, diag};
+use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile, diag};
 
 /// Does `job` for each item, on all cores, and fails with all faults that it found. The job gives
 /// the item's label and what is wrong with it.
@@ -71,5 +71,29 @@ fn every_file_checks_without_a_word() {
     for file in impasto_stdlib::files() {
         let text = problems(&format!("{}.impasto", file.name), file.text);
         assert!(text.is_empty(), "{}/{}:\n{text}", file.folder, file.name);
+    }
+}
+
+#[test]
+fn every_closure_compiles_to_valid_code() {
+    for (folder, output) in [("bsdf", "surface"), ("edf", "emission")] {
+        for file in impasto_stdlib::folder(folder) {
+            let name = file.name;
+            let mut text = format!("use std::{folder}::{name} as closure;\n");
+            if folder == "edf" {
+                text += "use std::bsdf::diffuse;\n";
+            }
+            let matte = if folder == "edf" {
+                "surface = diffuse(); "
+            } else {
+                ""
+            };
+            text += &format!("material m {{ {matte}{output} = closure(); }}");
+            let mut files = MemoryLoader::default();
+            files.add("m.impasto", text);
+            let compiled = compile(&[MaterialRequest::new("m", "m.impasto")], &mut files);
+            let problems = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
+            assert!(problems.is_empty(), "{folder}/{name}:\n{problems}");
+        }
     }
 }
