@@ -57,6 +57,25 @@ pub fn lobes(material: &Material, root: ClosureId) -> Vec<Path<'_>> {
     found
 }
 
+/// How many lobes [`lobes`] would find without leaving any out. A closure that is used twice
+/// counts twice, so there may be too many to list.
+pub fn lobe_count(material: &Material, root: ClosureId) -> usize {
+    let mut counts: Vec<usize> = Vec::new();
+    // Children come before their parents.
+    for closure in &material.closures[..=root.index()] {
+        let count = |id: &ClosureId| counts[id.index()];
+        counts.push(match closure {
+            Closure::Lobe(_) => 1,
+            Closure::Weight(_, a) => count(a),
+            Closure::Layer(a, b)
+            | Closure::Mix(a, b, _)
+            | Closure::Add(a, b)
+            | Closure::Select(_, a, b) => count(a).saturating_add(count(b)),
+        });
+    }
+    counts[root.index()]
+}
+
 fn collect<'a>(m: &'a Material, id: ClosureId, found: &mut Vec<Path<'a>>) {
     match &m.closures[id.index()] {
         Closure::Lobe(lobe) => found.push(Path { lobe, id }),

@@ -246,7 +246,7 @@ pub fn fold_compose(ty: Type, parts: &[&Const]) -> Option<Const> {
 }
 
 /// Floats clamped to the finite range of f32.
-fn in_range(value: Const) -> Const {
+pub(crate) fn in_range(value: Const) -> Const {
     const MAX: f64 = f32::MAX as f64;
     let clamp = |x: f64| if x.is_nan() { 0.0 } else { x.clamp(-MAX, MAX) };
     match value {

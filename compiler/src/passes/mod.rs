@@ -8,10 +8,12 @@ mod bake;
 mod dead_code;
 mod fold;
 mod hoist;
+mod prune;
 
 pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted, hoist};
+pub use prune::prune;
 
 /// A pass with its name.
 pub struct Pass {

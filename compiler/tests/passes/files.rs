@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use impasto_compiler::ir::parse::{Parsed, parse};
-use impasto_compiler::ir::{Module, print, verify};
-use impasto_compiler::passes::PIPELINE;
+use impasto_compiler::ir::{Function, Module, print, verify};
+use impasto_compiler::passes::{Hoisted, PIPELINE, hoist, prune};
 use impasto_compiler::source::FileId;
 
 use crate::{RULE, meaning};
@@ -52,12 +52,15 @@ fn read(path: PathBuf) -> Case {
 /// Runs a case; an error says how what came out differs.
 pub fn check(case: &Case) -> Result<(), String> {
     let before = parse(FileId(0), &case.input).map_err(|e| e.to_string())?;
-    let mut after = before.clone();
+    let mut after = Outcome {
+        parsed: before.clone(),
+        hoisted: Vec::new(),
+    };
     for pass in &case.passes {
-        apply(pass, &mut after)?;
+        after.apply(pass)?;
     }
-    meaning::same(&before.module, &after.module)?;
-    let text = print::module(&after.module, &after.materials);
+    meaning::same(&before.module, &after.parsed.module, &after.hoisted)?;
+    let text = after.text();
     parse(FileId(0), &text).map_err(|e| format!("what came out cannot be read: {e}\n{text}"))?;
     if text == case.expected {
         return Ok(());
@@ -70,20 +73,65 @@ pub fn check(case: &Case) -> Result<(), String> {
     Err(format!("`-` is expected, `+` came out\n{lines}"))
 }
 
-/// Runs one pass over every function, as the compiler does: callees first.
-fn apply(pass: &str, parsed: &mut Parsed) -> Result<(), String> {
-    let Some(row) = PIPELINE.iter().find(|p| p.name == pass) else {
-        return Err(format!("there is no pass `{pass}`"));
-    };
-    let module: &mut Module = &mut parsed.module;
-    for i in 0..module.functions.len() {
-        let mut f = module.functions[i].clone();
-        (row.run)(module, &mut f);
-        let text = print::function(module, &f);
-        verify::function(module, &f).map_err(|e| format!("after {pass}: {e}\n{text}"))?;
-        module.functions[i] = f;
+/// What passes made of a case.
+struct Outcome {
+    parsed: Parsed,
+    /// What was hoisted from each function, if anything was to be.
+    hoisted: Vec<Hoisted>,
+}
+
+impl Outcome {
+    /// Runs one pass as the compiler does: over every function, callees first, or over every
+    /// material.
+    fn apply(&mut self, pass: &str) -> Result<(), String> {
+        let run: &mut dyn FnMut(&Module, &mut Function) = match pass {
+            "prune" => return self.prune(),
+            "hoist" => &mut |module, f| self.hoisted.push(hoist(module, f)),
+            _ => match PIPELINE.iter().find(|p| p.name == pass) {
+                Some(row) => &mut |module, f| (row.run)(module, f),
+                None => return Err(format!("there is no pass `{pass}`")),
+            },
+        };
+        let module = &mut self.parsed.module;
+        for i in 0..module.functions.len() {
+            let mut f = module.functions[i].clone();
+            run(module, &mut f);
+            let text = print::function(module, &f);
+            verify::function(module, &f).map_err(|e| format!("after {pass}: {e}\n{text}"))?;
+            module.functions[i] = f;
+        }
+        for h in &self.hoisted {
+            let text = print::function(module, &h.prelude);
+            verify::function(module, &h.prelude).map_err(|e| format!("prelude: {e}\n{text}"))?;
+        }
+        Ok(())
     }
-    Ok(())
+
+    fn prune(&mut self) -> Result<(), String> {
+        for m in &mut self.parsed.materials {
+            prune(&self.parsed.module, m);
+            verify::material(&self.parsed.module, m).map_err(|e| format!("after prune: {e}"))?;
+        }
+        Ok(())
+    }
+
+    /// The module, then what was hoisted from its functions.
+    fn text(&self) -> String {
+        let Parsed { module, materials } = &self.parsed;
+        let mut out = print::module(module, materials);
+        for h in self.hoisted.iter().filter(|h| !h.values.is_empty()) {
+            let mut prelude = h.prelude.clone();
+            prelude.name += "_prelude";
+            let values = h.values.iter().enumerate();
+            let values: Vec<String> = values
+                .map(|(k, &v)| format!("${k} = {}", print::operand(module, &prelude, v)))
+                .collect();
+            let values = values.join(", ");
+            let text = print::function(module, &prelude);
+            out.push_str(&format!("\n// {values}\n{text}"));
+        }
+        out
+    }
 }
 
 /// Lines of both texts; those that only one has are marked.

@@ -3,6 +3,7 @@
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprKind, Function, Module, Type};
+use impasto_compiler::passes::Hoisted;
 
 /// Values that programs treat specially, before random ones.
 const SPECIAL: [f64; 5] = [0.0, 1.0, -1.0, 0.5, -0.0];
@@ -22,8 +23,13 @@ impl Numbers {
     fn float(&mut self) -> f64 {
         match self.next() % 16 {
             i @ 0..5 => SPECIAL[i as usize],
-            _ => (self.next() >> 11) as f64 / (1_u64 << 53) as f64 * 6.0 - 3.0,
+            _ => self.unit() * 6.0 - 3.0,
         }
+    }
+
+    /// From 0 to below 1.
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// A constant of a type that has some.
@@ -53,22 +59,24 @@ impl Numbers {
     }
 }
 
-/// Compares the functions of two modules, in order.
-pub fn same(before: &Module, after: &Module) -> Result<(), String> {
-    for (f, g) in before.functions.iter().zip(&after.functions) {
+/// Compares the functions of two modules, in order. From those of the latter, uniform work may
+/// have been hoisted.
+pub fn same(before: &Module, after: &Module, hoisted: &[Hoisted]) -> Result<(), String> {
+    for (i, (f, g)) in before.functions.iter().zip(&after.functions).enumerate() {
         let mut numbers = Numbers(7);
         for _ in 0..64 {
-            let args: Vec<Value<f64>> = f
-                .params
-                .iter()
-                .map(|p| numbers.value(before, p.ty))
-                .collect();
-            let uniforms = uniforms(f, &mut numbers);
-            let run = |module, f| {
-                let mut run = Interpreter::<f64>::new(module, 1 << 20).with_uniforms(&uniforms);
+            let params = f.params.iter();
+            let args: Vec<Value<f64>> = params.map(|p| numbers.value(before, p.ty)).collect();
+            let given = uniforms(f, &mut numbers);
+            let values = match hoisted.get(i) {
+                Some(h) => h.evaluate(before, &given).map_err(|_| "too long")?,
+                None => given.clone(),
+            };
+            let run = |module, f, uniforms: &[Const]| {
+                let mut run = Interpreter::<f64>::new(module, 1 << 20).with_uniforms(uniforms);
                 run.run(f, args.clone())
             };
-            let (old, new) = (run(before, f), run(after, g));
+            let (old, new) = (run(before, f, &given), run(after, g, &values));
             let equal = match (&old, &new) {
                 (Ok(old), Ok(new)) => near(old, new),
                 (old, _) => old.is_err(),

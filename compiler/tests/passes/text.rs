@@ -4,32 +4,13 @@
 use impasto_compiler::ir::parse::{MAX_NESTING, parse};
 use impasto_compiler::ir::print;
 use impasto_compiler::source::FileId;
-use impasto_compiler::{Loader, check};
 
-/// Reads files of the repository.
-struct Files;
-
-impl Loader for Files {
-    fn load(&mut self, path: &str) -> Result<Vec<u8>, String> {
-        std::fs::read(path).map_err(|e| e.to_string())
-    }
-}
-
-/// Every material file of the repository, and the library's.
-fn sources() -> Vec<String> {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-    let entries = std::fs::read_dir(format!("{root}/materials")).unwrap();
-    let paths = entries.map(|e| e.unwrap().path().to_string_lossy().into_owned());
-    let mut found: Vec<String> = paths.filter(|p| p.ends_with(".impasto")).collect();
-    found.sort();
-    assert!(found.len() > 10, "no materials in {root}");
-    found
-}
+use crate::lowered::{Files, checked, material_files};
 
 #[test]
 fn text_of_every_material_survives_reading() {
-    for path in sources() {
-        let checked = check(&path, &mut Files);
+    for path in material_files() {
+        let checked = checked(&path, &mut Files);
         let text = print::module(&checked.ir, &checked.checked);
         let parsed = parse(FileId(0), &text).unwrap_or_else(|e| panic!("{path}: {e}"));
         assert_eq!(parsed.materials.len(), checked.checked.len(), "{path}");

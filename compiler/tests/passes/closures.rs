@@ -1,0 +1,118 @@
+//! Pruning does not change what a material reflects.
+
+use impasto_compiler::MemoryLoader;
+use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::value::Value;
+use impasto_compiler::ir::{Closure, Const, Function, Material, Module, verify};
+use impasto_compiler::passes::prune;
+
+use crate::lowered::{checked, evaluate};
+use crate::meaning::{Numbers, near};
+
+/// Surfaces, with the number of lobes that are left of each. `t` and `c` are parameters.
+const SURFACES: [(&str, usize); 7] = [
+    ("layer(0.0 * shiny, mix(diffuse(c), diffuse(0.2), 0.0))", 1),
+    ("layer(mix(shiny, 0.0 * diffuse(c), t), diffuse(c))", 2),
+    (
+        "layer(shiny, if t < 0.5 { 0.0 * shiny } else { diffuse(c) })",
+        2,
+    ),
+    ("layer(t * diffuse(color(1.0)), diffuse(c))", 2),
+    ("layer(1.0 * (c * diffuse(0.5)), shiny)", 2),
+    ("0.5 * matte + 0.25 * matte", 2),
+    ("layer(t * shiny, mix(matte, shiny, 1.0))", 2),
+];
+
+fn lobes(m: &Material) -> usize {
+    let lobes = m.closures.iter();
+    lobes.filter(|c| matches!(c, Closure::Lobe(_))).count()
+}
+
+/// The light that comes from a direction, by the numbers.
+fn reflected(module: &Module, f: &Function, uniforms: &[Const], args: &[Value<f64>]) -> Value<f64> {
+    let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
+    let sample = run.run(f, args.to_vec()).unwrap();
+    let structs = module.structs.iter();
+    let fields = &structs
+        .clone()
+        .find(|s| s.name == "MaterialSample")
+        .unwrap()
+        .fields;
+    let index = fields
+        .iter()
+        .position(|f| f.0 == "light_throughput")
+        .unwrap();
+    sample.field(index).unwrap().clone()
+}
+
+#[test]
+fn pruning_keeps_what_a_material_reflects() {
+    for (surface, left) in SURFACES {
+        let mut files = MemoryLoader::default();
+        let text = format!(
+            "use std::bsdf::{{diffuse, blinn_phong}};
+             material m {{
+                 param t: float = 0.3 in 0.0 .. 1.0;
+                 param c: color = color(0.2, 0.5, 0.9);
+                 let shiny = blinn_phong(exponent: 20.0);
+                 let matte = diffuse(c);
+                 let _unused = layer(shiny, matte);
+                 surface = {surface};
+             }}"
+        );
+        files.add("m.impasto", text);
+        let checked = checked("m.impasto", &mut files);
+        let (module, m) = (&checked.ir, &checked.checked[0]);
+        let mut pruned = m.clone();
+        prune(module, &mut pruned);
+        verify::material(module, &pruned).unwrap();
+        assert_eq!(lobes(&pruned), left, "{surface}");
+        compare(module, surface, m, &pruned);
+    }
+}
+
+fn compare(module: &Module, surface: &str, m: &Material, pruned: &Material) {
+    let (f, g) = (evaluate(module, m), evaluate(module, pruned));
+    let (mut numbers, mut lit) = (Numbers(3), 0);
+    for _ in 0..50 {
+        let uniforms = [
+            Const::Float(vec![numbers.unit()]),
+            Const::Float([(); 3].map(|()| numbers.unit()).to_vec()),
+        ];
+        let args = view(module, &f, &mut numbers);
+        let old = reflected(module, &f, &uniforms, &args);
+        let new = reflected(module, &g, &uniforms, &args);
+        assert!(
+            near(&old, &new),
+            "{surface}: {uniforms:?} was {old:?} and is {new:?}"
+        );
+        lit += usize::from(old.to_f64().iter().any(|&x| x > 0.0));
+    }
+    assert!(lit > 40, "{surface}: only {lit} of 50 are lit");
+}
+
+/// A flat point, and directions on its front.
+fn view(module: &Module, f: &Function, numbers: &mut Numbers) -> Vec<Value<f64>> {
+    let direction = |numbers: &mut Numbers| {
+        let (z, a) = (0.05 + 0.95 * numbers.unit(), 6.28 * numbers.unit());
+        let s = (1.0 - z * z).sqrt();
+        Value::vector(&[s * a.cos(), s * a.sin(), z])
+    };
+    let structs = module.structs.iter();
+    let point = structs.clone().find(|s| s.name == "SurfacePoint").unwrap();
+    let fields = point.fields.iter().map(|(name, ty)| match name.as_str() {
+        "normal" | "geometric_normal" => Value::vector(&[0.0, 0.0, 1.0]),
+        "tangent" => Value::vector(&[1.0, 0.0, 0.0]),
+        "exterior_ior" => Value::float(1.0),
+        _ => numbers.value(module, *ty),
+    });
+    let point = Value::Struct(fields.collect());
+    let u = [(); 4].map(|()| numbers.unit());
+    assert_eq!(f.params.len(), 4);
+    vec![
+        point,
+        direction(numbers),
+        direction(numbers),
+        Value::vector(&u),
+    ]
+}

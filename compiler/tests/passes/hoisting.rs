@@ -1,0 +1,71 @@
+//! A material computes the same whether the host or the kernel does the work on its parameters.
+
+use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::value::Value;
+use impasto_compiler::ir::{Const, Function, Material, Module, verify};
+use impasto_compiler::passes::{self, hoist};
+
+use crate::lowered::{Files, checked, evaluate, material_files};
+use crate::meaning::{Numbers, near};
+
+/// Values for a material's parameters: the defaults, or others within their ranges.
+fn parameters(m: &Material, numbers: &mut Numbers) -> Vec<Const> {
+    let value = |p: &impasto_compiler::ir::MaterialParam| match (&p.default, p.range) {
+        (Const::Float(v), range) => {
+            let (low, high) = range.unwrap_or((0.0, 1.0));
+            Const::Float(
+                v.iter()
+                    .map(|_| low + (high - low) * numbers.unit())
+                    .collect(),
+            )
+        }
+        (Const::Bool(_), _) => Const::Bool(numbers.unit() < 0.5),
+        (other, _) => other.clone(),
+    };
+    m.params.iter().map(value).collect()
+}
+
+/// Compares a function with what is left of it after hoisting. Gives how many values there are.
+fn compare(module: &Module, m: &Material, f: &Function) -> usize {
+    let mut g = f.clone();
+    let hoisted = hoist(module, &mut g);
+    verify::function(module, &g).unwrap();
+    verify::function(module, &hoisted.prelude).unwrap();
+    let mut numbers = Numbers(11);
+    for _ in 0..8 {
+        let given = parameters(m, &mut numbers);
+        let values = hoisted.evaluate(module, &given).unwrap();
+        assert_eq!(values.len(), hoisted.types().len());
+        for _ in 0..4 {
+            let params = f.params.iter();
+            let args: Vec<Value<f64>> = params.map(|p| numbers.value(module, p.ty)).collect();
+            let run = |f, uniforms: &[Const]| {
+                let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
+                run.run(f, args.clone()).unwrap()
+            };
+            let (old, new) = (run(f, &given), run(&g, &values));
+            assert!(
+                near(&old, &new),
+                "{}{args:?} with {given:?} was {old:?} and is {new:?}",
+                m.name
+            );
+        }
+    }
+    hoisted.values.len()
+}
+
+#[test]
+fn every_material_computes_the_same_after_hoisting() {
+    let mut values = 0;
+    for path in material_files() {
+        let checked = checked(&path, &mut Files);
+        for m in &checked.checked {
+            let raw = evaluate(&checked.ir, m);
+            values += compare(&checked.ir, m, &raw);
+            let mut optimised = raw.clone();
+            passes::run(&checked.ir, &mut optimised);
+            compare(&checked.ir, m, &optimised);
+        }
+    }
+    assert!(values > 0, "no material has parameters");
+}
