@@ -230,7 +230,13 @@ impl Cut {
             self.values.remove(&id);
             self.kept.insert(id);
             // One of several expressions that are this uniform; all are to read the value.
-            self.values.extend(f.expr(id).kind.operands().iter().filter(|o| uniform(o).is_some()));
+            self.values.extend(
+                f.expr(id)
+                    .kind
+                    .operands()
+                    .iter()
+                    .filter(|o| uniform(o).is_some()),
+            );
         }
     }
 }

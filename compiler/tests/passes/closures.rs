@@ -1,10 +1,10 @@
 //! Pruning does not change what a material reflects.
 
-use impasto_compiler::MemoryLoader;
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Closure, Const, Function, Material, Module, verify};
 use impasto_compiler::passes::prune;
+use impasto_compiler::{Checked, MemoryLoader};
 
 use crate::lowered::{checked, evaluate};
 use crate::meaning::{Numbers, near};
@@ -45,43 +45,57 @@ fn reflected(module: &Module, f: &Function, uniforms: &[Const], args: &[Value<f6
     sample.field(index).unwrap().clone()
 }
 
+/// A material with a surface.
+fn with_surface(surface: &str) -> Checked {
+    let mut files = MemoryLoader::default();
+    let text = format!(
+        "use std::bsdf::{{diffuse, blinn_phong}};
+         material m {{
+             param t: float = 0.3 in 0.0 .. 1.0;
+             param c: color = color(0.2, 0.5, 0.9);
+             let shiny = blinn_phong(exponent: 20.0);
+             let matte = diffuse(c);
+             let _unused = layer(shiny, matte);
+             surface = {surface};
+         }}"
+    );
+    files.add("m.impasto", text);
+    checked("m.impasto", &mut files)
+}
+
 #[test]
 fn pruning_keeps_what_a_material_reflects() {
     for (surface, left) in SURFACES {
-        let mut files = MemoryLoader::default();
-        let text = format!(
-            "use std::bsdf::{{diffuse, blinn_phong}};
-             material m {{
-                 param t: float = 0.3 in 0.0 .. 1.0;
-                 param c: color = color(0.2, 0.5, 0.9);
-                 let shiny = blinn_phong(exponent: 20.0);
-                 let matte = diffuse(c);
-                 let _unused = layer(shiny, matte);
-                 surface = {surface};
-             }}"
-        );
-        files.add("m.impasto", text);
-        let checked = checked("m.impasto", &mut files);
-        let (module, m) = (&checked.ir, &checked.checked[0]);
-        let mut pruned = m.clone();
-        prune(module, &mut pruned);
-        verify::material(module, &pruned).unwrap();
+        let checked = with_surface(surface);
+        let mut pruned = checked.checked[0].clone();
+        prune(&checked.ir, &mut pruned);
+        verify::material(&checked.ir, &pruned).unwrap();
         assert_eq!(lobes(&pruned), left, "{surface}");
-        compare(module, surface, m, &pruned);
+        // A closure that is used twice is as if it were written twice.
+        let written_out = surface
+            .replace("shiny", "blinn_phong(exponent: 20.0)")
+            .replace("matte", "diffuse(c)");
+        let reference = with_surface(&written_out);
+        let (before, after) = (
+            (&reference.ir, &reference.checked[0]),
+            (&checked.ir, &pruned),
+        );
+        compare(surface, before, after);
     }
 }
 
-fn compare(module: &Module, surface: &str, m: &Material, pruned: &Material) {
-    let (f, g) = (evaluate(module, m), evaluate(module, pruned));
+/// Compares two materials, each over its module.
+fn compare(surface: &str, before: (&Module, &Material), after: (&Module, &Material)) {
+    let (f, g) = (evaluate(before.0, before.1), evaluate(after.0, after.1));
     let (mut numbers, mut lit) = (Numbers(3), 0);
     for _ in 0..50 {
         let uniforms = [
             Const::Float(vec![numbers.unit()]),
             Const::Float([(); 3].map(|()| numbers.unit()).to_vec()),
         ];
-        let args = view(module, &f, &mut numbers);
-        let old = reflected(module, &f, &uniforms, &args);
-        let new = reflected(module, &g, &uniforms, &args);
+        let args = view(before.0, &f, &mut numbers);
+        let old = reflected(before.0, &f, &uniforms, &args);
+        let new = reflected(after.0, &g, &uniforms, &args);
         assert!(
             near(&old, &new),
             "{surface}: {uniforms:?} was {old:?} and is {new:?}"

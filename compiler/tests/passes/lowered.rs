@@ -58,5 +58,6 @@ fn core(module: &Module) -> Core {
         transport_valid: function("transport_valid"),
         surface_point: structure("SurfacePoint"),
         material_sample: structure("MaterialSample"),
+        transparent: None,
     }
 }
