@@ -336,3 +336,16 @@ fn trees_that_share_branches_end() {
         .collect();
     ends(&material(&deep, "a2499"), "E0315");
 }
+
+#[test]
+fn the_index_outside_is_an_input() {
+    same(
+        "material m { surface = specular(exterior_ior / 2.0); }",
+        "material m { surface = specular(0.625); }",
+    );
+    let reads = |surface: &str| {
+        let text = format!("{USES}material m {{ surface = {surface}; }}");
+        program(&text).infos()[0].inputs.exterior_ior
+    };
+    assert!(reads("specular(exterior_ior / 2.0)") && !reads("specular(uv.x)"));
+}

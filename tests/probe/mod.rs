@@ -25,26 +25,54 @@ pub(crate) fn source(path: &Path) -> Option<String> {
     if !names.contains(&"diffuse") {
         source += "use std::bsdf::diffuse as probe_diffuse;\n";
     }
+    if used_types(&module).any(|ty| matches!(ty, "edf" | "medium")) {
+        source += "use std::edf::uniform as probe_uniform;\n";
+    }
     for item in &module.items {
-        if let ItemKind::Closure(closure) = &item.kind {
-            let output = match closure.kind {
-                ClosureKind::Edf => "emission",
-                _ => "surface",
-            };
-            let call = call(item, &closure.params);
-            source += &format!(
-                "material probe_{} {{ {output} = {call}; }}\n",
-                item.name.node
-            );
+        if let Some((output, params)) = output(item) {
+            let (name, call) = (&item.name.node, call(item, params));
+            source += &format!("material probe_{name} {{ {output} = {call}; }}\n");
         }
     }
     Some(source + &functions(&module))
 }
 
+/// The output that what an item makes is assigned to, with its parameters, if it makes closures.
+fn output(item: &Item) -> Option<(&'static str, &[Param])> {
+    match &item.kind {
+        ItemKind::Closure(closure) => match closure.kind {
+            ClosureKind::Edf => Some(("emission", &closure.params)),
+            _ => Some(("surface", &closure.params)),
+        },
+        ItemKind::Function(f) => match f.result.node.as_str() {
+            "bsdf" => Some(("surface", &f.params)),
+            "edf" => Some(("emission", &f.params)),
+            // An interior may not depend on the point, as arguments here do; it is made all the same.
+            "medium" => Some(("emission = probe_uniform(1.0); let _unused", &f.params)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Types that stand in the parameters and results of functions.
+fn used_types(module: &Module) -> impl Iterator<Item = &str> {
+    let functions = module.items.iter().filter_map(|item| match &item.kind {
+        ItemKind::Function(f) => Some(f),
+        _ => None,
+    });
+    functions.flat_map(|f| {
+        let params = f.params.iter().map(|p| p.ty.node.as_str());
+        params.chain([f.result.node.as_str()])
+    })
+}
+
 /// One material whose color is the sum of what all functions of the module give.
 fn functions(module: &Module) -> String {
     let values = module.items.iter().filter_map(|item| match &item.kind {
-        ItemKind::Function(f) => Some((call(item, &f.params), f.result.node.as_str())),
+        ItemKind::Function(f) if output(item).is_none() => {
+            Some((call(item, &f.params), f.result.node.as_str()))
+        }
         _ => None,
     });
     let values: Vec<(String, &str)> = values.collect();
@@ -84,6 +112,9 @@ fn argument(ty: &str) -> String {
         "color" => "color(position)",
         "mat3" => "mat3(tangent, normal, geometric_normal)",
         "texture" => "\"probe.png\"",
+        "bsdf" => "probe_diffuse(0.5)",
+        "edf" => "probe_uniform(1.0)",
+        "medium" => "medium()",
         name => return structure(name),
     };
     text.into()
