@@ -6,9 +6,9 @@ use crate::ir::build::Builder;
 use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
 use crate::source::Span;
 
-use super::closure::TreeSize;
 use super::inline::Expansion;
 use super::modules::ModuleId;
+use super::tree::TreeSize;
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
 

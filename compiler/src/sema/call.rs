@@ -1,8 +1,8 @@
-//! Checking calls: built-in functions, type conversions, functions, structs and closures.
+//! Checking calls: of built-in functions, functions, structs and closures.
 
-use crate::ast::{Arg, ExprKind, ItemKind, Name};
+use crate::ast::{Arg, ItemKind, Name};
 use crate::diag::{self, Code, Diagnostic};
-use crate::ir::{self, Const, ExprId};
+use crate::ir::{self, ExprId};
 use crate::ops::{Op, Shape};
 use crate::source::Span;
 
@@ -191,7 +191,7 @@ impl Body<'_, '_> {
     }
 
     /// Values of arguments that take no names.
-    fn positional(&mut self, callee: &str, args: &[Arg]) -> Option<Vec<(ExprId, Ty, Span)>> {
+    pub fn positional(&mut self, callee: &str, args: &[Arg]) -> Option<Vec<(ExprId, Ty, Span)>> {
         let mut values = Vec::new();
         let mut ok = true;
         for arg in args {
@@ -333,126 +333,6 @@ impl Body<'_, '_> {
         };
         self.report(unknown)
     }
-
-    /// `srgb(0xRRGGBB)` or `srgb(r, g, b)`: a linear color.
-    fn srgb(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
-        let values = self.positional("srgb", args)?;
-        let encoded = match values.as_slice() {
-            [(id, Ty::Int, _)] => match self.builder.function().constant(*id) {
-                Some(Const::Int(rgb)) if (0..=0xff_ffff).contains(rgb) => {
-                    let byte = |shift: u32| f64::from((rgb >> shift) & 0xff) / 255.0;
-                    let components = vec![byte(16), byte(8), byte(0)];
-                    self.constant(Const::Float(components), span)
-                }
-                _ => return self.wrong_srgb(span),
-            },
-            [(r, rt, _), (g, gt, _), (b, bt, _)]
-                if [rt, gt, bt]
-                    .iter()
-                    .all(|t| matches!(t, Ty::Int | Ty::Float)) =>
-            {
-                let parts = [(*r, *rt), (*g, *gt), (*b, *bt)].map(|(id, ty)| {
-                    if ty == Ty::Int {
-                        self.promote(id, span)
-                    } else {
-                        id
-                    }
-                });
-                self.builder.compose(ir::Type::Vec3, &parts, span)
-            }
-            _ => return self.wrong_srgb(span),
-        };
-        Some(Operand::Value(
-            self.builder.op(Op::SrgbDecode, &[encoded], span),
-            Ty::Color,
-        ))
-    }
-
-    fn wrong_srgb<T>(&mut self, span: Span) -> Option<T> {
-        let wrong = Diagnostic::new(Code::TypeMismatch, span, "`srgb` does not take this")
-            .expected("a constant such as `srgb(0xff8800)`, or three floats from 0 to 1");
-        self.report(wrong)
-    }
-
-    /// A call of a type: conversion and composition.
-    fn convert(&mut self, to: Ty, args: &[Arg], span: Span) -> Option<Operand> {
-        let name = self.cx.type_text(to);
-        let values = self.positional(&name, args)?;
-        let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
-        let id = match (to, values.as_slice()) {
-            (_, &[(id, ty, _)]) if ty == to => Some(id),
-            (Ty::Float, &[(id, Ty::Int, _)]) => Some(self.promote(id, span)),
-            (Ty::Float, &[(id, ty, _)]) if ty.is_dimension() => Some(id),
-            (Ty::Float, &[(id, Ty::Bool, _)]) => {
-                let (one, zero) = (self.builder.float(1.0, span), self.builder.float(0.0, span));
-                Some(self.builder.op(Op::Select, &[id, one, zero], span))
-            }
-            (Ty::Int, &[(id, Ty::Float, _)]) => Some(self.builder.op(Op::ToInt, &[id], span)),
-            (Ty::Int, &[(id, Ty::Bool, _)]) => {
-                let (one, zero) = (
-                    self.constant(Const::Int(1), span),
-                    self.constant(Const::Int(0), span),
-                );
-                Some(self.builder.op(Op::Select, &[id, one, zero], span))
-            }
-            (Ty::Mat3, &[(x, a, _), (y, b, _), (z, c, _)])
-                if [a, b, c].iter().all(|t| t.is_geometric()) =>
-            {
-                Some(self.builder.compose(ir::Type::Mat3, &[x, y, z], span))
-            }
-            (_, &[(id, ty, _)])
-                if to.ir() == Some(ir::Type::Vec3) && ty.ir() == Some(ir::Type::Vec3) =>
-            {
-                Some(id)
-            }
-            _ if to.is_vector() => self.compose_vector(to, &values, span),
-            _ => None,
-        };
-        match id {
-            Some(id) => Some(Operand::Value(id, to)),
-            None => {
-                let shown: Vec<String> = types.iter().map(|&t| self.cx.type_text(t)).collect();
-                let message = format!(
-                    "a {name} cannot be made from {}",
-                    if shown.is_empty() {
-                        "nothing".into()
-                    } else {
-                        shown.join(", ")
-                    }
-                );
-                let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
-                    .expected(conversion_help(to));
-                self.report(wrong)
-            }
-        }
-    }
-
-    /// A vector from one float for all components, or from parts that fill it exactly.
-    fn compose_vector(
-        &mut self,
-        to: Ty,
-        values: &[(ExprId, Ty, Span)],
-        span: Span,
-    ) -> Option<ExprId> {
-        let machine = to.ir()?;
-        let mut parts = Vec::new();
-        let mut width = 0;
-        for &(id, ty, at) in values {
-            let id = if ty == Ty::Int {
-                self.promote(id, at)
-            } else {
-                id
-            };
-            width += if ty.is_vector() || ty == Ty::Int || ty == Ty::Float {
-                self.builder.ty(id).width()?
-            } else {
-                return None;
-            };
-            parts.push(id);
-        }
-        let fills = Some(width) == machine.width() || (width == 1 && parts.len() == 1);
-        fills.then(|| self.builder.compose(machine, &parts, span))
-    }
 }
 
 /// The surface type of an op's result; `None` where the kinds of vectors do not mix.
@@ -499,20 +379,6 @@ fn expected_operands(op: Op) -> &'static str {
     }
 }
 
-fn conversion_help(to: Ty) -> &'static str {
-    match to {
-        Ty::Float => "an int, a bool, a length (in metres) or an angle (in radians)",
-        Ty::Int => "a float or a bool",
-        Ty::Vec2 => "one float for both components, or two",
-        Ty::Vec4 => "one float, or parts with four components together",
-        Ty::Mat3 => "three columns",
-        Ty::Angle => "a number with a unit, as in `30 deg`",
-        Ty::Texture => "a file name where a texture parameter is declared",
-        Ty::Bool => "a comparison",
-        _ => "one float, another three-component value, or parts with three components together",
-    }
-}
-
 /// What a function of another shading language is called here.
 fn foreign_function(name: &str) -> Option<&'static str> {
     Some(match name {
@@ -525,26 +391,4 @@ fn foreign_function(name: &str) -> Option<&'static str> {
         "noise" => "perlin(p), after `use std::noise::perlin;`",
         _ => return None,
     })
-}
-
-/// Is the callee a closure-making function of the language itself?
-pub fn makes_closure(
-    callee: &str,
-    args: &[Arg],
-    is_closure: impl Fn(&crate::ast::Expr) -> bool,
-) -> bool {
-    match callee {
-        "layer" | "medium" => true,
-        "mix" => args.iter().any(|a| is_closure(&a.value)),
-        _ => false,
-    }
-}
-
-/// The last expression of a block, through nested blocks.
-pub fn tail(block: &crate::ast::Block) -> Option<&crate::ast::Expr> {
-    let value = block.value.as_deref()?;
-    match &value.kind {
-        ExprKind::Block(inner) => tail(inner),
-        _ => Some(value),
-    }
 }

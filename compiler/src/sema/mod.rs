@@ -17,6 +17,7 @@ mod body;
 mod call;
 mod closure;
 mod constant;
+mod convert;
 mod expr;
 mod gradient;
 mod inline;
@@ -25,6 +26,7 @@ mod medium;
 mod modules;
 mod outputs;
 mod stmt;
+mod tree;
 pub mod types;
 mod varying;
 
