@@ -1,8 +1,10 @@
 //! Removes what nothing reads: values, stores to variables that are never loaded, empty branches.
 //!
-//! All functions are pure, so an unused call goes as well.
+//! All functions are pure, so an unused call goes as well. What is left is numbered anew in the
+//! order of evaluation, so that equal code has equal text however it came about.
 
-use crate::ir::{Block, ExprId, ExprKind, Function, Stmt};
+use super::rewrite::operands_mut;
+use crate::ir::{Block, Expr, ExprId, ExprKind, Function, Local, LocalId, Stmt};
 
 /// Removes dead code in place.
 pub fn remove(f: &mut Function) {
@@ -16,6 +18,7 @@ pub fn remove(f: &mut Function) {
     let body = std::mem::take(&mut f.body);
     while live.block(f, &body) {}
     f.body = sweep(body, &live);
+    Renumber::function(f);
 }
 
 struct Live {
@@ -88,7 +91,8 @@ impl Live {
                 .iter()
                 .chain(b)
                 .any(|s| self.needed(s) && !matches!(s, Stmt::Eval(_))),
-            Stmt::For { body, .. } | Stmt::While { body, .. } => self.has_effect(body),
+            Stmt::For { body, .. } => self.has_effect(body),
+            Stmt::While { head, body, .. } => self.has_effect(head) || self.has_effect(body),
             Stmt::Break | Stmt::Continue => true,
         }
     }
@@ -98,7 +102,8 @@ impl Live {
         block.iter().any(|stmt| match stmt {
             Stmt::Store(local, ..) => self.locals[local.index()],
             Stmt::If(_, a, b) => self.has_effect(a) || self.has_effect(b),
-            Stmt::For { body, .. } | Stmt::While { body, .. } => self.has_effect(body),
+            Stmt::For { body, .. } => self.has_effect(body),
+            Stmt::While { head, body, .. } => self.has_effect(head) || self.has_effect(body),
             Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
         })
     }
@@ -141,4 +146,112 @@ fn sweep(block: Block, live: &Live) -> Block {
         });
     }
     out
+}
+
+/// Numbers expressions and variables in the order in which statements mention them.
+struct Renumber<'a> {
+    old: &'a mut Function,
+    exprs: Vec<Expr>,
+    expr_ids: Vec<Option<ExprId>>,
+    locals: Vec<Local>,
+    local_ids: Vec<Option<LocalId>>,
+}
+
+impl Renumber<'_> {
+    fn function(f: &mut Function) {
+        let mut body = std::mem::take(&mut f.body);
+        let mut this = Renumber {
+            expr_ids: vec![None; f.exprs.len()],
+            local_ids: vec![None; f.locals.len()],
+            exprs: Vec::new(),
+            locals: Vec::new(),
+            old: f,
+        };
+        this.block(&mut body);
+        let value = this.expr(this.old.value);
+        let (exprs, locals) = (this.exprs, this.locals);
+        (f.exprs, f.locals, f.value, f.body) = (exprs, locals, value, body);
+    }
+
+    /// The new number of an expression, which is taken over with what it reads.
+    fn expr(&mut self, id: ExprId) -> ExprId {
+        if let Some(known) = self.expr_ids[id.index()] {
+            return known;
+        }
+        // Operands have been evaluated, or are free and read nothing: no deep recursion.
+        let mut expr = take(&mut self.old.exprs[id.index()]);
+        if let ExprKind::Load(local) = &mut expr.kind {
+            *local = self.local(*local);
+        }
+        for operand in operands_mut(&mut expr.kind) {
+            *operand = self.expr(*operand);
+        }
+        let new = ExprId(self.exprs.len() as u32);
+        self.exprs.push(expr);
+        self.expr_ids[id.index()] = Some(new);
+        new
+    }
+
+    fn local(&mut self, id: LocalId) -> LocalId {
+        if let Some(known) = self.local_ids[id.index()] {
+            return known;
+        }
+        let new = LocalId(self.locals.len() as u32);
+        self.locals.push(self.old.locals[id.index()].clone());
+        self.local_ids[id.index()] = Some(new);
+        new
+    }
+
+    fn block(&mut self, block: &mut Block) {
+        for stmt in block {
+            self.stmt(stmt);
+        }
+    }
+
+    fn stmt(&mut self, stmt: &mut Stmt) {
+        match stmt {
+            Stmt::Eval(id) => *id = self.expr(*id),
+            Stmt::Store(local, _, value) => {
+                *value = self.expr(*value);
+                *local = self.local(*local);
+            }
+            Stmt::If(cond, a, b) => {
+                *cond = self.expr(*cond);
+                self.block(a);
+                self.block(b);
+            }
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => {
+                *low = self.expr(*low);
+                *high = self.expr(*high);
+                *local = self.local(*local);
+                self.block(body);
+            }
+            Stmt::While {
+                head, test, body, ..
+            } => {
+                self.block(head);
+                *test = self.expr(*test);
+                self.block(body);
+            }
+            Stmt::Break | Stmt::Continue => {}
+        }
+    }
+}
+
+/// Takes an expression out of an arena that is thrown away.
+fn take(expr: &mut Expr) -> Expr {
+    let (ty, span) = (expr.ty, expr.span);
+    let kind = std::mem::replace(&mut expr.kind, ExprKind::Param(0));
+    let name = expr.name.take();
+    Expr {
+        kind,
+        ty,
+        span,
+        name,
+    }
 }

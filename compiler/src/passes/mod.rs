@@ -1,14 +1,21 @@
 //! Passes over functions: each makes a function simpler and keeps its meaning.
 //!
 //! A pass is one file and one row of [`PIPELINE`]. In debug builds the verifier runs after each.
+//! The pipeline is repeated until it changes nothing, so what one pass makes possible for an
+//! earlier one is not lost, and running it again gives the same text.
 
 use crate::ir::{self, Function, Module};
 
 mod bake;
+mod cse;
 mod dead_code;
 mod fold;
 mod hoist;
+mod inline;
+mod licm;
 mod prune;
+mod rewrite;
+mod simplify;
 
 pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
@@ -19,15 +26,31 @@ pub use prune::prune;
 pub struct Pass {
     /// Its name in messages.
     pub name: &'static str,
-    /// What it does to a function over a module; must not change what the function computes.
+    /// What it does to a function; must not change what the function computes.
     pub run: fn(&Module, &mut Function),
 }
 
 /// The passes in the order they run, over every function that reaches code generation.
 pub const PIPELINE: &[Pass] = &[
     Pass {
+        name: "inline",
+        run: inline::inline,
+    },
+    Pass {
         name: "fold",
-        run: |_, f| fold::fold(f),
+        run: fold::fold,
+    },
+    Pass {
+        name: "simplify",
+        run: simplify::simplify,
+    },
+    Pass {
+        name: "cse",
+        run: cse::cse,
+    },
+    Pass {
+        name: "licm",
+        run: licm::hoist,
     },
     Pass {
         name: "dead_code",
@@ -35,22 +58,77 @@ pub const PIPELINE: &[Pass] = &[
     },
 ];
 
-/// Runs all passes on a function.
+/// Most times that the pipeline is run over a function.
+const MAX_ROUNDS: usize = 6;
+
+/// Runs all passes on a function until they change nothing.
+///
+/// The fewer expressions its callees have, the faster: run [`library`] on the module before.
 ///
 /// # Panics
 /// In debug builds, if a pass breaks the function: a defect of the pass.
 pub fn run(module: &Module, function: &mut Function) {
     verify(module, function, "lowering");
-    for pass in PIPELINE {
-        (pass.run)(module, function);
-        verify(module, function, pass.name);
+    for _ in 0..MAX_ROUNDS {
+        let before = function.clone();
+        for pass in PIPELINE {
+            (pass.run)(module, function);
+            verify(module, function, pass.name);
+        }
+        if same(&before, function) {
+            break;
+        }
     }
 }
 
-/// Folds the constants of a material's body; dead code stays, since closures refer to it.
+/// Runs the pipeline once, up to and including the pass `name`. False if there is no such pass.
+///
+/// # Panics
+/// As [`run`].
+pub fn run_until(module: &Module, function: &mut Function, name: &str) -> bool {
+    let Some(last) = PIPELINE.iter().position(|p| p.name == name) else {
+        return false;
+    };
+    for pass in &PIPELINE[..=last] {
+        (pass.run)(module, function);
+        verify(module, function, pass.name);
+    }
+    true
+}
+
+/// Runs all passes on the functions of a module from `first` on, so that callers inline the result.
+pub fn library(module: &mut Module, first: usize) {
+    for i in first..module.functions.len() {
+        // Callees stand before their callers, so they are done already.
+        let mut f = module.functions[i].clone();
+        run(module, &mut f);
+        module.functions[i] = f;
+    }
+}
+
+/// Makes constants of what is constant in a material's body. Dead code stays, and every
+/// expression keeps its number, since closures refer to them.
 pub fn fold_body(module: &Module, body: &mut Function) {
-    fold::fold(body);
+    let rules = rewrite::Rules {
+        simplify: true,
+        keep: true,
+        ..rewrite::Rules::default()
+    };
+    rewrite::run(module, body, rules);
     verify(module, body, "fold");
+}
+
+/// Are two functions the same code?
+fn same(a: &Function, b: &Function) -> bool {
+    let names = |f: &Function| f.locals.iter().map(|l| l.ty).collect::<Vec<_>>();
+    a.body == b.body
+        && a.value == b.value
+        && names(a) == names(b)
+        && a.exprs.len() == b.exprs.len()
+        && a.exprs
+            .iter()
+            .zip(&b.exprs)
+            .all(|(a, b)| a.kind == b.kind && a.ty == b.ty)
 }
 
 fn verify(module: &Module, function: &Function, after: &str) {

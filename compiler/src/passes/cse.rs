@@ -1,0 +1,176 @@
+//! Computes what is written several times once.
+//!
+//! Values are numbered as the function is walked: an expression with the same operation and the
+//! same operands as one that is available (in this block or one around it) becomes that one. A
+//! variable's loads become the value that was last stored, as long as one store is known to be the
+//! last. Everything is pure, so calls and texture lookups are shared as well.
+
+use std::collections::HashMap;
+
+use super::rewrite::{self, Rules, operands_mut};
+use crate::ir::{Const, ExprId, ExprKind, Function, Module, Type};
+use crate::ops::Op;
+
+/// Removes common subexpressions in place.
+pub fn cse(module: &Module, f: &mut Function) {
+    let rules = Rules {
+        forward: true,
+        table: Some(Table::default()),
+        ..Rules::default()
+    };
+    rewrite::run(module, f, rules);
+}
+
+/// The values that are available, by what computes them.
+#[derive(Default)]
+pub(super) struct Table {
+    /// By hash; never iterated. Of two with equal hashes the later is kept.
+    known: HashMap<u64, Entry>,
+    /// What each entry made since replaced, to close blocks.
+    undo: Vec<(u64, Option<Entry>)>,
+    /// Constants, parameters and uniforms: available everywhere, so never removed.
+    leaves: HashMap<u64, Entry>,
+}
+
+struct Entry {
+    kind: ExprKind,
+    ty: Type,
+    id: ExprId,
+}
+
+impl Entry {
+    fn fits(&self, kind: &ExprKind, ty: Type) -> bool {
+        self.ty == ty && self.kind == *kind
+    }
+}
+
+impl Table {
+    /// The one expression that stands, in keys, for all equal constants, parameters or uniforms.
+    /// Elsewhere each keeps its own place in the source.
+    fn leaf(&mut self, f: &Function, id: ExprId) -> ExprId {
+        let e = f.expr(id);
+        let key = hash(&e.kind, e.ty);
+        match self.leaves.get(&key) {
+            Some(known) if known.fits(&e.kind, e.ty) => known.id,
+            Some(_) => id,
+            None => {
+                let (kind, ty) = (e.kind.clone(), e.ty);
+                self.leaves.insert(key, Entry { kind, ty, id });
+                id
+            }
+        }
+    }
+
+    /// An available value that `id` equals; if there is none, `id` is available from here on.
+    pub fn find_or_add(&mut self, f: &Function, id: ExprId) -> Option<ExprId> {
+        let e = f.expr(id);
+        // What a variable holds is the walk's to know.
+        if let ExprKind::Load(_) = e.kind {
+            return None;
+        }
+        let mut kind = e.kind.clone();
+        for operand in operands_mut(&mut kind) {
+            if f.expr(*operand).kind.is_free() {
+                *operand = self.leaf(f, *operand);
+            }
+        }
+        order(&mut kind);
+        let key = hash(&kind, e.ty);
+        if let Some(known) = self.known.get(&key)
+            && known.fits(&kind, e.ty)
+        {
+            return Some(known.id);
+        }
+        let replaced = self.known.insert(key, Entry { kind, ty: e.ty, id });
+        self.undo.push((key, replaced));
+        None
+    }
+
+    /// How much is known, for [`Table::close`].
+    pub fn mark(&self) -> usize {
+        self.undo.len()
+    }
+
+    /// Forgets what was added since `mark`.
+    pub fn close(&mut self, mark: usize) {
+        for (key, replaced) in self.undo.drain(mark..).rev() {
+            match replaced {
+                Some(entry) => drop(self.known.insert(key, entry)),
+                None => drop(self.known.remove(&key)),
+            }
+        }
+    }
+}
+
+/// Brings a key into the form in which equal computations are recognised: operands whose order
+/// does not matter in order, comparisons as `<` and `<=`. The expression itself stays as it was
+/// written.
+fn order(kind: &mut ExprKind) {
+    if let ExprKind::Op(op, args) = kind {
+        match op {
+            Op::Add | Op::Mul | Op::Min | Op::Max | Op::Dot | Op::Distance => args.sort(),
+            Op::Equal | Op::NotEqual | Op::And | Op::Or => args.sort(),
+            Op::BitAnd | Op::BitOr | Op::BitXor => args.sort(),
+            Op::Greater => {
+                args.swap(0, 1);
+                *op = Op::Less;
+            }
+            Op::GreaterEqual => {
+                args.swap(0, 1);
+                *op = Op::LessEqual;
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A hash that is the same on every machine.
+fn hash(kind: &ExprKind, ty: Type) -> u64 {
+    let mut h = Hash(0xcbf2_9ce4_8422_2325);
+    h.add(match ty {
+        Type::Bool => 0,
+        Type::Int => 1,
+        Type::Mat3 => 2,
+        Type::Struct(id) => 16 + u64::from(id.0),
+        _ => 2 + ty.width().unwrap_or(1) as u64,
+    });
+    match kind {
+        ExprKind::Const(Const::Bool(b)) => h.add(0x100 | u64::from(*b)),
+        ExprKind::Const(Const::Int(i)) => h.all(0x200, [*i as u32 as u64]),
+        // Both zeros are equal, so they must hash alike.
+        ExprKind::Const(Const::Float(v)) => {
+            h.all(
+                0x300,
+                v.iter().map(|x| if *x == 0.0 { 0 } else { x.to_bits() }),
+            );
+        }
+        ExprKind::Param(i) => h.all(0x400, [u64::from(*i)]),
+        ExprKind::Uniform(i) => h.all(0x500, [u64::from(*i)]),
+        ExprKind::Load(local) => h.all(0x600, [u64::from(local.0)]),
+        ExprKind::Op(op, _) => h.all(0x700, [*op as u64]),
+        ExprKind::Compose(_) => h.add(0x800),
+        ExprKind::Swizzle(_, c) => h.all(0x900, c.iter().map(|&c| u64::from(c))),
+        ExprKind::Call(callee, _) => h.all(0xa00, [u64::from(callee.0)]),
+        ExprKind::Make(s, _) => h.all(0xb00, [u64::from(s.0)]),
+        ExprKind::Field(_, i) => h.all(0xc00, [u64::from(*i)]),
+    }
+    h.all(0xd00, kind.operands().iter().map(|a| u64::from(a.0)));
+    h.0
+}
+
+/// FNV-1a, a word at a time, with a final mix in every step.
+struct Hash(u64);
+
+impl Hash {
+    fn add(&mut self, x: u64) {
+        let h = (self.0 ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 = h ^ (h >> 29);
+    }
+
+    fn all(&mut self, tag: u64, values: impl IntoIterator<Item = u64>) {
+        self.add(tag);
+        for value in values {
+            self.add(value);
+        }
+    }
+}

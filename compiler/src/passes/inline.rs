@@ -1,0 +1,400 @@
+//! Puts the bodies of functions in place of their calls.
+//!
+//! In line go the methods of bsdfs and edfs, so that a material is one function a person can
+//! read top to bottom; functions with one call left; and functions so small that a call is no
+//! shorter. A large function that is called from several places (a noise) stays one: copies of it
+//! would cost the instruction cache more than the call costs.
+//!
+//! A call whose arguments are the same for a whole instance stays as well: the host makes it
+//! once, after uniform hoisting. Calls with constant arguments never get here, they are folded.
+//!
+//! Callees are copied through the walk that folds and simplifies, so a lobe with constant
+//! parameters arrives small.
+
+use super::rewrite::{self, Rewriter, Rules, operands_mut};
+use crate::ir::{
+    Block, Const, ExprId, ExprKind, Function, FunctionId, LocalId, Methods, Module, Stmt, Type,
+};
+use crate::ops::CostClass;
+use crate::source::Span;
+
+/// Most expressions of a function that goes in line wherever it is called.
+const SMALL: u32 = 24;
+
+/// Most blocks within blocks that inlining makes.
+const MAX_DEPTH: usize = 128;
+
+/// Expressions that a function may have before only small callees go in line.
+const MAX_EXPRS: usize = 1 << 15;
+
+/// Expressions that a function may have before none does.
+const MAX_ALL_EXPRS: usize = 1 << 17;
+
+/// Inlines calls in place.
+pub fn inline(module: &Module, f: &mut Function) {
+    let rules = Rules {
+        simplify: true,
+        forward: true,
+        inline: Some(Policy::new(module, f)),
+        ..Rules::default()
+    };
+    rewrite::run(module, f, rules);
+}
+
+/// What decides whether a call goes in line.
+pub(super) struct Policy {
+    /// How often each function would be called if all that can go in line did.
+    sites: Vec<u32>,
+    /// Is a function the method of a bsdf or edf?
+    method: Vec<bool>,
+    /// Expressions that each function evaluates, where asked.
+    sizes: Vec<Option<u32>>,
+    /// Is an expression the same for a whole instance? By expression.
+    uniform: Vec<bool>,
+    /// Does a function look up textures, which only the kernel can? Where asked.
+    textures: Vec<Option<bool>>,
+}
+
+impl Policy {
+    fn new(module: &Module, f: &Function) -> Self {
+        let n = module.functions.len();
+        let mut policy = Self {
+            sites: vec![0; n],
+            method: vec![false; n],
+            sizes: vec![None; n],
+            uniform: Vec::new(),
+            textures: vec![None; n],
+        };
+        for def in &module.closures {
+            let methods = match def.methods {
+                Methods::Bsdf {
+                    sample,
+                    eval,
+                    pdf,
+                    albedo,
+                } => vec![sample, eval, pdf, albedo],
+                Methods::Edf { emit } => vec![emit],
+            };
+            for id in methods {
+                // A module that is being built lists closures before all their methods.
+                if let Some(method) = policy.method.get_mut(id.index()) {
+                    *method = true;
+                }
+            }
+        }
+        policy.count_sites(module, f);
+        policy
+    }
+
+    /// Counts calls, those within callees that go in line included. Callees stand before their
+    /// callers in a module, so one walk from the last to the first sees each count final.
+    fn count_sites(&mut self, module: &Module, f: &Function) {
+        for_each_call(f, &f.body, &mut |id| self.sites[id.index()] += 1);
+        for index in (0..module.functions.len()).rev() {
+            let id = FunctionId(index as u32);
+            let calls = self.sites[index];
+            if calls > 0 && self.wanted(module, id) {
+                let callee = &module.functions[index];
+                for_each_call(callee, &callee.body, &mut |inner| {
+                    let sites = &mut self.sites[inner.index()];
+                    *sites = sites.saturating_add(calls);
+                });
+            }
+        }
+    }
+
+    /// Does a function go in line, as far as it alone decides?
+    fn wanted(&mut self, module: &Module, id: FunctionId) -> bool {
+        self.method[id.index()] || self.sites[id.index()] == 1 || self.size(module, id) <= SMALL
+    }
+
+    fn size(&mut self, module: &Module, id: FunctionId) -> u32 {
+        let body = &module.functions[id.index()].body;
+        *self.sizes[id.index()].get_or_insert_with(|| evaluations(body))
+    }
+
+    /// Notes of an expression that is evaluated whether it is the same for a whole instance.
+    pub(super) fn note(&mut self, f: &Function, id: ExprId) {
+        let kind = &f.expr(id).kind;
+        let operands = kind.operands();
+        let uniform = match kind {
+            ExprKind::Load(_) => false,
+            ExprKind::Op(op, _) if op.info().class == CostClass::Texture => false,
+            _ => operands.iter().all(|&a| self.is_uniform(f, a)),
+        };
+        self.uniform.resize(f.exprs.len(), false);
+        self.uniform[id.index()] = uniform;
+    }
+
+    fn is_uniform(&self, f: &Function, id: ExprId) -> bool {
+        match f.expr(id).kind {
+            ExprKind::Const(_) | ExprKind::Uniform(_) => true,
+            ExprKind::Param(_) => false,
+            _ => self.uniform.get(id.index()).copied().unwrap_or(false),
+        }
+    }
+
+    fn reads_textures(&mut self, module: &Module, id: FunctionId) -> bool {
+        if let Some(known) = self.textures[id.index()] {
+            return known;
+        }
+        let callee = &module.functions[id.index()];
+        let lookup = callee.exprs.iter().any(
+            |e| matches!(e.kind, ExprKind::Op(op, _) if op.info().class == CostClass::Texture),
+        );
+        let mut inner = Vec::new();
+        for_each_call(callee, &callee.body, &mut |id| inner.push(id));
+        let reads = lookup || inner.into_iter().any(|id| self.reads_textures(module, id));
+        self.textures[id.index()] = Some(reads);
+        reads
+    }
+}
+
+/// The value of a call that goes in line.
+pub(super) fn call(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) -> Option<ExprId> {
+    let mut policy = w.rules.inline.take()?;
+    let wanted = goes_in_line(w, &mut policy, callee, args);
+    w.rules.inline = Some(policy);
+    wanted.then(|| splice(w, callee, args))
+}
+
+fn goes_in_line(
+    w: &Rewriter<'_>,
+    policy: &mut Policy,
+    callee: FunctionId,
+    args: &[ExprId],
+) -> bool {
+    // With constant arguments it was too long to fold; with uniform ones the host makes it.
+    if args.iter().all(|&a| policy.is_uniform(w.f, a)) && !policy.reads_textures(w.module, callee) {
+        return false;
+    }
+    let small = policy.size(w.module, callee) <= SMALL;
+    let room = if small { MAX_ALL_EXPRS } else { MAX_EXPRS };
+    policy.wanted(w.module, callee)
+        && w.f.exprs.len() < room
+        && w.depth + nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
+}
+
+/// Copies a callee's body into the open block; gives its value.
+fn splice(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) -> ExprId {
+    let module = w.module;
+    let callee = &module.functions[callee.index()];
+    let shift = Shift {
+        exprs: w.f.exprs.len() as u32,
+        locals: w.f.locals.len() as u32,
+    };
+    for local in &callee.locals {
+        w.local(local.clone());
+    }
+    for expr in &callee.exprs {
+        if let ExprKind::Param(i) = expr.kind {
+            w.stand_in(args[i as usize], expr.span);
+            continue;
+        }
+        let mut copy = expr.clone();
+        shift.kind(&mut copy.kind);
+        w.adopt(copy);
+    }
+    for local in unset(callee) {
+        let zero = zero(w, callee.locals[local.index()].ty, callee.span);
+        w.store(shift.local(local), None, zero);
+    }
+    w.depth += 1;
+    w.block(shift.block(&callee.body));
+    w.depth -= 1;
+    w.resolve(shift.expr(callee.value))
+}
+
+/// How far a callee's numbers are moved in its caller.
+struct Shift {
+    exprs: u32,
+    locals: u32,
+}
+
+impl Shift {
+    fn expr(&self, id: ExprId) -> ExprId {
+        ExprId(id.0 + self.exprs)
+    }
+
+    fn local(&self, id: LocalId) -> LocalId {
+        LocalId(id.0 + self.locals)
+    }
+
+    fn kind(&self, kind: &mut ExprKind) {
+        if let ExprKind::Load(local) = kind {
+            *local = self.local(*local);
+        }
+        for operand in operands_mut(kind) {
+            *operand = self.expr(*operand);
+        }
+    }
+
+    fn block(&self, block: &Block) -> Block {
+        block.iter().map(|s| self.stmt(s)).collect()
+    }
+
+    fn stmt(&self, stmt: &Stmt) -> Stmt {
+        match stmt {
+            Stmt::Eval(id) => Stmt::Eval(self.expr(*id)),
+            Stmt::Store(local, part, value) => {
+                Stmt::Store(self.local(*local), *part, self.expr(*value))
+            }
+            Stmt::If(cond, a, b) => Stmt::If(self.expr(*cond), self.block(a), self.block(b)),
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => Stmt::For {
+                local: self.local(*local),
+                low: self.expr(*low),
+                high: self.expr(*high),
+                body: self.block(body),
+            },
+            Stmt::While {
+                head,
+                test,
+                limit,
+                body,
+            } => Stmt::While {
+                head: self.block(head),
+                test: self.expr(*test),
+                limit: *limit,
+                body: self.block(body),
+            },
+            Stmt::Break => Stmt::Break,
+            Stmt::Continue => Stmt::Continue,
+        }
+    }
+}
+
+/// Variables that may be read before they are stored. They are zero at first, and must be so
+/// again each time when the callee now stands in a loop.
+fn unset(f: &Function) -> Vec<LocalId> {
+    let mut state = Unset {
+        f,
+        set: vec![false; f.locals.len()],
+        read: vec![false; f.locals.len()],
+    };
+    state.block(&f.body);
+    let ids = (0..f.locals.len() as u32).map(LocalId);
+    ids.filter(|l| state.read[l.index()]).collect()
+}
+
+struct Unset<'a> {
+    f: &'a Function,
+    set: Vec<bool>,
+    read: Vec<bool>,
+}
+
+impl Unset<'_> {
+    fn block(&mut self, block: &Block) {
+        for stmt in block {
+            self.stmt(stmt);
+        }
+    }
+
+    fn stmt(&mut self, stmt: &Stmt) {
+        match stmt {
+            Stmt::Eval(id) => {
+                if let ExprKind::Load(local) = self.f.expr(*id).kind {
+                    self.read[local.index()] |= !self.set[local.index()];
+                }
+            }
+            Stmt::Store(local, None, _) => self.set[local.index()] = true,
+            // The other components keep what they were.
+            Stmt::Store(local, Some(_), _) => {
+                self.read[local.index()] |= !self.set[local.index()];
+            }
+            Stmt::If(_, a, b) => {
+                let before = self.set.clone();
+                self.block(a);
+                let after = std::mem::replace(&mut self.set, before);
+                self.block(b);
+                for (b, a) in self.set.iter_mut().zip(after) {
+                    *b &= a;
+                }
+            }
+            Stmt::For { local, body, .. } => {
+                let before = self.set.clone();
+                self.set[local.index()] = true;
+                self.block(body);
+                self.set = before;
+            }
+            Stmt::While { head, body, .. } => {
+                self.block(head);
+                let before = self.set.clone();
+                self.block(body);
+                self.set = before;
+            }
+            Stmt::Break | Stmt::Continue => {}
+        }
+    }
+}
+
+/// The zero of a type, evaluated here.
+fn zero(w: &mut Rewriter<'_>, ty: Type, span: Span) -> ExprId {
+    match ty {
+        Type::Bool => w.constant(Const::Bool(false), span),
+        Type::Int => w.constant(Const::Int(0), span),
+        Type::Mat3 => {
+            let column = w.constant(Const::Float(vec![0.0; 3]), span);
+            w.create(ExprKind::Compose(vec![column; 3]), ty, span)
+        }
+        Type::Struct(id) => {
+            let types: Vec<Type> = w.module.structs[id.index()]
+                .fields
+                .iter()
+                .map(|(_, ty)| *ty)
+                .collect();
+            let fields = types.into_iter().map(|ty| zero(w, ty, span)).collect();
+            w.create(ExprKind::Make(id, fields), ty, span)
+        }
+        _ => w.constant(Const::Float(vec![0.0; ty.width().unwrap_or(1)]), span),
+    }
+}
+
+fn for_each_call(f: &Function, block: &Block, found: &mut impl FnMut(FunctionId)) {
+    for stmt in block {
+        match stmt {
+            Stmt::Eval(id) => {
+                if let ExprKind::Call(callee, _) = f.expr(*id).kind {
+                    found(callee);
+                }
+            }
+            Stmt::If(_, a, b) => {
+                for_each_call(f, a, found);
+                for_each_call(f, b, found);
+            }
+            Stmt::For { body, .. } => for_each_call(f, body, found),
+            Stmt::While { head, body, .. } => {
+                for_each_call(f, head, found);
+                for_each_call(f, body, found);
+            }
+            Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
+        }
+    }
+}
+
+/// Expressions that stand in a block.
+fn evaluations(block: &Block) -> u32 {
+    let each = block.iter().map(|stmt| match stmt {
+        Stmt::Eval(_) => 1,
+        Stmt::If(_, a, b) => evaluations(a) + evaluations(b),
+        Stmt::For { body, .. } => evaluations(body),
+        Stmt::While { head, body, .. } => evaluations(head) + evaluations(body),
+        Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
+    });
+    each.sum()
+}
+
+/// Blocks within blocks.
+fn nesting(block: &Block) -> usize {
+    let each = block.iter().map(|stmt| match stmt {
+        Stmt::If(_, a, b) => 1 + nesting(a).max(nesting(b)),
+        Stmt::For { body, .. } => 1 + nesting(body),
+        Stmt::While { head, body, .. } => 1 + nesting(head).max(nesting(body)),
+        Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
+    });
+    each.max().unwrap_or(0)
+}
