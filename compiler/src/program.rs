@@ -256,6 +256,7 @@ impl ProgramBuilder {
         let agreed = agreed(settings);
         passes::bake(&mut material.body, &agreed);
         passes::fold_body(&self.module, &mut material.body);
+        passes::prune(&self.module, &mut material);
         let lowered = match self.lower(&material) {
             Ok(lowered) => lowered,
             Err(problem) => return checker.diagnostics.push(problem),
