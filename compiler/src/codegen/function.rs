@@ -186,13 +186,17 @@ impl Printer<'_> {
             let Some(place) = layout.places.get(i as usize) else {
                 continue;
             };
-            let name = read.entry(i).or_insert_with(|| {
-                let name = unique(&mut self.taken, e.name.as_deref().unwrap_or("uniform"));
-                let text = uniform(row, *place, &type_name(self.program, place.ty));
-                let _ = writeln!(self.out, "    let {name} = {text};");
-                name
-            });
-            self.names[id.index()] = Some(name.clone());
+            let name = match read.get(&i) {
+                Some(name) => name.clone(),
+                None => {
+                    let name = unique(&mut self.taken, e.name.as_deref().unwrap_or("given"));
+                    let text = uniform(row, *place, &type_name(self.program, place.ty));
+                    self.line_of(id, 1, &format!("let {name} = {text};"));
+                    read.insert(i, name.clone());
+                    name
+                }
+            };
+            self.names[id.index()] = Some(name);
         }
     }
 
