@@ -171,10 +171,9 @@ fn request(name: &str, source: &str) -> Option<MaterialRequest> {
     });
     let material = directives.iter().find_map(|d| d.strip_prefix("material "));
     (!directives.is_empty()).then(|| MaterialRequest {
-        name: "probe".into(),
-        file: name.into(),
         material: material.map(|m| m.trim().to_owned()),
         params: params.collect(),
+        ..MaterialRequest::new("probe", name)
     })
 }
 
