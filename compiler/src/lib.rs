@@ -26,6 +26,7 @@ pub mod ast;
 pub mod closure;
 pub mod codegen;
 pub mod diag;
+pub mod inspect;
 mod interior;
 pub mod ir;
 pub mod lexer;

@@ -238,6 +238,11 @@ impl ProgramBuilder {
         })
     }
 
+    /// What lowered code uses of the library.
+    pub(crate) fn core(&self) -> closure::Core {
+        self.core
+    }
+
     /// Lowers a material, with the given settings as its instances.
     pub(crate) fn add(
         &mut self,

@@ -13,6 +13,7 @@ use impasto::compiler::source::SourceMap;
 mod check;
 mod completions;
 mod emit;
+mod eval;
 mod explain;
 mod info;
 mod interrupt;
@@ -61,6 +62,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Print what the compiler makes of a material file
     Emit(emit::EmitArgs),
+    /// Evaluate a material, closure or function at one point
+    Eval(eval::EvalArgs),
     /// Render a scene
     Render(Box<render::RenderArgs>),
     /// Show the GPU that would be rendered on, and its limits
@@ -96,6 +99,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
+        Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),

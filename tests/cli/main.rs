@@ -3,4 +3,5 @@
 
 mod common;
 mod emit_check;
+mod eval;
 mod render;

@@ -16,11 +16,13 @@ use crate::ir::{
 mod emission;
 mod evaluate;
 mod opacity;
+mod probe;
 mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
 pub use opacity::cut_out;
+pub use probe::{Probe, ProbedLobe, probe};
 
 /// Most lobes of a material.
 pub const MAX_LOBES: usize = 64;

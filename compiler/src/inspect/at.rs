@@ -1,0 +1,265 @@
+//! The point and directions at which something is evaluated, and how they are written:
+//! `position=(0.1, 0, 2), wo=(0, 0, 1), u=(0.5, 0.5, 0.5, 0.5)`.
+
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use crate::diag::nearest;
+
+/// Where and from where something is evaluated. Directions are unit vectors in world space.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct At {
+    /// Metres.
+    pub position: [f64; 3],
+    /// Shading normal.
+    pub normal: [f64; 3],
+    /// Normal of the geometry.
+    pub geometric_normal: [f64; 3],
+    /// Direction in which u grows; zero if there is none.
+    pub tangent: [f64; 3],
+    /// Texture coordinates.
+    pub uv: [f64; 2],
+    /// Index of refraction of the medium outside.
+    pub exterior_ior: f64,
+    /// Toward the viewer.
+    pub wo: [f64; 3],
+    /// Toward the light.
+    pub wi: [f64; 3],
+    /// The numbers that choose a lobe and a direction, each in [0, 1).
+    pub u: [f64; 4],
+}
+
+impl Default for At {
+    fn default() -> Self {
+        Self {
+            position: [0.1, 0.2, 0.3],
+            normal: [0.0, 0.0, 1.0],
+            geometric_normal: [0.0, 0.0, 1.0],
+            tangent: [1.0, 0.0, 0.0],
+            uv: [0.25, 0.75],
+            exterior_ior: 1.0,
+            wo: [0.6, 0.0, 0.8],
+            wi: [-0.48, 0.36, 0.8],
+            u: [0.5; 4],
+        }
+    }
+}
+
+/// The keys in the order they are shown, each with how many numbers it takes.
+const KEYS: [(&str, usize); 9] = [
+    ("position", 3),
+    ("normal", 3),
+    ("geometric_normal", 3),
+    ("tangent", 3),
+    ("uv", 2),
+    ("exterior_ior", 1),
+    ("wo", 3),
+    ("wi", 3),
+    ("u", 4),
+];
+
+impl At {
+    /// Every key with its numbers.
+    pub fn entries(&self) -> [(&'static str, &[f64]); 9] {
+        let numbers: [&[f64]; 9] = [
+            &self.position,
+            &self.normal,
+            &self.geometric_normal,
+            &self.tangent,
+            &self.uv,
+            std::slice::from_ref(&self.exterior_ior),
+            &self.wo,
+            &self.wi,
+            &self.u,
+        ];
+        std::array::from_fn(|i| (KEYS[i].0, numbers[i]))
+    }
+
+    /// The numbers of `key`, if it is one.
+    pub fn get(&self, key: &str) -> Option<&[f64]> {
+        let mut entries = self.entries().into_iter();
+        entries.find(|(k, _)| *k == key).map(|(_, numbers)| numbers)
+    }
+
+    fn numbers(&mut self, key: &str) -> Option<&mut [f64]> {
+        Some(match key {
+            "position" => &mut self.position,
+            "normal" => &mut self.normal,
+            "geometric_normal" => &mut self.geometric_normal,
+            "tangent" => &mut self.tangent,
+            "uv" => &mut self.uv,
+            "exterior_ior" => std::slice::from_mut(&mut self.exterior_ior),
+            "wo" => &mut self.wo,
+            "wi" => &mut self.wi,
+            "u" => &mut self.u,
+            _ => return None,
+        })
+    }
+
+    fn set(&mut self, key: &str, mut values: Vec<f64>) -> Result<(), String> {
+        let Some(numbers) = self.numbers(key) else {
+            return Err(unknown(key));
+        };
+        if numbers.len() != values.len() {
+            let (wanted, given) = (numbers.len(), values.len());
+            return Err(format!(
+                "`{key}` takes {}, not {given}",
+                if wanted == 1 {
+                    "1 number".into()
+                } else {
+                    format!("{wanted} numbers")
+                }
+            ));
+        }
+        check(key, &mut values)?;
+        numbers.copy_from_slice(&values);
+        Ok(())
+    }
+}
+
+fn unknown(key: &str) -> String {
+    let names = KEYS.map(|(name, _)| name);
+    match nearest(key, names) {
+        Some(near) => format!("unknown key `{key}`; did you mean `{near}`?"),
+        None => format!("unknown key `{key}`; the keys are {}", names.join(", ")),
+    }
+}
+
+/// Checks the values of `key`, and makes directions unit vectors.
+fn check(key: &str, values: &mut [f64]) -> Result<(), String> {
+    // Single precision must be able to hold them.
+    if !values.iter().all(|x| (*x as f32).is_finite()) {
+        return Err(format!("`{key}` must be finite"));
+    }
+    match key {
+        "u" if !values.iter().all(|x| (0.0..1.0).contains(x)) => {
+            Err("the numbers of `u` lie in [0, 1)".into())
+        }
+        "exterior_ior" if values.iter().all(|x| *x > 0.0) => Ok(()),
+        "exterior_ior" => Err("`exterior_ior` must be above 0; air has 1".into()),
+        "position" | "uv" | "u" => Ok(()),
+        _ => {
+            let longest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            if longest > 0.0 {
+                // Scaled first, so that squares neither overflow nor vanish.
+                values.iter_mut().for_each(|x| *x /= longest);
+                let length = values.iter().map(|x| x * x).sum::<f64>().sqrt();
+                values.iter_mut().for_each(|x| *x /= length);
+                Ok(())
+            } else if key == "tangent" {
+                Ok(())
+            } else {
+                Err(format!("`{key}` is a direction and cannot be zero"))
+            }
+        }
+    }
+}
+
+impl FromStr for At {
+    type Err = String;
+
+    /// Reads `key=(x, y, ..), key=x`; what is not given keeps its default, and the normal of the
+    /// geometry is the normal if only that is given.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut at = Self::default();
+        let mut seen: Vec<&str> = Vec::new();
+        let mut rest = text.trim();
+        while !rest.is_empty() {
+            let (key, values, after) = entry(rest)?;
+            if seen.contains(&key) {
+                return Err(format!("`{key}` is given twice"));
+            }
+            at.set(key, values)?;
+            seen.push(key);
+            rest = after;
+        }
+        if seen.contains(&"normal") && !seen.contains(&"geometric_normal") {
+            at.geometric_normal = at.normal;
+        }
+        Ok(at)
+    }
+}
+
+/// The first entry: key, numbers, and what follows its comma.
+fn entry(text: &str) -> Result<(&str, Vec<f64>, &str), String> {
+    let form = "write `key=(x, y, z)`, separated by commas";
+    let (key, after) = text
+        .split_once('=')
+        .ok_or_else(|| format!("`{text}` has no `=`; {form}"))?;
+    let (key, after) = (key.trim(), after.trim_start());
+    let (numbers, rest) = match after.strip_prefix('(') {
+        Some(inner) => inner
+            .split_once(')')
+            .ok_or_else(|| format!("the `(` of `{key}` is not closed; {form}"))?,
+        None => after.split_at(after.find(',').unwrap_or(after.len())),
+    };
+    let rest = rest.trim_start();
+    let rest = match rest.strip_prefix(',') {
+        Some(more) => more.trim_start(),
+        None if rest.is_empty() => rest,
+        None => return Err(format!("a comma is missing before `{rest}`; {form}")),
+    };
+    let number = |part: &str| {
+        let part = part.trim();
+        part.parse::<f64>()
+            .map_err(|_| format!("`{part}` in `{key}` is not a number; {form}"))
+    };
+    let values: Result<Vec<f64>, String> = numbers.split(',').map(number).collect();
+    Ok((key, values?, rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_read_and_directions_made_unit() {
+        let at: At = "position=(1, -2,3e-1), wo = (0,3,4),exterior_ior=1.33, normal=(0,2,0)"
+            .parse()
+            .expect("fine");
+        assert_eq!(at.position, [1.0, -2.0, 0.3]);
+        assert_eq!(at.wo, [0.0, 0.6, 0.8]);
+        assert_eq!(at.exterior_ior, 1.33);
+        assert_eq!(
+            (at.normal, at.geometric_normal),
+            ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])
+        );
+        assert_eq!(at.uv, At::default().uv);
+        assert_eq!("".parse(), Ok(At::default()));
+        let tiny: At = "wi=(0,1e-30,0), tangent=(0,0,0)".parse().expect("fine");
+        assert_eq!((tiny.wi, tiny.tangent), ([0.0, 1.0, 0.0], [0.0; 3]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        for (text, said) in [
+            ("positon=(0,0,0)", "did you mean `position`"),
+            ("light=(0,0,1)", "the keys are position, normal"),
+            ("wo=(0,0)", "`wo` takes 3 numbers, not 2"),
+            ("exterior_ior=(1,2)", "takes 1 number, not 2"),
+            ("wo=(0,0,0)", "cannot be zero"),
+            ("uv=(nan,0)", "must be finite"),
+            ("position=(1e39,0,0)", "must be finite"),
+            ("u=(0,0,0,1)", "[0, 1)"),
+            ("exterior_ior=0", "above 0"),
+            ("wo=(0,0,x)", "`x` in `wo` is not a number"),
+            ("wo=(0,0,1", "not closed"),
+            ("wo", "has no `=`"),
+            ("wo=(0,0,1) wi=(0,0,1)", "a comma is missing"),
+            ("uv=(0,0), uv=(1,1)", "`uv` is given twice"),
+        ] {
+            let error = text.parse::<At>().expect_err(text);
+            assert!(error.contains(said), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn every_key_is_shown_and_set() {
+        let mut at = At::default();
+        for (key, width) in KEYS {
+            assert_eq!(at.get(key).map(<[f64]>::len), Some(width), "{key}");
+            assert_eq!(at.numbers(key).map(|n| n.len()), Some(width), "{key}");
+        }
+    }
+}
