@@ -10,12 +10,12 @@ use crate::stub::{gpu, mean};
 const CLEAR: [f32; 3] = [0.0; 3];
 
 /// A layer between two boundaries: thickness, absorption and index.
-type Layer = (f64, [f32; 3], f64);
+pub type Layer = (f64, [f32; 3], f64);
 
 /// What a stack of layers in air lets pass and reflects at right angles, in each channel: layers
 /// and boundaries are added one after the other, with all reflections between what lies before
 /// and behind (Stokes 1862).
-fn stack(layers: &[Layer], channel: usize) -> [f64; 2] {
+pub fn stack(layers: &[Layer], channel: usize) -> [f64; 2] {
     // Passes either way, reflects from the front, reflects from the back.
     let (mut t, mut front, mut back) = (1.0, 0.0, 0.0);
     let mut add = |pass: f64, reflect: f64| {
@@ -37,7 +37,7 @@ fn stack(layers: &[Layer], channel: usize) -> [f64; 2] {
 }
 
 #[track_caller]
-fn assert_channel(rendering: &Rendering, channel: usize, expected: f64) {
+pub fn assert_channel(rendering: &Rendering, channel: usize, expected: f64) {
     let values = rendering.film.pixels.iter();
     let (mean, error) = mean(values.map(|p| f64::from(p[channel])));
     assert!(

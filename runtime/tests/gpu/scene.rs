@@ -4,11 +4,14 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use impasto_compiler::abi::InstanceInfo;
 use impasto_compiler::partition::{Form, Strategy};
 use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile};
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{self, Scene};
+use impasto_runtime::world::World;
 
+use crate::media::{Layer, assert_channel, stack};
 use crate::stub::{assert_mean, gpu, mean, red, samples};
 
 /// A cube from -1 to 1 whose faces look inwards.
@@ -33,6 +36,13 @@ material glowing { surface = diffuse(0.7); emission = uniform(color(1)); }
 material dull { surface = diffuse(0.6); }
 material glass { surface = smooth_dielectric(ior: 1.5); }
 material silver { surface = mirror(); }
+material liquid {
+    param absorption: color = 0.0;
+    param ior: float = 1.5;
+    param priority: int = 0;
+    surface = smooth_dielectric(ior: ior / exterior_ior);
+    interior = medium(absorption: absorption, ior: ior, priority: priority);
+}
 ";
 
 struct Folder<'a>(&'a Path);
@@ -146,6 +156,110 @@ fn glass_under_an_even_sky_is_invisible() {
     assert!(extended.is_some_and(|k| k.items > rendering.report.paths / 4));
     let (mean, _) = mean(red(&rendering));
     assert!((mean - 2.0).abs() < 0.02, "{mean}");
+}
+
+/// A row of blocks of `liquid` under an even sky of 2, seen from `z` along -z at right angles.
+fn blocks(z: f32, medium: &str, each: &[(f32, &str)]) -> (Scene, Program) {
+    let mut toml = format!(
+        "film = {{ width = 16, height = 16 }}\n\
+         integrator = {{ max_depth = 64, roulette_start = 1000 }}\n\
+         environment = {{ color = 2 }}\n\
+         camera = {{ position = [0.05, 0.11, {z:?}], look_at = [0.05, 0.11, -9], fov = 0.01 {medium} }}\n"
+    );
+    for (i, (z, params)) in each.iter().enumerate() {
+        toml += &format!(
+            "[materials.b{i}]\nfile = 'm.impasto'\nmaterial = 'liquid'\nparams = {{ {params} }}\n\
+             [[geometry]]\nobj = 'block.obj'\ntranslate = [0, 0, {z:?}]\nmaterial = 'b{i}'\n"
+        );
+    }
+    load(&toml)
+}
+
+/// Light that passes layers and light they reflect is all there is to see, less what they absorb.
+fn assert_layers(rendering: &Rendering, layers: &[Layer]) {
+    for channel in 0..3 {
+        let [passed, reflected] = stack(layers, channel);
+        assert_channel(rendering, channel, 2.0 * (passed + reflected));
+    }
+}
+
+/// Two instances of one material, each with an interior of its own.
+#[test]
+fn instances_absorb_each_by_its_own_interior() {
+    let [red, blue] = [[0.1, 1.0, 2.0], [2.0, 0.5, 0.1]];
+    let (scene, program) = blocks(
+        3.0,
+        "",
+        &[
+            (0.0, "absorption = [0.1, 1.0, 2.0]"),
+            (-2.0, "absorption = [2.0, 0.5, 0.1], ior = 1.25"),
+        ],
+    );
+    assert_eq!(program.infos().len(), 1);
+    let layers = [(0.8, red, 1.5), (1.2, [0.0; 3], 1.0), (0.8, blue, 1.25)];
+    for strategy in ["wavefront", "shared", "inline", "mega"] {
+        let rendering = render(&scene, &program, strategy, &samples(64));
+        assert_eq!(
+            (
+                rendering.report.material_count,
+                rendering.report.instance_count
+            ),
+            (1, 2)
+        );
+        assert_layers(&rendering, &layers);
+    }
+}
+
+/// Blocks at -0.4..0.4 and at 0..0.8: what they share is the one's or the other's.
+#[test]
+fn compiled_interiors_nest_by_priority() {
+    for (first, second, layers) in [
+        (
+            1,
+            2,
+            [(0.8, [0.0, 1.0, 0.0], 1.33), (0.4, [1.0, 0.0, 0.0], 1.5)],
+        ),
+        (
+            2,
+            1,
+            [(0.4, [0.0, 1.0, 0.0], 1.33), (0.8, [1.0, 0.0, 0.0], 1.5)],
+        ),
+    ] {
+        let near = format!("absorption = [0, 1, 0], ior = 1.33, priority = {second}");
+        let far = format!("absorption = [1, 0, 0], priority = {first}");
+        let (scene, program) = blocks(3.0, "", &[(0.0, &far), (0.4, &near)]);
+        let rendering = render(&scene, &program, "wavefront", &samples(64));
+        assert_layers(&rendering, &layers);
+    }
+}
+
+#[test]
+fn a_camera_in_a_block_sees_through_what_is_left_of_it() {
+    let params = "absorption = [0.5, 1.0, 2.0]";
+    let (scene, program) = blocks(0.0, ", medium = 'b0'", &[(0.0, params)]);
+    assert_eq!(scene.camera_media, [0]);
+    let rendering = render(&scene, &program, "wavefront", &samples(64));
+    for (channel, a) in [0.5, 1.0, 2.0].into_iter().enumerate() {
+        // Out at the first face, or after so many turns between the two.
+        let (r, way) = (0.04, f64::exp(-0.4 * a));
+        let expected = 2.0 * (1.0 - r) * way / (1.0 - r * way * way);
+        // What comes in is squeezed into a narrower cone, so that radiance is higher inside.
+        assert_channel(&rendering, channel, expected * 1.5 * 1.5);
+    }
+    let (scene, program) = blocks(0.0, ", medium = 'b0'", &[(0.0, "")]);
+    let mut dull = scene.clone();
+    dull.materials[0].material = Some("dull".into());
+    let instances: Vec<_> = program.instances().iter().map(|i| i.info.clone()).collect();
+    let none = instances.iter().map(|i| InstanceInfo {
+        medium: None,
+        ..i.clone()
+    });
+    let error = World::new(&dull, &program.infos(), &none.collect::<Vec<_>>(), &[]);
+    let error = error.expect_err("there is nothing to be in").to_string();
+    assert!(
+        error.contains("`b0`") && error.contains("interior"),
+        "{error}"
+    );
 }
 
 /// A lamp, walls, and a block of glass or metal: every organisation gives the same picture.

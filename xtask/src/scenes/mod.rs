@@ -10,6 +10,7 @@ mod check;
 mod city;
 mod conference;
 mod cornell;
+mod glasses;
 mod image_file;
 mod mesh;
 mod obj;
@@ -18,6 +19,7 @@ mod preview;
 mod random;
 mod shapes;
 mod sky;
+mod swatches;
 #[cfg(test)]
 mod tests;
 mod textures;
@@ -32,7 +34,8 @@ use obj::MtlEntry;
 /// Arguments of `cargo xtask scenes`.
 #[derive(clap::Args, Debug)]
 pub(crate) struct ScenesArgs {
-    /// What to generate: cornell, carpaint, city, conference, materials_preview, textures
+    /// What to generate: cornell, carpaint, city, conference, glasses, materials_preview,
+    /// swatches, textures
     /// [default: all of them]
     names: Vec<String>,
     /// Folder that takes the place of the repository's root
@@ -52,7 +55,7 @@ struct Recipe {
     generate: fn() -> Result<Vec<GeneratedFile>, String>,
 }
 
-const RECIPES: [Recipe; 6] = [
+const RECIPES: [Recipe; 8] = [
     Recipe {
         name: "cornell",
         generate: || {
@@ -79,11 +82,22 @@ const RECIPES: [Recipe; 6] = [
         },
     },
     Recipe {
+        name: "glasses",
+        generate: || {
+            let folder = "examples/glasses/generated";
+            Ok(model_files(folder, "glasses", &glasses::build()))
+        },
+    },
+    Recipe {
         name: "materials_preview",
         generate: || {
             let folder = "examples/materials_preview";
             Ok(model_files(folder, "preview", &preview::build()))
         },
+    },
+    Recipe {
+        name: "swatches",
+        generate: || Ok(swatches_files()),
     },
     Recipe {
         name: "textures",
@@ -160,6 +174,17 @@ fn carpaint_files() -> Result<Vec<GeneratedFile>, String> {
         bytes: sky::studio()?,
     });
     Ok(files)
+}
+
+fn swatches_files() -> Vec<GeneratedFile> {
+    let folder = "examples/swatches";
+    let mut files = model_files(folder, "ball", &swatches::ball());
+    files.extend(model_files(folder, "stage", &swatches::stage()));
+    files.push(GeneratedFile {
+        path: format!("{folder}/scene.toml"),
+        bytes: swatches::scene(swatches::BALLS),
+    });
+    files
 }
 
 fn city_files() -> Result<Vec<GeneratedFile>, String> {

@@ -47,7 +47,7 @@ pub(crate) fn build() -> Model {
 }
 
 /// A floor that bends up into a wall far behind, without an edge.
-fn sweep() -> super::mesh::Surface {
+pub(crate) fn sweep() -> super::mesh::Surface {
     const BEND: f64 = 0.5;
     grid(1, 24, Topology::Sheet, |u, v| {
         let along = v * 3.0 - 1.2;

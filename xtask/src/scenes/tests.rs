@@ -7,13 +7,16 @@ use std::sync::LazyLock;
 use super::check::{defects, is_closed, pieces, signed_volume};
 use super::*;
 
-static MODELS: LazyLock<[(&str, Model); 5]> = LazyLock::new(|| {
+static MODELS: LazyLock<[(&str, Model); 8]> = LazyLock::new(|| {
     [
         ("cornell", cornell::build()),
         ("carpaint", carpaint::build()),
         ("city", city::build()),
         ("conference", conference::build()),
+        ("glasses", glasses::build()),
         ("materials_preview", preview::build()),
+        ("swatches", swatches::ball()),
+        ("swatches' stage", swatches::stage()),
     ]
 });
 
@@ -56,7 +59,9 @@ fn things_that_need_an_inside_are_closed_and_face_outward() {
         ("carpaint", &["car_paint"]),
         ("city", &["rubber", "lamp", "paint_white"]),
         ("conference", &["glass", "chair", "chrome", "ceramic"]),
+        ("glasses", &["glass", "amber", "mint", "ice", "ruby"]),
         ("materials_preview", &["sample", "foot"]),
+        ("swatches", &["ball"]),
     ];
     for (name, materials) in closed {
         let mesh = &model(name).mesh;
@@ -96,7 +101,9 @@ fn files_are_the_same_bytes_everywhere() {
         ("carpaint", 0x23de_92b5_453e_c6ff),
         ("city", 0x1892_751e_7868_db51),
         ("conference", 0x6b60_06a3_a190_d63e),
+        ("glasses", 0xe15b_2cd8_f4c2_4a97),
         ("materials_preview", 0x71ca_6aa9_bf62_72ff),
+        ("swatches", 0xc4b6_a67a_64f1_22dd),
         ("textures", 0x0cdf_4d4d_b6dd_e235),
     ];
     assert_eq!(digests, expected, "{digests:#x?}");
@@ -128,7 +135,7 @@ impl std::hash::Hasher for Fnv {
 
 #[test]
 fn committed_files_are_what_the_generator_writes() {
-    for name in ["cornell", "materials_preview", "textures"] {
+    for name in ["cornell", "materials_preview", "swatches", "textures"] {
         let recipe = RECIPES.iter().find(|recipe| recipe.name == name);
         for file in (recipe.expect("known").generate)().expect("generates") {
             let on_disk = std::fs::read(shell::root().join(&file.path)).unwrap_or_default();
