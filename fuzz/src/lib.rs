@@ -1,0 +1,94 @@
+//! Feeds the compiler input that is not what it should be: sources and textual IR, made from good
+//! ones by mutation. No input may make it panic, take long or take much memory.
+//!
+//! `cargo run -p impasto-fuzz --bin source -- --seconds 60` (or `--bin ir`) searches; what it finds
+//! goes to `compiler/tests/regressions/`, where a test keeps it found. `compiler/tests/bad_input.rs`
+//! runs the same targets on random input in every test run.
+
+use std::time::{Duration, Instant};
+
+pub mod corpus;
+pub mod mutate;
+pub mod search;
+pub mod target;
+
+pub use mutate::Random;
+pub use target::{Target, ir, source};
+
+/// Longest input that the limits below are stated for, in bytes.
+pub const MAX_INPUT: usize = 64 * 1024;
+
+/// Longest time that such an input may take in an optimised build.
+pub const MAX_TIME: Duration = Duration::from_secs(1);
+
+/// Most memory that the process may have come to hold after such an input, in bytes.
+pub const MAX_MEMORY: u64 = 256 << 20;
+
+/// Stack of the thread that runs a target: what threads of the standard library have.
+const STACK: usize = 2 << 20;
+
+/// What went wrong with an input.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// It panicked, with these words.
+    Panic(String),
+    /// It took this long.
+    Slow(Duration),
+    /// The process came to hold so many bytes.
+    Memory(u64),
+}
+
+/// Runs a target on an input, in a thread of its own.
+///
+/// # Errors
+/// What went wrong. An exhausted stack ends the process instead.
+pub fn run(target: Target, input: &[u8]) -> Result<(), Failure> {
+    reset_peak();
+    let first = timed(target, input)?;
+    let memory = peak();
+    if memory > MAX_MEMORY {
+        return Err(Failure::Memory(memory));
+    }
+    // A busy machine is not a slow compiler: what is slow must be so again.
+    if first > MAX_TIME {
+        let again = timed(target, input)?.min(timed(target, input)?);
+        if again > MAX_TIME {
+            return Err(Failure::Slow(again));
+        }
+    }
+    Ok(())
+}
+
+/// How long a target takes.
+fn timed(target: Target, input: &[u8]) -> Result<Duration, Failure> {
+    let start = Instant::now();
+    let input = input.to_vec();
+    let thread = std::thread::Builder::new()
+        .stack_size(STACK)
+        .spawn(move || target(&input));
+    match thread.map(std::thread::JoinHandle::join) {
+        Ok(Ok(())) => Ok(start.elapsed()),
+        Ok(Err(panic)) => Err(Failure::Panic(words(&*panic))),
+        Err(e) => Err(Failure::Panic(format!("no thread: {e}"))),
+    }
+}
+
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("no words").to_owned()
+}
+
+/// Forgets how much memory the process has held, where the system can (Linux).
+fn reset_peak() {
+    // Without it the peak is that of all inputs so far, which is a limit as well.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// The most memory that the process has held, in bytes; 0 where the system does not say.
+fn peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|l| l.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+    kib.unwrap_or(0) << 10
+}

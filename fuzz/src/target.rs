@@ -1,0 +1,122 @@
+//! What is run on an input: the compiler from end to end, and the IR's text with all passes.
+
+use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::parse::parse;
+use impasto_compiler::ir::value::Value;
+use impasto_compiler::ir::{Const, ExprKind, Function, Module, Type, print, verify};
+use impasto_compiler::passes;
+use impasto_compiler::source::FileId;
+use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile, diag};
+
+/// Takes any bytes; panics if they show a fault.
+pub type Target = fn(&[u8]);
+
+/// Expressions that the interpreter may evaluate for a function.
+const FUEL: u64 = 1 << 16;
+
+/// Compiles a source, as `impasto check` and as a scene do, renders its diagnostics, and runs what
+/// came out.
+pub fn source(input: &[u8]) {
+    let mut files = MemoryLoader::default();
+    files.add("m.impasto", input);
+    let checked = check("m.impasto", &mut files);
+    let text = diag::render::text(&checked.sources, &checked.diagnostics, false);
+    let failed = diag::has_errors(&checked.diagnostics);
+    assert!(!failed || !text.is_empty(), "an error without words");
+    let internal = checked
+        .diagnostics
+        .iter()
+        .find(|d| d.code.id().starts_with("E09"));
+    assert!(internal.is_none(), "{text}");
+    if failed {
+        return;
+    }
+    let Some(name) = checked.materials.first() else {
+        return;
+    };
+    let request = MaterialRequest {
+        material: Some(name.clone()),
+        ..MaterialRequest::new("m", "m.impasto")
+    };
+    let compiled = compile(&[request], &mut files);
+    let Some(program) = compiled.program else {
+        return;
+    };
+    for m in program.compiled() {
+        execute(program.ir(), &m.evaluate, &[]);
+    }
+}
+
+/// Reads IR, prints it, runs the passes and what they made of it.
+pub fn ir(input: &[u8]) {
+    let text = String::from_utf8_lossy(input);
+    let Ok(parsed) = parse(FileId(0), &text) else {
+        return;
+    };
+    let printed = print::module(&parsed.module, &parsed.materials);
+    match parse(FileId(0), &printed) {
+        Ok(again) => {
+            let again = print::module(&again.module, &again.materials);
+            assert!(
+                again == printed,
+                "the text changes when it is read and printed again"
+            );
+        }
+        Err(e) => panic!("what was printed cannot be read: {e}"),
+    }
+    let mut module = parsed.module;
+    for i in 0..module.functions.len() {
+        let mut f = module.functions[i].clone();
+        let uniforms = uniforms(&f);
+        execute(&module, &f, &uniforms);
+        passes::run(&module, &mut f);
+        execute(&module, &f, &uniforms);
+        module.functions[i] = f.clone();
+        let hoisted = passes::hoist(&module, &mut f);
+        well_formed(verify::function(&module, &f));
+        well_formed(verify::function(&module, &hoisted.prelude));
+        if let Ok(values) = hoisted.evaluate(&module, &uniforms) {
+            execute(&module, &f, &values);
+        }
+    }
+    for mut m in parsed.materials {
+        passes::fold_body(&module, &mut m.body);
+        passes::prune(&module, &mut m);
+        well_formed(verify::material(&module, &m));
+    }
+}
+
+fn well_formed(result: Result<(), verify::Problem>) {
+    if let Err(problem) = result {
+        panic!("{problem}");
+    }
+}
+
+/// Runs a function on zeros.
+fn execute(module: &Module, f: &Function, uniforms: &[Const]) {
+    let params = f.params.iter();
+    let args = params.map(|p| Value::zero(p.ty, &module.structs)).collect();
+    let mut run = Interpreter::<f64>::new(module, FUEL).with_uniforms(uniforms);
+    let _ = run.run(f, args);
+}
+
+/// Zeros for the uniforms that a function mentions, unless there are very many.
+fn uniforms(f: &Function) -> Vec<Const> {
+    let mut out: Vec<Const> = Vec::new();
+    for e in &f.exprs {
+        if let ExprKind::Uniform(i) = e.kind {
+            let i = i as usize;
+            out.resize(out.len().max(i + 1), Const::Bool(false));
+            out[i] = zero(e.ty);
+        }
+    }
+    out
+}
+
+fn zero(ty: Type) -> Const {
+    match ty {
+        Type::Bool => Const::Bool(false),
+        Type::Int => Const::Int(0),
+        _ => Const::Float(vec![0.0; ty.width().unwrap_or(1)]),
+    }
+}
