@@ -14,6 +14,9 @@ use super::{Checked, Checker};
 /// Expressions that evaluating one constant may take.
 const FUEL: u64 = 1 << 20;
 
+/// Expressions that evaluating all constants of a compilation may take.
+const FUEL_IN_ALL: u64 = 1 << 22;
+
 impl Checker<'_> {
     /// The value of a constant expression as a `ty`; `what` names it in messages.
     pub fn constant(
@@ -32,10 +35,11 @@ impl Checker<'_> {
         let value = match function.constant(id) {
             Some(value) => Some(value.clone()),
             None => {
-                let mut run = Interpreter::<f64>::new(&self.ir, FUEL);
-                run.run(&function, Vec::new())
-                    .ok()
-                    .and_then(|v| v.to_const())
+                let fuel = FUEL.min(FUEL_IN_ALL.saturating_sub(self.evaluated));
+                let mut run = Interpreter::<f64>::new(&self.ir, fuel);
+                let value = run.run(&function, Vec::new());
+                self.evaluated += run.executed();
+                value.ok().and_then(|v| v.to_const())
             }
         };
         match value {

@@ -194,8 +194,12 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Counts an expression or statement of a called function; `None` when there are too many.
+    /// Counts an expression or statement of a called function; `None` when there are too many, or
+    /// too much is wrong already.
     pub fn step(&mut self, span: Span) -> Option<()> {
+        if self.cx.has_enough_errors() {
+            return None;
+        }
         if self.expansion.depth == 0 {
             return Some(());
         }

@@ -59,7 +59,14 @@ pub struct Checker<'a> {
     closure_params: Vec<Vec<Param>>,
     /// Expressions and statements that calls of closure functions were replaced by.
     expanded: u64,
+    /// Errors reported.
+    errors: usize,
+    /// Expressions that evaluating constants took.
+    evaluated: u64,
 }
+
+/// Errors of checking that are reported; what is as wrong as that is not looked at further.
+const MAX_ERRORS: usize = 64;
 
 /// How far an item is checked.
 #[derive(Clone, Debug)]
@@ -107,6 +114,8 @@ impl<'a> Checker<'a> {
             fields: Vec::new(),
             closure_params: Vec::new(),
             expanded: 0,
+            errors: 0,
+            evaluated: 0,
         };
         checker.add_std_sources();
         checker.load_core();
@@ -126,6 +135,9 @@ impl<'a> Checker<'a> {
     /// Checks every definition of a file but its materials, used or not.
     pub fn check_items(&mut self, module: ModuleId) {
         for index in 0..self.ast(module).items.len() {
+            if self.has_enough_errors() {
+                return;
+            }
             self.demand(ItemRef { module, index }, None);
         }
     }
@@ -164,8 +176,22 @@ impl<'a> Checker<'a> {
     }
 
     /// Notes a problem.
-    fn report(&mut self, diagnostic: Diagnostic) {
+    fn report(&mut self, mut diagnostic: Diagnostic) {
+        self.errors += usize::from(diagnostic.is_error());
+        if self.has_enough_errors() {
+            if !diagnostic.is_error() || self.errors > MAX_ERRORS {
+                return;
+            }
+            let more = "this is the last error that is shown; there may be more";
+            let hint = diagnostic.hint.map_or(String::new(), |h| h + "; ");
+            diagnostic.hint = Some(hint + more);
+        }
         self.diagnostics.push(diagnostic);
+    }
+
+    /// Is so much wrong that checking ends?
+    fn has_enough_errors(&self) -> bool {
+        self.errors >= MAX_ERRORS
     }
 
     /// Checks an item if that has not happened; `None` if it does not check or is a material.

@@ -127,6 +127,9 @@ impl Checker<'_> {
             .insert(path.to_owned(), Loading::InProgress(id));
         self.define_items(id, &ast);
         for import in &ast.uses {
+            if self.has_enough_errors() {
+                break;
+            }
             self.import(id, import);
         }
         self.loading.insert(path.to_owned(), Loading::Done(id));

@@ -10,8 +10,14 @@ use crate::lowered::{checked, evaluate};
 use crate::meaning::{Numbers, near};
 
 /// Surfaces, with the number of lobes that are left of each. `t` and `c` are parameters.
-const SURFACES: [(&str, usize); 7] = [
+const SURFACES: [(&str, usize); 10] = [
     ("layer(0.0 * shiny, mix(diffuse(c), diffuse(0.2), 0.0))", 1),
+    ("mix(diffuse(color(0.0)), shiny, t)", 1),
+    ("mix(shiny, diffuse(color(0.0)), t)", 1),
+    (
+        "layer(shiny, if t < 0.5 { diffuse(c) } else { diffuse(color(0.0)) })",
+        2,
+    ),
     ("layer(mix(shiny, 0.0 * diffuse(c), t), diffuse(c))", 2),
     (
         "layer(shiny, if t < 0.5 { 0.0 * shiny } else { diffuse(c) })",

@@ -8,6 +8,9 @@ use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Local, LocalId, 
 use crate::ops::Op;
 use crate::source::Span;
 
+/// Uniforms are numbered below this.
+const MAX_UNIFORMS: u32 = 1 << 16;
+
 /// A body while it is read.
 pub(super) struct Body<'p> {
     pub(super) p: &'p mut Parser,
@@ -83,6 +86,10 @@ impl<'p> Body<'p> {
     }
 
     pub(super) fn declare_uniform(&mut self, at: Span, index: u32, ty: Type) -> Result<()> {
+        if index >= MAX_UNIFORMS {
+            let far = Wrong::new(at, "the number of the uniform is too large");
+            return Err(far.expected(format!("a number below {MAX_UNIFORMS}")));
+        }
         match self.uniforms.insert(index, ty) {
             None => Ok(()),
             Some(_) => Err(Wrong::new(at, format!("`${index}` is declared twice"))),
