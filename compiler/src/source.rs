@@ -148,6 +148,7 @@ impl SourceMap {
 
     /// `name:line` of a span, as written in WGSL comments.
     pub fn file_line(&self, span: Span) -> String {
-        format!("{}:{}", self.file(span.file).name, self.line_column(span).0)
+        let file = self.file(span.file);
+        format!("{}:{}", file.name, file.line_index(span.start as usize) + 1)
     }
 }

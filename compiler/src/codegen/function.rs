@@ -14,6 +14,7 @@ use crate::abi::PARAMETERS;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
 use crate::ops::{Op, Shape, Wgsl};
 use crate::parameters::{Layout, Place};
+use crate::source::Span;
 
 /// Operations that may stand in one expression before it gets a name.
 const MAX_INLINE: u32 = 7;
@@ -87,6 +88,7 @@ pub fn print(
         inline: Inliner::decide(f),
         taken,
         next: 0,
+        origin: (f.span, program.origin(f.span)),
     };
     printer.function(name, &counters, row.as_deref().zip(layout));
 }
@@ -136,6 +138,8 @@ struct Printer<'a> {
     inline: Vec<bool>,
     taken: BTreeMap<String, u32>,
     next: u32,
+    /// Where the last line came from: the next often comes from there too.
+    origin: (Span, String),
 }
 
 impl Printer<'_> {
@@ -205,13 +209,18 @@ impl Printer<'_> {
     }
 
     fn line(&mut self, depth: usize, text: &str) {
-        let _ = writeln!(self.out, "{}{text}", "    ".repeat(depth));
+        let indent = 4 * depth;
+        let _ = writeln!(self.out, "{:indent$}{text}", "");
     }
 
     /// A line with where the expression `id` of the source stands that it comes from.
     fn line_of(&mut self, id: ExprId, depth: usize, text: &str) {
-        let origin = self.program.origin(self.f.expr(id).span);
-        self.line(depth, &format!("{text} // {origin}"));
+        let span = self.f.expr(id).span;
+        if span != self.origin.0 {
+            self.origin = (span, self.program.origin(span));
+        }
+        let (indent, origin) = (4 * depth, &self.origin.1);
+        let _ = writeln!(self.out, "{:indent$}{text} // {origin}", "");
     }
 
     fn stmt(&mut self, stmt: &Stmt, depth: usize) {

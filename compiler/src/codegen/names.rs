@@ -1,6 +1,7 @@
 //! WGSL identifiers for source names: readable, unique, and never a reserved word.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
 use crate::ir::{Module, StructId};
 use crate::source::{SourceMap, Span};
@@ -92,10 +93,11 @@ pub fn identifier(name: &str) -> String {
 
 /// Names that belong to WGSL or to unnamed values.
 fn is_taken(name: &str) -> bool {
-    KEYWORDS.contains(&name)
-        || RESERVED.contains(&name)
-        || PREDECLARED.contains(&name)
-        || is_temporary(name)
+    static TAKEN: LazyLock<BTreeSet<&str>> = LazyLock::new(|| {
+        let all = [KEYWORDS, RESERVED, PREDECLARED];
+        all.into_iter().flatten().copied().collect()
+    });
+    TAKEN.contains(name) || is_temporary(name)
 }
 
 /// `v12`: what unnamed values are called.
