@@ -12,6 +12,7 @@ mod dead_code;
 mod fold;
 mod hoist;
 mod inline;
+mod join;
 mod licm;
 mod prune;
 mod rewrite;
@@ -47,6 +48,10 @@ pub const PIPELINE: &[Pass] = &[
     Pass {
         name: "cse",
         run: cse::cse,
+    },
+    Pass {
+        name: "join",
+        run: join::join,
     },
     Pass {
         name: "licm",
