@@ -6,6 +6,7 @@
 //! last. Everything is pure, so calls and texture lookups are shared as well.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use super::rewrite::{self, Rules, operands_mut};
 use crate::ir::{Const, ExprId, ExprKind, Function, Module, Type};
@@ -25,11 +26,34 @@ pub fn cse(module: &Module, f: &mut Function) {
 #[derive(Default)]
 pub(super) struct Table {
     /// By hash; never iterated. Of two with equal hashes the later is kept.
-    known: HashMap<u64, Entry>,
+    known: HashMap<u64, Entry, Hashed>,
     /// What each entry made since replaced, to close blocks.
     undo: Vec<(u64, Option<Entry>)>,
     /// Constants, parameters and uniforms: available everywhere, so never removed.
-    leaves: HashMap<u64, Entry>,
+    leaves: HashMap<u64, Entry, Hashed>,
+}
+
+/// Keys are hashes already.
+type Hashed = BuildHasherDefault<Itself>;
+
+/// A hash of a `u64` that is itself.
+#[derive(Default)]
+struct Itself(u64);
+
+impl Hasher for Itself {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes
+            .iter()
+            .for_each(|b| self.0 = self.0 << 8 | u64::from(*b));
+    }
+
+    fn write_u64(&mut self, x: u64) {
+        self.0 = x;
+    }
 }
 
 struct Entry {

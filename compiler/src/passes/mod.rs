@@ -53,6 +53,11 @@ pub const PIPELINE: &[Pass] = &[
         name: "join",
         run: join::join,
     },
+    // What joined branches have in common, without another round of all.
+    Pass {
+        name: "cse",
+        run: cse::cse,
+    },
     Pass {
         name: "licm",
         run: licm::hoist,
