@@ -97,6 +97,12 @@ const RULES: &[Rule] = &[
         Bits,
     ),
     ("float", "clamp(x, 2.0, 1.0)", "clamp(x, 2.0, 1.0)", Bits),
+    (
+        "float",
+        "clamp(saturate(x), 3.0, 2.0)",
+        "clamp(saturate(x), 3.0, 2.0)",
+        Bits,
+    ),
     ("float", "max(abs(x), 0.0)", "abs(x)", Bits),
     ("float", "max(x, x)", "x", Bits),
     ("float", "min(max(x, 0.0), -1.0)", "-1.0", Bits),
