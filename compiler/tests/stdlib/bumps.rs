@@ -36,8 +36,8 @@ const FIELDS: &str = "
 const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
 fn near(a: &[f64], b: &[f64], tolerance: f64, what: &str) {
-    let far = a.iter().zip(b).any(|(a, b)| !((a - b).abs() <= tolerance));
-    assert!(!far && a.len() == b.len(), "{what}: {a:?} is not {b:?}");
+    let close = a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance);
+    assert!(close && a.len() == b.len(), "{what}: {a:?} is not {b:?}");
 }
 
 /// The gradient of `twisted`, by hand.
