@@ -37,18 +37,18 @@ fn lobes(m: &Material) -> usize {
 /// The light that comes from a direction, by the numbers.
 fn reflected(module: &Module, f: &Function, uniforms: &[Const], args: &[Value<f64>]) -> Value<f64> {
     let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
-    let sample = run.run(f, args.to_vec()).unwrap();
+    let sample = run.run(f, args.to_vec()).expect("fuel");
     let structs = module.structs.iter();
     let fields = &structs
         .clone()
         .find(|s| s.name == "MaterialSample")
-        .unwrap()
+        .expect("a struct of the core")
         .fields;
     let index = fields
         .iter()
         .position(|f| f.0 == "light_throughput")
-        .unwrap();
-    sample.field(index).unwrap().clone()
+        .expect("a field");
+    sample.field(index).expect("a field").clone()
 }
 
 /// A material with a surface.
@@ -75,7 +75,7 @@ fn pruning_keeps_what_a_material_reflects() {
         let checked = with_surface(surface);
         let mut pruned = checked.checked[0].clone();
         prune(&checked.ir, &mut pruned);
-        verify::material(&checked.ir, &pruned).unwrap();
+        verify::material(&checked.ir, &pruned).expect("well-formed");
         assert_eq!(lobes(&pruned), left, "{surface}");
         // A closure that is used twice is as if it were written twice.
         let written_out = surface
@@ -114,12 +114,18 @@ fn compare(surface: &str, before: (&Module, &Material), after: (&Module, &Materi
 /// A flat point, and directions on its front.
 fn view(module: &Module, f: &Function, numbers: &mut Numbers) -> Vec<Value<f64>> {
     let direction = |numbers: &mut Numbers| {
-        let (z, a) = (0.05 + 0.95 * numbers.unit(), 6.28 * numbers.unit());
+        let (z, a) = (
+            0.05 + 0.95 * numbers.unit(),
+            std::f64::consts::TAU * numbers.unit(),
+        );
         let s = (1.0 - z * z).sqrt();
         Value::vector(&[s * a.cos(), s * a.sin(), z])
     };
     let structs = module.structs.iter();
-    let point = structs.clone().find(|s| s.name == "SurfacePoint").unwrap();
+    let point = structs
+        .clone()
+        .find(|s| s.name == "SurfacePoint")
+        .expect("a struct of the core");
     let fields = point.fields.iter().map(|(name, ty)| match name.as_str() {
         "normal" | "geometric_normal" => Value::vector(&[0.0, 0.0, 1.0]),
         "tangent" => Value::vector(&[1.0, 0.0, 0.0]),

@@ -23,8 +23,8 @@ pub struct Case {
 pub fn cases() -> Vec<Case> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/passes/cases");
     let mut paths: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+        .expect("the folder of cases")
+        .map(|entry| entry.expect("an entry").path())
         .filter(|path| path.extension().is_some_and(|e| e == "ir"))
         .collect();
     paths.sort();
@@ -32,8 +32,12 @@ pub fn cases() -> Vec<Case> {
 }
 
 fn read(path: PathBuf) -> Case {
-    let name = path.file_name().unwrap().to_string_lossy().into_owned();
-    let text = std::fs::read_to_string(&path).unwrap();
+    let name = path
+        .file_name()
+        .expect("a name")
+        .to_string_lossy()
+        .into_owned();
+    let text = std::fs::read_to_string(&path).expect("a text");
     let head = text.lines().next().unwrap_or_default();
     let Some(passes) = head.strip_prefix("// pass: ") else {
         panic!("{name}: the first line is not `// pass: NAME`");
@@ -154,7 +158,8 @@ fn difference(old: &str, new: &str) -> String {
             (Some(a), Some(b)) if a == b => (' ', a),
             (Some(a), Some(_)) if common[i + 1][j] >= common[i][j + 1] => ('-', a),
             (Some(a), None) => ('-', a),
-            (_, b) => ('+', b.unwrap()),
+            (_, Some(b)) => ('+', b),
+            (None, None) => break,
         };
         out.push_str(&format!("{mark} {line}\n"));
         i += usize::from(mark != '+');

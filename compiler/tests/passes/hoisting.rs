@@ -29,19 +29,19 @@ fn parameters(m: &Material, numbers: &mut Numbers) -> Vec<Const> {
 fn compare(module: &Module, m: &Material, f: &Function) -> usize {
     let mut g = f.clone();
     let hoisted = hoist(module, &mut g);
-    verify::function(module, &g).unwrap();
-    verify::function(module, &hoisted.prelude).unwrap();
+    verify::function(module, &g).expect("well-formed");
+    verify::function(module, &hoisted.prelude).expect("well-formed");
     let mut numbers = Numbers(11);
     for _ in 0..8 {
         let given = parameters(m, &mut numbers);
-        let values = hoisted.evaluate(module, &given).unwrap();
+        let values = hoisted.evaluate(module, &given).expect("fuel");
         assert_eq!(values.len(), hoisted.types().len());
         for _ in 0..4 {
             let params = f.params.iter();
             let args: Vec<Value<f64>> = params.map(|p| numbers.value(module, p.ty)).collect();
             let run = |f, uniforms: &[Const]| {
                 let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
-                run.run(f, args.clone()).unwrap()
+                run.run(f, args.clone()).expect("fuel")
             };
             let (old, new) = (run(f, &given), run(&g, &values));
             assert!(

@@ -16,8 +16,8 @@ impl Loader for Files {
 /// Every material file of the repository.
 pub fn material_files() -> Vec<String> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../materials");
-    let entries = std::fs::read_dir(folder).unwrap();
-    let paths = entries.map(|e| e.unwrap().path().to_string_lossy().into_owned());
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|e| e.expect("an entry").path().to_string_lossy().into_owned());
     let mut found: Vec<String> = paths.filter(|p| p.ends_with(".impasto")).collect();
     found.sort();
     assert!(found.len() > 10, "no materials in {folder}");

@@ -35,7 +35,7 @@ impl Numbers {
     /// A constant of a type that has some.
     pub fn constant(&mut self, ty: Type) -> Const {
         match ty {
-            Type::Bool => Const::Bool(self.next() % 2 == 0),
+            Type::Bool => Const::Bool(self.next().is_multiple_of(2)),
             Type::Int => Const::Int((self.next() % 13) as i32 - 4),
             _ => Const::Float((0..ty.width().unwrap_or(1)).map(|_| self.float()).collect()),
         }

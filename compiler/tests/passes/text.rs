@@ -56,7 +56,7 @@ fn names_that_occur_twice_are_numbered() {
         FileId(0),
         "fn f() -> int { return 1 } fn g() -> int { return 2 }",
     )
-    .unwrap();
+    .expect("IR");
     parsed.module.functions[1].name = "f".into();
     let text = print::module(&parsed.module, &[]);
     assert!(text.contains("fn f#2()"), "{text}");
@@ -233,9 +233,9 @@ fn deep_nesting_is_refused() {
         format!("fn f() -> int {{ {open}{close} return 1 }}")
     };
     assert!(parse(FileId(0), &deep(MAX_NESTING)).is_ok());
-    let refused = parse(FileId(0), &deep(MAX_NESTING + 1)).unwrap_err();
+    let refused = parse(FileId(0), &deep(MAX_NESTING + 1)).expect_err("too deep");
     assert!(refused.to_string().contains("nest too deeply"), "{refused}");
     let layers = format!("material m() {{ surface = {} }}", "layer ".repeat(100_000));
-    let refused = parse(FileId(0), &layers).unwrap_err();
+    let refused = parse(FileId(0), &layers).expect_err("too deep");
     assert!(refused.to_string().contains("nest too deeply"), "{refused}");
 }

@@ -31,6 +31,7 @@ use super::{ClosureDefId, FunctionId, Local, Material, Module, StructId, Type, v
 use crate::source::{FileId, MAX_SOURCE_BYTES, SourceMap, Span};
 
 mod body;
+mod expr;
 mod item;
 mod lex;
 mod material;

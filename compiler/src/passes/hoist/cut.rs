@@ -1,0 +1,99 @@
+//! Decides which uniform work becomes a value of the table, and which the kernel does again.
+
+use std::collections::BTreeSet;
+
+use super::Uses;
+use crate::ir::{ExprId, ExprKind, Function, Module, Type};
+use crate::ops::{CostClass, Op};
+
+/// Where uniform work is cut: what becomes a value, and what the kernel makes of values.
+pub(super) struct Cut {
+    pub(super) values: BTreeSet<ExprId>,
+    pub(super) kept: BTreeSet<ExprId>,
+}
+
+impl Cut {
+    pub(super) fn of(module: &Module, f: &Function, uses: &Uses) -> Self {
+        let mut cut = Self {
+            values: BTreeSet::new(),
+            kept: BTreeSet::new(),
+        };
+        let mut pending: Vec<ExprId> = uses.read.iter().copied().collect();
+        while let Some(id) = pending.pop() {
+            if cut.values.contains(&id) || cut.kept.contains(&id) {
+                continue;
+            }
+            let sources = sources(f, uses, id);
+            if cheap(module, f, id, &sources) {
+                cut.kept.insert(id);
+                pending.extend(sources);
+            } else {
+                cut.values.insert(id);
+            }
+        }
+        cut.keep_parts(f);
+        cut
+    }
+
+    /// Components of what is there anyway need no value of their own. Fields do: structs are read
+    /// by fields, so theirs is the value that is there.
+    fn keep_parts(&mut self, f: &Function) {
+        let uniform = |id: &ExprId| match f.expr(*id).kind {
+            ExprKind::Uniform(i) => Some(i),
+            _ => None,
+        };
+        let read: BTreeSet<u32> = self.values.iter().filter_map(uniform).collect();
+        let there: BTreeSet<ExprId> = self.values.union(&self.kept).copied().collect();
+        let is_part = |&id: &ExprId| match f.expr(id).kind {
+            ExprKind::Swizzle(of, _) => {
+                there.contains(&of) || uniform(&of).is_some_and(|i| read.contains(&i))
+            }
+            _ => false,
+        };
+        let parts: Vec<ExprId> = self.values.iter().copied().filter(is_part).collect();
+        for id in parts {
+            self.values.remove(&id);
+            self.kept.insert(id);
+            // One of several expressions that are this uniform; all are to read the value.
+            self.values.extend(
+                f.expr(id)
+                    .kind
+                    .operands()
+                    .iter()
+                    .filter(|o| uniform(o).is_some()),
+            );
+        }
+    }
+}
+
+/// The uniform operands of an expression, each once.
+fn sources(f: &Function, uses: &Uses, id: ExprId) -> Vec<ExprId> {
+    let operands = f.expr(id).kind.operands().iter().copied();
+    let all: BTreeSet<ExprId> = operands.filter(|o| uses.uniform[o.index()]).collect();
+    all.into_iter().collect()
+}
+
+/// Is it cheaper for a kernel to make a value from its sources than to read it?
+fn cheap(module: &Module, f: &Function, id: ExprId, sources: &[ExprId]) -> bool {
+    let expr = f.expr(id);
+    let read: u32 = sources.iter().map(|&s| words(module, f.ty(s))).sum();
+    let made = words(module, expr.ty);
+    match &expr.kind {
+        ExprKind::Compose(_) | ExprKind::Make(..) | ExprKind::Swizzle(..) => read <= made,
+        ExprKind::Op(Op::Neg, _) => read <= made,
+        ExprKind::Op(op, _) => op.info().class == CostClass::Alu(1) && read < made,
+        _ => false,
+    }
+}
+
+/// Words of 32 bits that a value takes.
+fn words(module: &Module, ty: Type) -> u32 {
+    match ty {
+        Type::Mat3 => 9,
+        Type::Struct(id) => {
+            let fields = module.structs[id.index()].fields.iter();
+            fields.map(|f| words(module, f.1)).sum()
+        }
+        _ => ty.width().unwrap_or(1) as u32,
+    }
+}
