@@ -135,7 +135,7 @@ fn compile(file: &str, loader: &mut dyn Loader) -> Program {
             file: file.into(),
             material: Some(name.clone()),
             params: Vec::new(),
-            parameters: Parameters::Agreed,
+            parameters: compiler::Parameters::Agreed,
         })
         .collect();
     let compiled = compiler::compile(&requests, loader);
