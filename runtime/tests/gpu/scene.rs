@@ -43,6 +43,7 @@ material liquid {
     surface = smooth_dielectric(ior: ior / exterior_ior);
     interior = medium(absorption: absorption, ior: ior, priority: priority);
 }
+material net { surface = diffuse(1); opacity = 0.5; }
 material ember {
     param priority: int = 3;
     surface = diffuse(0.5);
@@ -266,6 +267,28 @@ fn a_camera_in_a_block_sees_through_what_is_left_of_it() {
         error.contains("`b0`") && error.contains("interior"),
         "{error}"
     );
+}
+
+/// Walls that emit 1 and reflect 0.7 make a room of radiance 1 / 0.3, and what absorbs nothing
+/// leaves it at that. Light samples that it blocks must be made up for by scattering.
+#[test]
+fn cut_outs_and_clear_things_in_an_even_room_are_invisible() {
+    for block in ["net", "glass", "liquid"] {
+        let toml = room(1.0, 0.0, 64)
+            + &format!(
+                "[[geometry]]\nobj = 'block.obj'\n\
+                 [materials.block]\nfile = 'm.impasto'\nmaterial = '{block}'\n"
+            );
+        let (scene, program) = load(&toml);
+        let rendering = render(&scene, &program, "wavefront", &samples(64));
+        let (mean, error) = mean(red(&rendering));
+        let difference = (mean - 1.0 / 0.3).abs();
+        // Glass keeps some paths for more than 64 segments.
+        assert!(
+            difference <= 4.0 * error + 0.01,
+            "{block}: {mean} +- {error}"
+        );
+    }
 }
 
 /// A boundary that is hidden does not shine either, for scattered rays and light samples alike.
