@@ -13,6 +13,7 @@ mod library;
 mod mappings;
 mod materials;
 mod matte;
+mod microfacet;
 mod noise;
 mod normals;
 mod precision;

@@ -9,7 +9,7 @@ use super::library::{Bsdf, Case};
 use super::statistics::{Numbers, chi_squared_tail, direction, sidak};
 
 /// Directions drawn for each case and view; a quarter decides on the cells.
-const SAMPLES: usize = 1 << 16;
+const SAMPLES: usize = 1 << 15;
 
 /// Significance of all chi-squared tests of a BSDF together.
 const SIGNIFICANCE: f64 = 0.01;
@@ -224,7 +224,12 @@ fn samples_follow_the_density_and_keep_energy() {
     let continuous: Vec<&Bsdf> = all.iter().filter(|b| !b.delta).collect();
     let work: Vec<(&Bsdf, &Case, f64)> = continuous
         .iter()
-        .flat_map(|b| b.cases.iter().flat_map(|c| VIEWS.map(|v| (*b, c, v))))
+        .flat_map(|b| {
+            // Every other view of a case: the next case has the others.
+            let views = |i: usize| VIEWS.into_iter().skip(i % 2).step_by(2);
+            let cases = b.cases.iter().enumerate();
+            cases.flat_map(move |(i, c)| views(i).map(move |v| (*b, c, v)))
+        })
         .collect();
     let tests = work.len();
     super::each_in_parallel(&work, |i, (bsdf, case, degrees)| {
@@ -252,8 +257,12 @@ pub fn albedo(bsdf: &Bsdf, case: &Case, wo: [f64; 3]) -> [f64; 3] {
 /// `albedo` is the integral, within what its documentation promises.
 fn albedo_fault(bsdf: &Bsdf, case: &Case, wo: [f64; 3], outcome: &Outcome) -> Option<String> {
     let said = albedo(bsdf, case, wo);
+    let within = match (wo[2] > 0.0) == (case.ior >= 1.0) {
+        true => bsdf.albedo_within,
+        false => bsdf.albedo_within_inside,
+    };
     let right = (0..3).all(|c| {
-        let close = (said[c] - outcome.energy[c]).abs() < bsdf.albedo_within + 1e-3;
+        let close = (said[c] - outcome.energy[c]).abs() < within + 1e-3;
         close && (0.0..=1.0).contains(&said[c])
     });
     (!right).then(|| format!("albedo says {said:?}, the integral is {:?}", outcome.energy))
