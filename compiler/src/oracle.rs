@@ -101,8 +101,8 @@ impl<'p> Stack<'p> {
         let mut at_top = true;
         for _ in 0..MOST_MEETINGS {
             let scattered = layers[usize::from(!at_top)].scatter(wo, numbers)?;
-            for c in 0..3 {
-                weight[c] *= scattered.throughput[c];
+            for (w, factor) in weight.iter_mut().zip(scattered.throughput) {
+                *w *= factor;
             }
             let up = scattered.wi[2] > 0.0;
             if at_top && up {
