@@ -96,9 +96,9 @@ fn fibre_sheen_follows_the_published_table() {
         let turn = 0.9;
         let wo = direction(z, turn);
         let found = bsdf.albedo(wo);
-        assert!((found - albedo).abs() < 0.02, "{found}, not {albedo}");
-        // Densities a little apart on the sphere, as the lobe is fitted: 0.04 in the whole.
-        let mut apart = 0.0;
+        assert!((found - albedo).abs() < 6e-3, "{found}, not {albedo}");
+        // How far apart the distributions are; the fit is coarser for thin lobes.
+        let (mut apart, most) = (0.0, if alpha < 12.0 { 0.13 } else { 0.065 });
         let mut n = Numbers::new(32);
         let count = 2000;
         for _ in 0..count {
@@ -112,6 +112,6 @@ fn fibre_sheen_follows_the_published_table() {
             apart += (bsdf.pdf(wo, wi) - exact).abs() * PI / f64::from(count);
             assert_near(bsdf.eval(wo, wi), found * bsdf.pdf(wo, wi), 1e-9, "value");
         }
-        assert!(apart < 0.2, "lobes {apart} apart at {alpha}, {cosine}");
+        assert!(apart < most, "{apart} apart at {alpha}, {cosine}");
     }
 }

@@ -11,9 +11,9 @@ pub(super) struct AliasTable {
 }
 
 impl AliasTable {
-    /// A table for weights that are finite, not negative and not all zero.
+    /// A table for weights that are finite and not negative. If all are zero, nothing should be drawn.
     pub(super) fn new(weights: &[f64]) -> AliasTable {
-        let total: f64 = weights.iter().sum();
+        let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let scale = weights.len() as f64 / total;
         let mut thresholds: Vec<f64> = weights.iter().map(|w| w * scale).collect();
         let mut aliases: Vec<u32> = (0..weights.len() as u32).collect();

@@ -15,8 +15,11 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
             };
             let radiance = Vec3::from(radiance);
             let power = std::f64::consts::PI * area(mesh.positions[triangle]) * luminance(radiance);
+            // Whether a boundary exists where it is hidden at times, a light sample cannot tell.
+            let by_chance = context.media.overlap && info.medium.is_some();
             (power > 0.0).then(|| Sampled {
                 power,
+                by_chance,
                 radiance,
                 primitive: context.primitives[triangle],
                 triangles: vec![triangle as u32],

@@ -7,6 +7,7 @@
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 
+use crate::media::Media;
 use crate::scene::{Mesh, Scene, SceneError};
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::wgsl;
@@ -39,9 +40,14 @@ pub struct Lights {
 
 impl Lights {
     /// The lights of `scene`, whose triangles are stored in `order` and whose bindings compiled
-    /// to `instances`.
-    pub fn build(scene: &Scene, order: &[u32], instances: &[InstanceInfo]) -> Lights {
-        let context = Context::new(scene, order, instances);
+    /// to `instances` with `media`.
+    pub fn build(
+        scene: &Scene,
+        order: &[u32],
+        instances: &[InstanceInfo],
+        media: &Media,
+    ) -> Lights {
+        let context = Context::new(scene, order, instances, media);
         let mut kinds = Vec::new();
         let mut count = 0;
         for kind in KINDS {
@@ -57,7 +63,7 @@ impl Lights {
         Lights {
             part: part(&kinds, count),
             of_triangle,
-            has_sampled: count > 0,
+            has_sampled: is_any_sampled(&kinds),
         }
     }
 }
@@ -79,6 +85,7 @@ pub fn check(scene: &Scene, instances: &[InstanceInfo]) -> Result<(), SceneError
 struct Context<'a> {
     scene: &'a Scene,
     instances: &'a [InstanceInfo],
+    media: &'a Media,
     /// Triangle of the mesh to primitive.
     primitives: Vec<u32>,
     /// Radius of a sphere around the mesh: what a light at infinity shines on.
@@ -86,7 +93,12 @@ struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    fn new(scene: &'a Scene, order: &[u32], instances: &'a [InstanceInfo]) -> Self {
+    fn new(
+        scene: &'a Scene,
+        order: &[u32],
+        instances: &'a [InstanceInfo],
+        media: &'a Media,
+    ) -> Self {
         let mut primitives = vec![0; order.len()];
         for (primitive, &triangle) in order.iter().enumerate() {
             primitives[triangle as usize] = primitive as u32;
@@ -94,6 +106,7 @@ impl<'a> Context<'a> {
         Context {
             scene,
             instances,
+            media,
             primitives,
             radius: bounding_radius(&scene.mesh),
         }
@@ -107,7 +120,7 @@ impl<'a> Context<'a> {
 
 /// One kind of light as a scene has it.
 struct Kind {
-    /// Those that can be sampled.
+    /// Those of the light table.
     lights: Vec<Sampled>,
     /// The kind's functions and constants.
     wgsl: String,
@@ -130,6 +143,8 @@ struct Sampled {
     radiance: Vec3,
     /// The primitive that light samples read, of lights with a surface.
     primitive: u32,
+    /// Is it found by scattering alone?
+    by_chance: bool,
     /// The kind's own use.
     flag: u32,
     /// Triangles of the mesh that belong to it.
@@ -141,7 +156,8 @@ fn part(kinds: &[Kind], count: u32) -> ShaderPart {
         wgsl: include_str!("../kernels/lights/common.wgsl").to_owned(),
         buffers: Vec::new(),
     };
-    part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {};\n", count > 0);
+    let sampled = is_any_sampled(kinds);
+    part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {sampled};\n");
     if count > 0 {
         part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count);
         part.wgsl += include_str!("../kernels/lights/select.wgsl");
@@ -163,7 +179,7 @@ fn part(kinds: &[Kind], count: u32) -> ShaderPart {
 /// Two words a light; see `kernels/lights/select.wgsl`.
 fn light_table(kinds: &[Kind]) -> BufferData {
     let weights = selection_weights(kinds);
-    let total: f64 = weights.iter().sum();
+    let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let alias = AliasTable::new(&weights);
     let rows: Vec<[[u32; 4]; 2]> = kinds
         .iter()
@@ -182,17 +198,25 @@ fn light_table(kinds: &[Kind]) -> BufferData {
     BufferData::new("light_table", "array<vec4<u32>>", &rows)
 }
 
+fn is_any_sampled(kinds: &[Kind]) -> bool {
+    let mut lights = kinds.iter().flat_map(|k| &k.lights);
+    lights.any(|light| !light.by_chance)
+}
+
 /// Half of the choice goes by power over all lights. The other half goes in equal parts to the
 /// kinds, so that a bright sky over a large ground plane leaves samples for a lamp, and then by
-/// power within the kind.
+/// power within the kind. Lights that are found by chance have none, which gives hits full weight.
 fn selection_weights(kinds: &[Kind]) -> Vec<f64> {
-    let power = |k: &Kind| k.lights.iter().map(|l| l.power).sum::<f64>();
+    let of_light = |l: &Sampled| if l.by_chance { 0.0 } else { l.power };
+    let power = |k: &Kind| k.lights.iter().map(of_light).sum::<f64>();
     let total: f64 = kinds.iter().map(power).sum();
-    let present = kinds.iter().filter(|k| !k.lights.is_empty()).count() as f64;
+    let present = kinds.iter().filter(|k| power(k) > 0.0).count() as f64;
     let weights = kinds.iter().flat_map(|kind| {
         let share = power(kind) * present;
-        let lights = kind.lights.iter();
-        lights.map(move |l| l.power / total + l.power / share)
+        kind.lights.iter().map(move |light| match of_light(light) {
+            power if power > 0.0 => power / total + power / share,
+            _ => 0.0,
+        })
     });
     weights.collect()
 }

@@ -53,7 +53,7 @@ impl SceneParts {
         let texture = texture::part(textures, &scene.base)?;
         let bvh = Bvh::build(&scene.mesh);
         let media = Media::build(materials, instances, &scene.camera_media)?;
-        let lights = Lights::build(scene, bvh.order(), instances);
+        let lights = Lights::build(scene, bvh.order(), instances, &media);
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
         Ok(SceneParts {
             geometry: geometry_part(

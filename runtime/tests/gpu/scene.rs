@@ -43,6 +43,13 @@ material liquid {
     surface = smooth_dielectric(ior: ior / exterior_ior);
     interior = medium(absorption: absorption, ior: ior, priority: priority);
 }
+material net { surface = diffuse(1); opacity = 0.5; }
+material ember {
+    param priority: int = 3;
+    surface = diffuse(0.5);
+    emission = uniform(color(3));
+    interior = medium(ior: 1.2, priority: priority);
+}
 ";
 
 struct Folder<'a>(&'a Path);
@@ -260,6 +267,55 @@ fn a_camera_in_a_block_sees_through_what_is_left_of_it() {
         error.contains("`b0`") && error.contains("interior"),
         "{error}"
     );
+}
+
+/// Walls that emit 1 and reflect 0.7 make a room of radiance 1 / 0.3, and what absorbs nothing
+/// leaves it at that. Light samples that it blocks must be made up for by scattering.
+#[test]
+fn cut_outs_and_clear_things_in_an_even_room_are_invisible() {
+    for block in ["net", "glass", "liquid"] {
+        let toml = room(1.0, 0.0, 64)
+            + &format!(
+                "[[geometry]]\nobj = 'block.obj'\n\
+                 [materials.block]\nfile = 'm.impasto'\nmaterial = '{block}'\n"
+            );
+        let (scene, program) = load(&toml);
+        let rendering = render(&scene, &program, "wavefront", &samples(64));
+        let (mean, error) = mean(red(&rendering));
+        let difference = (mean - 1.0 / 0.3).abs();
+        // Glass keeps some paths for more than 64 segments.
+        assert!(
+            difference <= 4.0 * error + 0.01,
+            "{block}: {mean} +- {error}"
+        );
+    }
+}
+
+/// A boundary that is hidden does not shine either, for scattered rays and light samples alike.
+#[test]
+fn what_a_medium_hides_gives_no_light() {
+    let toml = room(1.0, 0.0, 4).replace("glowing", "dull")
+        + "[[geometry]]\nobj = 'block.obj'\n\
+           [materials.block]\nfile = 'm.impasto'\nmaterial = 'ember'\n\
+           [materials.thick]\nfile = 'm.impasto'\nmaterial = 'liquid'\nparams.priority = 5\n";
+    let (scene, program) = load(&toml);
+    let open = render(&scene, &program, "wavefront", &samples(16));
+    let (seen, _) = mean(red(&open));
+    assert!(seen > 0.3, "{seen}");
+    let (scene, program) = load(&toml.replace("fov = 60", "fov = 60, medium = 'thick'"));
+    let hidden = render(&scene, &program, "wavefront", &samples(4));
+    assert!(red(&hidden).all(|v| v == 0.0));
+    // Where it is there but might not be, chance alone finds it, on average as much.
+    let (scene, program) = load(
+        &toml
+            .replace("fov = 60", "fov = 60, medium = 'thick'")
+            .replace("params.priority = 5", "params = { priority = 1, ior = 1 }"),
+    );
+    let around = render(&scene, &program, "wavefront", &samples(64));
+    assert!(around.report.kernels.iter().all(|k| k.name != "shadow"));
+    let difference = red(&around).zip(red(&open)).map(|(a, b)| a - b);
+    let (difference, error) = mean(difference);
+    assert!(difference.abs() <= 4.0 * error, "{difference} +- {error}");
 }
 
 /// A lamp, walls, and a block of glass or metal: every organisation gives the same picture.
