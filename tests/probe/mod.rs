@@ -13,7 +13,8 @@ pub(crate) fn source(path: &Path) -> Option<String> {
     let folder = path.parent()?.file_name()?.to_str()?;
     let name = path.file_stem()?.to_str()?;
     let module = parsed(impasto_stdlib::file(folder, name)?.text);
-    let used = module.items.iter().filter(|item| is_callable(item));
+    let used = module.items.iter();
+    let used = used.filter(|item| is_callable(item) || is_argument(&module, item));
     let names: Vec<&str> = used.map(|item| item.name.node.as_str()).collect();
     if names.is_empty() {
         return None;
@@ -89,6 +90,15 @@ fn functions(module: &Module) -> String {
 
 fn is_callable(item: &Item) -> bool {
     matches!(item.kind, ItemKind::Function(_) | ItemKind::Closure(_))
+}
+
+/// Is an item a struct that some function of the module takes?
+fn is_argument(module: &Module, item: &Item) -> bool {
+    matches!(item.kind, ItemKind::Struct(_))
+        && module.items.iter().any(|user| match &user.kind {
+            ItemKind::Function(f) => f.params.iter().any(|p| p.ty.node == item.name.node),
+            _ => false,
+        })
 }
 
 fn call(item: &Item, params: &[Param]) -> String {

@@ -8,18 +8,17 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::rewrite::{self, Rules, operands_mut};
+use super::rewrite::{Rules, operands_mut};
 use crate::ir::{Const, ExprId, ExprKind, Function, Module, Type};
 use crate::ops::Op;
 
-/// Removes common subexpressions in place.
-pub fn cse(module: &Module, f: &mut Function) {
-    let rules = Rules {
+/// Removes common subexpressions.
+pub(super) fn cse(_: &Module, _: &Function) -> Rules {
+    Rules {
         forward: true,
         table: Some(Table::default()),
         ..Rules::default()
-    };
-    rewrite::run(module, f, rules);
+    }
 }
 
 /// The values that are available, by what computes them.

@@ -7,13 +7,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Module, Stmt};
+use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 
 /// Most statements that a branch moves across.
 const MAX_DISTANCE: usize = 256;
 
 /// Joins branches in place.
-pub fn join(_: &Module, f: &mut Function) {
+pub fn join(f: &mut Function) {
     let body = std::mem::take(&mut f.body);
     f.body = block(f, body);
 }

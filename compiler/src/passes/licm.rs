@@ -8,10 +8,10 @@
 //! and would hold a register across the loop.
 
 use super::rewrite::stored_in;
-use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Module, Stmt};
+use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 
 /// Moves invariant work out of loops in place.
-pub fn hoist(_: &Module, f: &mut Function) {
+pub fn hoist(f: &mut Function) {
     let body = std::mem::take(&mut f.body);
     f.body = block(f, body);
 }

@@ -18,53 +18,76 @@ mod prune;
 mod rewrite;
 mod simplify;
 
+use rewrite::Rules;
+
 pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted, hoist};
 pub use prune::prune;
 
-/// A pass with its name.
+/// A pass with its name. It must not change what a function computes.
 pub struct Pass {
     /// Its name in messages.
     pub name: &'static str,
-    /// What it does to a function; must not change what the function computes.
-    pub run: fn(&Module, &mut Function),
+    how: How,
+}
+
+/// How a pass goes over a function.
+enum How {
+    /// As the walk of `rewrite`, in evaluation order, with these rules. Walks that follow each other
+    /// are done as one.
+    Walk(fn(&Module, &Function) -> Rules),
+    /// In its own way.
+    Own(fn(&mut Function)),
+}
+
+impl Pass {
+    /// Runs this pass alone.
+    pub fn run(&self, module: &Module, f: &mut Function) {
+        match self.how {
+            How::Walk(rules) => {
+                let rules = rules(module, f);
+                rewrite::run(module, f, rules);
+            }
+            How::Own(change) => change(f),
+        }
+    }
 }
 
 /// The passes in the order they run, over every function that reaches code generation.
 pub const PIPELINE: &[Pass] = &[
     Pass {
         name: "inline",
-        run: inline::inline,
+        how: How::Walk(inline::inline),
     },
     Pass {
         name: "fold",
-        run: fold::fold,
+        how: How::Walk(fold::fold),
     },
     Pass {
         name: "simplify",
-        run: simplify::simplify,
+        how: How::Walk(simplify::simplify),
     },
     Pass {
         name: "cse",
-        run: cse::cse,
+        how: How::Walk(cse::cse),
     },
     Pass {
         name: "join",
-        run: join::join,
+        how: How::Own(join::join),
     },
     // What joined branches have in common, without another round of all.
     Pass {
         name: "cse",
-        run: cse::cse,
+        how: How::Walk(cse::cse),
     },
     Pass {
         name: "licm",
-        run: licm::hoist,
+        how: How::Own(licm::hoist),
     },
     Pass {
         name: "dead_code",
-        run: |_, f| dead_code::remove(f),
+        how: How::Own(dead_code::remove),
     },
 ];
 
@@ -81,13 +104,29 @@ pub fn run(module: &Module, function: &mut Function) {
     verify(module, function, "lowering");
     for _ in 0..MAX_ROUNDS {
         let before = function.clone();
-        for pass in PIPELINE {
-            (pass.run)(module, function);
-            verify(module, function, pass.name);
-        }
+        round(module, function);
         if same(&before, function) {
             break;
         }
+    }
+}
+
+/// Runs the pipeline once; passes that are walks and follow each other in one walk.
+fn round(module: &Module, f: &mut Function) {
+    let mut rest = PIPELINE;
+    while let [first, ..] = rest {
+        let walks = rest.iter().map_while(|pass| match pass.how {
+            How::Walk(rules) => Some(rules(module, f)),
+            How::Own(_) => None,
+        });
+        let rules: Vec<Rules> = walks.collect();
+        let count = rules.len().max(1);
+        match rules.into_iter().reduce(Rules::and) {
+            Some(rules) => rewrite::run(module, f, rules),
+            None => first.run(module, f),
+        }
+        verify(module, f, rest[count - 1].name);
+        rest = &rest[count..];
     }
 }
 
@@ -100,7 +139,7 @@ pub fn run_until(module: &Module, function: &mut Function, name: &str) -> bool {
         return false;
     };
     for pass in &PIPELINE[..=last] {
-        (pass.run)(module, function);
+        pass.run(module, function);
         verify(module, function, pass.name);
     }
     true

@@ -35,7 +35,7 @@ fn check_passes(s: &Subject) -> Vec<String> {
     let mut f = s.function.clone();
     let mut before = answers(&s.module, &f, &s.uniforms);
     for pass in PIPELINE {
-        (pass.run)(&s.module, &mut f);
+        pass.run(&s.module, &mut f);
         if let Err(e) = verify::function(&s.module, &f) {
             problems.push(format!("{}: after {}: {e}", s.name, pass.name));
             return problems;

@@ -239,7 +239,7 @@ fn after(module: &Module, f: &Function, names: &[&str]) -> Function {
     let mut f = f.clone();
     for name in names {
         let pass = PIPELINE.iter().find(|p| p.name == *name).expect("a pass");
-        (pass.run)(module, &mut f);
+        pass.run(module, &mut f);
     }
     f
 }

@@ -92,7 +92,7 @@ impl Outcome {
             "prune" => return self.prune(),
             "hoist" => &mut |module, f| self.hoisted.push(hoist(module, f)),
             _ => match PIPELINE.iter().find(|p| p.name == pass) {
-                Some(row) => &mut |module, f| (row.run)(module, f),
+                Some(row) => &mut |module, f| row.run(module, f),
                 None => return Err(format!("there is no pass `{pass}`")),
             },
         };

@@ -11,7 +11,7 @@
 //! Callees are copied through the walk that folds and simplifies, so a lobe with constant
 //! parameters arrives small.
 
-use super::rewrite::{self, Rewriter, Rules};
+use super::rewrite::{Rewriter, Rules};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, Methods, Module, Stmt};
 use crate::ops::CostClass;
 
@@ -29,15 +29,14 @@ const MAX_EXPRS: usize = 1 << 15;
 /// Expressions that a function may have before none does.
 const MAX_ALL_EXPRS: usize = 1 << 17;
 
-/// Inlines calls in place.
-pub fn inline(module: &Module, f: &mut Function) {
-    let rules = Rules {
+/// Inlines calls, and folds and simplifies what is copied.
+pub(super) fn inline(module: &Module, f: &Function) -> Rules {
+    Rules {
         simplify: true,
         forward: true,
         inline: Some(Policy::new(module, f)),
         ..Rules::default()
-    };
-    rewrite::run(module, f, rules);
+    }
 }
 
 /// What decides whether a call goes in line.

@@ -34,6 +34,19 @@ pub(super) struct Rules {
     pub keep: bool,
 }
 
+impl Rules {
+    /// Both in one walk.
+    pub fn and(self, other: Rules) -> Rules {
+        Rules {
+            simplify: self.simplify || other.simplify,
+            forward: self.forward || other.forward,
+            inline: self.inline.or(other.inline),
+            table: self.table.or(other.table),
+            keep: self.keep || other.keep,
+        }
+    }
+}
+
 /// What a rule puts in place of an expression.
 pub(super) enum New {
     /// A value that is available already.

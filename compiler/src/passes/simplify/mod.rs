@@ -8,7 +8,7 @@
 //! One function an operation holds its rules, each with its reason. The tests run every rule over
 //! random and extreme operands against the expression it replaces.
 
-use super::rewrite::{self, New, Rewriter, Rules};
+use super::rewrite::{New, Rewriter, Rules};
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Module, Stmt, Type};
 use crate::ops::Op;
 use crate::source::Span;
@@ -23,14 +23,13 @@ mod vectors;
 /// Most variables that a branch may set to become selections.
 const MAX_PICKS: usize = 2;
 
-/// Simplifies a function in place.
-pub fn simplify(module: &Module, f: &mut Function) {
-    let rules = Rules {
+/// Applies the rules of this folder.
+pub(super) fn simplify(_: &Module, _: &Function) -> Rules {
+    Rules {
         simplify: true,
         forward: true,
         ..Rules::default()
-    };
-    rewrite::run(module, f, rules);
+    }
 }
 
 /// What an expression with final operands can be replaced by.
