@@ -8,6 +8,9 @@
 //! A call whose arguments are the same for a whole instance stays as well: the host makes it
 //! once, after uniform hoisting. Calls with constant arguments never get here, they are folded.
 //!
+//! Where constant arguments decide the branches of a callee, what counts is what is left: an option
+//! that is off costs nothing.
+//!
 //! Callees are copied through the walk that folds and simplifies, so a lobe with constant
 //! parameters arrives small.
 
@@ -15,6 +18,7 @@ use super::rewrite::{Rewriter, Rules};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, Methods, Module, Stmt};
 use crate::ops::CostClass;
 
+mod decided;
 mod splice;
 
 /// Most expressions of a function that goes in line wherever it is called.
@@ -166,9 +170,11 @@ fn goes_in_line(
     if args.iter().all(|&a| policy.is_uniform(w.f, a)) && !policy.reads_textures(w.module, callee) {
         return false;
     }
-    let small = policy.size(w.module, callee) <= SMALL;
+    let small = policy.size(w.module, callee) <= SMALL
+        || decided::size(&w.module.functions[callee.index()], w.f, args)
+            .is_some_and(|left| left <= SMALL);
     let room = if small { MAX_ALL_EXPRS } else { MAX_EXPRS };
-    policy.wanted(w.module, callee)
+    (small || policy.wanted(w.module, callee))
         && w.f.exprs.len() < room
         && w.depth + nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
 }

@@ -1,0 +1,67 @@
+//! How large a function is once constant arguments have decided its branches.
+
+use crate::ir::build::fold_op;
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, Stmt};
+
+/// Operations within operations that a condition is looked into.
+const DEPTH: u32 = 8;
+
+/// Expressions that are left of `callee` when it is called from `f` with `args`; none if that
+/// decides no branch.
+pub(super) fn size(callee: &Function, f: &Function, args: &[ExprId]) -> Option<u32> {
+    let constants: Vec<Option<&Const>> = args.iter().map(|&a| f.constant(a)).collect();
+    if constants.iter().all(Option::is_none) {
+        return None;
+    }
+    let mut count = Count {
+        callee,
+        constants,
+        decided: false,
+    };
+    let left = count.block(&callee.body);
+    count.decided.then_some(left)
+}
+
+struct Count<'a> {
+    callee: &'a Function,
+    /// The arguments, where constant.
+    constants: Vec<Option<&'a Const>>,
+    /// Was a branch decided?
+    decided: bool,
+}
+
+impl Count<'_> {
+    fn block(&mut self, block: &Block) -> u32 {
+        block.iter().map(|stmt| self.stmt(stmt)).sum()
+    }
+
+    fn stmt(&mut self, stmt: &Stmt) -> u32 {
+        match stmt {
+            Stmt::Eval(_) => 1,
+            Stmt::If(cond, then, otherwise) => match self.value(*cond, DEPTH) {
+                Some(Const::Bool(taken)) => {
+                    self.decided = true;
+                    self.block(if taken { then } else { otherwise })
+                }
+                _ => self.block(then) + self.block(otherwise),
+            },
+            Stmt::For { body, .. } => self.block(body),
+            Stmt::While { head, body, .. } => self.block(head) + self.block(body),
+            Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
+        }
+    }
+
+    /// The constant that an expression of the callee is in this call.
+    fn value(&self, id: ExprId, depth: u32) -> Option<Const> {
+        match &self.callee.expr(id).kind {
+            ExprKind::Const(c) => Some(c.clone()),
+            ExprKind::Param(i) => self.constants.get(*i as usize).copied().flatten().cloned(),
+            ExprKind::Op(op, args) if depth > 0 => {
+                let values = args.iter().map(|&a| self.value(a, depth - 1));
+                let values: Vec<Const> = values.collect::<Option<_>>()?;
+                fold_op(*op, &values.iter().collect::<Vec<_>>())
+            }
+            _ => None,
+        }
+    }
+}
