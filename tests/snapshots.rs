@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use impasto::FileLoader;
 use impasto::compiler::source::SourceMap;
-use impasto::compiler::{self, Loader, MaterialRequest, Parameters, Program, parser};
+use impasto::compiler::{self, Loader, MaterialRequest, Program, parser};
 
 #[test]
 fn materials() {
