@@ -81,7 +81,7 @@ fn generated(index: usize, n: &mut Numbers) -> String {
     let base = |n: &mut Numbers| match n.below(3) {
         0 => format!("diffuse(mix(color({}), tint, p))", n.fraction()),
         1 => format!("metal(reflectance: tint, roughness: {} * p)", n.fraction()),
-        _ => format!("fresnel_diffuse(tint, color(p))"),
+        _ => "fresnel_diffuse(tint, color(p))".to_owned(),
     };
     let top = |n: &mut Numbers| match n.below(3) {
         0 => format!("mirror(1.{})", 1 + n.below(8)),
