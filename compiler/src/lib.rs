@@ -195,6 +195,25 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
     }
 }
 
+/// Shows `look` each material's evaluate function as [`passes::PIPELINE`] gets it, with the module
+/// that it calls into. What is wrong with the requests, [`compile`] says.
+pub fn before_passes(
+    requests: &[MaterialRequest],
+    loader: &mut dyn Loader,
+    mut look: impl FnMut(&Module, ir::Function),
+) {
+    let mut checker = Checker::new(loader);
+    let Some(mut builder) = ProgramBuilder::new(&mut checker) else {
+        return;
+    };
+    for Wanted { material, settings } in wanted(&mut checker, requests) {
+        let settings: Vec<Setting> = settings.into_iter().map(|(_, s)| s).collect();
+        if let Some((module, f)) = builder.before_passes(&mut checker, material, &settings) {
+            look(module, f);
+        }
+    }
+}
+
 /// Drops the warnings that an error may be the cause of: what did not check uses nothing.
 fn drop_unsure(diagnostics: &mut Vec<Diagnostic>) {
     if diag::has_errors(diagnostics) {

@@ -250,18 +250,9 @@ impl ProgramBuilder {
         mut material: ir::Material,
         settings: &[Setting],
     ) {
-        if material.opacity.is_some() {
-            let Some(transparent) = checker.library_closure("bsdf", "transparent") else {
-                return;
-            };
-            self.core.transparent = Some(transparent);
-            closure::cut_out(&mut material, transparent);
+        if self.prepare(checker, &mut material, settings).is_none() {
+            return;
         }
-        self.optimise_functions(&checker.ir);
-        let agreed = agreed(settings);
-        passes::bake(&mut material.body, &agreed);
-        passes::fold_body(&self.module, &mut material.body);
-        passes::prune(&self.module, &mut material);
         let lowered = match self.lower(&material) {
             Ok(lowered) => lowered,
             Err(problem) => return checker.diagnostics.push(problem),
@@ -273,6 +264,39 @@ impl ProgramBuilder {
             Err(problem) => return checker.diagnostics.push(problem),
         }
         self.finish_material(&material, lowered, read, settings.len());
+    }
+
+    /// Makes of a material what is lowered: cut out by its opacity, with the values on which all
+    /// settings agree as constants.
+    fn prepare(
+        &mut self,
+        checker: &mut Checker,
+        material: &mut ir::Material,
+        settings: &[Setting],
+    ) -> Option<()> {
+        if material.opacity.is_some() {
+            let transparent = checker.library_closure("bsdf", "transparent")?;
+            self.core.transparent = Some(transparent);
+            closure::cut_out(material, transparent);
+        }
+        self.optimise_functions(&checker.ir);
+        passes::bake(&mut material.body, &agreed(settings));
+        passes::fold_body(&self.module, &mut material.body);
+        passes::prune(&self.module, material);
+        Some(())
+    }
+
+    /// A material's evaluate function as the passes get it, and the module that it calls into.
+    pub(crate) fn before_passes(
+        &mut self,
+        checker: &mut Checker,
+        mut material: ir::Material,
+        settings: &[Setting],
+    ) -> Option<(&Module, Function)> {
+        self.prepare(checker, &mut material, settings)?;
+        let lobes = closure::lobes(&material, material.surface?);
+        let f = closure::evaluate(&self.module, &self.core, &material, &material.name, &lobes);
+        Some((&self.module, f))
     }
 
     /// Takes over the functions that were checked since the last material.

@@ -293,6 +293,21 @@ fn too_many_lobes_are_refused() {
 }
 
 #[test]
+fn matrices_can_be_chosen() {
+    // WGSL's own `select` takes none.
+    let text = wgsl(
+        "use std::bsdf::diffuse;
+        material m {
+            let a = mat3(vec3(normal), vec3(tangent), vec3(position));
+            let b = mat3(vec3(tangent), vec3(position), vec3(normal));
+            let v = select(uv.x > 0.5, a, b) * vec3(uv.x, 1, uv.y);
+            surface = diffuse(color(saturate(v)));
+        }",
+    );
+    assert!(text.contains("op_select_mat3x3f("), "{text}");
+}
+
+#[test]
 fn comparisons_that_face_each_other_are_no_template_list() {
     // Compiling includes validation. In WGSL `select` takes the value for false first.
     common::program(

@@ -2,14 +2,20 @@
 
 use std::path::Path;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use impasto::compiler::codegen::Target;
+use impasto::compiler::ir;
+use impasto::compiler::passes::{PIPELINE, run_until};
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
 use impasto::files;
 use impasto::{FileLoader, Program};
 
 use super::{Failure, Global, Outcome, print};
+
+/// What gives passes their first function.
+const LOWERING: &str = "lowering";
 
 #[derive(Args)]
 pub(super) struct EmitArgs {
@@ -21,6 +27,10 @@ pub(super) struct EmitArgs {
     /// Which material of the file; needed for IR and WGSL where it has several
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
+    /// With `--what ir`: the evaluate functions of materials once the passes up to this one
+    /// have gone over them for the first time; `lowering` is before all of them
+    #[arg(long, value_name = "PASS", value_parser = passes())]
+    after: Option<String>,
     /// What the WGSL is for
     #[arg(long, default_value = "native")]
     target: TargetName,
@@ -62,6 +72,17 @@ impl From<TargetName> for Target {
     }
 }
 
+/// What `--after` takes: the passes, each once, and what comes before them.
+fn passes() -> PossibleValuesParser {
+    let mut names = vec![LOWERING];
+    for pass in PIPELINE {
+        if !names.contains(&pass.name) {
+            names.push(pass.name);
+        }
+    }
+    PossibleValuesParser::new(names)
+}
+
 pub(super) fn run(args: &EmitArgs, global: &Global) -> Outcome {
     let to_stdout = args.out == files::STDIN;
     if !to_stdout {
@@ -80,10 +101,12 @@ fn emitted(args: &EmitArgs, global: &Global) -> Result<String, Failure> {
     let bytes = loader
         .load(&args.file)
         .map_err(|message| format!("cannot read `{}`: {message}", args.file))?;
-    match args.what {
-        What::Tokens | What::Ast => syntax(args, &bytes, global),
-        What::Ir => ir(args, &mut loader, global),
-        What::Wgsl => wgsl(args, &mut loader, global),
+    match (args.what, &args.after) {
+        (What::Ir, Some(pass)) => after(args, pass, &mut loader, global),
+        (_, Some(_)) => Err(Failure::Error("`--after` goes with `--what ir`".into())),
+        (What::Tokens | What::Ast, None) => syntax(args, &bytes, global),
+        (What::Ir, None) => ir(args, &mut loader, global),
+        (What::Wgsl, None) => wgsl(args, &mut loader, global),
     }
 }
 
@@ -129,6 +152,25 @@ fn ir(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Strin
         true => Err(Failure::Diagnostics),
         false => Ok(impasto::ir_text(&checked, &args.file, only)),
     }
+}
+
+/// The evaluate functions of one material, or of all that the file defines, after a pass.
+fn after(
+    args: &EmitArgs,
+    pass: &str,
+    loader: &mut FileLoader,
+    global: &Global,
+) -> Result<String, Failure> {
+    compiled(args, loader, global)?;
+    let mut functions = Vec::new();
+    let requests = requests(args, loader);
+    compiler::before_passes(&requests, loader, |module, mut f| {
+        if pass != LOWERING {
+            run_until(module, &mut f, pass);
+        }
+        functions.push(ir::print::function(module, &f));
+    });
+    Ok(functions.join("\n"))
 }
 
 /// The WGSL of one material, or of all that the file defines.

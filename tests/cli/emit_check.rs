@@ -158,6 +158,42 @@ fn every_stage_is_printed() {
 }
 
 #[test]
+fn emit_shows_what_passes_do() {
+    let source = "use std::bsdf::diffuse;
+        fn twice(x: float) -> float = x + x;
+        material plain { surface = diffuse(saturate(twice(uv.x) * 1 + 0 * uv.y)); }";
+    let after = |pass| {
+        let args = ["emit", "-", "--what", "ir", "--after", pass];
+        let run = impasto_with(&args, source.as_bytes()).exits(0);
+        assert!(run.stdout.starts_with("fn plain("), "{pass}: {run:#?}");
+        run.stdout
+    };
+    let calls = |text: &str| text.contains("twice(");
+    assert!(calls(&after("lowering")));
+    assert!(!calls(&after("inline")));
+    let lines = |pass| after(pass).lines().count();
+    assert!(lines("dead_code") < lines("inline"));
+}
+
+#[test]
+fn emit_after_a_pass_that_is_not_there() {
+    let run = impasto_with(
+        &["emit", "-", "--what", "ir", "--after", "unroll"],
+        GOOD.as_bytes(),
+    );
+    run.exits(2).prints_nothing().says("lowering, inline, fold");
+    let run = impasto_with(&["emit", "-", "--after", "fold"], GOOD.as_bytes());
+    run.exits(2).prints_nothing().says("--what ir");
+    impasto_with(
+        &["emit", "-", "--what", "ir", "--after", "fold"],
+        b"material a { surface = nothing(); }",
+    )
+    .exits(1)
+    .prints_nothing()
+    .says("E0201");
+}
+
+#[test]
 fn emit_of_a_bad_source_writes_no_file() {
     let folder = folder();
     let out = folder.path().join("out.wgsl").display().to_string();

@@ -413,7 +413,8 @@ impl Printer<'_> {
                 format!("{} {symbol} {}", self.tight(args[0]), self.tight(args[1]))
             }
             Wgsl::Builtin("select") => {
-                format!("select({})", self.list(&[args[2], args[1], args[0]]))
+                let name = self.helpers.select(self.program, ty);
+                format!("{name}({})", self.list(&[args[2], args[1], args[0]]))
             }
             Wgsl::Builtin(name) => format!("{name}({})", self.widened(op, args, ty)),
             Wgsl::Helper(text, _) => {

@@ -26,9 +26,22 @@ impl Helpers {
         helper_name(text, ty)
     }
 
+    /// The name of `select` on values of type `ty`; WGSL has it for scalars and vectors only.
+    pub fn select(&mut self, program: &Program, ty: Type) -> String {
+        if matches!(ty, Type::Mat3 | Type::Struct(_)) {
+            self.used.insert((Op::Select, ty));
+            return select_name(&type_name(program, ty));
+        }
+        "select".into()
+    }
+
     /// Prints the helpers used.
     pub fn print(&self, program: &Program, out: &mut String) {
         for &(op, ty) in &self.used {
+            if op == Op::Select {
+                select(out, &type_name(program, ty));
+                continue;
+            }
             let info = op.info();
             let row = info
                 .wgsl_int
@@ -71,6 +84,19 @@ fn helper_name(text: &str, ty: Type) -> String {
         Some(w) if w > 1 => format!("op_{text}_{w}"),
         _ => format!("op_{text}"),
     }
+}
+
+fn select_name(ty: &str) -> String {
+    format!("op_select_{ty}")
+}
+
+/// `select` for a type that WGSL's own does not take.
+fn select(out: &mut String, ty: &str) {
+    let _ = writeln!(
+        out,
+        "fn {}(no: {ty}, yes: {ty}, c: bool) -> {ty} {{ if c {{ return yes; }} return no; }}\n",
+        select_name(ty)
+    );
 }
 
 /// The largest or smallest component of a vector.

@@ -58,6 +58,20 @@ pub fn module(program: &Program, members: &[usize]) -> String {
     out
 }
 
+/// The WGSL of functions that no material calls, under their own names: operations by themselves,
+/// for comparing what a GPU makes of them with what the interpreter does. They use neither structs
+/// nor calls nor uniforms.
+pub fn functions(program: &Program, functions: &[Function]) -> String {
+    let mut helpers = Helpers::default();
+    let mut body = String::new();
+    for f in functions {
+        function::print(program, f, &f.name, None, &mut helpers, &mut body);
+    }
+    let mut out = String::new();
+    helpers.print(program, &mut out);
+    out + &body
+}
+
 /// A material's own function.
 struct Root<'p> {
     function: &'p Function,

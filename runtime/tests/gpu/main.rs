@@ -10,7 +10,10 @@ mod furnace;
 mod info;
 mod lights;
 mod media;
+mod ops;
 mod planes;
 mod plans;
 mod scene;
 mod stub;
+#[path = "../support/mod.rs"]
+mod support;
