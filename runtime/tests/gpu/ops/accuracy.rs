@@ -111,9 +111,11 @@ fn by_component(op: Op, [a, b, c]: [f64; 3], off: f64, x: f64) -> f64 {
         Op::Mix => 4.0 * EPSILON * ((a * (1.0 - c)).abs() + (b * c).abs() + (a * c).abs()),
         Op::Smoothstep => 1e-5,
         Op::Rem | Op::Mod => {
-            // A quotient near a whole number may be cut to either side.
+            // A quotient that is a whole number but for rounding may be cut to either side.
+            let quotient = a / b;
+            let whole = (quotient - quotient.round()).abs() <= 3.0 * EPSILON * quotient.abs();
             let rounding = 4.0 * EPSILON * a.abs().max(b.abs());
-            let near = (off - b.abs()).abs() <= rounding;
+            let near = b != 0.0 && whole && (off - b.abs()).abs() <= rounding;
             if near { off } else { rounding }
         }
         _ => 0.0,
