@@ -81,7 +81,10 @@ fn masses_are_frequencies_and_values_are_the_albedo() {
                 format!("{wi:?} is neither mirrored nor refracted"),
             );
             let expected = mass * SAMPLES as f64;
-            let most = 5.0 * (expected * (1.0 - mass).max(0.0)).sqrt() + 1e-6;
+            // A number of 24 bits is 0 more often than it is below a mass of less than that: a
+            // direction of next to no mass may be seen once.
+            let once = f64::from(u8::from(*mass > 0.0 && *mass < 1.0));
+            let most = 5.0 * (expected * (1.0 - mass).max(0.0)).sqrt() + once + 1e-6;
             fault(
                 (times - expected).abs() <= most,
                 format!("{wi:?}: {times} times, expected {expected}"),

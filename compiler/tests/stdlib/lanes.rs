@@ -311,6 +311,9 @@ fn fast(op: Op, args: &[Lanes]) -> Option<Lanes> {
         let picked = |(a, b): (&Column, &Column)| choose(cond[0].bools(), a.floats(), b.floats());
         return Some(a.iter().zip(b).map(picked).collect());
     }
+    if let Op::And | Op::Or = op {
+        return Some(vec![logic(op, &args[0][0], &args[1][0])]);
+    }
     if !all_floats {
         return None;
     }
@@ -322,7 +325,31 @@ fn fast(op: Op, args: &[Lanes]) -> Option<Lanes> {
         Op::Div => map2(args, zero_safe),
         Op::Min => map2(args, low),
         Op::Max => map2(args, high),
+        Op::Clamp => map2(&[map2(&args[..2], high), args[2].clone()], low),
+        Op::Saturate => map1(args, |x| low(high(x, 0.0), 1.0)),
+        Op::Mix => {
+            let kept = map2(&[args[0].clone(), map1(&args[2..], |t| 1.0 - t)], |x, t| {
+                x * t
+            });
+            map2(&[kept, map2(&args[1..], |y, t| y * t)], |x, y| x + y)
+        }
         Op::Abs => map1(args, f64::abs),
+        Op::Exp => map1(args, |x| x.min(88.0).exp()),
+        Op::Log => map1(args, |x| x.max(ops::TINY).ln()),
+        Op::InverseSqrt => map1(args, |x| {
+            if x > 0.0 {
+                1.0 / high(x, ops::TINY).sqrt()
+            } else {
+                0.0
+            }
+        }),
+        Op::Normalize => {
+            let inverse = |d: f64| if d > ops::TINY { 1.0 / d.sqrt() } else { 0.0 };
+            let scale = map1(&[vec![dot(&args[0], &args[0])]], inverse);
+            map2(&[args[0].clone(), scale], |x, s| {
+                if s == 0.0 { 0.0 } else { x * s }
+            })
+        }
         Op::Sqrt => map1(args, |x| high(x, 0.0).sqrt()),
         Op::Sin => map1(args, f64::sin),
         Op::Cos => map1(args, f64::cos),
@@ -366,6 +393,15 @@ fn dot(a: &Lanes, b: &Lanes) -> Column {
 
 fn compare(args: &[Lanes], f: impl Fn(f64, f64) -> bool) -> Column {
     Column::Bool(Rc::new(zip(args[0][0].floats(), args[1][0].floats(), f)))
+}
+
+fn logic(op: Op, a: &Column, b: &Column) -> Column {
+    let (a, b) = (a.bools(), b.bools());
+    let one = |l: usize| match op {
+        Op::And => at(a, l) && at(b, l),
+        _ => at(a, l) || at(b, l),
+    };
+    Column::Bool(Rc::new((0..a.len().max(b.len())).map(one).collect()))
 }
 
 fn choose(cond: &[bool], a: &[f64], b: &[f64]) -> Column {

@@ -5,9 +5,9 @@
 //! `Try: name = value | value` (any Impasto constants; the default is tried anyway),
 //! `Albedo: within 0.02.` or `Albedo: exact.` (and `..., from inside within 0.3`: on the side of
 //! the greater index), `Precision: within 0.01.` (relative error in single precision, where it is
-//! large), `Not reciprocal`, `Radiance:`, which says that what passes is scaled by the squared ratio
-//! of the indices, given by the parameter `ior`, and `Straight:`, which says that what passes is
-//! not refracted.
+//! large; and `weights within 0.002`, of value over density), `Not reciprocal`, `Radiance:`, which
+//! says that what passes is scaled by the squared ratio of the indices, given by the parameter
+//! `ior`, and `Straight:`, which says that what passes is not refracted.
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
 use impasto_compiler::ir::{Closure, ClosureId, Const, FunctionId, Material, Methods, Module};
@@ -15,7 +15,7 @@ use impasto_compiler::source::FileId;
 use impasto_compiler::{MemoryLoader, check, diag, parser, passes};
 
 /// Cases of one BSDF beyond which parameters vary one at a time.
-const MOST_CASES: usize = 12;
+const MOST_CASES: usize = 30;
 
 /// A BSDF of the library.
 pub struct Bsdf {
@@ -27,6 +27,8 @@ pub struct Bsdf {
     pub albedo_within_inside: f64,
     /// How far single precision may be off, where the documentation says so.
     pub precision_within: Option<f64>,
+    /// The same for value over density, `weights within X.`
+    pub weight_within: Option<f64>,
     /// Is it the same with the directions exchanged?
     pub reciprocal: bool,
     /// Is transmitted radiance scaled by the indices?
@@ -253,6 +255,7 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
         albedo_within,
         albedo_within_inside: promise(docs, "from inside").unwrap_or(albedo_within),
         precision_within: promise(docs, "Precision:"),
+        weight_within: promise(docs, "weights"),
         reciprocal: !docs.contains("Not reciprocal"),
         scales_radiance: docs.contains("Radiance:"),
         sample,

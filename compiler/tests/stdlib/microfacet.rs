@@ -407,6 +407,49 @@ fn single_pairs_of_directions_have_the_values_of_the_formulas() {
 }
 
 #[test]
+fn what_passes_has_the_jacobian_of_refraction() {
+    // The Jacobian by differences: how the refracted direction turns with the facet.
+    let (wo, n, a) = (super::statistics::direction(0.8, 0.3), 1.5f64, 0.36);
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let tilted = |x: f64, y: f64| {
+        let l = (x * x + y * y + 1.0).sqrt();
+        [x / l, y / l, 1.0 / l]
+    };
+    let refracted = |m: [f64; 3]| -> [f64; 3] {
+        let c = dot(wo, m);
+        let t = (1.0 - (1.0 - c * c) / (n * n)).sqrt();
+        std::array::from_fn(|k| (m[k] * (c - n * t) - wo[k]) / n)
+    };
+    for (x, y) in [(0.1, 0.2), (-0.2, 0.05), (0.4, 0.1)] {
+        let m = tilted(x, y);
+        // Solid angle that a small parallelogram of slopes takes.
+        let area = |w: &dyn Fn(f64, f64) -> [f64; 3]| {
+            let d: [[f64; 3]; 2] = [(1e-5, 0.0), (0.0, 1e-5)].map(|(dx, dy)| {
+                let (after, before) = (w(x + dx, y + dy), w(x - dx, y - dy));
+                std::array::from_fn(|k| after[k] - before[k])
+            });
+            (dot(d[0], d[0]) * dot(d[1], d[1]) - dot(d[0], d[1]).powi(2)).sqrt()
+        };
+        let jacobian = area(&tilted) / area(&|x, y| refracted(tilted(x, y)));
+        let (c, wi) = (dot(wo, m), refracted(m));
+        let t = (1.0 - (1.0 - c * c) / (n * n)).sqrt();
+        let (s, p) = ((c - n * t) / (c + n * t), (n * c - t) / (n * c + t));
+        let passed = 1.0 - 0.5 * (s * s + p * p);
+        let seen = ggx(m[2], a) * c / (0.8 * (1.0 + lambda(0.8, a)));
+        let expected = seen * jacobian;
+        for (name, share) in [("dielectric", passed), ("dielectric_transmission", 1.0)] {
+            let [pdf, value, ..] = Given::new(name, "roughness: 0.6").measure(wo, wi);
+            for (found, expected) in [(pdf, share * expected), (value, passed * expected)] {
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-6,
+                    "{name} at {m:?}: {found}, {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn roughness_going_to_0_reaches_the_smooth_ones() {
     for (rough, args, smooth) in [
         ("conductor", "", "smooth_conductor"),
