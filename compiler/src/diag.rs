@@ -66,7 +66,7 @@ codes! {
     InvalidNumber = "E0105", Error, "invalid number",
         "Integers fit 32 bits (hexadecimal ones may fill them), and floats are finite in 32-bit precision.";
     NestedTooDeep = "E0106", Error, "nested too deeply",
-        "Brackets, operators and else-if chains may nest at most 256 levels in all. Name parts of the expression with `let`.";
+        "Brackets, operators and else-if chains may nest at most 256 levels in all, and the blocks of a function 126. Name parts of the expression with `let`, or move inner blocks to a function.";
     Syntax = "E0107", Error, "syntax error",
         "The parser met something else than what the grammar allows at this place. See docs/language.md for the grammar.";
     Unclosed = "E0108", Error, "unbalanced brackets",

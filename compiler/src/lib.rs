@@ -308,11 +308,18 @@ fn wanted(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Wanted> {
     found
 }
 
-/// Has naga check the code of all materials together.
+/// Materials whose code is checked as one module. The memory that naga takes grows with it.
+const CHECKED_TOGETHER: usize = 50;
+
+/// Has naga check the code of all materials.
 fn validate(checker: &mut Checker, program: &Program) {
-    if let Err(problem) = codegen::validate(&program.complete_wgsl(codegen::Target::Native)) {
-        checker
-            .diagnostics
-            .push(Diagnostic::without_span(Code::InvalidWgsl, problem));
+    let all: Vec<usize> = (0..program.materials.len()).collect();
+    for members in all.chunks(CHECKED_TOGETHER) {
+        let text = codegen::complete(program, members, codegen::Target::Native);
+        if let Err(problem) = codegen::validate(&text) {
+            let deep = program.nested_too_deep(members);
+            let rejected = || Diagnostic::without_span(Code::InvalidWgsl, problem);
+            return checker.diagnostics.push(deep.unwrap_or_else(rejected));
+        }
     }
 }

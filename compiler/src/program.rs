@@ -181,6 +181,24 @@ impl Program {
         }
     }
 
+    /// The first function of some materials whose blocks lie deeper within each other than WGSL
+    /// allows, as the error to report.
+    pub(crate) fn nested_too_deep(&self, members: &[usize]) -> Option<Diagnostic> {
+        let own = members.iter().map(|&m| &self.materials[m]);
+        let own = own.flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
+        let deep = |f: &&Function| codegen::nesting(&f.body) > codegen::MAX_NESTING;
+        let f = self.module.functions.iter().chain(own).find(deep)?;
+        let message = format!("the blocks of `{}` nest too deeply", f.name);
+        Some(
+            Diagnostic::new(Code::NestedTooDeep, f.span, message)
+                .expected(format!(
+                    "at most {} blocks within each other",
+                    codegen::MAX_NESTING
+                ))
+                .hint("move inner blocks to a function"),
+        )
+    }
+
     /// `car_paint.impasto:12`: where a span is, without folders, which differ between machines.
     pub(crate) fn origin(&self, span: Span) -> String {
         let text = self.sources.file_line(span);
@@ -301,6 +319,17 @@ impl ProgramBuilder {
 
     /// Takes over the functions that were checked since the last material.
     fn optimise_functions(&mut self, checked: &Module) {
+        let extent = |m: &Module| {
+            [
+                m.structs.len(),
+                m.closures.len(),
+                m.textures.len(),
+                m.functions.len(),
+            ]
+        };
+        if extent(&self.module) == extent(checked) {
+            return;
+        }
         self.module.structs.clone_from(&checked.structs);
         self.module.closures.clone_from(&checked.closures);
         self.module.textures.clone_from(&checked.textures);
@@ -326,14 +355,16 @@ impl ProgramBuilder {
     /// The functions of a material whose agreed parameters are constants.
     fn lower(&mut self, material: &ir::Material) -> Result<Lowered, Diagnostic> {
         let module = &self.module;
+        // Counted before they are listed: a tree that shares closures can have any number.
+        let roots = material.surface.into_iter().chain(material.emission);
+        let counts = roots.map(|root| closure::lobe_count(material, root));
+        let most = counts.max().unwrap_or(0);
+        if most > closure::MAX_LOBES {
+            return Err(too_many_lobes(material, most));
+        }
         let lobes = material
             .surface
             .map_or(Vec::new(), |root| closure::lobes(material, root));
-        if lobes.len() > closure::MAX_LOBES {
-            let message = format!("`{}` has {} lobes", material.name, lobes.len());
-            return Err(Diagnostic::new(Code::TooManyLobes, material.span, message)
-                .expected(format!("at most {}", closure::MAX_LOBES)));
-        }
         let mut evaluate = closure::evaluate(module, &self.core, material, &material.name, &lobes);
         passes::run(module, &mut evaluate);
         let mut emission = closure::emission(module, &self.core, material, &material.name);
@@ -547,6 +578,13 @@ fn texture_spaces(module: &Module, materials: &[CompiledMaterial]) -> BTreeSet<T
 
 /// Most expressions of a material after its calls are put in line, as a GPU driver does.
 const MAX_SIZE: u64 = 400_000;
+
+/// A material with more lobes than it may have.
+fn too_many_lobes(material: &ir::Material, count: usize) -> Diagnostic {
+    let message = format!("`{}` has {count} lobes", material.name);
+    Diagnostic::new(Code::TooManyLobes, material.span, message)
+        .expected(format!("at most {}", closure::MAX_LOBES))
+}
 
 /// A material whose calls multiply beyond what a driver can compile.
 fn too_large(material: &ir::Material, size: u64) -> Diagnostic {

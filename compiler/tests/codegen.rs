@@ -316,3 +316,62 @@ fn comparisons_that_face_each_other_are_no_template_list() {
         material m { surface = diffuse(select(faces(uv.x, uv.y > 0.0), 1.0, 0.0)); }",
     );
 }
+
+/// A material whose color goes through `depth` blocks within each other.
+fn blocks(depth: usize, open: impl Fn(usize) -> String, close: &str) -> String {
+    let open: String = (0..depth).map(open).collect();
+    format!(
+        "{DIFFUSE} fn low(x: float) -> bool = x < 0.5;
+        fn f(x: float) -> float {{ var y = x; {open} y += sin(y); {} y }}
+        material m {{ surface = diffuse(saturate(f(uv.x))); }}",
+        close.repeat(depth)
+    )
+}
+
+#[test]
+fn blocks_nest_as_deep_as_wgsl_allows() {
+    // Loops of more turns meet the bound on turns before.
+    let repeated = |_| "while low(y) limit 1 { y += cos(y);".to_owned();
+    let chosen = |_| "if low(y) { y += cos(y);".to_owned();
+    for depth in [60, 80, 120] {
+        let found = codes(&blocks(depth, repeated, "}"), &[]);
+        assert!(found.is_empty(), "{depth} loops: {found:?}");
+    }
+    let found = codes(&blocks(120, chosen, "}"), &[]);
+    assert!(found.is_empty(), "120 branches: {found:?}");
+    assert_eq!(codes(&blocks(127, repeated, "}"), &[]), ["E0106"]);
+}
+
+#[test]
+fn functions_in_line_stay_within_what_wgsl_allows() {
+    let open = |_| "while low(y) limit 1 { y += cos(y);".to_owned();
+    let caller = blocks(100, open, "}");
+    let callee = caller.split("material").next().unwrap_or_default();
+    let callee = callee.split("fn f(").nth(1).unwrap_or_default();
+    let callee = "fn g(".to_owned() + callee;
+    let caller = caller.replace("sin(y)", "g(y)");
+    assert!(codes(&(caller + &callee), &[]).is_empty());
+}
+
+#[test]
+fn whatever_a_source_may_nest_compiles() {
+    let parentheses = "(".repeat(240) + "uv.x" + &")".repeat(240);
+    let calls = "sin(".repeat(240) + "uv.x" + &")".repeat(240);
+    let sum = vec!["uv.x"; 120].join(" + ");
+    let powers = "0.5 * (uv.x + ".repeat(55) + "uv.y" + &")".repeat(55);
+    let choices = (0..60).map(|i| format!("if uv.x < {i}.5 {{ {i}.25 * uv.y }} else "));
+    let choices = choices.collect::<String>() + "{ 0.5 }";
+    let values = "{ let a = uv.x; a * ".repeat(80) + "uv.y" + &" }".repeat(80);
+    for value in [parentheses, calls, sum, powers, choices, values] {
+        let text =
+            format!("{DIFFUSE} material m {{ let v = {value}; surface = diffuse(saturate(v)); }}");
+        assert!(
+            codes(&text, &[]).is_empty(),
+            "{value}: {:?}",
+            codes(&text, &[])
+        );
+    }
+    let layers = "layer(uv.x * diffuse(0.1), ".repeat(60) + "diffuse(0.5)" + &")".repeat(60);
+    let text = format!("{DIFFUSE} material m {{ surface = {layers}; }}");
+    assert!(codes(&text, &[]).is_empty(), "{:?}", codes(&text, &[]));
+}

@@ -3,6 +3,7 @@
 //! A value that a `let` named keeps its name; one that is used once, nearby, stands where it is
 //! used; the rest are numbered in order.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -41,6 +42,21 @@ pub fn evaluated(f: &Function) -> Vec<ExprId> {
     let mut out = Vec::new();
     walk(&f.body, &mut out);
     out
+}
+
+/// Most blocks within each other in the body of a function: with the body's, WGSL allows 127.
+pub const MAX_NESTING: usize = 126;
+
+/// Blocks within each other in the text of a block, at most: fewer where an `else` has an `if` only.
+pub fn nesting(block: &Block) -> usize {
+    let each = block.iter().map(|stmt| match stmt {
+        Stmt::If(_, a, b) => 1 + nesting(a).max(nesting(b)),
+        Stmt::For { body, .. } => 1 + nesting(body),
+        // The test stands in a block of its own.
+        Stmt::While { head, body, .. } => 1 + nesting(head).max(nesting(body)).max(1),
+        Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
+    });
+    each.max().unwrap_or(0)
 }
 
 /// The functions that a function calls.
@@ -194,7 +210,7 @@ impl Printer<'_> {
                 Some(name) => name.clone(),
                 None => {
                     let name = unique(&mut self.taken, e.name.as_deref().unwrap_or("given"));
-                    let text = uniform(row, *place, &type_name(self.program, place.ty));
+                    let text = uniform(row, *place, type_name(self.program, place.ty));
                     self.line_of(id, 1, &format!("let {name} = {text};"));
                     read.insert(i, name.clone());
                     name
@@ -244,7 +260,7 @@ impl Printer<'_> {
             } => {
                 let bound = high;
                 let (name, low, high) = (
-                    self.locals[local.index()].clone(),
+                    &self.locals[local.index()],
                     self.operand(*low),
                     self.operand(*high),
                 );
@@ -326,22 +342,20 @@ impl Printer<'_> {
     }
 
     /// An expression where it is used.
-    fn operand(&self, id: ExprId) -> String {
+    fn operand(&self, id: ExprId) -> Cow<'_, str> {
         match &self.f.expr(id).kind {
-            ExprKind::Const(c) => constant(c),
-            ExprKind::Param(i) => self.params[*i as usize].clone(),
-            _ => self.names[id.index()]
-                .clone()
-                .unwrap_or_else(|| "0.0".into()),
+            ExprKind::Const(c) => constant(c).into(),
+            ExprKind::Param(i) => self.params[*i as usize].as_str().into(),
+            _ => self.names[id.index()].as_deref().unwrap_or("0.0").into(),
         }
     }
 
     /// As `operand`, in parentheses where it is an operator or negative.
-    fn tight(&self, id: ExprId) -> String {
+    fn tight(&self, id: ExprId) -> Cow<'_, str> {
         let text = self.operand(id);
         let inline_operator = self.inline[id.index()] && self.is_operator(id);
         if inline_operator || text.starts_with('-') {
-            format!("({text})")
+            format!("({text})").into()
         } else {
             text
         }
@@ -371,7 +385,9 @@ impl Printer<'_> {
         let f = self.f;
         let expr = f.expr(id);
         match &expr.kind {
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => self.operand(id),
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => {
+                self.operand(id).into_owned()
+            }
             ExprKind::Load(local) => self.locals[local.index()].clone(),
             ExprKind::Op(op, args) => self.op(*op, args, expr.ty),
             ExprKind::Compose(args) => {
@@ -394,7 +410,7 @@ impl Printer<'_> {
                     let name = &self.program.module.structs[s.index()].fields[*i as usize].0;
                     format!("{}.{}", self.tight(*v), super::names::identifier(name))
                 }
-                _ => self.operand(*v),
+                _ => self.operand(*v).into_owned(),
             },
         }
     }
@@ -436,7 +452,7 @@ impl Printer<'_> {
             let text = self.operand(a);
             let narrow = by_component && self.f.ty(a) == Type::Float && ty != Type::Float;
             if narrow {
-                format!("{}({text})", type_name(self.program, ty))
+                format!("{}({text})", type_name(self.program, ty)).into()
             } else {
                 text
             }
@@ -717,7 +733,7 @@ impl<'a> Inliner<'a> {
 
 /// Arguments with commas between them. `a < b, c > d` would begin a template list in WGSL, so
 /// comparisons that face each other like that get parentheses.
-fn joined(mut args: Vec<String>) -> String {
+fn joined(mut args: Vec<Cow<'_, str>>) -> String {
     let less = args.iter().position(|a| a.contains(" <"));
     let greater = args.iter().rposition(|a| a.contains(" >"));
     if less
@@ -728,7 +744,7 @@ fn joined(mut args: Vec<String>) -> String {
             .iter_mut()
             .filter(|a| a.contains(" <") || a.contains(" >"))
         {
-            *arg = format!("({arg})");
+            *arg = format!("({arg})").into();
         }
     }
     args.join(", ")

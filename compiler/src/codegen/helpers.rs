@@ -58,7 +58,7 @@ impl Helpers {
                     let _ = writeln!(
                         out,
                         "fn {name}{}\n",
-                        with_type(body, &type_name(program, ty))
+                        with_type(body, type_name(program, ty))
                     );
                 }
             }

@@ -17,7 +17,7 @@ mod names;
 mod target;
 
 pub use dispatch::lookup;
-pub use function::evaluated;
+pub use function::{MAX_NESTING, evaluated, nesting};
 use helpers::Helpers;
 pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
@@ -101,16 +101,16 @@ fn roots<'p>(program: &'p Program, members: &[usize]) -> Vec<Root<'p>> {
 }
 
 /// The WGSL name of a type.
-fn type_name(program: &Program, ty: Type) -> String {
+fn type_name(program: &Program, ty: Type) -> &str {
     match ty {
-        Type::Bool => "bool".into(),
-        Type::Int => "i32".into(),
-        Type::Float => "f32".into(),
-        Type::Vec2 => "vec2f".into(),
-        Type::Vec3 => "vec3f".into(),
-        Type::Vec4 => "vec4f".into(),
-        Type::Mat3 => "mat3x3f".into(),
-        Type::Struct(id) => program.names.structure(id).to_owned(),
+        Type::Bool => "bool",
+        Type::Int => "i32",
+        Type::Float => "f32",
+        Type::Vec2 => "vec2f",
+        Type::Vec3 => "vec3f",
+        Type::Vec4 => "vec4f",
+        Type::Mat3 => "mat3x3f",
+        Type::Struct(id) => program.names.structure(id),
     }
 }
 

@@ -10,7 +10,7 @@ mod lower;
 
 use self::code::{Code, Ins, Numbers, Place};
 use super::value::{Real, Value};
-use super::{Const, Function, FunctionId, Module};
+use super::{Const, ExprId, Function, FunctionId, Module};
 use crate::ops::{Counts, Op, Operands};
 
 /// Looks up a texture: index, u, v, color or data; gives RGBA.
@@ -126,6 +126,19 @@ impl<'a, F: Real> Interpreter<'a, F> {
         self.start(code, f, &args)
     }
 
+    /// Runs a function without parameters once, for the values of some of its expressions, which
+    /// stand in no block within another.
+    pub fn values(&mut self, f: &Function, of: &[ExprId]) -> Result<Vec<Value<F>>, OutOfFuel> {
+        let (code, places) = lower::lower(self.module, f, &self.uniforms, of);
+        self.codes.push(code);
+        self.execute(self.codes.len() - 1)?;
+        let value = |(&id, mut at): (&ExprId, Place)| {
+            let structs = &self.module.structs;
+            self.stack.read(f.ty(id), structs, &mut at)
+        };
+        Ok(of.iter().zip(places).map(value).collect())
+    }
+
     fn known_code(&mut self, id: FunctionId) -> usize {
         if let Some(code) = self.known[id.index()] {
             return code;
@@ -136,8 +149,8 @@ impl<'a, F: Real> Interpreter<'a, F> {
     }
 
     fn lower(&mut self, f: &Function) -> usize {
-        self.codes
-            .push(lower::lower(self.module, f, &self.uniforms));
+        let (code, _) = lower::lower(self.module, f, &self.uniforms, &[]);
+        self.codes.push(code);
         self.codes.len() - 1
     }
 

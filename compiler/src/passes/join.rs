@@ -12,30 +12,35 @@ use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 /// Most statements that a branch moves across.
 const MAX_DISTANCE: usize = 256;
 
-/// Joins branches in place.
-pub fn join(f: &mut Function) {
+/// Joins branches in place; false if there were none to join.
+pub fn join(f: &mut Function) -> bool {
     let body = std::mem::take(&mut f.body);
-    f.body = block(f, body);
+    let mut joined = false;
+    f.body = block(f, body, &mut joined);
+    joined
 }
 
 /// Joins the branches of a block, and of the blocks that result.
-fn block(f: &Function, stmts: Block) -> Block {
+fn block(f: &Function, stmts: Block, joined: &mut bool) -> Block {
     let mut out: Block = Vec::with_capacity(stmts.len());
     for stmt in stmts {
         match earlier(f, &out, &stmt) {
             Some(at) => match movers(f, &out[at..], &stmt) {
-                Some(movers) => merge(&mut out, at, &movers, stmt),
+                Some(movers) => {
+                    merge(&mut out, at, &movers, stmt);
+                    *joined = true;
+                }
                 None => out.push(stmt),
             },
             None => out.push(stmt),
         }
     }
-    out.into_iter().map(|s| inner(f, s)).collect()
+    out.into_iter().map(|s| inner(f, s, joined)).collect()
 }
 
-fn inner(f: &Function, stmt: Stmt) -> Stmt {
+fn inner(f: &Function, stmt: Stmt, joined: &mut bool) -> Stmt {
     match stmt {
-        Stmt::If(cond, a, b) => Stmt::If(cond, block(f, a), block(f, b)),
+        Stmt::If(cond, a, b) => Stmt::If(cond, block(f, a, joined), block(f, b, joined)),
         Stmt::For {
             local,
             low,
@@ -45,7 +50,7 @@ fn inner(f: &Function, stmt: Stmt) -> Stmt {
             local,
             low,
             high,
-            body: block(f, body),
+            body: block(f, body, joined),
         },
         Stmt::While {
             head,
@@ -53,10 +58,10 @@ fn inner(f: &Function, stmt: Stmt) -> Stmt {
             limit,
             body,
         } => Stmt::While {
-            head: block(f, head),
+            head: block(f, head, joined),
             test,
             limit,
-            body: block(f, body),
+            body: block(f, body, joined),
         },
         other => other,
     }

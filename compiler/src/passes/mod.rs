@@ -37,19 +37,21 @@ enum How {
     /// As the walk of `rewrite`, in evaluation order, with these rules. Walks that follow each other
     /// are done as one.
     Walk(fn(&Module, &Function) -> Rules),
-    /// In its own way.
-    Own(fn(&mut Function)),
+    /// As a walk, if the pass before, which the same rules came before, changed something.
+    Again(fn(&Module, &Function) -> Rules),
+    /// In its own way; false if nothing changed.
+    Own(fn(&mut Function) -> bool),
 }
 
 impl Pass {
     /// Runs this pass alone.
     pub fn run(&self, module: &Module, f: &mut Function) {
         match self.how {
-            How::Walk(rules) => {
+            How::Walk(rules) | How::Again(rules) => {
                 let rules = rules(module, f);
                 rewrite::run(module, f, rules);
             }
-            How::Own(change) => change(f),
+            How::Own(change) => drop(change(f)),
         }
     }
 }
@@ -79,15 +81,21 @@ pub const PIPELINE: &[Pass] = &[
     // What joined branches have in common, without another round of all.
     Pass {
         name: "cse",
-        how: How::Walk(cse::cse),
+        how: How::Again(cse::cse),
     },
     Pass {
         name: "licm",
-        how: How::Own(licm::hoist),
+        how: How::Own(|f| {
+            licm::hoist(f);
+            true
+        }),
     },
     Pass {
         name: "dead_code",
-        how: How::Own(dead_code::remove),
+        how: How::Own(|f| {
+            dead_code::remove(f);
+            true
+        }),
     },
 ];
 
@@ -114,16 +122,19 @@ pub fn run(module: &Module, function: &mut Function) {
 /// Runs the pipeline once; passes that are walks and follow each other in one walk.
 fn round(module: &Module, f: &mut Function) {
     let mut rest = PIPELINE;
+    let mut changed = true;
     while let [first, ..] = rest {
         let walks = rest.iter().map_while(|pass| match pass.how {
             How::Walk(rules) => Some(rules(module, f)),
-            How::Own(_) => None,
+            How::Again(_) | How::Own(_) => None,
         });
         let rules: Vec<Rules> = walks.collect();
         let count = rules.len().max(1);
-        match rules.into_iter().reduce(Rules::and) {
-            Some(rules) => rewrite::run(module, f, rules),
-            None => first.run(module, f),
+        match (rules.into_iter().reduce(Rules::and), &first.how) {
+            (Some(rules), _) => rewrite::run(module, f, rules),
+            (None, How::Own(change)) => changed = change(f),
+            (None, _) if changed => first.run(module, f),
+            (None, _) => {}
         }
         verify(module, f, rest[count - 1].name);
         rest = &rest[count..];

@@ -10,8 +10,14 @@ use crate::ir::value::{Real, Value};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, LocalId, Module, Stmt, Type};
 use crate::ops::{self, Op};
 
-/// The code of `f`, a function over `module`.
-pub(super) fn lower<F: Real>(module: &Module, f: &Function, uniforms: &[Value<F>]) -> Code<F> {
+/// The code of `f`, a function over `module`, and where it leaves the values of the expressions
+/// `kept`, which stand in no block within another.
+pub(super) fn lower<F: Real>(
+    module: &Module,
+    f: &Function,
+    uniforms: &[Value<F>],
+    kept: &[ExprId],
+) -> (Code<F>, Vec<Place>) {
     let mut l = Lowering {
         module,
         f,
@@ -26,18 +32,20 @@ pub(super) fn lower<F: Real>(module: &Module, f: &Function, uniforms: &[Value<F>
     };
     let params: Vec<Place> = f.params.iter().map(|p| l.reserve(p.ty)).collect();
     let image_at = l.top;
-    let image = l.image(&params, uniforms);
+    let image = l.image(&params, uniforms, kept);
     l.block(&f.body);
     l.emit(Ins::Return);
     let result = (l.place(f.value), l.size_of(f.ty(f.value)));
-    Code {
+    let places = kept.iter().map(|&id| l.place(id)).collect();
+    let code = Code {
         image_at,
         image,
         size: l.size,
         result,
         runs: l.runs,
         instructions: l.instructions,
-    }
+    };
+    (code, places)
 }
 
 /// Jumps of a loop whose targets are not known yet.
@@ -65,7 +73,7 @@ struct Lowering<'a, F> {
 
 impl<F: Real> Lowering<'_, F> {
     /// Places variables, constants and uniforms behind the parameters.
-    fn image(&mut self, params: &[Place], uniforms: &[Value<F>]) -> Numbers<F> {
+    fn image(&mut self, params: &[Place], uniforms: &[Value<F>], kept: &[ExprId]) -> Numbers<F> {
         let mut image = Numbers::new();
         let base = self.top;
         for local in &self.f.locals {
@@ -74,6 +82,7 @@ impl<F: Real> Lowering<'_, F> {
         }
         let mut used = vec![false; self.f.exprs.len()];
         used[self.f.value.index()] = true;
+        kept.iter().for_each(|id| used[id.index()] = true);
         mark(self.f, &self.f.body, &mut used);
         for (i, e) in self.f.exprs.iter().enumerate() {
             if !used[i] {

@@ -9,12 +9,13 @@
 //! color times a scale), and components of what is read anyway. Lookups of textures stay as well:
 //! only the kernel has them. Matrices and structs are read by columns and by fields.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::dead_code;
 use crate::ir::build::in_range;
 use crate::ir::interp::{Interpreter, OutOfFuel};
-use crate::ir::{Block, Const, ExprId, ExprKind, Function, Module, Stmt, Type};
+use crate::ir::value::Value;
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type};
 use crate::ops::CostClass;
 
 mod cut;
@@ -48,31 +49,13 @@ impl Hoisted {
     /// # Errors
     /// If they take more than [`HOIST_FUEL`] operations.
     pub fn evaluate(&self, module: &Module, parameters: &[Const]) -> Result<Vec<Const>, OutOfFuel> {
-        let parts: Vec<Function> = self.values.iter().map(|&v| self.only(v)).collect();
-        let mut run = Interpreter::<f64>::new(module, HOIST_FUEL).with_uniforms(parameters);
-        let values = parts.iter().map(|part| {
-            let value = run.run(part, Vec::new())?.to_const();
-            Ok(in_range(value.unwrap_or(Const::Bool(false))))
-        });
-        values.collect()
-    }
-
-    /// The part of the prelude that computes one value.
-    fn only(&self, value: ExprId) -> Function {
-        let mut f = self.prelude.clone();
-        let mut needed = vec![false; f.exprs.len()];
-        needed[value.index()] = true;
-        for i in (0..=value.index()).rev() {
-            if needed[i] {
-                let operands = f.exprs[i].kind.operands();
-                operands.iter().for_each(|o| needed[o.index()] = true);
-            }
+        if self.values.is_empty() {
+            return Ok(Vec::new());
         }
-        f.body
-            .retain(|s| matches!(s, Stmt::Eval(id) if needed[id.index()]));
-        f.result = f.ty(value);
-        f.value = value;
-        f
+        let mut run = Interpreter::<f64>::new(module, HOIST_FUEL).with_uniforms(parameters);
+        let values = run.values(&self.prelude, &self.values)?;
+        let constant = |v: &Value<f64>| in_range(v.to_const().unwrap_or(Const::Bool(false)));
+        Ok(values.iter().map(constant).collect())
     }
 }
 
@@ -109,7 +92,10 @@ struct Uses {
 
 impl Uses {
     fn of(module: &Module, f: &Function) -> Self {
-        let textures = texture_users(module);
+        let mut textures = TextureUsers {
+            module,
+            known: BTreeMap::new(),
+        };
         let mut uses = Self {
             uniform: vec![false; f.exprs.len()],
             read: BTreeSet::from([f.value]),
@@ -130,7 +116,7 @@ impl Uses {
                 && match kind {
                     ExprKind::Load(_) => false,
                     ExprKind::Op(op, _) => op.info().class != CostClass::Texture,
-                    ExprKind::Call(callee, _) => !textures[callee.index()],
+                    ExprKind::Call(callee, _) => !textures.contains(*callee),
                     _ => true,
                 };
             let called = matches!(kind, ExprKind::Call(..));
@@ -173,18 +159,29 @@ impl Uses {
     }
 }
 
-/// Which functions look up textures, themselves or through others.
-fn texture_users(module: &Module) -> Vec<bool> {
-    let mut users: Vec<bool> = Vec::new();
-    for f in &module.functions {
+/// Which functions look up textures, themselves or through others; found where asked.
+struct TextureUsers<'a> {
+    module: &'a Module,
+    known: BTreeMap<FunctionId, bool>,
+}
+
+impl TextureUsers<'_> {
+    fn contains(&mut self, id: FunctionId) -> bool {
+        if let Some(&known) = self.known.get(&id) {
+            return known;
+        }
+        let module = self.module;
+        let Some(f) = module.functions.get(id.index()) else {
+            return true;
+        };
         let uses = f.exprs.iter().any(|e| match &e.kind {
             ExprKind::Op(op, _) => op.info().class == CostClass::Texture,
-            ExprKind::Call(callee, _) => users.get(callee.index()).copied().unwrap_or(true),
+            ExprKind::Call(callee, _) => self.contains(*callee),
             _ => false,
         });
-        users.push(uses);
+        self.known.insert(id, uses);
+        uses
     }
-    users
 }
 
 /// Drops evaluations that are not to be kept.

@@ -15,6 +15,7 @@
 //! parameters arrives small.
 
 use super::rewrite::{Rewriter, Rules};
+use crate::codegen;
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, Methods, Module, Stmt};
 use crate::ops::CostClass;
 
@@ -24,8 +25,8 @@ mod splice;
 /// Most expressions of a function that goes in line wherever it is called.
 const SMALL: u32 = 24;
 
-/// Most blocks within blocks that inlining makes.
-const MAX_DEPTH: usize = 128;
+/// Most blocks within blocks that inlining makes, a few less than WGSL allows.
+const MAX_DEPTH: usize = codegen::MAX_NESTING - 8;
 
 /// Expressions that a function may have before only small callees go in line.
 const MAX_EXPRS: usize = 1 << 15;
@@ -176,7 +177,7 @@ fn goes_in_line(
     let room = if small { MAX_ALL_EXPRS } else { MAX_EXPRS };
     (small || policy.wanted(w.module, callee))
         && w.f.exprs.len() < room
-        && w.depth + nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
+        && w.depth + codegen::nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
 }
 
 fn for_each_call(f: &Function, block: &Block, found: &mut impl FnMut(FunctionId)) {
@@ -211,15 +212,4 @@ fn evaluations(block: &Block) -> u32 {
         Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
     });
     each.sum()
-}
-
-/// Blocks within blocks.
-fn nesting(block: &Block) -> usize {
-    let each = block.iter().map(|stmt| match stmt {
-        Stmt::If(_, a, b) => 1 + nesting(a).max(nesting(b)),
-        Stmt::For { body, .. } => 1 + nesting(body),
-        Stmt::While { head, body, .. } => 1 + nesting(head).max(nesting(body)),
-        Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
-    });
-    each.max().unwrap_or(0)
 }
