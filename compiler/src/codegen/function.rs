@@ -9,66 +9,14 @@ use std::fmt::Write;
 
 use super::helpers::Helpers;
 use super::names::unique;
-use super::type_name;
+use super::walk::{callees, counters, stored, used_uniforms};
+use super::{inliner, type_name};
 use crate::Program;
 use crate::abi::PARAMETERS;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
 use crate::ops::{Op, Shape, Wgsl};
 use crate::parameters::{Layout, Place};
 use crate::source::Span;
-
-/// Operations that may stand in one expression before it gets a name.
-const MAX_INLINE: u32 = 7;
-
-/// Every expression that a function evaluates.
-pub fn evaluated(f: &Function) -> Vec<ExprId> {
-    fn walk(block: &Block, out: &mut Vec<ExprId>) {
-        for stmt in block {
-            match stmt {
-                Stmt::Eval(id) => out.push(*id),
-                Stmt::If(_, a, b) => {
-                    walk(a, out);
-                    walk(b, out);
-                }
-                Stmt::For { body, .. } => walk(body, out),
-                Stmt::While { head, body, .. } => {
-                    walk(head, out);
-                    walk(body, out);
-                }
-                Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
-            }
-        }
-    }
-    let mut out = Vec::new();
-    walk(&f.body, &mut out);
-    out
-}
-
-/// Most blocks within each other in the body of a function: with the body's, WGSL allows 127.
-pub const MAX_NESTING: usize = 126;
-
-/// Blocks within each other in the text of a block, at most: fewer where an `else` has an `if` only.
-pub fn nesting(block: &Block) -> usize {
-    let each = block.iter().map(|stmt| match stmt {
-        Stmt::If(_, a, b) => 1 + nesting(a).max(nesting(b)),
-        Stmt::For { body, .. } => 1 + nesting(body),
-        // The test stands in a block of its own.
-        Stmt::While { head, body, .. } => 1 + nesting(head).max(nesting(body)).max(1),
-        Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
-    });
-    each.max().unwrap_or(0)
-}
-
-/// The functions that a function calls.
-pub fn callees(f: &Function) -> BTreeSet<usize> {
-    let called = evaluated(f)
-        .into_iter()
-        .filter_map(|id| match f.expr(id).kind {
-            ExprKind::Call(callee, _) => Some(callee.index()),
-            _ => None,
-        });
-    called.collect()
-}
 
 /// Prints a function under a name. One that reads uniforms gets the first row of its instance
 /// as its first parameter, and `layout` tells where they lie.
@@ -101,7 +49,7 @@ pub fn print(
         params,
         locals,
         names: vec![None; f.exprs.len()],
-        inline: Inliner::decide(f),
+        inline: inliner::decide(f),
         taken,
         next: 0,
         origin: (f.span, program.origin(f.span)),
@@ -120,26 +68,6 @@ fn called_names(program: &Program, f: &Function) -> BTreeMap<String, u32> {
         .chain(structs)
         .map(|name| (name.to_owned(), 1))
         .collect()
-}
-
-/// Variables that loops declare.
-fn counters(block: &Block) -> BTreeSet<LocalId> {
-    let mut found = BTreeSet::new();
-    for stmt in block {
-        match stmt {
-            Stmt::For { local, body, .. } => {
-                found.insert(*local);
-                found.extend(counters(body));
-            }
-            Stmt::If(_, a, b) => {
-                found.extend(counters(a));
-                found.extend(counters(b));
-            }
-            Stmt::While { body, .. } => found.extend(counters(body)),
-            _ => {}
-        }
-    }
-    found
 }
 
 struct Printer<'a> {
@@ -487,43 +415,6 @@ impl Printer<'_> {
     }
 }
 
-/// The uniforms that statements read, each expression once.
-fn used_uniforms(f: &Function) -> BTreeSet<ExprId> {
-    let mut used = BTreeSet::from([f.value]);
-    read_by(f, &f.body, &mut used);
-    used.retain(|&id| matches!(f.expr(id).kind, ExprKind::Uniform(_)));
-    used
-}
-
-/// The expressions that statements and what they evaluate read.
-fn read_by(f: &Function, block: &Block, out: &mut BTreeSet<ExprId>) {
-    for stmt in block {
-        match stmt {
-            Stmt::Eval(id) => out.extend(f.expr(*id).kind.operands()),
-            Stmt::Store(_, _, value) => drop(out.insert(*value)),
-            Stmt::If(cond, a, b) => {
-                out.insert(*cond);
-                read_by(f, a, out);
-                read_by(f, b, out);
-            }
-            Stmt::For {
-                low, high, body, ..
-            } => {
-                out.extend([*low, *high]);
-                read_by(f, body, out);
-            }
-            Stmt::While {
-                head, test, body, ..
-            } => {
-                read_by(f, head, out);
-                out.insert(*test);
-                read_by(f, body, out);
-            }
-            Stmt::Break | Stmt::Continue => {}
-        }
-    }
-}
-
 /// A value of the parameter table.
 fn uniform(row: &str, place: Place, ty: &str) -> String {
     let row = match place.row {
@@ -537,31 +428,6 @@ fn uniform(row: &str, place: Place, ty: &str) -> String {
         Type::Bool => format!("{words} != 0u"),
         _ => format!("bitcast<{ty}>({words})"),
     }
-}
-
-/// Variables that are ever loaded or stored.
-fn stored(f: &Function) -> BTreeSet<LocalId> {
-    fn walk(block: &Block, out: &mut BTreeSet<LocalId>) {
-        for stmt in block {
-            match stmt {
-                Stmt::Store(local, ..) => drop(out.insert(*local)),
-                Stmt::If(_, a, b) => {
-                    walk(a, out);
-                    walk(b, out);
-                }
-                Stmt::For { body, .. } | Stmt::While { body, .. } => walk(body, out),
-                _ => {}
-            }
-        }
-    }
-    let mut out = BTreeSet::new();
-    walk(&f.body, &mut out);
-    for id in evaluated(f) {
-        if let ExprKind::Load(local) = f.expr(id).kind {
-            out.insert(local);
-        }
-    }
-    out
 }
 
 fn letter(component: u8) -> char {
@@ -603,131 +469,6 @@ fn float(x: f64) -> String {
         format!("{x:?}")
     } else {
         format!("{:?}", f32::MAX.copysign(x))
-    }
-}
-
-/// Decides which values stand where they are used.
-struct Inliner<'a> {
-    f: &'a Function,
-    uses: Vec<u32>,
-    inline: Vec<bool>,
-    size: Vec<u32>,
-    loads: Vec<bool>,
-}
-
-impl<'a> Inliner<'a> {
-    fn decide(f: &'a Function) -> Vec<bool> {
-        let n = f.exprs.len();
-        let mut this = Self {
-            f,
-            uses: vec![0; n],
-            inline: vec![false; n],
-            size: vec![1; n],
-            loads: vec![false; n],
-        };
-        this.count(&f.body);
-        this.uses[f.value.index()] += 1;
-        let mut pending = this.block(&f.body);
-        this.consume(f.value, &mut pending);
-        this.inline
-    }
-
-    fn count(&mut self, block: &Block) {
-        for stmt in block {
-            match stmt {
-                Stmt::Eval(id) => self
-                    .f
-                    .expr(*id)
-                    .kind
-                    .operands()
-                    .iter()
-                    .for_each(|a| self.uses[a.index()] += 1),
-                Stmt::Store(_, _, value) => self.uses[value.index()] += 1,
-                Stmt::If(cond, a, b) => {
-                    self.uses[cond.index()] += 1;
-                    self.count(a);
-                    self.count(b);
-                }
-                Stmt::For {
-                    low, high, body, ..
-                } => {
-                    self.uses[low.index()] += 1;
-                    // The bound stands in the loop's condition: never move work into it.
-                    self.uses[high.index()] += 2;
-                    self.count(body);
-                }
-                Stmt::While {
-                    head, test, body, ..
-                } => {
-                    self.count(head);
-                    self.uses[test.index()] += 1;
-                    self.count(body);
-                }
-                Stmt::Break | Stmt::Continue => {}
-            }
-        }
-    }
-
-    /// Walks a block; gives the values that could still move to a use right after it.
-    fn block(&mut self, block: &Block) -> Vec<ExprId> {
-        let mut pending: Vec<ExprId> = Vec::new();
-        for stmt in block {
-            match stmt {
-                Stmt::Eval(id) => {
-                    for operand in self.f.expr(*id).kind.operands() {
-                        self.consume(*operand, &mut pending);
-                    }
-                    self.measure(*id);
-                    pending.push(*id);
-                }
-                Stmt::Store(_, _, value) => {
-                    self.consume(*value, &mut pending);
-                    pending.retain(|p| !self.loads[p.index()]);
-                }
-                Stmt::If(cond, a, b) => {
-                    self.consume(*cond, &mut pending);
-                    self.block(a);
-                    self.block(b);
-                    pending.retain(|p| !self.loads[p.index()]);
-                }
-                Stmt::For { low, body, .. } => {
-                    self.consume(*low, &mut pending);
-                    self.block(body);
-                    pending.retain(|p| !self.loads[p.index()]);
-                }
-                Stmt::While {
-                    head, test, body, ..
-                } => {
-                    let mut inner = self.block(head);
-                    self.consume(*test, &mut inner);
-                    self.block(body);
-                    pending.retain(|p| !self.loads[p.index()]);
-                }
-                Stmt::Break | Stmt::Continue => {}
-            }
-        }
-        pending
-    }
-
-    fn consume(&mut self, id: ExprId, pending: &mut Vec<ExprId>) {
-        let movable = self.uses[id.index()] == 1
-            && self.f.expr(id).name.is_none()
-            && self.size[id.index()] <= MAX_INLINE;
-        if let Some(at) = pending.iter().position(|p| *p == id)
-            && movable
-        {
-            self.inline[id.index()] = true;
-            pending.remove(at);
-        }
-    }
-
-    fn measure(&mut self, id: ExprId) {
-        let kind = &self.f.expr(id).kind;
-        let inlined = kind.operands().iter().filter(|a| self.inline[a.index()]);
-        let size: u32 = inlined.clone().map(|a| self.size[a.index()]).sum();
-        self.size[id.index()] = size + 1;
-        self.loads[id.index()] =
-            matches!(kind, ExprKind::Load(_)) || inlined.clone().any(|a| self.loads[a.index()]);
     }
 }
 

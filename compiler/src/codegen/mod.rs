@@ -13,14 +13,16 @@ use crate::parameters::Layout;
 mod dispatch;
 mod function;
 mod helpers;
+mod inliner;
 mod names;
 mod target;
+mod walk;
 
 pub use dispatch::lookup;
-pub use function::{MAX_NESTING, evaluated, nesting};
 use helpers::Helpers;
 pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
+pub use walk::{MAX_NESTING, evaluated, nesting};
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {
@@ -129,7 +131,7 @@ fn reachable(program: &Program, roots: &[Root<'_>]) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let mut pending: Vec<&Function> = roots.iter().map(|r| r.function).collect();
     while let Some(f) = pending.pop() {
-        for callee in function::callees(f) {
+        for callee in walk::callees(f) {
             if found.insert(callee) {
                 pending.push(&program.module.functions[callee]);
             }
@@ -200,7 +202,7 @@ pub fn inputs(
 ) -> crate::abi::InputSet {
     let mut set = crate::abi::InputSet::default();
     for f in functions {
-        for id in function::evaluated(f) {
+        for id in walk::evaluated(f) {
             let ExprKind::Field(base, i) = f.expr(id).kind else {
                 continue;
             };
