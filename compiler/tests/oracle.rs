@@ -28,9 +28,9 @@ fn walk(program: &Program, cos_o: f64) -> Estimate {
 
 /// Within four standard errors, and these are small.
 fn agrees(e: &Estimate, expected: [f64; 3], what: &str) {
-    for c in 0..3 {
+    for (c, expected) in expected.into_iter().enumerate() {
         assert!(e.error[c] < 0.005, "{what}: {e:?}");
-        near(e.mean[c], expected[c], 4.0 * e.error[c] + 1e-9, what);
+        near(e.mean[c], expected, 4.0 * e.error[c] + 1e-9, what);
     }
 }
 

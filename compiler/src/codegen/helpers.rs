@@ -30,7 +30,7 @@ impl Helpers {
     pub fn select(&mut self, program: &Program, ty: Type) -> String {
         if matches!(ty, Type::Mat3 | Type::Struct(_)) {
             self.used.insert((Op::Select, ty));
-            return select_name(&type_name(program, ty));
+            return select_name(type_name(program, ty));
         }
         "select".into()
     }
@@ -39,7 +39,7 @@ impl Helpers {
     pub fn print(&self, program: &Program, out: &mut String) {
         for &(op, ty) in &self.used {
             if op == Op::Select {
-                select(out, &type_name(program, ty));
+                select(out, type_name(program, ty));
                 continue;
             }
             let info = op.info();
