@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
 use crate::codegen::{self, Target};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::{self, Const, ExprKind, Function, Module, Type};
+use crate::ir::{self, Const, ExprKind, Function, Module, Type, walk};
 use crate::ops::Op;
 use crate::parameters::Layout;
 use crate::passes::{self, Hoisted};
@@ -148,7 +148,7 @@ impl Program {
             || self.materials.iter().any(|m| m.layout.rows > 0)
     }
 
-    /// The words of an instance in the parameter table; texture indices become slots.
+    /// The words of an instance in the parameter table.
     fn row_words(&self, instance: &Instance) -> Vec<u32> {
         self.materials[instance.info.material]
             .layout
@@ -186,14 +186,14 @@ impl Program {
     pub(crate) fn nested_too_deep(&self, members: &[usize]) -> Option<Diagnostic> {
         let own = members.iter().map(|&m| &self.materials[m]);
         let own = own.flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
-        let deep = |f: &&Function| codegen::nesting(&f.body) > codegen::MAX_NESTING;
+        let deep = |f: &&Function| walk::nesting(&f.body) > walk::MAX_NESTING;
         let f = self.module.functions.iter().chain(own).find(deep)?;
         let message = format!("the blocks of `{}` nest too deeply", f.name);
         Some(
             Diagnostic::new(Code::NestedTooDeep, f.span, message)
                 .expected(format!(
                     "at most {} blocks within each other",
-                    codegen::MAX_NESTING
+                    walk::MAX_NESTING
                 ))
                 .hint("move inner blocks to a function"),
         )
@@ -343,7 +343,7 @@ impl ProgramBuilder {
 
     /// Expressions of a function with its calls put in line.
     fn size(&self, f: &Function) -> u64 {
-        codegen::evaluated(f).into_iter().fold(0u64, |n, id| {
+        f.evaluated().into_iter().fold(0u64, |n, id| {
             let inner = match f.expr(id).kind {
                 ExprKind::Call(callee, _) => self.sizes.get(callee.index()).copied().unwrap_or(0),
                 _ => 1,
@@ -567,7 +567,7 @@ fn texture_spaces(module: &Module, materials: &[CompiledMaterial]) -> BTreeSet<T
         .flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
     let all = own
         .chain(&module.functions)
-        .flat_map(|f| codegen::evaluated(f).into_iter().map(move |id| f.expr(id)));
+        .flat_map(|f| f.evaluated().into_iter().map(move |id| f.expr(id)));
     all.filter_map(|e| match e.kind {
         ExprKind::Op(Op::Image, _) => Some(TextureSpace::Color),
         ExprKind::Op(Op::ImageData, _) => Some(TextureSpace::Data),

@@ -106,32 +106,16 @@ pub fn emission_kind(module: &Module, function: Option<&Function>, uniforms: &[C
 
 /// Does the value depend on a field of the surface point other than its geometric normal?
 fn reads_point(module: &Module, f: &Function) -> bool {
-    f.exprs.iter().any(|e| match &e.kind {
+    f.evaluated().into_iter().any(|id| match &f.expr(id).kind {
         ExprKind::Field(base, i) => match (&f.expr(*base).kind, f.ty(*base)) {
             (ExprKind::Param(0), Type::Struct(s)) => {
                 module.structs[s.index()].fields[*i as usize].0 != "geometric_normal"
-                    && is_evaluated(f, e)
             }
             _ => false,
         },
-        ExprKind::Op(Op::Image | Op::ImageData, _) => is_evaluated(f, e),
+        ExprKind::Op(Op::Image | Op::ImageData, _) => true,
         _ => false,
     })
-}
-
-/// Dead code was removed from the body but stays in the arena.
-fn is_evaluated(f: &Function, wanted: &crate::ir::Expr) -> bool {
-    use crate::ir::{Block, Stmt};
-    fn within(f: &Function, block: &Block, wanted: &crate::ir::Expr) -> bool {
-        block.iter().any(|s| match s {
-            Stmt::Eval(id) => std::ptr::eq(f.expr(*id), wanted),
-            Stmt::If(_, a, b) => within(f, a, wanted) || within(f, b, wanted),
-            Stmt::For { body, .. } => within(f, body, wanted),
-            Stmt::While { head, body, .. } => within(f, head, wanted) || within(f, body, wanted),
-            _ => false,
-        })
-    }
-    within(f, &f.body, wanted)
 }
 
 /// The radiance toward a direction of cosine `z` on a surface whose normal is z.

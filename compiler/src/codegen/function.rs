@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use super::helpers::Helpers;
 use super::names::unique;
-use super::walk::{callees, counters, stored, used_uniforms};
+use super::walk::{counters, stored, used_uniforms};
 use super::{inliner, type_name};
 use crate::Program;
 use crate::abi::PARAMETERS;
@@ -59,7 +59,7 @@ pub fn print(
 
 /// Names that the function's text refers to, which its own variables must not hide.
 fn called_names(program: &Program, f: &Function) -> BTreeMap<String, u32> {
-    let functions = callees(f).into_iter().map(|id| program.names.function(id));
+    let functions = f.calls().map(|id| program.names.function(id.index()));
     let structs = f.exprs.iter().filter_map(|e| match e.ty {
         Type::Struct(id) => Some(program.names.structure(id)),
         _ => None,

@@ -22,7 +22,6 @@ pub use dispatch::lookup;
 use helpers::Helpers;
 pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
-pub use walk::{MAX_NESTING, evaluated, nesting};
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {
@@ -131,9 +130,9 @@ fn reachable(program: &Program, roots: &[Root<'_>]) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let mut pending: Vec<&Function> = roots.iter().map(|r| r.function).collect();
     while let Some(f) = pending.pop() {
-        for callee in walk::callees(f) {
-            if found.insert(callee) {
-                pending.push(&program.module.functions[callee]);
+        for callee in f.calls() {
+            if found.insert(callee.index()) {
+                pending.push(&program.module.functions[callee.index()]);
             }
         }
     }
@@ -202,7 +201,7 @@ pub fn inputs(
 ) -> crate::abi::InputSet {
     let mut set = crate::abi::InputSet::default();
     for f in functions {
-        for id in walk::evaluated(f) {
+        for id in f.evaluated() {
             let ExprKind::Field(base, i) = f.expr(id).kind else {
                 continue;
             };

@@ -1,59 +1,9 @@
-//! What a function consists of, as its text needs to know: what it evaluates, calls, reads and
-//! stores.
+//! What the text of a function must know of it beforehand: its loop variables, the uniforms it
+//! reads, the variables it stores.
 
 use std::collections::BTreeSet;
 
 use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
-
-/// Every expression that a function evaluates.
-pub fn evaluated(f: &Function) -> Vec<ExprId> {
-    fn walk(block: &Block, out: &mut Vec<ExprId>) {
-        for stmt in block {
-            match stmt {
-                Stmt::Eval(id) => out.push(*id),
-                Stmt::If(_, a, b) => {
-                    walk(a, out);
-                    walk(b, out);
-                }
-                Stmt::For { body, .. } => walk(body, out),
-                Stmt::While { head, body, .. } => {
-                    walk(head, out);
-                    walk(body, out);
-                }
-                Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
-            }
-        }
-    }
-    let mut out = Vec::new();
-    walk(&f.body, &mut out);
-    out
-}
-
-/// Most blocks within each other in the body of a function: with the body's, WGSL allows 127.
-pub const MAX_NESTING: usize = 126;
-
-/// Blocks within each other in the text of a block, at most: fewer where an `else` has an `if` only.
-pub fn nesting(block: &Block) -> usize {
-    let each = block.iter().map(|stmt| match stmt {
-        Stmt::If(_, a, b) => 1 + nesting(a).max(nesting(b)),
-        Stmt::For { body, .. } => 1 + nesting(body),
-        // The test stands in a block of its own.
-        Stmt::While { head, body, .. } => 1 + nesting(head).max(nesting(body)).max(1),
-        Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
-    });
-    each.max().unwrap_or(0)
-}
-
-/// The functions that a function calls.
-pub fn callees(f: &Function) -> BTreeSet<usize> {
-    let called = evaluated(f)
-        .into_iter()
-        .filter_map(|id| match f.expr(id).kind {
-            ExprKind::Call(callee, _) => Some(callee.index()),
-            _ => None,
-        });
-    called.collect()
-}
 
 /// Variables that loops declare.
 pub fn counters(block: &Block) -> BTreeSet<LocalId> {
@@ -129,7 +79,7 @@ pub fn stored(f: &Function) -> BTreeSet<LocalId> {
     }
     let mut out = BTreeSet::new();
     walk(&f.body, &mut out);
-    for id in evaluated(f) {
+    for id in f.evaluated() {
         if let ExprKind::Load(local) = f.expr(id).kind {
             out.insert(local);
         }

@@ -18,6 +18,7 @@ pub mod parse;
 pub mod print;
 pub mod value;
 pub mod verify;
+pub mod walk;
 
 /// A machine type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

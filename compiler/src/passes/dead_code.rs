@@ -111,41 +111,9 @@ impl Live {
 
 /// Keeps what is needed. Statements of a loop that is dropped are dropped with it.
 fn sweep(block: Block, live: &Live) -> Block {
-    let mut out = Vec::with_capacity(block.len());
-    for stmt in block {
-        if !live.needed(&stmt) {
-            continue;
-        }
-        out.push(match stmt {
-            Stmt::If(cond, then, otherwise) => {
-                Stmt::If(cond, sweep(then, live), sweep(otherwise, live))
-            }
-            Stmt::For {
-                local,
-                low,
-                high,
-                body,
-            } => Stmt::For {
-                local,
-                low,
-                high,
-                body: sweep(body, live),
-            },
-            Stmt::While {
-                head,
-                test,
-                limit,
-                body,
-            } => Stmt::While {
-                head: sweep(head, live),
-                test,
-                limit,
-                body: sweep(body, live),
-            },
-            other => other,
-        });
-    }
-    out
+    let kept = block.into_iter().filter(|stmt| live.needed(stmt));
+    kept.map(|stmt| stmt.map_blocks(|inner| sweep(inner, live)))
+        .collect()
 }
 
 /// Numbers expressions and variables in the order in which statements mention them.

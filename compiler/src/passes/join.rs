@@ -35,36 +35,9 @@ fn block(f: &Function, stmts: Block, joined: &mut bool) -> Block {
             None => out.push(stmt),
         }
     }
-    out.into_iter().map(|s| inner(f, s, joined)).collect()
-}
-
-fn inner(f: &Function, stmt: Stmt, joined: &mut bool) -> Stmt {
-    match stmt {
-        Stmt::If(cond, a, b) => Stmt::If(cond, block(f, a, joined), block(f, b, joined)),
-        Stmt::For {
-            local,
-            low,
-            high,
-            body,
-        } => Stmt::For {
-            local,
-            low,
-            high,
-            body: block(f, body, joined),
-        },
-        Stmt::While {
-            head,
-            test,
-            limit,
-            body,
-        } => Stmt::While {
-            head: block(f, head, joined),
-            test,
-            limit,
-            body: block(f, body, joined),
-        },
-        other => other,
-    }
+    out.into_iter()
+        .map(|stmt| stmt.map_blocks(|inner| block(f, inner, joined)))
+        .collect()
 }
 
 /// The last branch before `stmt` on its condition.

@@ -186,36 +186,10 @@ impl TextureUsers<'_> {
 
 /// Drops evaluations that are not to be kept.
 fn without(block: Block, kept: &dyn Fn(ExprId) -> bool) -> Block {
-    let stmts = block.into_iter().filter_map(|stmt| {
-        Some(match stmt {
-            Stmt::Eval(id) if !kept(id) => return None,
-            Stmt::If(cond, a, b) => Stmt::If(cond, without(a, kept), without(b, kept)),
-            Stmt::For {
-                local,
-                low,
-                high,
-                body,
-            } => Stmt::For {
-                local,
-                low,
-                high,
-                body: without(body, kept),
-            },
-            Stmt::While {
-                head,
-                test,
-                limit,
-                body,
-            } => Stmt::While {
-                head: without(head, kept),
-                test,
-                limit,
-                body: without(body, kept),
-            },
-            other => other,
-        })
-    });
-    stmts.collect()
+    let dropped = |stmt: &Stmt| matches!(stmt, Stmt::Eval(id) if !kept(*id));
+    let rest = block.into_iter().filter(|stmt| !dropped(stmt));
+    rest.map(|stmt| stmt.map_blocks(|inner| without(inner, kept)))
+        .collect()
 }
 
 /// Takes back what no statement reads, so that no uniform of the old numbering is left.

@@ -15,8 +15,7 @@
 //! parameters arrives small.
 
 use super::rewrite::{Rewriter, Rules};
-use crate::codegen;
-use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, Methods, Module, Stmt};
+use crate::ir::{ExprId, ExprKind, Function, FunctionId, Methods, Module, walk};
 use crate::ops::CostClass;
 
 mod decided;
@@ -26,7 +25,7 @@ mod splice;
 const SMALL: u32 = 24;
 
 /// Most blocks within blocks that inlining makes, a few less than WGSL allows.
-const MAX_DEPTH: usize = codegen::MAX_NESTING - 8;
+const MAX_DEPTH: usize = walk::MAX_NESTING - 8;
 
 /// Expressions that a function may have before only small callees go in line.
 const MAX_EXPRS: usize = 1 << 15;
@@ -92,16 +91,15 @@ impl Policy {
     /// Counts calls, those within callees that go in line included. Callees stand before their
     /// callers in a module, so one walk from the last to the first sees each count final.
     fn count_sites(&mut self, module: &Module, f: &Function) {
-        for_each_call(f, &f.body, &mut |id| self.sites[id.index()] += 1);
+        f.calls().for_each(|id| self.sites[id.index()] += 1);
         for index in (0..module.functions.len()).rev() {
             let id = FunctionId(index as u32);
             let calls = self.sites[index];
             if calls > 0 && self.wanted(module, id) {
-                let callee = &module.functions[index];
-                for_each_call(callee, &callee.body, &mut |inner| {
+                for inner in module.functions[index].calls() {
                     let sites = &mut self.sites[inner.index()];
                     *sites = sites.saturating_add(calls);
-                });
+                }
             }
         }
     }
@@ -112,8 +110,8 @@ impl Policy {
     }
 
     fn size(&mut self, module: &Module, id: FunctionId) -> u32 {
-        let body = &module.functions[id.index()].body;
-        *self.sizes[id.index()].get_or_insert_with(|| evaluations(body))
+        let count = || module.functions[id.index()].evaluated().len() as u32;
+        *self.sizes[id.index()].get_or_insert_with(count)
     }
 
     /// Notes of an expression that is evaluated whether it is the same for a whole instance.
@@ -145,9 +143,7 @@ impl Policy {
         let lookup = callee.exprs.iter().any(
             |e| matches!(e.kind, ExprKind::Op(op, _) if op.info().class == CostClass::Texture),
         );
-        let mut inner = Vec::new();
-        for_each_call(callee, &callee.body, &mut |id| inner.push(id));
-        let reads = lookup || inner.into_iter().any(|id| self.reads_textures(module, id));
+        let reads = lookup || callee.calls().any(|id| self.reads_textures(module, id));
         self.textures[id.index()] = Some(reads);
         reads
     }
@@ -177,39 +173,5 @@ fn goes_in_line(
     let room = if small { MAX_ALL_EXPRS } else { MAX_EXPRS };
     (small || policy.wanted(w.module, callee))
         && w.f.exprs.len() < room
-        && w.depth + codegen::nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
-}
-
-fn for_each_call(f: &Function, block: &Block, found: &mut impl FnMut(FunctionId)) {
-    for stmt in block {
-        match stmt {
-            Stmt::Eval(id) => {
-                if let ExprKind::Call(callee, _) = f.expr(*id).kind {
-                    found(callee);
-                }
-            }
-            Stmt::If(_, a, b) => {
-                for_each_call(f, a, found);
-                for_each_call(f, b, found);
-            }
-            Stmt::For { body, .. } => for_each_call(f, body, found),
-            Stmt::While { head, body, .. } => {
-                for_each_call(f, head, found);
-                for_each_call(f, body, found);
-            }
-            Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
-        }
-    }
-}
-
-/// Expressions that stand in a block.
-fn evaluations(block: &Block) -> u32 {
-    let each = block.iter().map(|stmt| match stmt {
-        Stmt::Eval(_) => 1,
-        Stmt::If(_, a, b) => evaluations(a) + evaluations(b),
-        Stmt::For { body, .. } => evaluations(body),
-        Stmt::While { head, body, .. } => evaluations(head) + evaluations(body),
-        Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
-    });
-    each.sum()
+        && w.depth + walk::nesting(&w.module.functions[callee.index()].body) <= MAX_DEPTH
 }

@@ -1,0 +1,75 @@
+//! Going over what a function does: the blocks within statements, what is evaluated and called.
+//! Passes, code generation and analyses ask here, so that a new statement is taught to them once.
+
+use super::{Block, ExprId, ExprKind, Function, FunctionId, Stmt};
+
+/// Most blocks within each other in the body of a function: with the body's, WGSL allows 127.
+pub const MAX_NESTING: usize = 126;
+
+impl Stmt {
+    /// The blocks within a statement, in the order they run.
+    pub fn blocks(&self) -> impl Iterator<Item = &Block> {
+        let (first, second) = match self {
+            Stmt::If(_, a, b) => (Some(a), Some(b)),
+            Stmt::For { body, .. } => (Some(body), None),
+            Stmt::While { head, body, .. } => (Some(head), Some(body)),
+            Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => (None, None),
+        };
+        first.into_iter().chain(second)
+    }
+
+    /// The statement with `change` made to each block within it.
+    pub fn map_blocks(mut self, mut change: impl FnMut(Block) -> Block) -> Stmt {
+        let mut replace = |block: &mut Block| *block = change(std::mem::take(block));
+        match &mut self {
+            Stmt::If(_, a, b) => {
+                replace(a);
+                replace(b);
+            }
+            Stmt::For { body, .. } => replace(body),
+            Stmt::While { head, body, .. } => {
+                replace(head);
+                replace(body);
+            }
+            Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
+        }
+        self
+    }
+}
+
+impl Function {
+    /// Every expression that is evaluated, in the order of the text.
+    pub fn evaluated(&self) -> Vec<ExprId> {
+        fn walk(block: &Block, out: &mut Vec<ExprId>) {
+            for stmt in block {
+                if let Stmt::Eval(id) = stmt {
+                    out.push(*id);
+                }
+                stmt.blocks().for_each(|inner| walk(inner, out));
+            }
+        }
+        let mut out = Vec::new();
+        walk(&self.body, &mut out);
+        out
+    }
+
+    /// The functions that are called, once for each call.
+    pub fn calls(&self) -> impl Iterator<Item = FunctionId> {
+        let called = |id| match self.expr(id).kind {
+            ExprKind::Call(callee, _) => Some(callee),
+            _ => None,
+        };
+        self.evaluated().into_iter().filter_map(called)
+    }
+}
+
+/// Blocks within each other in the text of a block, at most: fewer where an `else` has an `if` only.
+pub fn nesting(block: &Block) -> usize {
+    let each = block.iter().map(|stmt| {
+        let inner = stmt.blocks().map(nesting).max();
+        // The test of a `while` stands in a block of its own.
+        let least = usize::from(matches!(stmt, Stmt::While { .. }));
+        inner.map_or(0, |inner| 1 + inner.max(least))
+    });
+    each.max().unwrap_or(0)
+}
