@@ -30,6 +30,7 @@ pub mod shader_part;
 mod stages;
 mod state;
 mod status;
+pub mod technique;
 mod text;
 pub mod texture;
 mod wgsl;

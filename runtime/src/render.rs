@@ -26,6 +26,7 @@ use crate::schedule::{Schedule, Size, Step};
 use crate::shader_part::BufferData;
 use crate::state;
 use crate::status::{Flight, Status};
+use crate::technique::Technique;
 use crate::world::{MaterialSource, World};
 
 /// What to render of a world.
@@ -40,6 +41,8 @@ pub struct RenderOptions {
     pub seed: u32,
     /// Paths in flight; chosen by the size of the picture and the GPU if `None`.
     pub pool: Option<u32>,
+    /// How the work is done.
+    pub technique: Technique,
 }
 
 impl Default for RenderOptions {
@@ -49,6 +52,7 @@ impl Default for RenderOptions {
             first_sample: 0,
             seed: 0,
             pool: None,
+            technique: Technique::default(),
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::modules::{Feed, Kernel};
 use crate::queues::Scalar;
 use crate::render::RenderOptions;
 use crate::status::Status;
+use crate::technique::Technique;
 
 /// What a render did. Times are in seconds, sizes in bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -19,6 +20,8 @@ pub struct Report {
     pub adapter: AdapterReport,
     /// The plan's strategy.
     pub strategy: String,
+    /// How the work was done.
+    pub technique: Technique,
     /// Columns of the picture.
     pub width: u32,
     /// Rows of the picture.
@@ -160,6 +163,7 @@ impl Inputs<'_> {
         let dropped: u64 = kernels.iter().map(|k| k.nonfinite_samples).sum();
         Report {
             strategy: self.strategy.to_string(),
+            technique: self.options.technique,
             width: film.width,
             height: film.height,
             samples_per_pixel: self.options.samples,

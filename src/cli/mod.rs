@@ -18,6 +18,7 @@ mod explain;
 mod info;
 mod interrupt;
 mod render;
+mod technique;
 
 /// A material language, and the wavefront path tracer its compiler feeds.
 #[derive(Parser)]

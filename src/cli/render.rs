@@ -19,6 +19,7 @@ use impasto::{
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::info::GpuArgs;
+use super::technique::TechniqueArgs;
 use super::{Failure, Global, Outcome, interrupt, print};
 
 #[derive(Args)]
@@ -51,6 +52,8 @@ pub(super) struct RenderArgs {
     pool: Option<u32>,
     #[command(flatten)]
     gpu: GpuArgs,
+    #[command(flatten)]
+    technique: TechniqueArgs,
 }
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -165,6 +168,7 @@ impl RenderArgs {
             samples: self.spp,
             seed: self.seed,
             pool: self.pool,
+            technique: self.technique.technique(),
             ..RenderOptions::default()
         }
     }

@@ -1,0 +1,126 @@
+//! Ways to do the same work: what a researcher wants to compare and a user can leave alone.
+//!
+//! Every value of every choice gives the same picture, but for noise where the sampler changes.
+//! A choice is declared here once; the command line, the report and the experiments read its
+//! names from `ALL`.
+
+use serde::Serialize;
+
+/// A choice between techniques, each with a name on the command line.
+pub trait Choice: Copy + PartialEq + 'static {
+    /// Every value with its name and what it means; the default is first.
+    const ALL: &'static [(Self, &'static str, &'static str)];
+
+    /// The value's name.
+    fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(value, ..)| *value == self);
+        found.map_or("", |(_, name, _)| name)
+    }
+
+    /// The value called `name`.
+    fn from_name(name: &str) -> Option<Self> {
+        let found = Self::ALL.iter().find(|(_, n, _)| *n == name);
+        found.map(|(value, ..)| *value)
+    }
+}
+
+/// Declares enums that are choices: the first value is the default, doc comments are the help.
+macro_rules! choices {
+    ($($(#[doc = $about:literal])+ $choice:ident {
+        $(#[doc = $what:literal] $value:ident = $name:literal,)+
+    })+) => { $(
+        $(#[doc = $about])+
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $choice {
+            $(#[doc = $what] $value,)+
+        }
+
+        impl Choice for $choice {
+            const ALL: &'static [(Self, &'static str, &'static str)] =
+                &[$(($choice::$value, $name, $what)),+];
+        }
+
+        impl Default for $choice {
+            fn default() -> Self {
+                Self::ALL[0].0
+            }
+        }
+
+        impl Serialize for $choice {
+            fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                to.serialize_str(self.name())
+            }
+        }
+    )+ };
+}
+
+choices! {
+    /// Where random numbers come from.
+    Sampler {
+        /// Hashes of pixel, sample and dimension: independent numbers
+        Independent = "independent",
+    }
+
+    /// How kernels append to queues (Laine et al. 2013, section 4.4).
+    Append {
+        /// One atomic operation a workgroup and queue
+        Workgroup = "workgroup",
+    }
+
+    /// How path state lies in memory (Laine et al. 2013, section 4.3).
+    StateLayout {
+        /// A structure of arrays: neighbours read neighbouring words
+        Arrays = "soa",
+    }
+
+    /// The acceleration structure that rays are cast through.
+    Traversal {
+        /// An eight-wide BVH with compressed nodes
+        Cwbvh = "cwbvh",
+    }
+
+    /// In which order rays are cast.
+    RayOrder {
+        /// As they were asked for
+        Queue = "queue",
+    }
+}
+
+/// A value of every choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Technique {
+    /// Where random numbers come from.
+    pub sampler: Sampler,
+    /// How kernels append to queues.
+    pub append: Append,
+    /// How path state lies in memory.
+    pub state: StateLayout,
+    /// What rays are cast through.
+    pub traversal: Traversal,
+    /// In which order rays are cast.
+    pub ray_order: RayOrder,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check_names<C: Choice + Default + std::fmt::Debug>() {
+        assert_eq!(C::default(), C::ALL[0].0);
+        for (value, name, what) in C::ALL {
+            assert_eq!(C::from_name(name), Some(*value));
+            assert_eq!(value.name(), *name);
+            assert!(what.starts_with(' ') && what.len() > 10, "{name}: {what}");
+        }
+        assert_eq!(C::from_name("no such technique"), None);
+    }
+
+    #[test]
+    fn every_value_is_found_by_its_name() {
+        check_names::<Sampler>();
+        check_names::<Append>();
+        check_names::<StateLayout>();
+        check_names::<Traversal>();
+        check_names::<RayOrder>();
+    }
+}

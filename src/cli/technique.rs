@@ -1,0 +1,52 @@
+//! Options that choose between ways to do the same work, for those who compare them.
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use impasto::runtime::technique::{
+    Append, Choice, RayOrder, Sampler, StateLayout, Technique, Traversal,
+};
+
+/// Every choice of [`Technique`].
+#[derive(Args)]
+#[command(next_help_heading = "Techniques (docs/techniques.md)")]
+pub(super) struct TechniqueArgs {
+    /// Where random numbers come from
+    #[arg(long, value_name = "NAME", default_value = default_name::<Sampler>(), value_parser = named::<Sampler>())]
+    sampler: Sampler,
+    /// How kernels append to queues
+    #[arg(long, value_name = "NAME", default_value = default_name::<Append>(), value_parser = named::<Append>())]
+    append: Append,
+    /// How path state lies in memory
+    #[arg(long, value_name = "NAME", default_value = default_name::<StateLayout>(), value_parser = named::<StateLayout>())]
+    state: StateLayout,
+    /// What rays are cast through
+    #[arg(long, value_name = "NAME", default_value = default_name::<Traversal>(), value_parser = named::<Traversal>())]
+    traversal: Traversal,
+    /// In which order rays are cast
+    #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
+    ray_order: RayOrder,
+}
+
+impl TechniqueArgs {
+    pub(super) fn technique(&self) -> Technique {
+        Technique {
+            sampler: self.sampler,
+            append: self.append,
+            state: self.state,
+            traversal: self.traversal,
+            ray_order: self.ray_order,
+        }
+    }
+}
+
+fn default_name<C: Choice + Default>() -> &'static str {
+    C::default().name()
+}
+
+/// Takes the names of a choice, and shows what each means in the long help.
+fn named<C: Choice + Default + Send + Sync>() -> impl TypedValueParser<Value = C> {
+    let values = C::ALL
+        .iter()
+        .map(|(_, name, what)| PossibleValue::new(*name).help(what.trim()));
+    PossibleValuesParser::new(values).map(|name| C::from_name(&name).unwrap_or_default())
+}
