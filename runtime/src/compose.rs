@@ -50,7 +50,7 @@ impl Composer<'_> {
     pub(crate) fn compose(&self, recipe: Recipe) -> Kernel {
         let (stages, members) = (&recipe.stages, &recipe.members);
         let storage = if self.layout.wavefront {
-            Storage::Memory
+            Storage::Memory(self.technique.state)
         } else {
             Storage::Registers
         };

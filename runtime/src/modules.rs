@@ -10,6 +10,7 @@ use crate::queues::Queues;
 use crate::shader_part::BufferData;
 use crate::stages::{STAGES, StageId};
 use crate::state::{Need, Needs};
+use crate::technique::{Append, Regeneration, Technique};
 use crate::text::{case_labels, preprocess};
 use crate::world::{MaterialSource, World};
 
@@ -21,6 +22,8 @@ const PREPARE_THREADS: u32 = 64;
 pub(crate) enum Feed {
     /// One for every slot of the pool.
     Pool,
+    /// As many as fill the GPU; they fetch items until the pool's number is used up.
+    Fetched,
     /// One for every item of a queue, through indirect arguments.
     Queue(usize),
     /// One workgroup.
@@ -64,6 +67,8 @@ pub(crate) struct Sizes {
     pub pool: u32,
     /// Threads of a workgroup.
     pub workgroup: u32,
+    /// Threads that fill the GPU, for kernels whose threads fetch one item after another.
+    pub threads: u32,
     /// Workgroups in the first dimension of a dispatch, before a second is opened.
     pub row_groups: u32,
 }
@@ -78,6 +83,7 @@ pub(crate) struct Composer<'a> {
     pub plan: &'a Plan,
     pub layout: Layout,
     pub sizes: Sizes,
+    pub technique: Technique,
 }
 
 impl Composer<'_> {
@@ -221,7 +227,11 @@ impl Composer<'_> {
 
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
     fn prepare(&self, name: &str, consumed: std::ops::Range<usize>, hands_out: bool) -> Recipe {
-        let flags = [("queues", !consumed.is_empty()), ("work", hands_out)];
+        let flags = [
+            ("queues", !consumed.is_empty()),
+            ("work", hands_out),
+            ("regenerates", self.regenerates()),
+        ];
         let mut text = self.layout.queues.constants();
         for (name, value) in [
             ("PREPARE_SIZE", PREPARE_THREADS),
@@ -235,20 +245,45 @@ impl Composer<'_> {
     }
 
     fn mega(&self) -> Recipe {
-        let flags = [("shadow_rays", self.layout.needs.shadow_rays)];
-        let shell = preprocess(include_str!("kernels/mega.wgsl"), &flags);
+        let flags = [
+            ("shadow_rays", self.layout.needs.shadow_rays),
+            ("regenerates", self.regenerates()),
+        ];
+        let mut shell = preprocess(include_str!("kernels/mega.wgsl"), &flags);
+        if self.regenerates() {
+            // Idle lanes times this must exceed the subgroup's lanes.
+            let share = match self.technique.regeneration {
+                Regeneration::Always => "0xffffu",
+                _ => "2u",
+            };
+            shell += &format!("const REGENERATION_SHARE: u32 = {share};\n");
+            shell += include_str!("kernels/subgroup.wgsl");
+        }
         let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));
         let stages = stages.map(|s| s.id).collect();
         Recipe {
             form: Some(Form::Inline),
             members: (0..self.materials.len()).collect(),
-            ..recipe("mega", stages, Feed::Pool, shell)
+            ..recipe("mega", stages, self.mega_feed(), shell)
+        }
+    }
+
+    /// Whether this is a megakernel whose threads begin further paths.
+    fn regenerates(&self) -> bool {
+        !self.layout.wavefront && self.technique.regeneration != Regeneration::Never
+    }
+
+    fn mega_feed(&self) -> Feed {
+        match self.regenerates() {
+            true => Feed::Fetched,
+            false => Feed::Pool,
         }
     }
 
     /// Constants, request functions and entry point of a wavefront kernel.
     fn shell(&self, shell: &Shell) -> String {
         let pushes = shell.sorts || shell.casts;
+        let subgroups = pushes && self.technique.append == Append::Subgroup;
         let mut out = self.layout.queues.constants();
         if let Some(queue) = shell.consumes {
             out += &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n");
@@ -269,13 +304,30 @@ impl Composer<'_> {
                 ("casts_shadows", shell.casts_shadows),
             ];
             out += &preprocess(include_str!("kernels/queue.wgsl"), &flags);
+            out += &preprocess(self.append(), &flags);
+            if subgroups {
+                out += include_str!("kernels/subgroup.wgsl");
+            }
         }
         if shell.sorts {
             out += &self.material_queue();
         }
         out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
-        let flags = [("queued", shell.consumes.is_some()), ("pushes", pushes)];
+        let flags = [
+            ("queued", shell.consumes.is_some()),
+            ("pushes", pushes),
+            ("subgroups", subgroups),
+        ];
         out + &preprocess(include_str!("kernels/shell.wgsl"), &flags)
+    }
+
+    /// How requests are appended to queues.
+    fn append(&self) -> &'static str {
+        match self.technique.append {
+            Append::Workgroup => include_str!("kernels/append/workgroup.wgsl"),
+            Append::Subgroup => include_str!("kernels/append/subgroup.wgsl"),
+            Append::Thread => include_str!("kernels/append/thread.wgsl"),
+        }
     }
 
     /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.

@@ -22,6 +22,10 @@ const LARGE_POOL_BYTES: u64 = 1 << 30;
 const SOFTWARE_POOL: u32 = 1 << 16;
 /// Threads of a workgroup. On an H200 128 and 256 are equal, and 64 is 5 % slower.
 const WORKGROUP: u32 = 128;
+/// Threads that fetch their work: about as many as an H200 holds at once.
+const THREADS: u32 = 1 << 18;
+/// The same for GPUs in software.
+const SOFTWARE_THREADS: u32 = 1 << 12;
 
 /// A submission is made longer below the first and shorter above the second.
 const SHORT: Duration = Duration::from_millis(20);
@@ -63,9 +67,29 @@ pub(crate) fn sizes(
             .min(enough)
             .min(fits)
             .clamp(1, 1 << 30),
-        workgroup: WORKGROUP.min(limits.max_compute_invocations_per_workgroup),
+        workgroup: workgroup(&limits, options)?,
+        threads: match gpu.is_software() {
+            true => SOFTWARE_THREADS,
+            false => THREADS,
+        },
         row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
     })
+}
+
+/// Threads of a workgroup, within the GPU's limits.
+fn workgroup(limits: &wgpu::Limits, options: &RenderOptions) -> Result<u32, RuntimeError> {
+    let most = limits
+        .max_compute_invocations_per_workgroup
+        .min(limits.max_compute_workgroup_size_x);
+    match options.technique.workgroup {
+        Some(threads) if threads == 0 || threads > most => Err(RuntimeError::Setting {
+            setting: "workgroup",
+            value: threads.to_string(),
+            expected: format!("1 to {most} threads"),
+        }),
+        Some(threads) => Ok(threads),
+        None => Ok(WORKGROUP.min(most)),
+    }
 }
 
 fn default_pool(gpu: &Gpu, layout: &Layout, slot_bytes: u64) -> u32 {

@@ -61,6 +61,8 @@ pub(crate) enum Scalar {
     /// The first pixel and sample for the slots that start paths in this iteration.
     WorkPixel,
     WorkSample,
+    /// Items of the work handed out that threads of a megakernel have fetched.
+    Fetched,
     /// Slots that found no work left.
     Retired,
     /// Media that paths entered while in as many as a stack holds.
@@ -69,7 +71,7 @@ pub(crate) enum Scalar {
     LostPaths,
 }
 
-const SCALARS: [(Scalar, &str); 10] = [
+const SCALARS: [(Scalar, &str); 11] = [
     (Scalar::Overflow, "OVERFLOW"),
     (Scalar::FilmNonfinite, "FILM_NONFINITE"),
     (Scalar::FilmClamped, "FILM_CLAMPED"),
@@ -77,6 +79,7 @@ const SCALARS: [(Scalar, &str); 10] = [
     (Scalar::NextSample, "NEXT_SAMPLE"),
     (Scalar::WorkPixel, "WORK_PIXEL"),
     (Scalar::WorkSample, "WORK_SAMPLE"),
+    (Scalar::Fetched, "FETCHED"),
     (Scalar::Retired, "RETIRED"),
     (Scalar::MediaOverflow, "MEDIA_OVERFLOW"),
     (Scalar::LostPaths, "LOST_PATHS"),
@@ -163,9 +166,9 @@ mod tests {
             kernels: 4,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
-        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
-        assert_eq!(counters.nonfinite(0), 10 + 4 * 6);
-        assert_eq!(counters.len(), 10 + 4 * 6 + 4);
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
+        assert_eq!(counters.nonfinite(0), 11 + 4 * 6);
+        assert_eq!(counters.len(), 11 + 4 * 6 + 4);
         words[counters.items() + 2] = 5;
         words[counters.items() + 3] = 1;
         assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);

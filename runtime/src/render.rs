@@ -131,6 +131,11 @@ impl<'g> Renderer<'g> {
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
+        let technique = options.technique.within(gpu);
+        let options = &RenderOptions {
+            technique,
+            ..options.clone()
+        };
         check_settings(world, options)?;
         let (materials, instances) = (source.infos(), source.instances());
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
@@ -145,6 +150,7 @@ impl<'g> Renderer<'g> {
             plan,
             layout,
             sizes,
+            technique,
         };
         let kernels = composer.kernels();
         let resources = Resources::new(gpu, &composer, options)?;
@@ -385,6 +391,11 @@ fn build_steps(
             size: match kernel.recipe.feed {
                 Feed::Once => Size::Direct(1, 1),
                 Feed::Pool => Size::for_items(sizes.pool, sizes.workgroup, sizes.row_groups),
+                Feed::Fetched => Size::for_items(
+                    sizes.threads.min(sizes.pool),
+                    sizes.workgroup,
+                    sizes.row_groups,
+                ),
                 Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
             },
         })

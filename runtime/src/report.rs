@@ -207,7 +207,7 @@ impl Inputs<'_> {
             items: match recipe.feed {
                 Feed::Queue(queue) => counters.items_of(&status.counters, queue),
                 Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
-                Feed::Pool => paths,
+                Feed::Pool | Feed::Fetched => paths,
                 Feed::Once => status.iterations,
             },
             gpu_seconds: seconds,

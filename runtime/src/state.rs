@@ -2,12 +2,13 @@
 //!
 //! A field is one `vec4<u32>` in memory, a structure with named components in WGSL. Stages
 //! reach it through `load_FIELD(slot)` and `store_FIELD(slot, value)` only. In the wavefront
-//! these access a structure of arrays (Laine et al. 2013, section 4.3); in the megakernel the
-//! same names access private variables.
+//! these access a structure of arrays or an array of structures (Laine et al. 2013, section 4.3);
+//! in the megakernel the same names access private variables.
 
 use std::fmt::Write;
 
 use crate::stages::StageId::{self, Extension, Logic, Material, NewPath, Shadow};
+use crate::technique::StateLayout;
 
 /// Bytes that every field takes.
 pub(crate) const FIELD_BYTES: u64 = 16;
@@ -233,8 +234,8 @@ pub(crate) fn path_bytes(needs: Needs) -> u64 {
 /// Where accessors find the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Storage {
-    /// The buffer `state`, one region of `POOL_SIZE` a field.
-    Memory,
+    /// The buffer `state`.
+    Memory(StateLayout),
     /// Private variables; a slot is ignored.
     Registers,
 }
@@ -243,22 +244,30 @@ pub(crate) enum Storage {
 /// that a stage that reaches for a field it does not list fails validation.
 pub(crate) fn accessors(needs: Needs, stages: &[StageId], storage: Storage) -> String {
     let mut out = String::new();
+    let count = fields(needs).count();
     for (region, field) in fields(needs).enumerate() {
+        let place = match storage {
+            Storage::Memory(StateLayout::Arrays) => Some(format!("{region}u * POOL_SIZE + slot")),
+            Storage::Memory(StateLayout::Structures) => {
+                Some(format!("{count}u * slot + {region}u"))
+            }
+            Storage::Registers => None,
+        };
         let read = field.readers.iter().any(|s| stages.contains(s));
         let written = field.writers.iter().any(|s| stages.contains(s));
         if !read && !written {
             continue;
         }
         out += &structure(field);
-        if storage == Storage::Registers {
+        if place.is_none() {
             let (name, ty) = (field.name, type_name(field));
             let _ = writeln!(out, "var<private> state_{name}: {ty};");
         }
         if read {
-            out += &load(field, region, storage);
+            out += &load(field, place.as_deref());
         }
         if written {
-            out += &store(field, region, storage);
+            out += &store(field, place.as_deref());
         }
     }
     out
@@ -278,11 +287,12 @@ fn structure(field: &Field) -> String {
     format!("struct {} {{ {} }}\n", type_name(field), members.join(", "))
 }
 
-fn load(field: &Field, region: usize, storage: Storage) -> String {
+/// Reads the word of `state` at `place`, or the private variable.
+fn load(field: &Field, place: Option<&str>) -> String {
     let (name, ty) = (field.name, type_name(field));
-    if storage == Storage::Registers {
+    let Some(place) = place else {
         return format!("fn load_{name}(slot: u32) -> {ty} {{ return state_{name}; }}\n");
-    }
+    };
     let mut first = 0;
     let part = |(_, component): &(&str, Type)| {
         let swizzle = &"xyzw"[first..first + component.words()];
@@ -295,17 +305,18 @@ fn load(field: &Field, region: usize, storage: Storage) -> String {
     let parts: Vec<String> = field.components.iter().map(part).collect();
     format!(
         "fn load_{name}(slot: u32) -> {ty} {{\n    \
-         let words = state[{region}u * POOL_SIZE + slot];\n    \
+         let words = state[{place}];\n    \
          return {ty}({});\n}}\n",
         parts.join(", ")
     )
 }
 
-fn store(field: &Field, region: usize, storage: Storage) -> String {
+/// Writes the word of `state` at `place`, or the private variable.
+fn store(field: &Field, place: Option<&str>) -> String {
     let (name, ty) = (field.name, type_name(field));
-    if storage == Storage::Registers {
+    let Some(place) = place else {
         return format!("fn store_{name}(slot: u32, value: {ty}) {{ state_{name} = value; }}\n");
-    }
+    };
     let part = |(component, ty): &(&str, Type)| match ty {
         Type::U32 | Type::Words => format!("value.{component}"),
         _ => format!("bitcast<{}>(value.{component})", ty.words_type()),
@@ -313,7 +324,7 @@ fn store(field: &Field, region: usize, storage: Storage) -> String {
     let parts: Vec<String> = field.components.iter().map(part).collect();
     format!(
         "fn store_{name}(slot: u32, value: {ty}) {{\n    \
-         state[{region}u * POOL_SIZE + slot] = vec4<u32>({});\n}}\n",
+         state[{place}] = vec4<u32>({});\n}}\n",
         parts.join(", ")
     )
 }
@@ -338,7 +349,11 @@ mod tests {
         let text = format!(
             "const POOL_SIZE: u32 = 1u;\n\
              @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
-            accessors(EVERYTHING, &EVERY_STAGE, Storage::Memory)
+            accessors(
+                EVERYTHING,
+                &EVERY_STAGE,
+                Storage::Memory(StateLayout::Arrays)
+            )
         );
         let module = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
         let mut layouter = naga::proc::Layouter::default();
@@ -372,7 +387,11 @@ mod tests {
     fn a_scene_without_sampled_lights_stores_no_shadow_rays() {
         assert_eq!(path_bytes(Needs::default()), 80);
         assert_eq!(path_bytes(EVERYTHING), 160);
-        let text = accessors(Needs::default(), &EVERY_STAGE, Storage::Memory);
+        let text = accessors(
+            Needs::default(),
+            &EVERY_STAGE,
+            Storage::Memory(StateLayout::Arrays),
+        );
         assert!(!text.contains("shadow"), "{text}");
         assert!(!text.contains("media"), "{text}");
     }

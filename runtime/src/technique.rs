@@ -6,6 +6,8 @@
 
 use serde::Serialize;
 
+use crate::gpu::Gpu;
+
 /// A choice between techniques, each with a name on the command line.
 pub trait Choice: Copy + PartialEq + 'static {
     /// Every value with its name and what it means; the default is first.
@@ -65,12 +67,29 @@ choices! {
     Append {
         /// One atomic operation a workgroup and queue
         Workgroup = "workgroup",
+        /// One atomic operation a subgroup and queue
+        Subgroup = "subgroup",
+        /// One atomic operation a thread
+        Thread = "thread",
     }
 
     /// How path state lies in memory (Laine et al. 2013, section 4.3).
     StateLayout {
         /// A structure of arrays: neighbours read neighbouring words
         Arrays = "soa",
+        /// An array of structures: a path's words lie together
+        Structures = "aos",
+    }
+
+    /// When threads of a megakernel whose path has ended begin another (Laine et al. 2013,
+    /// section 4.1).
+    Regeneration {
+        /// When over half of a subgroup idles
+        Half = "half",
+        /// As soon as a thread idles
+        Always = "always",
+        /// Never: a thread traces one path
+        Never = "never",
     }
 
     /// The acceleration structure that rays are cast through.
@@ -89,16 +108,37 @@ choices! {
 /// A value of every choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Technique {
+    /// Threads of a workgroup; chosen by the kind of plan and GPU if `None`.
+    pub workgroup: Option<u32>,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// How kernels append to queues.
     pub append: Append,
     /// How path state lies in memory.
     pub state: StateLayout,
+    /// When threads of a megakernel begin another path.
+    pub regeneration: Regeneration,
     /// What rays are cast through.
     pub traversal: Traversal,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
+}
+
+impl Technique {
+    /// The technique with what a GPU lacks replaced by the next best; reports say what ran.
+    pub(crate) fn within(self, gpu: &Gpu) -> Self {
+        if gpu.has_subgroups() {
+            return self;
+        }
+        Self {
+            append: match self.append {
+                Append::Subgroup => Append::Workgroup,
+                other => other,
+            },
+            regeneration: Regeneration::Never,
+            ..self
+        }
+    }
 }
 
 #[cfg(test)]
@@ -120,6 +160,7 @@ mod tests {
         check_names::<Sampler>();
         check_names::<Append>();
         check_names::<StateLayout>();
+        check_names::<Regeneration>();
         check_names::<Traversal>();
         check_names::<RayOrder>();
     }

@@ -14,6 +14,9 @@ pub(super) struct GpuArgs {
     /// Keep the checks of array bounds and loops in all kernels (slower)
     #[arg(long)]
     checked: bool,
+    /// Let wgpu check the arguments of indirect dispatches (slower)
+    #[arg(long)]
+    validate_indirect: bool,
 }
 
 impl GpuArgs {
@@ -21,6 +24,7 @@ impl GpuArgs {
         let options = GpuOptions {
             adapter: self.gpu.clone(),
             checked: self.checked,
+            validate_indirect: self.validate_indirect,
             ..GpuOptions::default()
         };
         Gpu::new(&options).map_err(|error| Failure::Error(error.to_string()))

@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, RayOrder, Sampler, StateLayout, Technique, Traversal,
+    Append, Choice, RayOrder, Regeneration, Sampler, StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -19,9 +19,15 @@ pub(super) struct TechniqueArgs {
     /// How path state lies in memory
     #[arg(long, value_name = "NAME", default_value = default_name::<StateLayout>(), value_parser = named::<StateLayout>())]
     state: StateLayout,
+    /// When threads of a megakernel begin another path
+    #[arg(long, value_name = "NAME", default_value = default_name::<Regeneration>(), value_parser = named::<Regeneration>())]
+    regeneration: Regeneration,
     /// What rays are cast through
     #[arg(long, value_name = "NAME", default_value = default_name::<Traversal>(), value_parser = named::<Traversal>())]
     traversal: Traversal,
+    /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
+    #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    workgroup: Option<u32>,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
@@ -33,6 +39,8 @@ impl TechniqueArgs {
             sampler: self.sampler,
             append: self.append,
             state: self.state,
+            regeneration: self.regeneration,
+            workgroup: self.workgroup,
             traversal: self.traversal,
             ray_order: self.ray_order,
         }

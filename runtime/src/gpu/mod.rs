@@ -21,6 +21,9 @@ pub struct GpuOptions {
     pub adapter: Option<String>,
     /// Keeps wgpu's bounds checks and loop bounds in the kernels: slower, for finding defects.
     pub checked: bool,
+    /// Lets wgpu check the arguments of indirect dispatches, which the prepare kernels are known to
+    /// keep within limits: slower, for finding defects and for measuring what it costs.
+    pub validate_indirect: bool,
     /// How finely to time kernels; coarser if the GPU cannot.
     pub timing: Timing,
 }
@@ -39,12 +42,19 @@ pub struct Gpu {
 /// Features that are used where they exist; nothing requires one.
 pub(crate) const USED_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
-    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+    .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
+    .union(SUBGROUPS);
+
+/// What kernels need to work together within a subgroup.
+const SUBGROUPS: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::SUBGROUP_BARRIER);
 
 impl Gpu {
     /// Opens a GPU, with every limit as high as its driver allows.
     pub fn new(options: &GpuOptions) -> Result<Self, RuntimeError> {
-        let adapter = choose_adapter(adapters(), options.adapter.as_deref())?;
+        let adapter = choose_adapter(
+            adapters(options.validate_indirect),
+            options.adapter.as_deref(),
+        )?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("impasto"),
             required_features: adapter.features() & USED_FEATURES,
@@ -71,7 +81,8 @@ impl Gpu {
 
     /// The names of all adapters, best first.
     pub fn adapter_names() -> Vec<String> {
-        adapters().iter().map(|a| a.get_info().name).collect()
+        let adapters = adapters(false);
+        adapters.iter().map(|a| a.get_info().name).collect()
     }
 
     /// What the GPU is and can do.
@@ -87,6 +98,11 @@ impl Gpu {
     /// Whether its memory is not the processor's.
     pub(crate) fn has_own_memory(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::DiscreteGpu
+    }
+
+    /// Whether kernels may use subgroup operations and barriers.
+    pub(crate) fn has_subgroups(&self) -> bool {
+        self.device.features().contains(SUBGROUPS)
     }
 
     /// The first error since the device was opened, if there was any.
@@ -118,12 +134,16 @@ impl Gpu {
 }
 
 /// All adapters, the most capable kind first; equal kinds in the driver's order.
-fn adapters() -> Vec<wgpu::Adapter> {
+fn adapters(validate_indirect: bool) -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     // No debug layers unless the environment asks for them (`WGPU_VALIDATION`, `WGPU_DEBUG`),
-    // and no validation of indirect arguments: those come from the prepare kernels alone,
-    // which keep to the limits, and checking them again costs more than the dispatch itself.
+    // and no validation of indirect arguments unless it is asked for: those come from the prepare
+    // kernels alone, which divide a queue's length, at most the pool, into rows within the
+    // limits, and checking them again costs more than the dispatch itself.
     descriptor.flags = wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER.with_env();
+    if validate_indirect {
+        descriptor.flags |= wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    }
     let instance = wgpu::Instance::new(descriptor);
     let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {

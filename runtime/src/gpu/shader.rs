@@ -16,7 +16,9 @@ pub(crate) fn validate(kernel: &str, wgsl: &str) -> Result<naga::Module, Runtime
         .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
     let flags = naga::valid::ValidationFlags::all();
     // `unpack2x16float` is plain WGSL; naga asks for a capability for the sake of one driver.
-    let capabilities = naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+    let capabilities = naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32
+        | naga::valid::Capabilities::SUBGROUP
+        | naga::valid::Capabilities::SUBGROUP_BARRIER;
     naga::valid::Validator::new(flags, capabilities)
         .validate(&module)
         .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;

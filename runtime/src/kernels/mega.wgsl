@@ -1,10 +1,15 @@
-// The megakernel: the stages of the wavefront in a loop, with state in registers. A thread
-// takes one path from its camera to its end, which MAX_DEPTH bounds.
+// The megakernel: the stages of the wavefront in a loop, with state in registers (Laine et al. 2013,
+// section 4.1). A thread takes a path from its camera to its end, which MAX_DEPTH bounds.
+#if regenerates
+//
+// Threads whose path has ended begin another: they take what is left of the portion of work that the
+// prepare kernel handed out, until that is used up. Which thread traces a path changes nothing.
+#endif
 
 var<private> wanted_instance: u32 = NOTHING;
 var<private> wants_extension: bool = false;
 
-// The loop ends instead: what the path gathered is in the film.
+// A turn ends without a material instead: what the path gathered is in the film.
 fn request_new_path() {}
 
 fn request_material(instance: u32) {
@@ -21,7 +26,67 @@ var<private> wants_shadow: bool = false;
 fn request_shadow() {
     wants_shadow = true;
 }
+
 #endif
+// Takes a path over one segment; whether it goes on.
+fn advance(item: u32) -> bool {
+#if shadow_rays
+    if wants_shadow {
+        wants_shadow = false;
+        shadow(item);
+    }
+#endif
+    if wants_extension {
+        wants_extension = false;
+        extension(item);
+    }
+    wanted_instance = NOTHING;
+    logic(item);
+    if wanted_instance == NOTHING {
+        return false;
+    }
+    material(item, wanted_instance);
+    return true;
+}
+#if regenerates
+
+@compute @workgroup_size(WORKGROUP_SIZE)
+fn main(@builtin(subgroup_invocation_id) lane_of_subgroup: u32) {
+    subgroup_lane = lane_of_subgroup;
+    let lanes = lane_count(subgroupBallot(true));
+    var live = false;
+    var work_left = true;
+    var item = 0u;
+    loop {
+        // Paths diverge; here the threads come together again.
+        subgroupBarrier();
+        let idle = subgroupBallot(!live);
+        let idle_lanes = lane_count(idle);
+        if work_left && idle_lanes * REGENERATION_SHARE > lanes {
+            let leader = first_lane(idle);
+            var first = 0u;
+            if subgroup_lane == leader {
+                first = atomicAdd(&counters[COUNTER_FETCHED], idle_lanes);
+            }
+            first = subgroupShuffle(first, leader);
+            work_left = first + idle_lanes < POOL_SIZE;
+            if !live {
+                item = first + lanes_before(idle, subgroup_lane);
+                live = item < POOL_SIZE;
+                if live {
+                    new_path(item, item);
+                }
+            }
+        }
+        if !subgroupAny(live) {
+            break;
+        }
+        if live {
+            live = advance(item);
+        }
+    }
+}
+#else
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -32,21 +97,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     new_path(item, item);
     // Each segment takes a turn, and one more ends a path whose scattering failed.
     for (var turn = 0u; turn <= MAX_DEPTH + 1u; turn++) {
-#if shadow_rays
-        if wants_shadow {
-            wants_shadow = false;
-            shadow(item);
-        }
-#endif
-        if wants_extension {
-            wants_extension = false;
-            extension(item);
-        }
-        wanted_instance = NOTHING;
-        logic(item);
-        if wanted_instance == NOTHING {
+        if !advance(item) {
             return;
         }
-        material(item, wanted_instance);
     }
 }
+#endif

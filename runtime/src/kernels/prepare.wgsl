@@ -11,6 +11,9 @@ fn main(@builtin(local_invocation_index) lane: u32) {
 #if work
     if lane == 0u {
         hand_out_work();
+#if regenerates
+        atomicStore(&counters[COUNTER_FETCHED], 0u);
+#endif
     }
 #endif
 }

@@ -1,7 +1,16 @@
 // A kernel of the wavefront: one thread an item of its queue, or a slot of the pool.
 
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+#if subgroups
+    @builtin(subgroup_invocation_id) lane_of_subgroup: u32,
+#endif
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32
+) {
+#if subgroups
+    subgroup_lane = lane_of_subgroup;
+#endif
     let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;
     var slot = item;
 #if queued

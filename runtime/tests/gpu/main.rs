@@ -17,3 +17,4 @@ mod scene;
 mod stub;
 #[path = "../support/mod.rs"]
 mod support;
+mod techniques;

@@ -1,0 +1,53 @@
+// Appends a workgroup's requests: one atomic operation a queue reserves the places of all of its
+// threads, so that neighbours stay neighbours (Laine et al. 2013, section 4.4, with a workgroup in
+// the place of a warp).
+
+// Of the queues that this kernel pushes to: how many places the workgroup needs, and where
+// those begin.
+var<workgroup> group_count: array<atomic<u32>, PUSHED_QUEUES>;
+var<workgroup> group_base: array<u32, PUSHED_QUEUES>;
+
+// Appends the slot to every queue that its stage asked for. All threads of a workgroup call it.
+fn push_requests(lane: u32, slot: u32) {
+#if sorts
+    let work_rank = reserve(wanted_work, wanted_work != NOTHING);
+#endif
+#if casts
+    let extension_rank = reserve(QUEUE_EXTENSION, wants_extension);
+#endif
+#if casts_shadows
+    let shadow_rank = reserve(QUEUE_SHADOW, wants_shadow);
+#endif
+    workgroupBarrier();
+    for (var index = lane; index < PUSHED_QUEUES; index += WORKGROUP_SIZE) {
+        let count = atomicLoad(&group_count[index]);
+        if count > 0u {
+            let counter = COUNTER_PUSHED + FIRST_PUSHED + index;
+            group_base[index] = atomicAdd(&counters[counter], count);
+        }
+    }
+    workgroupBarrier();
+#if sorts
+    push(wanted_work, wanted_work != NOTHING, work_rank, slot);
+#endif
+#if casts
+    push(QUEUE_EXTENSION, wants_extension, extension_rank, slot);
+#endif
+#if casts_shadows
+    push(QUEUE_SHADOW, wants_shadow, shadow_rank, slot);
+#endif
+}
+
+fn reserve(queue: u32, wanted: bool) -> u32 {
+    if !wanted {
+        return 0u;
+    }
+    return atomicAdd(&group_count[queue - FIRST_PUSHED], 1u);
+}
+
+fn push(queue: u32, wanted: bool, rank: u32, slot: u32) {
+    if !wanted {
+        return;
+    }
+    put(queue, group_base[queue - FIRST_PUSHED] + rank, slot);
+}

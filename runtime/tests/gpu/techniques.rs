@@ -1,0 +1,105 @@
+//! Techniques are ways to do the same work: each value of each choice renders the paths that the
+//! default renders.
+
+use std::fmt::Debug;
+
+use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
+use impasto_compiler::partition::Strategy;
+use impasto_runtime::render::{RenderOptions, Rendering};
+use impasto_runtime::technique::{Append, Choice, Regeneration, StateLayout, Technique};
+
+fn surfaces() -> Materials {
+    materials(&[
+        Kind::Diffuse(0.6),
+        Kind::Failing(0.5),
+        Kind::Mirror,
+        Kind::Glowing(0.3, 1.0),
+    ])
+}
+
+fn run(strategy: Strategy, technique: Technique) -> Rendering {
+    let room = Room {
+        plate: true,
+        emitters: vec![3],
+        max_depth: 6,
+        roulette_start: 3,
+        materials: [0, 1, 2, 0, 3, 1, 2],
+        ..Room::default()
+    };
+    // A pool smaller than the picture, so that slots take path after path.
+    let options = RenderOptions {
+        pool: Some(700),
+        technique,
+        ..samples(8)
+    };
+    let surfaces = surfaces();
+    render_plan(
+        &room.world(),
+        &surfaces,
+        &plan(strategy, &surfaces),
+        &options,
+    )
+}
+
+/// Renders with every value of a choice, and fails where pictures differ.
+fn assert_equal<C: Choice + Debug>(strategy: Strategy, set: impl Fn(&mut Technique, C)) {
+    let reference = run(strategy, Technique::default());
+    for (value, name, _) in C::ALL {
+        let mut technique = Technique::default();
+        set(&mut technique, *value);
+        let rendering = run(strategy, technique);
+        let pixels = rendering.film.pixels.iter().flatten();
+        let pairs = pixels.zip(reference.film.pixels.iter().flatten());
+        let astray = pairs.filter(|(a, b)| (**a - **b).abs() > 1e-5 * b.max(1.0));
+        // Other drivers may round a kernel that is compiled another way differently.
+        let allowed = match gpu().info().kind {
+            "software" => 0,
+            _ => reference.film.pixels.len() * 3 / 50,
+        };
+        assert!(astray.count() <= allowed, "{value:?}: the pictures differ");
+        let ran = serde_json::to_value(rendering.report.technique).expect("JSON");
+        let ran = ran.as_object().expect("an object");
+        assert!(
+            ran.values().any(|v| v == name),
+            "`{name}` was asked for, {ran:?} ran"
+        );
+    }
+}
+
+#[test]
+fn queues_are_appended_to_in_any_way() {
+    for strategy in [Strategy::Own, Strategy::Shared] {
+        assert_equal::<Append>(strategy, |t, value| t.append = value);
+    }
+}
+
+#[test]
+fn path_state_may_lie_in_either_order() {
+    assert_equal::<StateLayout>(Strategy::Own, |t, value| t.state = value);
+}
+
+#[test]
+fn a_megakernel_may_regenerate_paths_whenever_it_likes() {
+    assert_equal::<Regeneration>(Strategy::Mega, |t, value| t.regeneration = value);
+}
+
+#[test]
+fn workgroups_may_have_any_size() {
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let reference = run(strategy, Technique::default());
+        for threads in [1, 32, 100, 256] {
+            for append in [Append::Workgroup, Append::Subgroup] {
+                let technique = Technique {
+                    workgroup: Some(threads),
+                    append,
+                    ..Technique::default()
+                };
+                let film = run(strategy, technique).film;
+                assert!(film.samples == reference.film.samples);
+                if gpu().info().kind == "software" {
+                    assert!(film == reference.film, "{strategy:?}, {threads} threads");
+                }
+            }
+        }
+    }
+}
