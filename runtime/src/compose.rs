@@ -11,7 +11,7 @@ use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
 use crate::state::{self, Storage};
 use crate::text::{mentions, predicate, preprocess, without_comments};
-use crate::{film, random};
+use crate::{film, profile, random};
 
 /// A buffer as a kernel binds it, in group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,8 +46,8 @@ pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 6] = [
 pub(crate) const RUN_MEMBERS: [&str; 4] = ["seed", "first_sample", "samples", "unused"];
 
 impl Composer<'_> {
-    /// Writes a kernel's text.
-    pub(crate) fn compose(&self, recipe: Recipe) -> Kernel {
+    /// Writes the text of the kernel that comes `index`-th in an iteration.
+    pub(crate) fn compose(&self, index: usize, recipe: Recipe) -> Kernel {
         let (stages, members) = (&recipe.stages, &recipe.members);
         let storage = if self.layout.wavefront {
             Storage::Memory(self.technique.state)
@@ -76,6 +76,9 @@ impl Composer<'_> {
         text += &recipe.shell;
         if mentions(&without_comments(&text), MATERIAL_OF) {
             text += &self.source.lookup_wgsl();
+        }
+        if self.technique.profile {
+            text = profile::instrument(&text) + &self.profile_constants(index);
         }
         let (declarations, bindings) = self.declarations(&text);
         Kernel {
@@ -130,6 +133,12 @@ impl Composer<'_> {
             out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
         }
         out + &self.layout.counters.constants() + &state::constants()
+    }
+
+    fn profile_constants(&self, kernel: usize) -> String {
+        let lanes = self.layout.counters.lanes(kernel);
+        let size = self.subgroup_size;
+        format!("const COUNTER_LANES: u32 = {lanes}u;\nconst SUBGROUP_SIZE: u32 = {size}u;\n")
     }
 
     fn part(&self, part: Part, members: &[usize]) -> String {

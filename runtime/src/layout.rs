@@ -39,6 +39,7 @@ impl Layout {
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
             kernels: if wavefront { plan.kernels.len() } else { 1 },
+            profiled: 0,
         };
         Ok(Self {
             needs,

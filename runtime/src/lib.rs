@@ -19,6 +19,7 @@ mod modules;
 pub mod output;
 mod parallel;
 mod pool;
+mod profile;
 mod queues;
 mod random;
 pub mod render;

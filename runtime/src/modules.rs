@@ -84,19 +84,25 @@ pub(crate) struct Composer<'a> {
     pub layout: Layout,
     pub sizes: Sizes,
     pub technique: Technique,
+    /// Lanes of the GPU's largest subgroups.
+    pub subgroup_size: u32,
 }
 
 impl Composer<'_> {
     /// Every kernel, in the order of an iteration.
     pub(crate) fn kernels(&self) -> Vec<Kernel> {
-        let recipes = match self.plan.organisation {
+        let recipes = self.recipes().into_iter().enumerate();
+        recipes
+            .map(|(index, recipe)| self.compose(index, recipe))
+            .collect()
+    }
+
+    /// What every kernel is made of, in the same order.
+    pub(crate) fn recipes(&self) -> Vec<Recipe> {
+        match self.plan.organisation {
             Organisation::Wavefront => self.wavefront(),
             Organisation::Mega => vec![self.prepare("prepare", 0..0, true), self.mega()],
-        };
-        recipes
-            .into_iter()
-            .map(|recipe| self.compose(recipe))
-            .collect()
+        }
     }
 
     /// The logic stage, the material stage with new paths, then ray casts. Kernels between

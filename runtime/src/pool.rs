@@ -20,8 +20,8 @@ const LARGE_POOL: u32 = 1 << 22;
 const LARGE_POOL_BYTES: u64 = 1 << 30;
 /// The same for GPUs in software, to stay responsive.
 const SOFTWARE_POOL: u32 = 1 << 16;
-/// Threads of a workgroup. On an H200 128 and 256 are equal, and 64 is 5 % slower.
-const WORKGROUP: u32 = 128;
+/// Threads of a workgroup (docs/measurements.md).
+const WORKGROUP: u32 = 256;
 /// Threads that fetch their work: about as many as an H200 holds at once.
 const THREADS: u32 = 1 << 18;
 /// The same for GPUs in software.

@@ -85,24 +85,28 @@ const SCALARS: [(Scalar, &str); 11] = [
     (Scalar::LostPaths, "LOST_PATHS"),
 ];
 
+/// Words between the lengths of queues: as far apart as the parts of a GPU's cache that work
+/// on atomic operations independently, since all threads of the logic kernel add to these.
+const PUSHED_STRIDE: usize = 64;
+
 /// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
-/// so far and its length when it was consumed, then items consumed in 64 bits, then one count
-/// of dropped samples for each kernel that evaluates materials.
+/// when it was consumed, then items consumed in 64 bits, then one count of dropped samples for
+/// each kernel that evaluates materials; in a profiling build lanes at work and lanes in all for
+/// each kernel, in 64 bits; at last, apart from each other, the lengths of queues so
+/// far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Counters {
     /// Number of queues; 0 in a megakernel.
     pub queues: usize,
     /// Number of kernels that evaluate materials.
     pub kernels: usize,
+    /// Number of kernels whose lanes are counted.
+    pub profiled: usize,
 }
 
 impl Counters {
-    fn pushed(self) -> usize {
-        SCALARS.len()
-    }
-
     fn taken(self) -> usize {
-        self.pushed() + self.queues
+        SCALARS.len()
     }
 
     fn items(self) -> usize {
@@ -114,9 +118,18 @@ impl Counters {
         self.items() + 2 * self.queues + kernel
     }
 
+    /// The words that count the lanes of the `kernel`-th kernel.
+    pub(crate) fn lanes(self, kernel: usize) -> usize {
+        self.nonfinite(self.kernels) + 4 * kernel
+    }
+
+    fn pushed(self) -> usize {
+        self.lanes(self.profiled).next_multiple_of(PUSHED_STRIDE)
+    }
+
     /// Words in all.
     pub(crate) fn len(self) -> usize {
-        self.nonfinite(self.kernels)
+        self.pushed() + PUSHED_STRIDE * self.queues
     }
 
     pub(crate) fn constants(self) -> String {
@@ -126,6 +139,7 @@ impl Counters {
             .map(|(at, (_, name))| (*name, at));
         let arrays = [
             ("PUSHED", self.pushed()),
+            ("PUSHED_STRIDE", PUSHED_STRIDE),
             ("TAKEN", self.taken()),
             ("ITEMS", self.items()),
         ];
@@ -144,10 +158,22 @@ impl Counters {
 
     /// How many items of `queue` were consumed, in the words read back.
     pub(crate) fn items_of(self, words: &[u32], queue: usize) -> u64 {
-        let word = |i: usize| words.get(i).copied().map_or(0, u64::from);
-        let low = self.items() + 2 * queue;
-        word(low) | word(low + 1) << 32
+        long(words, self.items() + 2 * queue)
     }
+
+    /// The share of lanes at work in the statements of the `kernel`-th kernel, if it was profiled
+    /// and ran.
+    pub(crate) fn utilisation(self, words: &[u32], kernel: usize) -> Option<f64> {
+        let at = self.lanes(kernel);
+        let all = long(words, at + 2);
+        (kernel < self.profiled && all > 0).then(|| long(words, at) as f64 / all as f64)
+    }
+}
+
+/// A counter of two words, the low one first.
+fn long(words: &[u32], at: usize) -> u64 {
+    let word = |i: usize| words.get(i).copied().map_or(0, u64::from);
+    word(at) | word(at + 1) << 32
 }
 
 #[cfg(test)]
@@ -164,11 +190,14 @@ mod tests {
         let counters = Counters {
             queues: queues.count(),
             kernels: 4,
+            profiled: 2,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
         assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
-        assert_eq!(counters.nonfinite(0), 11 + 4 * 6);
-        assert_eq!(counters.len(), 11 + 4 * 6 + 4);
+        assert_eq!(counters.nonfinite(0), 11 + 3 * 6);
+        assert!(counters.pushed() >= 11 + 3 * 6 + 4 + 2 * 4);
+        assert_eq!(counters.utilisation(&words, 2), None);
+        assert_eq!(counters.len(), counters.pushed() + 6 * PUSHED_STRIDE);
         words[counters.items() + 2] = 5;
         words[counters.items() + 3] = 1;
         assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);

@@ -141,7 +141,7 @@ impl<'g> Renderer<'g> {
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
         let layout = Layout::new(world, &materials, plan)?;
         let sizes = pool::sizes(gpu, world, &layout, options)?;
-        let composer = Composer {
+        let mut composer = Composer {
             world,
             source,
             materials: &materials,
@@ -151,7 +151,11 @@ impl<'g> Renderer<'g> {
             layout,
             sizes,
             technique,
+            subgroup_size: gpu.subgroup_size(),
         };
+        if technique.profile {
+            composer.layout.counters.profiled = composer.recipes().len();
+        }
         let kernels = composer.kernels();
         let resources = Resources::new(gpu, &composer, options)?;
         let steps = build_steps(gpu, &kernels, &resources, sizes)?;
@@ -174,7 +178,7 @@ impl<'g> Renderer<'g> {
         Ok(Self {
             gpu,
             options: options.clone(),
-            layout,
+            layout: composer.layout,
             kernels,
             resources,
             schedule,

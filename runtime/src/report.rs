@@ -127,6 +127,10 @@ pub struct KernelReport {
     pub items: u64,
     /// GPU time; 0 without timestamps.
     pub gpu_seconds: f64,
+    /// In a profiling build the share of a subgroup's lanes that are at work, on average over the
+    /// statements it executes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utilisation: Option<f64>,
     /// Samples that its materials gave a value that is no finite number, or below zero.
     pub nonfinite_samples: u64,
 }
@@ -154,10 +158,12 @@ impl Inputs<'_> {
         } else {
             self.wall_seconds
         };
-        let kernels: Vec<_> = self.kernels.iter().zip(&status.step_seconds).collect();
+        let kernels = self.kernels.iter().zip(&status.step_seconds).enumerate();
         let kernels: Vec<_> = kernels
-            .into_iter()
-            .map(|(kernel, seconds)| self.kernel(kernel, *seconds, status, paths))
+            .map(|(index, (kernel, seconds))| KernelReport {
+                utilisation: self.layout.counters.utilisation(&status.counters, index),
+                ..self.kernel(kernel, *seconds, status, paths)
+            })
             .collect();
         let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
         let dropped: u64 = kernels.iter().map(|k| k.nonfinite_samples).sum();
@@ -211,6 +217,7 @@ impl Inputs<'_> {
                 Feed::Once => status.iterations,
             },
             gpu_seconds: seconds,
+            utilisation: None,
             nonfinite_samples: match recipe.form {
                 Some(_) => status.counters.get(nonfinite).map_or(0, |n| u64::from(*n)),
                 None => 0,

@@ -108,6 +108,8 @@ choices! {
 /// A value of every choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Technique {
+    /// Whether kernels count the lanes at work, which makes them much slower.
+    pub profile: bool,
     /// Threads of a workgroup; chosen by the kind of plan and GPU if `None`.
     pub workgroup: Option<u32>,
     /// Where random numbers come from.
@@ -136,6 +138,7 @@ impl Technique {
                 other => other,
             },
             regeneration: Regeneration::Never,
+            profile: false,
             ..self
         }
     }

@@ -28,6 +28,9 @@ pub(super) struct TechniqueArgs {
     /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
+    /// Count the lanes at work in every kernel (`utilisation` in the report; much slower)
+    #[arg(long)]
+    profile: bool,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
@@ -40,6 +43,7 @@ impl TechniqueArgs {
             append: self.append,
             state: self.state,
             regeneration: self.regeneration,
+            profile: self.profile,
             workgroup: self.workgroup,
             traversal: self.traversal,
             ray_order: self.ray_order,

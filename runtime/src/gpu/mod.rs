@@ -105,6 +105,11 @@ impl Gpu {
         self.device.features().contains(SUBGROUPS)
     }
 
+    /// Lanes of its largest subgroups.
+    pub(crate) fn subgroup_size(&self) -> u32 {
+        self.adapter.get_info().subgroup_max_size
+    }
+
     /// The first error since the device was opened, if there was any.
     pub(crate) fn check(&self) -> Result<(), RuntimeError> {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

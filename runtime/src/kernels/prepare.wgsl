@@ -20,7 +20,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
 
 #if queues
 fn consume(queue: u32) {
-    let pushed = atomicExchange(&counters[COUNTER_PUSHED + queue], 0u);
+    let pushed = atomicExchange(&counters[COUNTER_PUSHED + COUNTER_PUSHED_STRIDE * queue], 0u);
     let items = min(pushed, POOL_SIZE);
     atomicStore(&counters[COUNTER_TAKEN + queue], items);
     if pushed > items {

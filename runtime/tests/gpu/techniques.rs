@@ -84,6 +84,39 @@ fn a_megakernel_may_regenerate_paths_whenever_it_likes() {
 }
 
 #[test]
+fn profiling_counts_lanes_and_leaves_the_picture_alone() {
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let reference = run(strategy, Technique::default());
+        assert!(
+            reference
+                .report
+                .kernels
+                .iter()
+                .all(|k| k.utilisation.is_none())
+        );
+        let technique = Technique {
+            profile: true,
+            ..Technique::default()
+        };
+        let profiled = run(strategy, technique);
+        assert!(profiled.film.samples == reference.film.samples);
+        for kernel in &profiled.report.kernels {
+            let share = kernel.utilisation.expect("a share of lanes");
+            assert!(share > 0.0 && share <= 1.0, "{}: {share}", kernel.name);
+        }
+        // Threads of a megakernel hit different materials; a queue's items are all at work.
+        let of = |name: &str| {
+            let kernel = profiled.report.kernels.iter().find(|k| k.name == name);
+            kernel.and_then(|k| k.utilisation)
+        };
+        match strategy {
+            Strategy::Mega => assert!(of("mega").expect("a share") < 0.9),
+            _ => assert!(of("new_path").expect("a share") > 0.8),
+        }
+    }
+}
+
+#[test]
 fn workgroups_may_have_any_size() {
     for strategy in [Strategy::Own, Strategy::Mega] {
         let reference = run(strategy, Technique::default());

@@ -29,7 +29,7 @@ fn append(queue: u32, wanted: bool, slot: u32) {
         let members = subgroupBallot(chosen);
         var base = 0u;
         if subgroup_lane == leader {
-            base = atomicAdd(&counters[COUNTER_PUSHED + queue], lane_count(members));
+            base = atomicAdd(&counters[COUNTER_PUSHED + COUNTER_PUSHED_STRIDE * queue], lane_count(members));
         }
         base = subgroupShuffle(base, leader);
         if chosen {

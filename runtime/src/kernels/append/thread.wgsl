@@ -16,6 +16,6 @@ fn push_requests(lane: u32, slot: u32) {
 
 fn append(queue: u32, wanted: bool, slot: u32) {
     if wanted {
-        put(queue, atomicAdd(&counters[COUNTER_PUSHED + queue], 1u), slot);
+        put(queue, atomicAdd(&counters[COUNTER_PUSHED + COUNTER_PUSHED_STRIDE * queue], 1u), slot);
     }
 }

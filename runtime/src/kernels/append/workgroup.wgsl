@@ -22,7 +22,7 @@ fn push_requests(lane: u32, slot: u32) {
     for (var index = lane; index < PUSHED_QUEUES; index += WORKGROUP_SIZE) {
         let count = atomicLoad(&group_count[index]);
         if count > 0u {
-            let counter = COUNTER_PUSHED + FIRST_PUSHED + index;
+            let counter = COUNTER_PUSHED + COUNTER_PUSHED_STRIDE * (FIRST_PUSHED + index);
             group_base[index] = atomicAdd(&counters[counter], count);
         }
     }
