@@ -237,6 +237,7 @@ impl<'g> Renderer<'g> {
             spare.push(flight);
             let before = now.paths;
             now = self.progress(&status, begin);
+            status.history.push((now.paths, status.gpu_seconds));
             if now.paths > before {
                 finished_at = status.iterations;
             }

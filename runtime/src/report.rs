@@ -53,6 +53,10 @@ pub struct Report {
     pub compile_seconds: f64,
     /// Paths finished in a second of `gpu_seconds`.
     pub paths_per_second: f64,
+    /// The same while the mixture of paths was steady, from a quarter to nine tenths of them; absent
+    /// if the render was too short to tell, or the GPU has no timestamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steady_paths_per_second: Option<f64>,
     /// Memory for the state of one path; 0 in a megakernel.
     pub path_state_bytes: u64,
     /// Paths in flight.
@@ -185,6 +189,9 @@ impl Inputs<'_> {
             wall_seconds: self.wall_seconds,
             compile_seconds: self.compile_seconds,
             paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
+            steady_paths_per_second: status.steady_rate(
+                u64::from(film.width) * u64::from(film.height) * u64::from(self.options.samples),
+            ),
             path_state_bytes: self.layout.path_bytes(),
             pool_size: self.pool,
             iterations: status.iterations,

@@ -15,6 +15,8 @@ pub(crate) struct Status {
     pub gpu_seconds: f64,
     /// Iterations run.
     pub iterations: u64,
+    /// After each submission: paths finished, and GPU seconds until then.
+    pub history: Vec<(u64, f64)>,
 }
 
 impl Status {
@@ -24,7 +26,19 @@ impl Status {
             step_seconds: vec![0.0; steps],
             gpu_seconds: 0.0,
             iterations: 0,
+            history: Vec::new(),
         }
+    }
+
+    /// Paths finished in a GPU second while the mixture of paths was steady: from a quarter to nine
+    /// tenths of `total` paths, without the beginning, when camera rays are coherent and
+    /// paths short, and without the end, when the pool runs empty. `None` if too few submissions
+    /// fell into that time.
+    pub(crate) fn steady_rate(&self, total: u64) -> Option<f64> {
+        let between = |(paths, _): &&(u64, f64)| 4 * paths >= total && 10 * paths <= 9 * total;
+        let (from, first) = self.history.iter().find(between)?;
+        let (to, last) = self.history.iter().rfind(between)?;
+        (last > first).then(|| (to - from) as f64 / (last - first))
     }
 }
 
@@ -136,5 +150,19 @@ impl Flight {
         status.counters = counters;
         status.iterations += u64::from(self.iterations);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_steady_rate_leaves_begin_and_end_out() {
+        let mut status = Status::new(1);
+        status.history = vec![(100, 1.0), (250, 2.0), (500, 4.0), (900, 8.0), (1000, 99.0)];
+        assert_eq!(status.steady_rate(1000), Some(650.0 / 6.0));
+        status.history = vec![(100, 1.0), (500, 2.0), (1000, 3.0)];
+        assert_eq!(status.steady_rate(1000), None);
     }
 }

@@ -10,6 +10,7 @@ use clap::{Parser, Subcommand};
 mod adapter;
 mod bless;
 mod demo;
+mod paper;
 mod scenes;
 mod shell;
 mod test;
@@ -31,6 +32,8 @@ enum Command {
     Bless,
     /// Generate the geometry, environment maps and textures of the example scenes
     Scenes(scenes::ScenesArgs),
+    /// Measure the tables of the paper on this machine's GPU, and write docs/paper.md
+    Paper(paper::PaperArgs),
 }
 
 fn main() -> ExitCode {
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         Command::Test(args) => test::run(&args),
         Command::Bless => bless::run(),
         Command::Scenes(args) => scenes::run(&args),
+        Command::Paper(args) => paper::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,102 @@
+//! `cargo xtask paper`: measures what Laine, Karras and Aila, "Megakernels Considered Harmful"
+//! (2013) report, on this machine's GPU, and writes it as JSON and as a page.
+//!
+//! Every number comes from the report of an `impasto render` that the file names. A run that was
+//! cut off goes on where it stopped, and the page can be written again from the JSON alone.
+
+mod experiments;
+mod page;
+mod record;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::shell::{self, Result, cargo};
+use record::Paper;
+
+#[derive(Args)]
+pub(crate) struct PaperArgs {
+    /// The command to measure [default: built from this checkout]
+    #[arg(long, value_name = "FILE")]
+    impasto: Option<PathBuf>,
+    /// Where paper.json and paper.md are written
+    #[arg(long, value_name = "FOLDER", default_value = "docs")]
+    out: PathBuf,
+    /// Measure these sections only [default: all]
+    #[arg(long, value_name = "SECTION", value_parser = experiments::SECTIONS)]
+    only: Vec<String>,
+    /// Divide samples by this and render once instead of three times, for a quick look
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    quick: u32,
+    /// What measured, as the page should call it, such as a commit
+    #[arg(long, value_name = "TEXT")]
+    version: Option<String>,
+    /// Write the page from the JSON that is there, without measuring
+    #[arg(long)]
+    page: bool,
+}
+
+pub(crate) fn run(args: &PaperArgs) -> Result {
+    let json = args.out.join("paper.json");
+    let mut paper = Paper::load(&json)?;
+    if !args.page {
+        let impasto = command(args)?;
+        paper.version = version(args)?;
+        let experiments = experiments::all(args.quick)?;
+        let wanted =
+            |section: &str| args.only.is_empty() || args.only.iter().any(|only| only == section);
+        let experiments: Vec<_> = experiments
+            .into_iter()
+            .filter(|e| wanted(e.section))
+            .collect();
+        for (index, experiment) in experiments.iter().enumerate() {
+            eprintln!(
+                "[{}/{}] {}",
+                index + 1,
+                experiments.len(),
+                experiment.line()
+            );
+            if paper.measure(&impasto, experiment)? {
+                paper.save(&json)?;
+            }
+        }
+    }
+    let page = args.out.join("paper.md");
+    write_whole(&page, &page::page(&paper))?;
+    eprintln!("{} and {} are written", json.display(), page.display());
+    Ok(())
+}
+
+fn command(args: &PaperArgs) -> Result<PathBuf> {
+    if let Some(impasto) = &args.impasto {
+        return Ok(impasto.clone());
+    }
+    shell::section("Building impasto");
+    shell::run(cargo().args(["build", "--release", "--package", "impasto"]))?;
+    shell::impasto("release")
+}
+
+/// The commit that is measured, unless the caller knows better.
+fn version(args: &PaperArgs) -> Result<String> {
+    if let Some(version) = &args.version {
+        return Ok(version.clone());
+    }
+    let mut git = std::process::Command::new("git");
+    git.current_dir(shell::root())
+        .args(["rev-parse", "--short", "HEAD"]);
+    shell::capture(&mut git)
+        .map_err(|why| format!("cannot tell what is measured: {why}\n  hint: give `--version`"))
+}
+
+/// Writes a file so that it is never half-written.
+fn write_whole(path: &Path, text: &str) -> Result {
+    let failure = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(failure)?;
+    }
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text).map_err(failure)?;
+    std::fs::rename(&partial, path).map_err(failure)
+}
