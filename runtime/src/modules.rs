@@ -4,6 +4,7 @@
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
+use crate::bvh;
 use crate::compose::Binding;
 use crate::layout::Layout;
 use crate::queues::Queues;
@@ -176,6 +177,7 @@ impl Composer<'_> {
             sorts: true,
             casts: !members.is_empty(),
             casts_shadows: self.needs_of(&members).shadow_rays,
+            traverses: false,
         });
         Recipe {
             name: StageId::Logic.stage().name.to_string(),
@@ -203,6 +205,7 @@ impl Composer<'_> {
                 sorts: false,
                 casts: true,
                 casts_shadows: self.needs_of(&planned.materials).shadow_rays,
+                traverses: false,
             });
             Recipe {
                 name: planned.name.clone(),
@@ -227,6 +230,7 @@ impl Composer<'_> {
             sorts: false,
             casts: starts,
             casts_shadows: false,
+            traverses: !starts,
         });
         recipe(name, vec![id], Feed::Queue(queue), shell)
     }
@@ -254,6 +258,7 @@ impl Composer<'_> {
         let flags = [
             ("shadow_rays", self.layout.needs.shadow_rays),
             ("regenerates", self.regenerates()),
+            ("lanes", bvh::asks_for_lane(&self.world.parts.bvh)),
         ];
         let mut shell = preprocess(include_str!("kernels/mega.wgsl"), &flags);
         if self.regenerates() {
@@ -323,6 +328,10 @@ impl Composer<'_> {
             ("queued", shell.consumes.is_some()),
             ("pushes", pushes),
             ("subgroups", subgroups),
+            (
+                "lanes",
+                shell.traverses && bvh::asks_for_lane(&self.world.parts.bvh),
+            ),
         ];
         out + &preprocess(include_str!("kernels/shell.wgsl"), &flags)
     }
@@ -390,4 +399,6 @@ struct Shell {
     casts: bool,
     /// Whether it pushes to the queue of shadow rays.
     casts_shadows: bool,
+    /// Whether it traces rays.
+    traverses: bool,
 }

@@ -118,6 +118,7 @@ impl<'g> Renderer<'g> {
             &program.infos(),
             &MaterialSource::instances(program),
             &program.textures(),
+            &options.technique,
         )?;
         Self::from_world(gpu, &world, program, plan, options)
     }

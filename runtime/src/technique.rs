@@ -94,8 +94,20 @@ choices! {
 
     /// The acceleration structure that rays are cast through.
     Traversal {
-        /// An eight-wide BVH with compressed nodes
+        /// An eight-wide BVH with compressed nodes (Ylitie et al. 2017)
         Cwbvh = "cwbvh",
+        /// A binary BVH with the boxes of children in their parent (Aila and Laine 2009)
+        Bvh2 = "bvh2",
+    }
+
+    /// Where a ray cast keeps the nodes it has yet to visit.
+    Stack {
+        /// An array of the thread's own
+        Private = "private",
+        /// The first entries in workgroup memory (Ylitie et al. 2017)
+        Workgroup = "workgroup",
+        /// Some bits a level in registers, and a way back up the tree (Laine 2010)
+        Trail = "trail",
     }
 
     /// In which order rays are cast.
@@ -122,6 +134,8 @@ pub struct Technique {
     pub regeneration: Regeneration,
     /// What rays are cast through.
     pub traversal: Traversal,
+    /// Where casts keep the nodes they have yet to visit.
+    pub stack: Stack,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
 }
@@ -165,6 +179,7 @@ mod tests {
         check_names::<StateLayout>();
         check_names::<Regeneration>();
         check_names::<Traversal>();
+        check_names::<Stack>();
         check_names::<RayOrder>();
     }
 }

@@ -8,6 +8,7 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
 
 use crate::camera::CameraFrame;
 use crate::scene::{Scene, SceneError, SceneParts};
+use crate::technique::Technique;
 
 /// A scene as the kernels see it.
 #[derive(Clone, Debug)]
@@ -30,12 +31,13 @@ pub struct World {
 
 impl World {
     /// The world of a scene whose bindings compiled to `instances` of `materials`, reading
-    /// `textures`.
+    /// `textures`; rays are cast as `technique` says.
     pub fn new(
         scene: &Scene,
         materials: &[MaterialInfo],
         instances: &[InstanceInfo],
         textures: &[TextureRef],
+        technique: &Technique,
     ) -> Result<Self, SceneError> {
         let (width, height) = (scene.film.width, scene.film.height);
         Ok(Self {
@@ -44,7 +46,7 @@ impl World {
             camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
-            parts: SceneParts::build(scene, materials, instances, textures)?,
+            parts: SceneParts::build(scene, materials, instances, textures, technique)?,
             triangles: scene.mesh.len() as u64,
         })
     }

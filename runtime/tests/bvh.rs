@@ -6,6 +6,7 @@ use glam::{DVec3, EulerRot, Quat, Vec3};
 use impasto_runtime::bvh::Bvh;
 use impasto_runtime::scene::surface::{geometry_part, surface_part};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
+use impasto_runtime::technique::{Choice, Stack, Traversal};
 use support::{Random, Row, floats, row, run};
 
 const MISS: u32 = u32::MAX;
@@ -43,7 +44,19 @@ struct Hit {
 struct Built {
     positions: Vec<[Vec3; 3]>,
     bvh: Bvh,
+    stack: Stack,
     mesh: Mesh,
+}
+
+/// Every way to cast rays.
+fn ways() -> impl Iterator<Item = (Traversal, Stack)> {
+    let stacks = |(traversal, ..): &(Traversal, &str, &str)| {
+        let traversal = *traversal;
+        Stack::ALL
+            .iter()
+            .map(move |(stack, ..)| (traversal, *stack))
+    };
+    Traversal::ALL.iter().flat_map(stacks)
 }
 
 fn mesh(positions: Vec<[Vec3; 3]>) -> Mesh {
@@ -56,9 +69,9 @@ fn mesh(positions: Vec<[Vec3; 3]>) -> Mesh {
     }
 }
 
-fn build(positions: Vec<[Vec3; 3]>) -> Built {
+fn build(positions: Vec<[Vec3; 3]>, (traversal, stack): (Traversal, Stack)) -> Built {
     let mesh = mesh(positions);
-    let bvh = Bvh::build(&mesh);
+    let bvh = Bvh::build(&mesh, traversal);
     let mut order = bvh.order().to_vec();
     let positions = order.iter().map(|&i| mesh.positions[i as usize]).collect();
     order.sort_unstable();
@@ -67,6 +80,7 @@ fn build(positions: Vec<[Vec3; 3]>) -> Built {
     Built {
         positions,
         bvh,
+        stack,
         mesh,
     }
 }
@@ -89,7 +103,7 @@ fn cast(built: &Built, rays: &[Ray]) -> Vec<Hit> {
         let any = trace_any(o.xyz, direction, o.w, d.w);
         result[2u * i] = vec4<u32>(bitcast<u32>(hit.t), bitcast<u32>(hit.u), bitcast<u32>(hit.v), hit.primitive);
         result[2u * i + 1u] = vec4<u32>(select(0u, 1u, any));";
-    let parts = [&geometry, &built.bvh.part()];
+    let parts = [&geometry, &built.bvh.part(built.stack)];
     let rows = run(&parts, body, &input, rays.len(), 2 * rays.len());
     rows.chunks(2)
         .map(|pair| {
@@ -238,179 +252,197 @@ fn random_rays(random: &mut Random, count: usize, spread: f32) -> Vec<Ray> {
 
 #[test]
 fn triangle_soups_agree_with_brute_force() {
-    let mut random = Random::new(1);
-    for (count, size) in [
-        (1, 1.0),
-        (2, 0.5),
-        (3, 1.0),
-        (9, 0.5),
-        (200, 0.3),
-        (3000, 0.05),
-    ] {
-        let built = build(soup(&mut random, count, size));
-        let rays = random_rays(&mut random, 1500, 3.0);
-        let clear = compare(&built, &rays);
-        assert!(
-            clear > 1000,
-            "{clear} clear rays among {} for {count} triangles",
-            rays.len()
-        );
+    for way in ways() {
+        println!("{way:?}");
+        let mut random = Random::new(1);
+        for (count, size) in [
+            (1, 1.0),
+            (2, 0.5),
+            (3, 1.0),
+            (9, 0.5),
+            (200, 0.3),
+            (3000, 0.05),
+        ] {
+            let built = build(soup(&mut random, count, size), way);
+            let rays = random_rays(&mut random, 1500, 3.0);
+            let clear = compare(&built, &rays);
+            assert!(
+                clear > 1000,
+                "{clear} clear rays among {} for {count} triangles",
+                rays.len()
+            );
+        }
     }
 }
 
 #[test]
 fn rays_along_the_axes_see_walls_that_are_flat_along_an_axis() {
-    let built = build(cube(5));
-    let mut rays = Vec::new();
-    for axis in 0..3 {
-        for sign in [-1.0, 1.0f32] {
-            for distance in [0.0, -4.0f32] {
-                for (u, v) in [
-                    (0.1, 0.3),
-                    (0.0, 0.0),
-                    (0.2, 0.2),
-                    (-0.6, 0.6),
-                    (0.99, -0.99),
-                ] {
-                    let (mut o, mut d) = ([0.0; 3], [0.0f32; 3]);
-                    (o[axis], o[(axis + 1) % 3], o[(axis + 2) % 3]) = (sign * distance, u, v);
-                    d[axis] = sign;
-                    // Both zeros, since the sign of zero must not matter.
-                    for zero in [0.0, -0.0] {
-                        let d = d.map(|x| if x == 0.0 { zero } else { x });
-                        rays.push(Ray {
-                            direction: d.into(),
-                            ..Ray::new(o.into(), Vec3::X)
-                        });
+    for way in ways() {
+        println!("{way:?}");
+        let built = build(cube(5), way);
+        let mut rays = Vec::new();
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0f32] {
+                for distance in [0.0, -4.0f32] {
+                    for (u, v) in [
+                        (0.1, 0.3),
+                        (0.0, 0.0),
+                        (0.2, 0.2),
+                        (-0.6, 0.6),
+                        (0.99, -0.99),
+                    ] {
+                        let (mut o, mut d) = ([0.0; 3], [0.0f32; 3]);
+                        (o[axis], o[(axis + 1) % 3], o[(axis + 2) % 3]) = (sign * distance, u, v);
+                        d[axis] = sign;
+                        // Both zeros, since the sign of zero must not matter.
+                        for zero in [0.0, -0.0] {
+                            let d = d.map(|x| if x == 0.0 { zero } else { x });
+                            rays.push(Ray {
+                                direction: d.into(),
+                                ..Ray::new(o.into(), Vec3::X)
+                            });
+                        }
                     }
                 }
             }
         }
-    }
-    for (ray, hit) in rays.iter().zip(cast(&built, &rays)) {
-        let expected = if ray.origin.dot(ray.direction) == 0.0 {
-            1.0
-        } else {
-            3.0
-        };
-        assert_ne!(hit.primitive, MISS, "{} -> {}", ray.origin, ray.direction);
-        assert!(
-            (hit.t - expected).abs() < 1e-6,
-            "{} instead of {expected}",
-            hit.t
-        );
+        for (ray, hit) in rays.iter().zip(cast(&built, &rays)) {
+            let expected = if ray.origin.dot(ray.direction) == 0.0 {
+                1.0
+            } else {
+                3.0
+            };
+            assert_ne!(hit.primitive, MISS, "{} -> {}", ray.origin, ray.direction);
+            assert!(
+                (hit.t - expected).abs() < 1e-6,
+                "{} instead of {expected}",
+                hit.t
+            );
+        }
     }
 }
 
 #[test]
 fn no_ray_passes_between_triangles_of_a_closed_mesh() {
-    // From inside, through every vertex, every edge's midpoint and random points of edges.
-    let mut random = Random::new(2);
-    for (center, radius) in [
-        (Vec3::ZERO, 1.0),
-        (Vec3::new(300.0, -20.0, 7.0), 2.0),
-        (Vec3::ZERO, 1e-4),
-    ] {
-        let built = build(sphere(center, radius, 24));
-        let origin = center + 0.3 * radius * random.direction();
-        let mut rays = Vec::new();
-        for corners in &built.positions {
-            for k in 0..3 {
-                let (p, q) = (corners[k], corners[(k + 1) % 3]);
-                for s in [0.0, 0.5, random.uniform(), random.uniform()] {
-                    rays.push(Ray::new(origin, p + s * (q - p) - origin));
+    for way in ways() {
+        println!("{way:?}");
+        // From inside, through every vertex, every edge's midpoint and random points of edges.
+        let mut random = Random::new(2);
+        for (center, radius) in [
+            (Vec3::ZERO, 1.0),
+            (Vec3::new(300.0, -20.0, 7.0), 2.0),
+            (Vec3::ZERO, 1e-4),
+        ] {
+            let built = build(sphere(center, radius, 24), way);
+            let origin = center + 0.3 * radius * random.direction();
+            let mut rays = Vec::new();
+            for corners in &built.positions {
+                for k in 0..3 {
+                    let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                    for s in [0.0, 0.5, random.uniform(), random.uniform()] {
+                        rays.push(Ray::new(origin, p + s * (q - p) - origin));
+                    }
                 }
             }
+            let leaks = cast(&built, &rays)
+                .iter()
+                .filter(|h| h.primitive == MISS)
+                .count();
+            assert_eq!(leaks, 0, "of {} rays, radius {radius}", rays.len());
         }
-        let leaks = cast(&built, &rays)
-            .iter()
-            .filter(|h| h.primitive == MISS)
-            .count();
-        assert_eq!(leaks, 0, "of {} rays, radius {radius}", rays.len());
     }
 }
 
 #[test]
 fn scale_does_not_change_what_is_hit() {
-    let mut random = Random::new(3);
-    let unit = soup(&mut random, 500, 0.2);
-    let rays = random_rays(&mut random, 1000, 2.0);
-    for scale in [1e-4, 1e4, 1e9] {
-        let built = build(unit.iter().map(|t| t.map(|p| p * scale)).collect());
-        let scaled: Vec<Ray> = rays
-            .iter()
-            .map(|r| Ray {
-                origin: r.origin * scale,
-                t_max: (r.t_max * scale).min(3e38),
-                ..*r
-            })
-            .collect();
-        let clear = compare(&built, &scaled);
-        assert!(clear > 600, "{clear} clear rays at scale {scale}");
+    for way in ways() {
+        println!("{way:?}");
+        let mut random = Random::new(3);
+        let unit = soup(&mut random, 500, 0.2);
+        let rays = random_rays(&mut random, 1000, 2.0);
+        for scale in [1e-4, 1e4, 1e9] {
+            let built = build(unit.iter().map(|t| t.map(|p| p * scale)).collect(), way);
+            let scaled: Vec<Ray> = rays
+                .iter()
+                .map(|r| Ray {
+                    origin: r.origin * scale,
+                    t_max: (r.t_max * scale).min(3e38),
+                    ..*r
+                })
+                .collect();
+            let clear = compare(&built, &scaled);
+            assert!(clear > 600, "{clear} clear rays at scale {scale}");
+        }
     }
 }
 
 #[test]
 fn flat_and_repeated_triangles_build() {
-    // All in one plane, all the same, and a chain of sizes from 1e-6 to 1e6.
-    let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let shift = |v: Vec3| one.map(|p| p + v);
-    let plane: Vec<_> = (0..64)
-        .map(|i| shift(Vec3::new(i as f32, 0.0, 0.0)))
-        .collect();
-    let chain: Vec<_> = (-20..20)
-        .map(|e| shift(Vec3::Z).map(|p| p * 2f32.powi(e)))
-        .collect();
-    for triangles in [vec![one], plane, vec![one; 50], chain] {
-        let built = build(triangles);
-        let rays: Vec<Ray> = (0..50)
-            .map(|i| {
-                Ray::new(
-                    Vec3::new(0.3 + i as f32, 0.3, -1.0),
-                    Vec3::new(0.001, 0.002, 1.0),
-                )
-            })
+    for way in ways() {
+        println!("{way:?}");
+        // All in one plane, all the same, and a chain of sizes from 1e-6 to 1e6.
+        let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let shift = |v: Vec3| one.map(|p| p + v);
+        let plane: Vec<_> = (0..64)
+            .map(|i| shift(Vec3::new(i as f32, 0.0, 0.0)))
             .collect();
-        assert!(compare(&built, &rays) > 30);
+        let chain: Vec<_> = (-20..20)
+            .map(|e| shift(Vec3::Z).map(|p| p * 2f32.powi(e)))
+            .collect();
+        for triangles in [vec![one], plane, vec![one; 50], chain] {
+            let built = build(triangles, way);
+            let rays: Vec<Ray> = (0..50)
+                .map(|i| {
+                    Ray::new(
+                        Vec3::new(0.3 + i as f32, 0.3, -1.0),
+                        Vec3::new(0.001, 0.002, 1.0),
+                    )
+                })
+                .collect();
+            assert!(compare(&built, &rays) > 30);
+        }
     }
 }
 
 #[test]
 fn rays_that_leave_a_surface_do_not_hit_it_again() {
-    // Row 19 of the numerics list: convex meshes of several scales and places; a ray that leaves
-    // to the outside hits nothing, one that leaves to the inside hits another side.
-    let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.1, 2.3);
-    let mut random = Random::new(4);
-    let places = [
-        (Vec3::ZERO, 1.0),
-        (Vec3::ZERO, 1e-4),
-        (Vec3::ZERO, 1e4),
-        (Vec3::new(1e5, 0.0, 0.0), 1e4),
-        (Vec3::new(-30.0, 40.0, 1.0), 1.0),
-        // A side of the cube through the origin, where coordinates are small and triangles not.
-        (turn * Vec3::Z, 1.0),
-    ];
-    for (center, radius) in places {
-        // Flat sides have neighbours in the same plane, the hardest to avoid at grazing angles.
-        let turned = cube(8)
-            .iter()
-            .map(|t| t.map(|p| center + radius * (turn * p)))
-            .collect();
-        for triangles in [turned, sphere(center, radius, 16)] {
-            let built = build(triangles);
-            let leaving = leaving_rays(&built, &mut random, 20_000);
-            let rays: Vec<Ray> = leaving.iter().map(|l| l.0).collect();
-            let hits = cast(&built, &rays);
-            let wrong = leaving
+    for way in ways() {
+        println!("{way:?}");
+        // Row 19 of the numerics list: convex meshes of several scales and places; a ray that leaves
+        // to the outside hits nothing, one that leaves to the inside hits another side.
+        let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 1.1, 2.3);
+        let mut random = Random::new(4);
+        let places = [
+            (Vec3::ZERO, 1.0),
+            (Vec3::ZERO, 1e-4),
+            (Vec3::ZERO, 1e4),
+            (Vec3::new(1e5, 0.0, 0.0), 1e4),
+            (Vec3::new(-30.0, 40.0, 1.0), 1.0),
+            // A side of the cube through the origin, where coordinates are small and triangles not.
+            (turn * Vec3::Z, 1.0),
+        ];
+        for (center, radius) in places {
+            // Flat sides have neighbours in the same plane, the hardest to avoid at grazing angles.
+            let turned = cube(8)
                 .iter()
-                .zip(&hits)
-                .filter(|((_, outward), hit)| (hit.primitive == MISS) != *outward);
-            assert_eq!(
-                wrong.count(),
-                0,
-                "of {} rays, radius {radius} at {center}",
-                rays.len()
-            );
+                .map(|t| t.map(|p| center + radius * (turn * p)))
+                .collect();
+            for triangles in [turned, sphere(center, radius, 16)] {
+                let built = build(triangles, way);
+                let leaving = leaving_rays(&built, &mut random, 20_000);
+                let rays: Vec<Ray> = leaving.iter().map(|l| l.0).collect();
+                let hits = cast(&built, &rays);
+                let wrong = leaving
+                    .iter()
+                    .zip(&hits)
+                    .filter(|((_, outward), hit)| (hit.primitive == MISS) != *outward);
+                assert_eq!(
+                    wrong.count(),
+                    0,
+                    "of {} rays, radius {radius} at {center}",
+                    rays.len()
+                );
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, RayOrder, Regeneration, Sampler, StateLayout, Technique, Traversal,
+    Append, Choice, RayOrder, Regeneration, Sampler, Stack, StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -25,15 +25,18 @@ pub(super) struct TechniqueArgs {
     /// What rays are cast through
     #[arg(long, value_name = "NAME", default_value = default_name::<Traversal>(), value_parser = named::<Traversal>())]
     traversal: Traversal,
+    /// Where ray casts keep the nodes they have yet to visit
+    #[arg(long, value_name = "NAME", default_value = default_name::<Stack>(), value_parser = named::<Stack>())]
+    stack: Stack,
+    /// In which order rays are cast
+    #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
+    ray_order: RayOrder,
     /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
     /// Count the lanes at work in every kernel (`utilisation` in the report; much slower)
     #[arg(long)]
     profile: bool,
-    /// In which order rays are cast
-    #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
-    ray_order: RayOrder,
 }
 
 impl TechniqueArgs {
@@ -46,6 +49,7 @@ impl TechniqueArgs {
             profile: self.profile,
             workgroup: self.workgroup,
             traversal: self.traversal,
+            stack: self.stack,
             ray_order: self.ray_order,
         }
     }

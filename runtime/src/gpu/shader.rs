@@ -4,6 +4,7 @@
 use wgpu::naga;
 
 use super::Gpu;
+use crate::bvh;
 use crate::error::RuntimeError;
 
 /// Parses and validates `wgsl`, the text of the kernel called `kernel`.
@@ -34,6 +35,10 @@ impl Gpu {
         layout: &wgpu::BindGroupLayout,
     ) -> wgpu::ComputePipeline {
         let module = self.shader_module(kernel, wgsl);
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: self.checked || !bvh::shares_stack(wgsl),
+            ..Default::default()
+        };
         let layout = self
             .device
             .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -47,7 +52,7 @@ impl Gpu {
                 layout: Some(&layout),
                 module: &module,
                 entry_point: Some("main"),
-                compilation_options: Default::default(),
+                compilation_options,
                 cache: None,
             })
     }

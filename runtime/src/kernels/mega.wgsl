@@ -51,8 +51,13 @@ fn advance(item: u32) -> bool {
 #if regenerates
 
 @compute @workgroup_size(WORKGROUP_SIZE)
-fn main(@builtin(subgroup_invocation_id) lane_of_subgroup: u32) {
+fn main(
+    @builtin(subgroup_invocation_id) lane_of_subgroup: u32, @builtin(local_invocation_index) lane: u32
+) {
     subgroup_lane = lane_of_subgroup;
+#if lanes
+    walk_lane = lane;
+#endif
     let lanes = lane_count(subgroupBallot(true));
     var live = false;
     var work_left = true;
@@ -90,6 +95,9 @@ fn main(@builtin(subgroup_invocation_id) lane_of_subgroup: u32) {
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+#if lanes
+    walk_lane = lane;
+#endif
     let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;
     if item >= POOL_SIZE {
         return;

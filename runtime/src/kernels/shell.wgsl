@@ -11,6 +11,9 @@ fn main(
 #if subgroups
     subgroup_lane = lane_of_subgroup;
 #endif
+#if lanes
+    walk_lane = lane;
+#endif
     let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;
     var slot = item;
 #if queued

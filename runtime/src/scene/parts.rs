@@ -3,7 +3,7 @@
 //! | part | provides | needs |
 //! |---|---|---|
 //! | `geometry` | `triangle_vertices`, `primitive_instance` | |
-//! | `bvh` | `Hit`, `NO_PRIMITIVE`, `trace_closest`, `trace_any` | `geometry` |
+//! | `bvh` | `Hit`, `NO_PRIMITIVE`, `trace_closest`, `trace_any`, the steps of casts | `geometry` |
 //! | `surface` | `hit_position`, `hit_normal`, ..., `offset_origin` | `geometry` |
 //! | `lights` | `sample_light`, `light_hit`, `light_escape`, `power_heuristic` | `surface` |
 //! | `media` | `active_medium`, `media_beyond`, `transmittance`, ... | `geometry` |
@@ -17,6 +17,7 @@ use crate::bvh::Bvh;
 use crate::lights::Lights;
 use crate::media::Media;
 use crate::shader_part::ShaderPart;
+use crate::technique::Technique;
 use crate::texture;
 
 /// Everything a kernel may include to read the scene.
@@ -43,15 +44,16 @@ pub struct SceneParts {
 
 impl SceneParts {
     /// The parts of `scene`, whose bindings compiled to `instances` of `materials`, which read
-    /// `textures`.
+    /// `textures`; rays are cast as `technique` says.
     pub fn build(
         scene: &Scene,
         materials: &[MaterialInfo],
         instances: &[InstanceInfo],
         textures: &[TextureRef],
+        technique: &Technique,
     ) -> Result<SceneParts, SceneError> {
         let texture = texture::part(textures, &scene.base)?;
-        let bvh = Bvh::build(&scene.mesh);
+        let bvh = Bvh::build(&scene.mesh, technique.traversal);
         let media = Media::build(materials, instances, &scene.camera_media)?;
         let lights = Lights::build(scene, bvh.order(), instances, &media);
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
@@ -62,7 +64,7 @@ impl SceneParts {
                 &lights.of_triangle,
                 &media.of_instance,
             ),
-            bvh: bvh.part(),
+            bvh: bvh.part(technique.stack),
             surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
             lights: lights.part,
             media,

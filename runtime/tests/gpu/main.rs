@@ -4,6 +4,7 @@
 //! The worlds are small and made by hand, so that what should come out is known in closed
 //! form; see `stub`.
 
+mod casts;
 mod determinism;
 mod film;
 mod furnace;

@@ -9,6 +9,7 @@ use impasto_compiler::partition::{Form, Strategy};
 use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile};
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{self, Scene};
+use impasto_runtime::technique::Technique;
 use impasto_runtime::world::World;
 
 use crate::media::{Layer, assert_channel, stack};
@@ -28,6 +29,24 @@ v -.4 -.4 .4\nv .4 -.4 .4\nv .4 .4 .4\nv -.4 .4 .4
 usemtl block
 f 4 3 2 1\nf 5 6 7 8\nf 8 4 1 5\nf 3 7 6 2\nf 8 7 3 4\nf 1 2 6 5
 ";
+
+/// A sphere of radius 0.5 in `2 n` by `n` squares, with a hierarchy some levels deep.
+fn ball(n: usize) -> String {
+    let mut text = String::from("usemtl ball\n");
+    for (j, i) in (0..=n).flat_map(|j| (0..2 * n).map(move |i| (j, i))) {
+        let theta = std::f64::consts::PI * (j as f64 / n as f64).clamp(1e-3, 1.0 - 1e-3);
+        let phi = std::f64::consts::PI * i as f64 / n as f64;
+        let (x, z) = (theta.sin() * phi.cos(), theta.sin() * phi.sin());
+        text += &format!("v {} {} {}\n", 0.5 * x, 0.5 * theta.cos(), -0.5 * z);
+    }
+    for (j, i) in (0..n).flat_map(|j| (0..2 * n).map(move |i| (j, i))) {
+        let at = |j: usize, i: usize| 1 + j * 2 * n + i % (2 * n);
+        let corners = [at(j, i), at(j + 1, i), at(j + 1, i + 1), at(j, i + 1)];
+        let [a, b, c, d] = corners;
+        text += &format!("f {a} {b} {c} {d}\n");
+    }
+    text
+}
 
 const MATERIALS: &str = "
 use std::bsdf::{diffuse, mirror, smooth_dielectric};
@@ -61,11 +80,12 @@ impl Loader for Folder<'_> {
 }
 
 /// Loads a scene with this TOML after a common head, and compiles its materials.
-fn load(toml: &str) -> (Scene, Program) {
+pub fn load(toml: &str) -> (Scene, Program) {
     let folder = tempfile::tempdir().expect("a folder");
     let files = [
         ("room.obj", ROOM),
         ("block.obj", BLOCK),
+        ("ball.obj", &ball(24)),
         ("m.impasto", MATERIALS),
         ("scene.toml", toml),
     ];
@@ -92,7 +112,12 @@ fn load(toml: &str) -> (Scene, Program) {
     )
 }
 
-fn render(scene: &Scene, program: &Program, strategy: &str, options: &RenderOptions) -> Rendering {
+pub fn render(
+    scene: &Scene,
+    program: &Program,
+    strategy: &str,
+    options: &RenderOptions,
+) -> Rendering {
     let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
     let inline = strategy == "inline";
     let strategy = Strategy::from_name(if inline { "shared" } else { strategy });
@@ -111,7 +136,7 @@ fn render(scene: &Scene, program: &Program, strategy: &str, options: &RenderOpti
     rendering
 }
 
-fn room(size: f32, offset: f32, depth: u32) -> String {
+pub fn room(size: f32, offset: f32, depth: u32) -> String {
     let place = |p: [f32; 3]| p.map(|v| v * size + offset);
     format!(
         "film = {{ width = 24, height = 16 }}\nintegrator.max_depth = {depth}\n\
@@ -261,7 +286,13 @@ fn a_camera_in_a_block_sees_through_what_is_left_of_it() {
         medium: None,
         ..i.clone()
     });
-    let error = World::new(&dull, &program.infos(), &none.collect::<Vec<_>>(), &[]);
+    let error = World::new(
+        &dull,
+        &program.infos(),
+        &none.collect::<Vec<_>>(),
+        &[],
+        &Technique::default(),
+    );
     let error = error.expect_err("there is nothing to be in").to_string();
     assert!(
         error.contains("`b0`") && error.contains("interior"),

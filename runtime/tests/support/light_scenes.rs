@@ -7,6 +7,7 @@ use impasto_runtime::scene::{
     Camera, DistantLight, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator,
     Light, Mesh, NO_MATERIAL, QuadLight, Scene, SceneParts,
 };
+use impasto_runtime::technique::Technique;
 
 use super::{Random, Row, floats, row, run};
 
@@ -243,7 +244,7 @@ pub(crate) fn turned(mut scene: Scene, degrees: f32) -> Scene {
 }
 
 pub(crate) fn parts(scene: &Scene, instances: &[InstanceInfo]) -> SceneParts {
-    SceneParts::build(scene, &[], instances, &[]).expect("the parts build")
+    SceneParts::build(scene, &[], instances, &[], &Technique::default()).expect("the parts build")
 }
 
 pub(crate) fn evaluate(

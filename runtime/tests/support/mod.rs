@@ -124,11 +124,14 @@ fn assemble(parts: &[&ShaderPart], body: &str, count: usize) -> String {
     for part in parts {
         code += &part.wgsl;
     }
+    let lanes = parts.iter().any(|part| part.wgsl.contains("walk_lane"));
+    let set_lane = if lanes { "walk_lane = lane;" } else { "" };
     code += &format!(
-        "fn evaluate(i: u32) {{\n{body}\n}}\n\
+        "const WORKGROUP_SIZE: u32 = {WORKGROUP}u;\nfn evaluate(i: u32) {{\n{body}\n}}\n\
          @compute @workgroup_size({WORKGROUP}) fn main(\
-         @builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {{\n\
-         {uses};\nif kept == 0u {{ return; }}\n\
+         @builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, \
+         @builtin(local_invocation_index) lane: u32) {{\n\
+         {set_lane}\n{uses};\nif kept == 0u {{ return; }}\n\
          for (var i = id.x; i < {count}u; i += groups.x * {WORKGROUP}u) {{ evaluate(i); }}\n}}\n"
     );
     code
