@@ -41,6 +41,7 @@ pub use runtime::gpu::{Gpu, GpuOptions};
 pub use runtime::render::{RenderOptions, Renderer, Rendering};
 pub use runtime::scene::{Scene, SceneError};
 
+pub mod cost;
 pub mod files;
 mod ir_text;
 

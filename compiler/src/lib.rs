@@ -25,6 +25,7 @@ pub mod abi;
 pub mod ast;
 pub mod closure;
 pub mod codegen;
+pub mod cost;
 pub mod diag;
 pub mod inspect;
 mod interior;

@@ -433,6 +433,24 @@ impl Counts {
         }
     }
 
+    /// What was counted after `before`, an earlier state of these counts.
+    pub fn since(&self, before: &Counts) -> Counts {
+        Counts {
+            alu: self.alu - before.alu,
+            special: self.special - before.special,
+            integer: self.integer - before.integer,
+            texture: self.texture - before.texture,
+            calls: self.calls - before.calls,
+            turns: self.turns - before.turns,
+        }
+    }
+
+    /// All operations on single numbers, a turn of a loop being one. Calls are none: drivers put
+    /// them in line.
+    pub fn operations(&self) -> u64 {
+        self.alu + self.special + self.integer + self.texture + self.turns
+    }
+
     /// Adds `other`, `times` over.
     pub fn add(&mut self, other: &Counts, times: u64) {
         self.alu += other.alu * times;

@@ -12,6 +12,7 @@ use impasto::compiler::source::SourceMap;
 
 mod check;
 mod completions;
+mod cost;
 mod emit;
 mod eval;
 mod explain;
@@ -63,6 +64,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Print what the compiler makes of a material file
     Emit(emit::EmitArgs),
+    /// Count the operations that one evaluation of materials takes
+    Cost(cost::CostArgs),
     /// Evaluate a material, closure or function at one point
     Eval(eval::EvalArgs),
     /// Render a scene
@@ -100,6 +103,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
+        Command::Cost(args) => cost::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),

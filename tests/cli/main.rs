@@ -2,6 +2,7 @@
 //! should be. Every test runs the built program.
 
 mod common;
+mod cost;
 mod emit_check;
 mod eval;
 mod render;

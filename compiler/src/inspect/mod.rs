@@ -7,9 +7,11 @@
 use serde::Serialize;
 
 use crate::diag::{self, Code, Diagnostic};
+use crate::ir::Module;
 use crate::ops::Counts;
+use crate::passes;
 use crate::source::{FileId, SourceMap};
-use crate::{Loader, MaterialRequest, Parameters, check, compile, lexer, parser};
+use crate::{Loader, MaterialRequest, MemoryLoader, Parameters, check, compile, lexer, parser};
 
 mod at;
 mod difference;
@@ -23,6 +25,7 @@ pub use items::Kind;
 pub use values::{Named, Shown, number};
 
 use items::{Call, Item};
+pub(crate) use run::{context, point};
 
 /// Most operations of one evaluation.
 pub const FUEL: u64 = 1 << 26;
@@ -388,6 +391,25 @@ fn function(
         Err(_) => return Err((checked.sources, vec![too_long(&answer.name)])),
     }
     Ok(())
+}
+
+/// The function that `std::folder::name` is named for, called with defaults and stand-ins over
+/// the context of [`items::CONTEXT`]: an optimised module, and the caller's index in it.
+pub(crate) fn library_call(path: &str) -> Option<(Module, usize)> {
+    let mut files = MemoryLoader::default();
+    let mut source = Source::open(path, &mut files).ok()?;
+    let (ast, _) = parser::parse(FileId(0), &source.text);
+    let (_, name) = path.rsplit_once("::")?;
+    let item = items::items(&ast).into_iter().find(|i| i.name == name)?;
+    let call = item.call(&[]).ok()?;
+    source.appended = format!("\n{}\n", call.text);
+    let mut module = check(path, &mut source).ir;
+    let index = module
+        .functions
+        .iter()
+        .rposition(|f| f.name == items::NAME)?;
+    passes::library(&mut module, 0);
+    Some((module, index))
 }
 
 fn texts(arguments: &[(String, String)]) -> Vec<Named> {

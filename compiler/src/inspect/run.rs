@@ -61,7 +61,7 @@ fn parameters(module: &Module, material: &Material, values: &[Const]) -> Vec<Nam
 }
 
 /// The surface point.
-fn point<F: Real>(at: &At, point: &Struct) -> Value<F> {
+pub(crate) fn point<F: Real>(at: &At, point: &Struct) -> Value<F> {
     let field = |(name, ty): &(String, Type)| match at.get(name) {
         Some(numbers) => Value::vector(numbers),
         None => Value::zero(*ty, &[]),
@@ -73,6 +73,13 @@ fn vector<F: Real>(numbers: &[f64]) -> Value<F> {
     Value::vector(numbers)
 }
 
+/// The arguments of a function over the context of [`items::CONTEXT`].
+pub(crate) fn context<F: Real>(at: &At) -> Vec<Value<F>> {
+    let context = items::CONTEXT.iter();
+    let args = context.map(|(name, _)| vector(at.get(name).unwrap_or(&[])));
+    args.collect()
+}
+
 /// The value of a function over the context of [`items::CONTEXT`].
 pub(super) fn function<F: Real>(
     module: &Module,
@@ -80,10 +87,8 @@ pub(super) fn function<F: Real>(
     at: &At,
     precision: Precision,
 ) -> Result<Results, OutOfFuel> {
-    let context = items::CONTEXT.iter();
-    let args = context.map(|(name, _)| vector(at.get(name).unwrap_or(&[])));
     let mut run = Interpreter::<F>::new(module, FUEL);
-    let value = run.run(f, args.collect())?;
+    let value = run.run(f, context(at))?;
     Ok(Results {
         value: Some(Shown::new(&value, f.result, module)),
         ..nothing(precision, run.counts())

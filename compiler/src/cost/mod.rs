@@ -1,0 +1,160 @@
+//! What materials cost. So far: how many operations one evaluation takes, counted by running the
+//! interpreter over many sampled inputs, so that branches and loops count as often as they are
+//! taken.
+//!
+//! An *operation* is what one thread of a GPU does to one number: adding two vectors of three is
+//! three operations, a dot product six, a hash eight. Reading and choosing components, copies, calls
+//! and jumps are none; a turn of a loop is one. The op table says how many operations an op is
+//! and of which class ([`crate::ops::CostClass`]). What is counted is the optimised IR from which
+//! WGSL is printed; the driver's machine code has more instructions where one operation takes
+//! several (a division, a sine, a guard) and fewer where it fuses two.
+
+use serde::Serialize;
+
+use crate::inspect::{self, At};
+use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::value::Value;
+use crate::ir::{Function, Module, Type};
+use crate::ops::Counts;
+use crate::program::Program;
+
+mod inputs;
+
+pub use inputs::Inputs;
+
+/// Most operations of all evaluations that one measurement makes.
+const FUEL: u64 = 1 << 34;
+
+/// Operations of one evaluation, over several.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Operations {
+    /// How many evaluations were counted.
+    pub evaluations: u64,
+    /// Their mean.
+    pub mean: f64,
+    /// The least that one took.
+    pub min: u64,
+    /// The most that one took.
+    pub max: u64,
+    /// The mean by class; the classes add up to it.
+    pub classes: Classes,
+}
+
+/// Mean operations of one evaluation by class of hardware.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Classes {
+    /// Float arithmetic.
+    pub alu: f64,
+    /// Divisions, roots and transcendentals.
+    pub special: f64,
+    /// Integer and bit arithmetic.
+    pub integer: f64,
+    /// Texture lookups.
+    pub texture: f64,
+    /// Turns of loops.
+    pub turns: f64,
+}
+
+/// The operations of material `material` of `program` over `inputs`: instances of it, and where
+/// they are evaluated. `None` without inputs.
+///
+/// One evaluation is what a path asks at a surface: scattering, and emission where it varies.
+/// Textures are not read; each gives one half.
+///
+/// # Errors
+/// If the evaluations take too long together.
+pub fn material(
+    program: &Program,
+    material: usize,
+    inputs: &[(usize, At)],
+) -> Result<Option<Operations>, OutOfFuel> {
+    let compiled = &program.compiled()[material];
+    let mut tally = Tally::default();
+    // Values of parameters are part of the interpreter's code: one interpreter an instance.
+    for of_one in inputs.chunk_by(|a, b| a.0 == b.0) {
+        let uniforms = &program.instances()[of_one[0].0].uniforms;
+        let mut run = Interpreter::<f32>::new(program.ir(), FUEL).with_uniforms(uniforms);
+        for (_, at) in of_one {
+            let [wo, wi, u] = [&at.wo[..], &at.wi[..], &at.u[..]].map(Value::vector);
+            let point = here(&compiled.evaluate, program.ir(), at);
+            run.run(&compiled.evaluate, vec![point, wo.clone(), wi, u])?;
+            if let Some(f) = compiled
+                .emission
+                .as_ref()
+                .filter(|_| compiled.info.varying_emission)
+            {
+                run.run(f, vec![here(f, program.ir(), at), wo])?;
+            }
+            tally.add(run.counts());
+        }
+        tally.before = Counts::default();
+    }
+    Ok(tally.operations())
+}
+
+/// The operations of a function of the library, such as `std::noise::perlin`, with its defaults at
+/// `inputs`. `None` without inputs, or if there is no such function.
+///
+/// # Errors
+/// If the evaluations take too long together.
+pub fn library_function(path: &str, inputs: &[At]) -> Result<Option<Operations>, OutOfFuel> {
+    let Some((module, index)) = inspect::library_call(path) else {
+        return Ok(None);
+    };
+    let mut run = Interpreter::<f32>::new(&module, FUEL);
+    let mut tally = Tally::default();
+    for at in inputs {
+        run.run(&module.functions[index], inspect::context(at))?;
+        tally.add(run.counts());
+    }
+    Ok(tally.operations())
+}
+
+fn here(f: &Function, module: &Module, at: &At) -> Value<f32> {
+    match f.params.first().map(|p| p.ty) {
+        Some(Type::Struct(id)) => inspect::point(at, &module.structs[id.index()]),
+        _ => Value::float(0.0),
+    }
+}
+
+/// Adds up evaluations.
+#[derive(Default)]
+struct Tally {
+    evaluations: u64,
+    total: Counts,
+    /// What the interpreter had counted before the present evaluation.
+    before: Counts,
+    least: Option<u64>,
+    most: u64,
+}
+
+impl Tally {
+    /// Adds an evaluation after which the interpreter has counted `now`.
+    fn add(&mut self, now: Counts) {
+        let one = now.since(&self.before);
+        let operations = one.operations();
+        self.before = now;
+        self.evaluations += 1;
+        self.total.add(&one, 1);
+        self.least = Some(self.least.map_or(operations, |l| l.min(operations)));
+        self.most = self.most.max(operations);
+    }
+
+    fn operations(&self) -> Option<Operations> {
+        let mean = |n: u64| n as f64 / self.evaluations as f64;
+        let total = &self.total;
+        Some(Operations {
+            evaluations: self.evaluations,
+            mean: mean(total.operations()),
+            min: self.least?,
+            max: self.most,
+            classes: Classes {
+                alu: mean(total.alu),
+                special: mean(total.special),
+                integer: mean(total.integer),
+                texture: mean(total.texture),
+                turns: mean(total.turns),
+            },
+        })
+    }
+}

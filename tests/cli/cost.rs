@@ -1,0 +1,163 @@
+//! `cost`: what it counts, what it prints, and that the counts in the paper's scenes are true.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::common::{folder, impasto, root, write};
+
+/// The operations of a material's only evaluation class, from JSON.
+fn operations(source: &str) -> serde_json::Value {
+    let folder = folder();
+    let file = write(folder.path(), "m.impasto", source);
+    let run = impasto(&["cost", &file, "--format", "json", "--samples", "512"]).exits(0);
+    run.json()["materials"][0]["operations"].clone()
+}
+
+fn emitting(value: &str) -> String {
+    format!("use std::edf::uniform;\nmaterial m {{ emission = uniform({value}); }}\n")
+}
+
+#[test]
+fn an_operation_is_one_number_of_a_vector() {
+    let of = |value: &str, class: &str| {
+        let found = operations(&emitting(value))["classes"][class].as_f64();
+        found.expect("a number")
+    };
+    let plain = of("color(position.xyz)", "alu");
+    assert_eq!(of("color(position.xyz + normal)", "alu"), plain + 3.0);
+    assert_eq!(of("color(dot(position.xyz, normal))", "alu"), plain + 6.0);
+    assert_eq!(of("color(position.zyx)", "alu"), plain);
+    assert_eq!(of("color(sqrt(position.xyz))", "special"), 3.0);
+    assert_eq!(of("color(float(hash(int(position.x))))", "integer"), 10.0);
+}
+
+#[test]
+fn branches_and_loops_count_as_often_as_they_are_taken() {
+    let source = emitting("color(turns(uv.x))");
+    let found = operations(&format!(
+        "{source}fn turns(x: float) -> float {{
+             var sum = x;
+             if x < 0.25 {{ for i in 0 .. 100 {{ sum = sqrt(sum + float(i)); }} }}
+             sum
+         }}\n"
+    ));
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let turns = number(&found["classes"]["turns"]);
+    assert!((turns - 25.0).abs() < 6.0, "{found:#}");
+    let (min, mean, max) = (&found["min"], &found["mean"], &found["max"]);
+    assert!(number(max) >= number(min) + 300.0, "{found:#}");
+    assert!(
+        number(min) < number(mean) && number(mean) < number(max),
+        "{found:#}"
+    );
+    let classes = found["classes"].as_object().expect("classes");
+    let sum: f64 = classes.values().map(number).sum();
+    assert!((sum - number(mean)).abs() < 1e-6, "{found:#}");
+}
+
+#[test]
+fn what_cannot_be_counted_is_refused() {
+    impasto(&["cost", "nothing.impasto"])
+        .exits(2)
+        .says("nothing.impasto");
+    impasto(&["cost", "nothing.toml"])
+        .exits(2)
+        .says("nothing.toml");
+    let (scene, file) = ("examples/cornell/scene.toml", "materials/matte.impasto");
+    impasto(&["cost", file, scene])
+        .exits(2)
+        .says("give it alone");
+    impasto(&["cost", file, "--samples", "0"]).exits(2);
+    let folder = folder();
+    let broken = write(folder.path(), "m.impasto", "material m { surface = 1; }");
+    impasto(&["cost", &broken]).exits(1).prints_nothing();
+    let empty = write(folder.path(), "e.impasto", "const A: float = 1.0;");
+    impasto(&["cost", &empty]).exits(1).prints_nothing();
+}
+
+#[test]
+fn instances_of_a_scene_are_counted_with_the_code_they_share() {
+    let run = impasto(&["cost", "examples/cornell/scene.toml", "--format", "json"]).exits(0);
+    let json = run.json();
+    let materials = json["materials"].as_array().expect("a list");
+    let matte = materials.iter().find(|m| m["name"] == "matte");
+    let matte = matte.expect("the walls are matte");
+    assert!(matte["instances"].as_u64() > Some(1), "{matte:#}");
+    assert_eq!(matte["operations"]["evaluations"], 1024);
+}
+
+/// Generates a scene anew in `out`, beside the materials and the scene file of the repository.
+fn generated(name: &str, out: &Path) -> String {
+    let run = Command::new(env!("CARGO"))
+        .args([
+            "run",
+            "--quiet",
+            "--package",
+            "xtask",
+            "--",
+            "scenes",
+            name,
+            "--out",
+        ])
+        .arg(out)
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    assert!(
+        run.status.success(),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    for folder in ["materials", "materials/textures"] {
+        std::fs::create_dir_all(out.join(folder)).expect("a folder");
+        for entry in std::fs::read_dir(root().join(folder))
+            .expect(folder)
+            .flatten()
+        {
+            if entry.path().is_file() {
+                std::fs::copy(entry.path(), out.join(folder).join(entry.file_name()))
+                    .expect("it is copied");
+            }
+        }
+    }
+    let scene = format!("examples/{name}/scene.toml");
+    std::fs::copy(root().join(&scene), out.join(&scene)).expect("it is copied");
+    out.join(&scene).display().to_string()
+}
+
+/// Do two lines of a table say the same? Numbers may differ by 2 %: sines round differently on
+/// other machines, and branches with them.
+fn agree(written: &str, counted: &str) -> bool {
+    let (a, b): (Vec<&str>, Vec<&str>) = (
+        written.split_whitespace().collect(),
+        counted.split_whitespace().collect(),
+    );
+    let near = |(a, b): (&&str, &&str)| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= 1.0f64.max(0.02 * b),
+        _ => a == b,
+    };
+    a.len() == b.len() && a.iter().zip(&b).all(near)
+}
+
+#[test]
+fn the_papers_scenes_carry_the_counts_of_their_materials() {
+    let folder = folder();
+    for name in ["carpaint", "city", "conference"] {
+        let scene = generated(name, folder.path());
+        let text = std::fs::read_to_string(&scene).expect("the scene");
+        let comment: Vec<&str> = text
+            .lines()
+            .skip_while(|line| !line.starts_with("# operations of one evaluation"))
+            .map(|line| line.trim_start_matches('#').trim())
+            .collect();
+        let counted = impasto(&["cost", &scene]).exits(0).stdout;
+        let lines: Vec<&str> = counted.lines().collect();
+        let same =
+            comment.len() == lines.len() && comment.iter().zip(&lines).all(|(a, b)| agree(a, b));
+        assert!(
+            same,
+            "the comment at the end of examples/{name}/scene.toml should be what `impasto cost \
+             examples/{name}/scene.toml` prints:\n{counted}"
+        );
+    }
+}
