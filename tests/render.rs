@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use impasto::runtime::scene::FilmSettings;
+use impasto::runtime::technique::{Regeneration, Technique};
 use impasto::{
     FileLoader, Gpu, GpuOptions, RenderOptions, Renderer, Rendering, Scene, Strategy, compiler,
 };
@@ -47,24 +48,34 @@ fn strategies_agree() {
     let gpu = gpu();
     let scene = scene("examples/cornell/scene.toml", 24);
     let seeds = 1..=4;
-    let pictures = |strategy| -> Vec<Vec<f64>> {
+    let pictures = |strategy, regeneration| -> Vec<Vec<f64>> {
         let picture = |seed| {
+            let technique = Technique {
+                regeneration,
+                ..Technique::default()
+            };
             let options = RenderOptions {
                 samples: 16,
                 seed,
+                technique,
                 ..Default::default()
             };
             blocks(&render(&gpu, &scene, strategy, options))
         };
         seeds.clone().map(picture).collect()
     };
-    let reference = pictures(Strategy::Own);
-    for strategy in [Strategy::Shared, Strategy::Mega] {
-        let other = pictures(strategy);
+    let reference = pictures(Strategy::Own, Regeneration::Never);
+    for (strategy, regeneration) in [
+        (Strategy::Shared, Regeneration::Never),
+        (Strategy::Mega, Regeneration::Never),
+        (Strategy::Mega, Regeneration::Half),
+        (Strategy::Mega, Regeneration::Always),
+    ] {
+        let other = pictures(strategy, regeneration);
         let outliers = outliers(&reference, &other);
         assert!(
             outliers.is_empty(),
-            "{strategy:?} differs from own: {outliers:#?}"
+            "{strategy:?} ({regeneration:?}) differs from own: {outliers:#?}"
         );
     }
 }

@@ -70,6 +70,8 @@ pub(crate) struct Sizes {
     pub workgroup: u32,
     /// Threads that fill the GPU, for kernels whose threads fetch one item after another.
     pub threads: u32,
+    /// Items that such a thread may fetch, which bounds the work of a dispatch.
+    pub fetch_limit: u32,
     /// Workgroups in the first dimension of a dispatch, before a second is opened.
     pub row_groups: u32,
 }
@@ -268,6 +270,8 @@ impl Composer<'_> {
                 _ => "2u",
             };
             shell += &format!("const REGENERATION_SHARE: u32 = {share};\n");
+            let limit = self.sizes.fetch_limit;
+            shell += &format!("const FETCH_LIMIT: u32 = {limit}u;\n");
             shell += include_str!("kernels/subgroup.wgsl");
         }
         let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));

@@ -24,8 +24,10 @@ const SOFTWARE_POOL: u32 = 1 << 16;
 const WORKGROUP: u32 = 256;
 /// Threads that fetch their work: about as many as an H200 holds at once.
 const THREADS: u32 = 1 << 18;
-/// The same for GPUs in software.
-const SOFTWARE_THREADS: u32 = 1 << 12;
+/// Items that each of them may fetch; with few threads and large pools a dispatch takes long.
+const FETCH_LIMIT: u32 = 64;
+/// The same for GPUs in software: Mesa's ends all loops of a thread after 65,535 turns in sum.
+const SOFTWARE_FETCH_LIMIT: u32 = 2;
 
 /// A submission is made longer below the first and shorter above the second.
 const SHORT: Duration = Duration::from_millis(20);
@@ -60,18 +62,21 @@ pub(crate) fn sizes(
     let default = default_pool(gpu, layout, state_bytes + queue_bytes);
     let paths = pixels.saturating_mul(u64::from(options.samples));
     let enough = u32::try_from(paths).unwrap_or(u32::MAX);
+    let pool = options
+        .pool
+        .unwrap_or(default)
+        .min(enough)
+        .min(fits)
+        .clamp(1, 1 << 30);
+    let fetch_limit = match gpu.is_software() {
+        true => SOFTWARE_FETCH_LIMIT,
+        false => FETCH_LIMIT,
+    };
     Ok(Sizes {
-        pool: options
-            .pool
-            .unwrap_or(default)
-            .min(enough)
-            .min(fits)
-            .clamp(1, 1 << 30),
+        pool,
         workgroup: workgroup(&limits, options)?,
-        threads: match gpu.is_software() {
-            true => SOFTWARE_THREADS,
-            false => THREADS,
-        },
+        threads: THREADS.min(pool).max(pool.div_ceil(fetch_limit)),
+        fetch_limit,
         row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
     })
 }

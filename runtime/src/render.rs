@@ -397,11 +397,7 @@ fn build_steps(
             size: match kernel.recipe.feed {
                 Feed::Once => Size::Direct(1, 1),
                 Feed::Pool => Size::for_items(sizes.pool, sizes.workgroup, sizes.row_groups),
-                Feed::Fetched => Size::for_items(
-                    sizes.threads.min(sizes.pool),
-                    sizes.workgroup,
-                    sizes.row_groups,
-                ),
+                Feed::Fetched => Size::for_items(sizes.threads, sizes.workgroup, sizes.row_groups),
                 Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
             },
         })

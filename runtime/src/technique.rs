@@ -84,12 +84,12 @@ choices! {
     /// When threads of a megakernel whose path has ended begin another (Laine et al. 2013,
     /// section 4.1).
     Regeneration {
+        /// Never: a thread traces one path
+        Never = "never",
         /// When over half of a subgroup idles
         Half = "half",
         /// As soon as a thread idles
         Always = "always",
-        /// Never: a thread traces one path
-        Never = "never",
     }
 
     /// The acceleration structure that rays are cast through.

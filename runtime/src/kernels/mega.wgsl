@@ -3,7 +3,9 @@
 #if regenerates
 //
 // Threads whose path has ended begin another: they take what is left of the portion of work that the
-// prepare kernel handed out, until that is used up. Which thread traces a path changes nothing.
+// prepare kernel handed out, until that or their own share is used up: a thread takes no more than
+// FETCH_LIMIT paths on average, and there are threads enough for all. Which of them traces a path
+// changes nothing.
 #endif
 
 var<private> wanted_instance: u32 = NOTHING;
@@ -61,6 +63,7 @@ fn main(
     let lanes = lane_count(subgroupBallot(true));
     var live = false;
     var work_left = true;
+    var fetched = 0u;
     var item = 0u;
     loop {
         // Paths diverge; here the threads come together again.
@@ -74,7 +77,8 @@ fn main(
                 first = atomicAdd(&counters[COUNTER_FETCHED], idle_lanes);
             }
             first = subgroupShuffle(first, leader);
-            work_left = first + idle_lanes < POOL_SIZE;
+            fetched += idle_lanes;
+            work_left = first + idle_lanes < POOL_SIZE && fetched < FETCH_LIMIT * lanes;
             if !live {
                 item = first + lanes_before(idle, subgroup_lane);
                 live = item < POOL_SIZE;
