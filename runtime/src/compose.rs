@@ -11,7 +11,7 @@ use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
 use crate::state::{self, Storage};
 use crate::text::{mentions, predicate, preprocess, without_comments};
-use crate::{film, profile, random};
+use crate::{film, profile};
 
 /// A buffer as a kernel binds it, in group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,7 +145,7 @@ impl Composer<'_> {
         let world = self.world;
         let parts = &world.parts;
         match part {
-            Part::Random => random::constants() + include_str!("kernels/random.wgsl"),
+            Part::Random => self.random.wgsl.clone(),
             Part::Camera => world.camera.wgsl(world.width, world.height),
             Part::Film => include_str!("kernels/film.wgsl").to_string(),
             Part::Numbers => include_str!("kernels/numbers.wgsl").to_string(),
@@ -214,7 +214,8 @@ impl Composer<'_> {
     /// The buffers of all parts of the scene, and the tables of its materials.
     pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
         let parts = &self.world.parts;
-        let parts: [Option<&ShaderPart>; 6] = [
+        let parts: [Option<&ShaderPart>; 7] = [
+            Some(&self.random),
             Some(&parts.geometry),
             Some(&parts.bvh),
             Some(&parts.surface),

@@ -21,7 +21,7 @@ mod parallel;
 mod pool;
 mod profile;
 mod queues;
-mod random;
+pub mod random;
 pub mod render;
 pub mod report;
 mod resources;

@@ -8,7 +8,7 @@ use crate::bvh;
 use crate::compose::Binding;
 use crate::layout::Layout;
 use crate::queues::Queues;
-use crate::shader_part::BufferData;
+use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{STAGES, StageId};
 use crate::state::{Need, Needs};
 use crate::technique::{Append, Regeneration, Technique};
@@ -89,6 +89,8 @@ pub(crate) struct Composer<'a> {
     pub technique: Technique,
     /// Lanes of the GPU's largest subgroups.
     pub subgroup_size: u32,
+    /// Random numbers of the sampler.
+    pub random: ShaderPart,
 }
 
 impl Composer<'_> {

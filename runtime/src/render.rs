@@ -10,15 +10,18 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use impasto_compiler::Program;
+use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::Plan;
 
 use crate::error::RuntimeError;
 use crate::film::Film;
 use crate::gpu::{Gpu, Timing};
 use crate::layout::Layout;
+use crate::lights::LIGHT_ROW_BYTES;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
 use crate::pool::{self, Pace};
 use crate::queues::{Queues, Scalar};
+use crate::random::{self, Demand};
 use crate::report::{MaterialReport, Report};
 use crate::resources::Resources;
 use crate::scene::Scene;
@@ -153,6 +156,10 @@ impl<'g> Renderer<'g> {
             sizes,
             technique,
             subgroup_size: gpu.subgroup_size(),
+            random: random::part(
+                options.technique.sampler,
+                demand(world, &materials, &layout),
+            ),
         };
         if technique.profile {
             composer.layout.counters.profiled = composer.recipes().len();
@@ -355,6 +362,22 @@ fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeE
         return refuse("pool", "0".into(), "at least 1 path");
     }
     Ok(())
+}
+
+/// What the world asks of random numbers. One light leaves nothing to choose, but an environment
+/// map chooses a row by what is left of the choice.
+fn demand(world: &World, materials: &[MaterialInfo], layout: &Layout) -> Demand {
+    let lights = &world.parts.lights.buffers;
+    let one_light = |b: &BufferData| b.name == "light_table" && b.bytes.len() <= LIGHT_ROW_BYTES;
+    let has_map = lights.iter().any(|b| b.name == "environment_alias");
+    Demand {
+        lens: world.camera.lens_radius > 0.0,
+        lobes: materials.iter().any(|m| m.lobes > 1),
+        lights: layout.needs.shadow_rays,
+        light_choice: has_map || !lights.iter().any(one_light),
+        roulette_start: world.roulette_start,
+        max_depth: world.max_depth,
+    }
 }
 
 /// Runs an iteration without any work: some drivers finish building a kernel when it first

@@ -59,6 +59,10 @@ macro_rules! choices {
 choices! {
     /// Where random numbers come from.
     Sampler {
+        /// Sobol points with a random mask a pixel for 32 dimensions, then independent (Laine et al. 2013)
+        Sobol = "sobol",
+        /// Sobol points, Owen-scrambled and shuffled anew for every pixel and draw (Burley 2020)
+        Owen = "owen",
         /// Hashes of pixel, sample and dimension: independent numbers
         Independent = "independent",
     }

@@ -281,8 +281,8 @@ fn black_lights_are_as_good_as_none() {
 #[test]
 fn extreme_random_numbers_give_finite_samples() {
     // Row 11: u = 0 and the largest number below 1, in every position. sample() checks for finite values.
-    let ends = [0.0f32, 0.99999994];
-    let corners = |i: usize| row([0, 1, 2, 3].map(|k| ends[i >> k & 1]));
+    let ends = [0, u32::MAX];
+    let corners = |i: usize| [0, 1, 2, 3].map(|k| ends[i >> k & 1]);
     let numbers: Vec<Row> = (0..16).map(corners).collect();
     let (mixed, infos) = mixed_scene();
     for (name, scene, infos) in scenes().into_iter().chain([("mixed", mixed, infos)]) {
@@ -345,6 +345,65 @@ fn a_sky_over_a_large_scene_leaves_samples_for_a_lamp() {
     let samples = sample(&parts(&scene, &[emissive([0.0; 3])]), Vec3::ZERO, 10_000, 1);
     let lamp = samples.iter().filter(|s| s.pdf > 1.0).count();
     assert!((2000..3000).contains(&lamp), "{lamp} of 10000");
+}
+
+/// A million triangles that emit: the kernel's choice, at the very numbers where it has to pass from
+/// one light to the next, against arithmetic in 128 bits.
+#[test]
+fn a_million_lights_are_chosen_by_their_probabilities() {
+    let mut scene = dark_scene();
+    let mut random = Random::new(21);
+    let count = 1_000_003u32;
+    for _ in 0..count {
+        let center = random.point(-5.0, 5.0);
+        let size = random.range(0.001, 0.1);
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|c| center + size * c);
+        push_triangle(&mut scene, corners, 0);
+    }
+    let parts = parts(&scene, &[emissive([1.0; 3])]);
+    let table = parts
+        .lights
+        .buffers
+        .iter()
+        .find(|b| b.name == "light_table");
+    let table: &[[u32; 4]] = bytemuck::cast_slice(&table.expect("a table").bytes);
+    assert_eq!(table.len() as u32, 2 * count);
+
+    // The number that decides has 56 bits; these are the first and last of some slots, and those
+    // beside the slots' thresholds.
+    let (steps, n) = (1u128 << 56, u128::from(count));
+    let mut questions = Vec::new();
+    for _ in 0..2000 {
+        let slot = u128::from(random.bits() % count);
+        let threshold = u128::from(table[2 * slot as usize][0]);
+        let first = (slot * steps).div_ceil(n);
+        let stays = (((slot << 32) + threshold) * (steps >> 32)).div_ceil(n);
+        questions.extend(
+            [first, stays]
+                .iter()
+                .flat_map(|&at| [at.max(1) - 1, at, at + 1]),
+        );
+    }
+    let bits = |number: &u128| {
+        let rest = |shift: u32| ((number >> shift) & 0xff) as u32;
+        [(number >> 24) as u32, rest(16), rest(8), rest(0)]
+    };
+    let input: Vec<Row> = questions.iter().map(bits).collect();
+    let body = "let pick = pick_light(input[i]);
+        result[i] = vec4<u32>(pick.light, bitcast<u32>(pick.probability), 0u, 0u);";
+    let picks = evaluate(&parts, body, &input, input.len(), input.len());
+    for (number, pick) in questions.iter().zip(picks) {
+        let place = (number * n) >> 24;
+        let (slot, within) = ((place >> 32) as usize, place as u32);
+        let [threshold, alias, ..] = table[2 * slot];
+        let expected = if within < threshold {
+            slot as u32
+        } else {
+            alias
+        };
+        assert_eq!(pick[0], expected, "{number}");
+        assert_eq!(pick[1], table[2 * expected as usize][2], "{number}");
+    }
 }
 
 #[test]

@@ -44,10 +44,18 @@ fn logic(slot: u32) {
     if instance != NOTHING && vertex >= MAX_DEPTH && !needs_last_evaluation(instance) {
         instance = NOTHING;
     }
+#if shadow_rays
+    let draws = instance != NOTHING;
+#else
+    let draws = instance != NOTHING && vertex >= ROULETTE_START;
+#endif
+    var bits = vec4<u32>(0u);
+    if draws {
+        bits = random_bits(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC));
+    }
     if instance != NOTHING && vertex >= ROULETTE_START {
-        let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_ROULETTE)).x;
         let survival = survival_probability(carried.throughput);
-        if u < survival {
+        if unit_numbers(bits).w < survival {
             carried.throughput /= survival;
             store_throughput(slot, carried);
         } else {
@@ -64,8 +72,7 @@ fn logic(slot: u32) {
 #if shadow_rays
     if vertex < MAX_DEPTH && scatters_sampled_light(instance) {
         let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
-        let u = random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LIGHT));
-        path.flags |= choose_light(slot, position, u);
+        path.flags |= choose_light(slot, position, bits);
     }
 #endif
     store_radiance(slot, path);
@@ -92,8 +99,8 @@ fn sampled_light(slot: u32) -> vec3<f32> {
 }
 
 // Samples a light for the material stage to aim at; the flag to set.
-fn choose_light(slot: u32, position: vec3<f32>, u: vec4<f32>) -> u32 {
-    let light = sample_light(position, u);
+fn choose_light(slot: u32, position: vec3<f32>, bits: vec4<u32>) -> u32 {
+    let light = sample_light(position, bits);
     if !any(light.radiance > vec3<f32>(0.0)) {
         return 0u;
     }

@@ -1,5 +1,5 @@
 // Random numbers as a pure function of pixel, sample, draw and seed, so that neither the slot
-// nor the order of execution can change a path.
+// nor the order of execution can change a path. A sampler (kernels/random/) gives `random_bits`.
 
 // Four well-mixed words of four. Source: Jarzynski and Olano, "Hash Functions for GPU
 // Rendering", JCGT 9(3), 2020.
@@ -17,10 +17,14 @@ fn pcg4d(input: vec4<u32>) -> vec4<u32> {
     return v;
 }
 
-// Four uniform numbers in [0, 1): 24 bits each, so that 1 cannot appear by rounding.
-fn random_numbers(pixel: u32, sample: u32, draw: u32) -> vec4<f32> {
-    let bits = pcg4d(vec4<u32>(pixel, sample, draw, run.seed));
+// Random bits as uniform numbers in [0, 1): 24 bits each, so that 1 cannot appear by rounding.
+fn unit_numbers(bits: vec4<u32>) -> vec4<f32> {
     return vec4<f32>(bits >> vec4<u32>(8u)) * 0x1p-24;
+}
+
+// The four numbers of a draw. Of those y and z are the most evenly distributed pair.
+fn random_numbers(pixel: u32, sample: u32, draw: u32) -> vec4<f32> {
+    return unit_numbers(random_bits(pixel, sample, draw));
 }
 
 // The draw for one purpose at a path's vertex, counted from 1.

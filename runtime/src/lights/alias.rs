@@ -4,15 +4,15 @@
 ///
 /// Construction after Vose, "A Linear Algorithm for Generating Random Numbers with a Given
 /// Distribution" (1991); it depends on nothing but the weights.
-pub(super) struct AliasTable {
+struct AliasTable {
     /// In 0..=1; 1 in slots that are their own alias.
-    pub(super) thresholds: Vec<f64>,
-    pub(super) aliases: Vec<u32>,
+    thresholds: Vec<f64>,
+    aliases: Vec<u32>,
 }
 
 impl AliasTable {
     /// A table for weights that are finite and not negative. If all are zero, nothing should be drawn.
-    pub(super) fn new(weights: &[f64]) -> AliasTable {
+    fn new(weights: &[f64]) -> AliasTable {
         let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let scale = weights.len() as f64 / total;
         let mut thresholds: Vec<f64> = weights.iter().map(|w| w * scale).collect();
@@ -57,6 +57,42 @@ fn settle(
         }
     }
 }
+
+/// An alias table with thresholds of 32 bits, and the probabilities that it has after rounding.
+pub(super) struct WordAlias {
+    /// Fractions of 2^32. What is its own alias stays whatever the threshold.
+    pub(super) thresholds: Vec<u32>,
+    pub(super) aliases: Vec<u32>,
+    pub(super) probabilities: Vec<f64>,
+}
+
+impl WordAlias {
+    /// Slots of weight zero get probability zero, all others more than that, if there are any.
+    pub(super) fn new(weights: &[f64]) -> WordAlias {
+        let table = AliasTable::new(weights);
+        let mut shares = vec![0u64; weights.len()];
+        let word = |(slot, &threshold): (usize, &f64)| {
+            // Not even the darkest light may become impossible. The conversion saturates.
+            ((threshold * FULL as f64).round() as u32).max(u32::from(weights[slot] > 0.0))
+        };
+        let thresholds: Vec<u32> = table.thresholds.iter().enumerate().map(word).collect();
+        for (slot, (&stay, &alias)) in thresholds.iter().zip(&table.aliases).enumerate() {
+            shares[slot] += u64::from(stay);
+            shares[alias as usize] += FULL - u64::from(stay);
+        }
+        let none = weights.iter().all(|&w| w <= 0.0);
+        let unit = 1.0 / (FULL as f64 * weights.len() as f64);
+        let probability = |&share: &u64| if none { 0.0 } else { share as f64 * unit };
+        WordAlias {
+            probabilities: shares.iter().map(probability).collect(),
+            thresholds,
+            aliases: table.aliases,
+        }
+    }
+}
+
+/// A threshold of one, in the units of [`WordAlias`].
+const FULL: u64 = 1 << 32;
 
 /// An alias table with thresholds of 16 bits in one word a slot (threshold low, alias high), for
 /// at most 65,536 slots, and the probabilities that it has after rounding.
@@ -130,6 +166,55 @@ mod tests {
                 assert!(*w > 0.0 || *p == 0.0, "a slot without weight is drawn");
             }
         }
+    }
+
+    /// Draws by every slot at once, in the integers that the kernel compares.
+    fn word_shares(table: &WordAlias) -> Vec<u64> {
+        let mut shares = vec![0; table.thresholds.len()];
+        for (slot, (&stay, &alias)) in table.thresholds.iter().zip(&table.aliases).enumerate() {
+            shares[slot] += u64::from(stay);
+            shares[alias as usize] += FULL - u64::from(stay);
+        }
+        shares
+    }
+
+    #[test]
+    fn a_million_lights_are_drawn_by_weight_and_say_so() {
+        let count = 1_000_003;
+        let weight = |i: u64| match i % 7 {
+            0 => 0.0,
+            // From dim to a ten-thousand times as bright, in no order.
+            _ => (1 + i.wrapping_mul(0x9e37_79b9_7f4a_7c15) % 10_000) as f64,
+        };
+        let weights: Vec<f64> = (0..count).map(weight).collect();
+        let total: f64 = weights.iter().sum();
+        let table = WordAlias::new(&weights);
+        let all = (FULL * count) as f64;
+        for ((share, said), weight) in word_shares(&table)
+            .into_iter()
+            .zip(&table.probabilities)
+            .zip(&weights)
+        {
+            let drawn = share as f64 / all;
+            assert!((drawn - said).abs() <= 1e-12 * drawn);
+            assert_eq!(share > 0, *weight > 0.0);
+            let expected = weight / total;
+            assert!(
+                (drawn - expected).abs() <= 1e-5 * expected,
+                "{drawn} for {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn lights_of_extreme_weights_stay_possible() {
+        let table = WordAlias::new(&[1e-30, 1.0, 0.0, 1e30]);
+        assert!(table.probabilities[0] > 0.0 && table.probabilities[1] > 0.0);
+        assert_eq!(table.probabilities[2], 0.0);
+        assert!((table.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let dark = WordAlias::new(&[0.0; 3]);
+        assert_eq!(dark.probabilities, [0.0; 3]);
+        assert_eq!(WordAlias::new(&[2.0]).probabilities, [1.0]);
     }
 
     #[test]

@@ -18,7 +18,7 @@ mod environment;
 mod mesh;
 mod quad;
 
-use alias::AliasTable;
+use alias::WordAlias;
 
 /// Index in the light table of triangles that are no sampled light: beyond any table.
 pub const NO_LIGHT: u32 = u32::MAX;
@@ -176,18 +176,20 @@ fn part(kinds: &[Kind], count: u32) -> ShaderPart {
     part
 }
 
-/// Two words a light; see `kernels/lights/select.wgsl`.
+/// Bytes of a light in the table.
+pub(crate) const LIGHT_ROW_BYTES: usize = 32;
+
+/// Two rows of words a light; see `kernels/lights/select.wgsl`.
 fn light_table(kinds: &[Kind]) -> BufferData {
     let weights = selection_weights(kinds);
-    let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let alias = AliasTable::new(&weights);
+    let alias = WordAlias::new(&weights);
     let rows: Vec<[[u32; 4]; 2]> = kinds
         .iter()
         .flat_map(|k| &k.lights)
         .enumerate()
         .map(|(i, light)| {
-            let threshold = (alias.thresholds[i] as f32).to_bits();
-            let probability = ((weights[i] / total) as f32).to_bits();
+            let threshold = alias.thresholds[i];
+            let probability = (alias.probabilities[i] as f32).to_bits();
             let [r, g, b] = light.radiance.to_array().map(f32::to_bits);
             [
                 [threshold, alias.aliases[i], probability, light.primitive],
@@ -223,12 +225,12 @@ fn selection_weights(kinds: &[Kind]) -> Vec<f64> {
 
 fn sample_function(kinds: &[Kind]) -> String {
     let mut text =
-        String::from("fn sample_light(position: vec3<f32>, u: vec4<f32>) -> LightSample {\n");
+        String::from("fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {\n");
     let sampled: Vec<&Kind> = kinds.iter().filter(|k| !k.lights.is_empty()).collect();
     let Some((last, others)) = sampled.split_last() else {
         return text + "    return no_light_sample();\n}\n";
     };
-    text += "    let pick = pick_light(u);\n";
+    text += "    let pick = pick_light(bits);\n";
     let mut end = 0;
     for kind in others {
         end += kind.lights.len();

@@ -3,6 +3,7 @@
 use crate::stub::{Kind, Materials, Room, materials, red, render, samples};
 use impasto_runtime::film::Film;
 use impasto_runtime::render::RenderOptions;
+use impasto_runtime::technique::{Choice, Sampler, Technique};
 
 fn room() -> Room {
     Room {
@@ -68,9 +69,13 @@ fn neighbouring_pixels_and_samples_are_uncorrelated() {
         max_depth: 3,
         ..Room::default()
     };
-    let picture = |first_sample| {
+    let picture = |sampler, first_sample| {
         let options = RenderOptions {
             first_sample,
+            technique: Technique {
+                sampler,
+                ..Technique::default()
+            },
             ..samples(1)
         };
         red(&render(
@@ -80,14 +85,19 @@ fn neighbouring_pixels_and_samples_are_uncorrelated() {
         ))
         .collect::<Vec<_>>()
     };
-    let first = picture(0);
-    let bound = 4.0 / (first.len() as f64).sqrt();
-    let r = correlation(&first[1..], &first[..first.len() - 1]);
-    assert!(r.abs() < bound, "pixels: {r}");
-    // 65,536 would repeat sample 0 if an index had 16 bits.
-    for sample in [1, 2, 65_535, 65_536, 70_000, u32::MAX - 1] {
-        let r = correlation(&first, &picture(sample));
-        assert!(r.abs() < bound, "sample {sample}: {r}");
+    for (sampler, name, _) in Sampler::ALL {
+        let first = picture(*sampler, 0);
+        let bound = 4.0 / (first.len() as f64).sqrt();
+        let r = correlation(&first[1..], &first[..first.len() - 1]);
+        assert!(r.abs() < bound, "{name}: pixels: {r}");
+        // 65,536 would repeat sample 0 if an index had 16 bits. Samples of a sequence keep out of
+        // each other's way, but do not repeat each other.
+        let independent = *sampler == Sampler::Independent;
+        for sample in [1, 2, 65_535, 65_536, 70_000, u32::MAX - 1] {
+            let r = correlation(&first, &picture(*sampler, sample));
+            let far = if independent { r.abs() } else { r };
+            assert!(far < bound, "{name}: sample {sample}: {r}");
+        }
     }
 }
 

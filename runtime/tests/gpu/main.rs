@@ -14,6 +14,7 @@ mod media;
 mod ops;
 mod planes;
 mod plans;
+mod random;
 mod scene;
 mod stub;
 #[path = "../support/mod.rs"]

@@ -177,9 +177,9 @@ fn smooth_solid(ior: f32, point: SurfacePoint, wo: vec3<f32>, u: vec4<f32>) -> M
 // A cosine lobe on the side of wo (1) or the other (-1).
 fn lambert(albedo: f32, side: f32, changes: f32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample {
     let up = side * select(-1.0, 1.0, dot(point.geometric_normal, wo) > 0.0) * point.geometric_normal;
-    let angle = 6.2831853 * u.y;
-    let r = sqrt(u.x);
-    let wi = normalize(vec3<f32>(r * cos(angle), r * sin(angle), up.z * sqrt(1.0 - u.x)));
+    let angle = 6.2831853 * u.z;
+    let r = sqrt(u.y);
+    let wi = normalize(vec3<f32>(r * cos(angle), r * sin(angle), up.z * sqrt(1.0 - u.y)));
     let pdf = max(dot(up, wi), 1e-6) / 3.14159265;
     let light_pdf = max(dot(up, wl), 0.0) / 3.14159265;
     return MaterialSample(wi, pdf, vec3<f32>(albedo), light_pdf, vec3<f32>(albedo * light_pdf), changes);
@@ -356,11 +356,12 @@ fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
 
 struct LightSample { wi: vec3<f32>, distance: f32, radiance: vec3<f32>, pdf: f32 }
 
-fn sample_light(position: vec3<f32>, u: vec4<f32>) -> LightSample {
+fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {
+    let u = vec4<f32>(bits >> vec4<u32>(8u)) * 0x1p-24;
     if LIGHT == 2u {
-        let z = 1.0 - 2.0 * u.x;
+        let z = 1.0 - 2.0 * u.y;
         let r = sqrt(1.0 - z * z);
-        let wi = vec3<f32>(r * cos(6.2831853 * u.y), r * sin(6.2831853 * u.y), z);
+        let wi = vec3<f32>(r * cos(6.2831853 * u.z), r * sin(6.2831853 * u.z), z);
         return LightSample(wi, 3.0e38, sky(wi) / SKY_PDF, SKY_PDF);
     }
     let to_light = vec3<f32>(0.0, 0.0, POINT_Z) - position;

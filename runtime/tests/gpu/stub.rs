@@ -144,9 +144,9 @@ struct MaterialSample {
 fn diffuse(albedo: f32, n: vec3<f32>, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample {
     let up = select(-n, n, dot(n, wo) > 0.0);
     let across = normalize(select(cross(up, vec3<f32>(1.0, 0.0, 0.0)), cross(up, vec3<f32>(0.0, 1.0, 0.0)), abs(up.x) > 0.5));
-    let angle = 6.2831853 * u.y;
-    let r = sqrt(u.x);
-    let wi = normalize(r * (cos(angle) * across + sin(angle) * cross(up, across)) + sqrt(1.0 - u.x) * up);
+    let angle = 6.2831853 * u.z;
+    let r = sqrt(u.y);
+    let wi = normalize(r * (cos(angle) * across + sin(angle) * cross(up, across)) + sqrt(1.0 - u.y) * up);
     let pdf = max(dot(up, wi), 1e-6) / 3.14159265;
     let light_pdf = max(dot(up, wl), 0.0) / 3.14159265;
     return MaterialSample(wi, pdf, vec3<f32>(albedo), light_pdf, vec3<f32>(albedo * light_pdf), 0.0);
@@ -156,7 +156,7 @@ fn failing(albedo: f32, n: vec3<f32>, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>
     var sample = diffuse(albedo, n, wo, wl, u);
     sample.pdf *= 0.5;
     sample.light_pdf *= 0.5;
-    sample.throughput = select(vec3<f32>(0.0), 2.0 * sample.throughput, u.z < 0.5);
+    sample.throughput = select(vec3<f32>(0.0), 2.0 * sample.throughput, u.x < 0.5);
     return sample;
 }
 
@@ -309,15 +309,16 @@ fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
 
 struct LightSample { wi: vec3<f32>, distance: f32, radiance: vec3<f32>, pdf: f32 }
 
-fn sample_light(position: vec3<f32>, u: vec4<f32>) -> LightSample {
+fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {
+    let u = vec4<f32>(bits >> vec4<u32>(8u)) * 0x1p-24;
     if SKY > 0.0 {
-        let z = 1.0 - 2.0 * u.x;
+        let z = 1.0 - 2.0 * u.y;
         let r = sqrt(1.0 - z * z);
-        let wi = vec3<f32>(r * cos(6.2831853 * u.y), r * sin(6.2831853 * u.y), z);
+        let wi = vec3<f32>(r * cos(6.2831853 * u.z), r * sin(6.2831853 * u.z), z);
         let pdf = 1.0 / 12.566371;
         return LightSample(wi, 3.0e38, vec3<f32>(SKY / pdf), select(0.0, pdf, STRATEGIES == 2u));
     }
-    var wanted = u32(u.z * f32(EMITTER_COUNT));
+    var wanted = u32(u.x * f32(EMITTER_COUNT));
     var wall = 0u;
     for (var i = 0u; i < 6u; i++) {
         if emits(i) {
@@ -325,7 +326,7 @@ fn sample_light(position: vec3<f32>, u: vec4<f32>) -> LightSample {
             wanted--;
         }
     }
-    let to_light = hit_position(wall, 2.0 * u.xy - 1.0) - position;
+    let to_light = hit_position(wall, 2.0 * u.yz - 1.0) - position;
     let distance = length(to_light);
     let wi = to_light / max(distance, 1e-9);
     let cosine = -dot(wi, hit_geometric_normal(wall));

@@ -272,13 +272,11 @@ pub(crate) struct Sample {
 
 pub(crate) fn sample(parts: &SceneParts, position: Vec3, count: usize, seed: u64) -> Vec<Sample> {
     let mut random = Random::new(seed);
-    let numbers: Vec<Row> = (0..count)
-        .map(|_| row([(); 4].map(|_| random.uniform())))
-        .collect();
+    let numbers: Vec<Row> = (0..count).map(|_| [(); 4].map(|_| random.bits())).collect();
     sample_with(parts, position, &numbers)
 }
 
-/// One sample for each row of random numbers.
+/// One sample for each row of random bits.
 pub(crate) fn sample_with(parts: &SceneParts, position: Vec3, numbers: &[Row]) -> Vec<Sample> {
     let count = numbers.len();
     let mut input = vec![row(position.extend(0.0).to_array())];
@@ -286,7 +284,7 @@ pub(crate) fn sample_with(parts: &SceneParts, position: Vec3, numbers: &[Row]) -
     let body = EMISSION.to_owned()
         + "
         let position = bitcast<vec3<f32>>(input[0].xyz);
-        let s = sample_light(position, bitcast<vec4<f32>>(input[i + 1u]));
+        let s = sample_light(position, input[i + 1u]);
         let visible = !trace_any(position, s.wi, s.distance, NO_PRIMITIVE);
         result[4u * i] = bitcast<vec4<u32>>(vec4<f32>(s.wi, s.pdf));
         result[4u * i + 1u] = bitcast<vec4<u32>>(vec4<f32>(s.radiance, select(0.0, 1.0, visible)));

@@ -47,6 +47,13 @@ fn pick_slot(u: f32, count: u32, decision: f32, first: u32) -> SlotPick {
     return SlotPick(select(entry >> 16u, slot, stays), fract(place), renew(decision, threshold));
 }
 
+// A uniform number that was compared with a threshold, stretched to be uniform again.
+fn renew(u: f32, threshold: f32) -> f32 {
+    let below = u < threshold;
+    let span = select(1.0 - threshold, threshold, below);
+    return clamp(select(u - threshold, u, below) / max(span, 1e-30), 0.0, 0.99999994);
+}
+
 fn environment_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
     let uv = environment_uv(direction);
     let column = min(u32(uv.x * f32(ENVIRONMENT_WIDTH)), ENVIRONMENT_WIDTH - 1u);
