@@ -89,7 +89,7 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 7] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 8] {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
@@ -105,6 +105,7 @@ impl Composer<'_> {
             ),
             ("absorption", needs.absorption),
             ("overlap", needs.overlap),
+            ("fetched", self.fetches(stage)),
             ("varying_emission", needs.varying_emission),
         ]
     }

@@ -11,12 +11,17 @@ use crate::queues::Queues;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{STAGES, StageId};
 use crate::state::{Need, Needs};
-use crate::technique::{Append, Regeneration, Technique};
+use crate::technique::{Append, Leaves, RayFetch, Regeneration, Technique};
 use crate::text::{case_labels, preprocess};
 use crate::world::{MaterialSource, World};
 
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
+
+/// A subgroup fetches rays when more than this share of its lanes has none (Aila and Laine 2009).
+const FETCH_PERCENT: u32 = 40;
+/// Triangles wait while less than this share of the lanes with a ray has any (Ylitie et al. 2017).
+const TRIANGLE_PERCENT: u32 = 20;
 
 /// What decides how many threads a kernel gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,6 +231,9 @@ impl Composer<'_> {
     /// A kernel of one stage that reads `queue` and evaluates no material.
     fn stage(&self, id: StageId, queue: usize) -> Recipe {
         let name = id.stage().name;
+        if self.fetches(id) {
+            return recipe(name, vec![id], Feed::Queue(queue), self.fetch_shell(queue));
+        }
         let starts = id == StageId::NewPath;
         let arguments = if starts { "slot, item" } else { "slot" };
         let shell = self.shell(&Shell {
@@ -239,16 +247,63 @@ impl Composer<'_> {
         recipe(name, vec![id], Feed::Queue(queue), shell)
     }
 
+    /// Whether the threads of a stage stay, and take up one ray after another. Boundaries that are
+    /// crossed would have to be crossed in the midst of a cast.
+    pub(crate) fn fetches(&self, id: StageId) -> bool {
+        let possible = match id {
+            StageId::Shadow => true,
+            StageId::Extension => !self.layout.needs.overlap,
+            _ => false,
+        };
+        possible
+            && self.layout.wavefront
+            && self.technique.ray_fetch == RayFetch::Persistent
+            && bvh::provides_steps(&self.world.parts.bvh)
+    }
+
+    /// Constants and entry point of a kernel whose threads fetch the rays of `queue`.
+    fn fetch_shell(&self, queue: usize) -> String {
+        let flags = [
+            ("lanes", bvh::asks_for_lane(&self.world.parts.bvh)),
+            ("together", self.technique.leaves == Leaves::Together),
+        ];
+        let mut out = String::new();
+        for (name, value) in [
+            ("CONSUMED_QUEUE", queue as u32),
+            ("FETCH_LIMIT", self.sizes.fetch_limit),
+            ("FETCH_PERCENT", FETCH_PERCENT),
+            ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
+        ] {
+            out += &format!("const {name}: u32 = {value}u;\n");
+        }
+        out += "const COUNTER_RAYS_FETCHED: u32 = \
+                COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE;\n";
+        out += include_str!("kernels/subgroup.wgsl");
+        out + &preprocess(include_str!("kernels/fetch.wgsl"), &flags)
+    }
+
+    /// The first queue whose rays are fetched; those after it are too.
+    fn first_fetched(&self) -> Option<usize> {
+        let queues = self.layout.queues;
+        let extension = self.fetches(StageId::Extension).then(|| queues.extension());
+        let shadow = self.fetches(StageId::Shadow).then(|| queues.shadow());
+        extension.or(shadow)
+    }
+
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
     fn prepare(&self, name: &str, consumed: std::ops::Range<usize>, hands_out: bool) -> Recipe {
         let flags = [
             ("queues", !consumed.is_empty()),
             ("work", hands_out),
             ("regenerates", self.regenerates()),
+            ("fetched", self.first_fetched().is_some()),
         ];
+        let groups = self.sizes.threads.div_ceil(self.sizes.workgroup);
         let mut text = self.layout.queues.constants();
         for (name, value) in [
             ("PREPARE_SIZE", PREPARE_THREADS),
+            ("FIRST_FETCHED", self.first_fetched().unwrap_or(0) as u32),
+            ("FETCHING_GROUPS", groups),
             ("FIRST_CONSUMED", consumed.start as u32),
             ("END_CONSUMED", consumed.end as u32),
         ] {

@@ -89,11 +89,14 @@ const SCALARS: [(Scalar, &str); 11] = [
 /// on atomic operations independently, since all threads of the logic kernel add to these.
 const PUSHED_STRIDE: usize = 64;
 
+/// Where between those lengths is the number of items that threads have fetched from the queue.
+const FETCHED_OF: usize = PUSHED_STRIDE / 2;
+
 /// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
 /// when it was consumed, then items consumed in 64 bits, then one count of dropped samples for
 /// each kernel that evaluates materials; in a profiling build lanes at work and lanes in all for
 /// each kernel, in 64 bits; at last, apart from each other, the lengths of queues so
-/// far.
+/// far and, between those, how much threads have fetched of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Counters {
     /// Number of queues; 0 in a megakernel.
@@ -140,6 +143,7 @@ impl Counters {
         let arrays = [
             ("PUSHED", self.pushed()),
             ("PUSHED_STRIDE", PUSHED_STRIDE),
+            ("FETCHED_OF", self.pushed() + FETCHED_OF),
             ("TAKEN", self.taken()),
             ("ITEMS", self.items()),
         ];

@@ -114,6 +114,30 @@ choices! {
         Trail = "trail",
     }
 
+    /// How the bytes of compressed nodes become numbers.
+    Planes {
+        /// By converting integers
+        Convert = "convert",
+        /// By putting them in the mantissa of a number between 1 and 2
+        Mantissa = "mantissa",
+    }
+
+    /// When a ray cast tests the triangles that it comes to.
+    Leaves {
+        /// Right after the node that they are in
+        AtOnce = "at-once",
+        /// When most threads of a subgroup have some (Aila and Laine 2009, Ylitie et al. 2017)
+        Together = "together",
+    }
+
+    /// How threads get the rays of a queue.
+    RayFetch {
+        /// One ray a thread
+        Thread = "thread",
+        /// Threads stay and take new rays when many of a subgroup have none (Aila and Laine 2009)
+        Persistent = "persistent",
+    }
+
     /// In which order rays are cast.
     RayOrder {
         /// As they were asked for
@@ -140,6 +164,12 @@ pub struct Technique {
     pub traversal: Traversal,
     /// Where casts keep the nodes they have yet to visit.
     pub stack: Stack,
+    /// How the bytes of compressed nodes become numbers.
+    pub planes: Planes,
+    /// When casts test triangles.
+    pub leaves: Leaves,
+    /// How threads get the rays of a queue; in a megakernel each has its own.
+    pub ray_fetch: RayFetch,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
 }
@@ -156,6 +186,7 @@ impl Technique {
                 other => other,
             },
             regeneration: Regeneration::Never,
+            ray_fetch: RayFetch::Thread,
             profile: false,
             ..self
         }
@@ -184,6 +215,9 @@ mod tests {
         check_names::<Regeneration>();
         check_names::<Traversal>();
         check_names::<Stack>();
+        check_names::<Planes>();
+        check_names::<Leaves>();
+        check_names::<RayFetch>();
         check_names::<RayOrder>();
     }
 }

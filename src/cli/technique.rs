@@ -3,7 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, RayOrder, Regeneration, Sampler, Stack, StateLayout, Technique, Traversal,
+    Append, Choice, Leaves, Planes, RayFetch, RayOrder, Regeneration, Sampler, Stack, StateLayout,
+    Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -28,6 +29,15 @@ pub(super) struct TechniqueArgs {
     /// Where ray casts keep the nodes they have yet to visit
     #[arg(long, value_name = "NAME", default_value = default_name::<Stack>(), value_parser = named::<Stack>())]
     stack: Stack,
+    /// How the bytes of compressed nodes become numbers
+    #[arg(long, value_name = "NAME", default_value = default_name::<Planes>(), value_parser = named::<Planes>())]
+    planes: Planes,
+    /// When ray casts test triangles
+    #[arg(long, value_name = "NAME", default_value = default_name::<Leaves>(), value_parser = named::<Leaves>())]
+    leaves: Leaves,
+    /// How threads get the rays of a queue
+    #[arg(long, value_name = "NAME", default_value = default_name::<RayFetch>(), value_parser = named::<RayFetch>())]
+    ray_fetch: RayFetch,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
@@ -50,6 +60,9 @@ impl TechniqueArgs {
             workgroup: self.workgroup,
             traversal: self.traversal,
             stack: self.stack,
+            planes: self.planes,
+            leaves: self.leaves,
+            ray_fetch: self.ray_fetch,
             ray_order: self.ray_order,
         }
     }

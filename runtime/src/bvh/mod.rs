@@ -17,9 +17,9 @@ use obvhs::ploc::PlocBuilder;
 
 use crate::scene::Mesh;
 use crate::shader_part::{BufferData, ShaderPart};
-use crate::technique::{Stack, Traversal};
+use crate::technique::{Stack, Technique, Traversal};
 
-pub(crate) use text::{asks_for_lane, shares_stack};
+pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
 
 /// The builder's settings. Which of several triangles at one distance a ray hits depends on
 /// them, and so do pictures: never change them by what a scene looks like.
@@ -60,18 +60,19 @@ impl Bvh {
         self.depth
     }
 
-    /// `trace_closest`, `trace_any` and the steps they are made of; needs the geometry part.
-    pub fn part(&self, stack: Stack) -> ShaderPart {
+    /// `trace_closest`, `trace_any` and the steps they are made of, as `technique` says; needs the
+    /// geometry part.
+    pub fn part(&self, technique: &Technique) -> ShaderPart {
         let mut buffers = vec![BufferData::new(
             "bvh_nodes",
             "array<vec4<u32>>",
             &self.nodes,
         )];
-        if stack == Stack::Trail {
+        if technique.stack == Stack::Trail {
             buffers.push(BufferData::new("bvh_parents", "array<u32>", &self.parents));
         }
         ShaderPart {
-            wgsl: text::casts(self.traversal, stack, self.root, self.depth),
+            wgsl: text::casts(self.traversal, technique, self.root, self.depth),
             buffers,
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::shader_part::ShaderPart;
-use crate::technique::{Stack, Traversal};
+use crate::technique::{Leaves, Planes, Stack, Technique, Traversal};
 use crate::text::{mentions, preprocess};
 use crate::wgsl;
 
@@ -16,12 +16,20 @@ const SLACK: f32 = 1.0 / (1 << 20) as f32;
 const SHARED_BYTES: usize = 96;
 
 /// Everything a kernel needs to cast rays through a tree of `depth` inner nodes below `root`.
-pub(super) fn casts(traversal: Traversal, stack: Stack, root: u32, depth: usize) -> String {
+pub(super) fn casts(
+    traversal: Traversal,
+    technique: &Technique,
+    root: u32,
+    depth: usize,
+) -> String {
+    let stack = technique.stack;
     let binary = traversal == Traversal::Bvh2;
     let flags = [
         ("binary", binary),
         ("wide", !binary),
         ("trail", stack == Stack::Trail),
+        ("together", technique.leaves == Leaves::Together),
+        ("mantissa", technique.planes == Planes::Mantissa),
     ];
     let nodes = if binary {
         include_str!("../kernels/bvh_binary.wgsl")
@@ -38,6 +46,11 @@ pub(super) fn casts(traversal: Traversal, stack: Stack, root: u32, depth: usize)
         Stack::Workgroup => array(depth, depth.min(SHARED_BYTES / if binary { 4 } else { 8 })),
     };
     out
+}
+
+/// Whether a part has the steps of a cast, so that kernels may take up rays in its midst.
+pub(crate) fn provides_steps(part: &ShaderPart) -> bool {
+    mentions(&part.wgsl, "begin_walk")
 }
 
 /// Whether a part must be told the thread's index in its workgroup.

@@ -49,8 +49,8 @@ fn trace(
     var walk = begin_walk(root, stack_floor, origin, direction, t_max, skip);
     loop {
         visit_node(&walk);
-#if binary
-        // Leaves are few among nodes: threads wait here until each of them has one.
+#if together
+        // Threads wait here until each of them has triangles, or is done.
         while walk.leaves.y == 0u {
             if !take_next(&walk) {
                 break;

@@ -1,5 +1,20 @@
 // Finds what a path's next segment hits.
 
+#if fetched
+fn begin_ray(slot: u32) -> Walk {
+    let start = load_ray_origin(slot).origin;
+    let direction = load_ray_direction(slot).direction;
+    return begin_walk(BVH_ROOT, 0u, start, direction, 3.0e38, load_hit(slot).primitive);
+}
+
+fn is_decided(hit: Hit) -> bool {
+    return false;
+}
+
+fn end_ray(slot: u32, hit: Hit) {
+    store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
+}
+#else
 fn extension(slot: u32) {
     let start = load_ray_origin(slot);
     let ray = load_ray_direction(slot);
@@ -10,6 +25,7 @@ fn extension(slot: u32) {
 #endif
     store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
 }
+#endif
 #if overlap
 
 // The nearest hit that is none of a medium hidden by another of higher priority. Such boundaries

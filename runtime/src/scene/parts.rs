@@ -64,7 +64,7 @@ impl SceneParts {
                 &lights.of_triangle,
                 &media.of_instance,
             ),
-            bvh: bvh.part(technique.stack),
+            bvh: bvh.part(technique),
             surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
             lights: lights.part,
             media,

@@ -2,12 +2,15 @@
 //! mirrored ball of a thousand triangles in it, do not depend on them.
 
 use impasto_runtime::render::{RenderOptions, Rendering};
-use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
+use impasto_runtime::technique::{
+    Choice, Leaves, Planes, RayFetch, Regeneration, Stack, Technique, Traversal,
+};
 
 use crate::scene::{load, render, room};
 use crate::stub::{gpu, samples};
 
-/// Renders with `technique`; the pool is smaller than the picture, so that queues vary in length.
+/// Renders with `technique`. There are more paths than a pool holds and more of them in the pool
+/// than threads that fetch rays.
 fn picture(strategy: &str, technique: Technique) -> Rendering {
     let toml = room(1.0, 0.0, 6)
         + "[materials.ball]\nfile = 'm.impasto'\nmaterial = 'silver'\n\
@@ -16,44 +19,90 @@ fn picture(strategy: &str, technique: Technique) -> Rendering {
            [[geometry]]\nobj = 'block.obj'\nscale = 0.3\ntranslate = [0.5, -0.6, 0.3]\n";
     let (scene, program) = load(&toml);
     let options = RenderOptions {
-        pool: Some(300),
+        pool: Some(6000),
         technique,
-        ..samples(4)
+        ..samples(24)
     };
     render(&scene, &program, strategy, &options)
 }
 
 /// Fails where the picture of `technique` is another than the default's. Which of two triangles a
-/// ray through their common edge hits may depend on the order in which they are tested.
+/// ray through their common edge hits may depend on the order in which they are tested, and what
+/// rounds differently then goes another way on the mirrored ball; that is rare and no bias.
 #[track_caller]
 fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) {
     let rendering = picture(strategy, technique);
     let pixels = rendering.film.pixels.iter().flatten();
-    let pairs = pixels.zip(reference.film.pixels.iter().flatten());
-    let astray = pairs.filter(|(a, b)| (**a - **b).abs() > 1e-5 * b.max(1.0));
+    let differences = pixels.zip(reference.film.pixels.iter().flatten());
+    let differences: Vec<f64> = differences.map(|(a, b)| f64::from(a - b)).collect();
+    let astray = differences.iter().filter(|d| d.abs() > 1e-5).count();
+    let bias = differences.iter().sum::<f64>() / differences.len() as f64;
+    println!("{strategy}, {technique:?}: {astray}, {bias}");
     let allowed = match (gpu().info().kind, technique.traversal) {
         ("software", Traversal::Cwbvh) => 0,
-        _ => reference.film.pixels.len() * 3 / 50,
+        _ => differences.len() / 8,
     };
-    let astray = astray.count();
     assert!(
         astray <= allowed,
-        "{strategy}, {technique:?}: {astray} differ"
+        "{astray} of {} differ",
+        differences.len()
     );
+    assert!(bias.abs() < 1e-3, "{bias}");
+}
+
+/// Every tree and stack, each with one ray a thread and with threads that stay.
+fn ways() -> Vec<Technique> {
+    let mut ways = Vec::new();
+    for (traversal, ..) in Traversal::ALL {
+        for (stack, ..) in Stack::ALL {
+            for (ray_fetch, ..) in RayFetch::ALL {
+                let odd = ways.len() % 4 / 2 == 1;
+                ways.push(Technique {
+                    traversal: *traversal,
+                    stack: *stack,
+                    ray_fetch: *ray_fetch,
+                    planes: if odd {
+                        Planes::Mantissa
+                    } else {
+                        Planes::Convert
+                    },
+                    leaves: if odd {
+                        Leaves::Together
+                    } else {
+                        Leaves::AtOnce
+                    },
+                    ..Technique::default()
+                });
+            }
+        }
+    }
+    ways
 }
 
 #[test]
-fn every_tree_and_stack_finds_the_same_hits() {
-    for strategy in ["own", "mega"] {
-        let reference = picture(strategy, Technique::default());
-        let trees = Traversal::ALL.iter();
-        for (traversal, stack) in trees.flat_map(|t| Stack::ALL.iter().map(move |s| (t.0, s.0))) {
+fn every_way_of_casting_finds_the_same_hits_in_a_wavefront() {
+    let reference = picture("own", Technique::default());
+    for technique in ways() {
+        assert_same("own", technique, &reference);
+    }
+}
+
+#[test]
+fn every_way_of_casting_finds_the_same_hits_in_a_megakernel() {
+    let reference = picture(
+        "mega",
+        Technique {
+            regeneration: Regeneration::Never,
+            ..Technique::default()
+        },
+    );
+    for technique in ways() {
+        if technique.ray_fetch == RayFetch::Thread {
             let technique = Technique {
-                traversal,
-                stack,
-                ..Technique::default()
+                regeneration: Regeneration::Never,
+                ..technique
             };
-            assert_same(strategy, technique, &reference);
+            assert_same("mega", technique, &reference);
         }
     }
 }
