@@ -86,8 +86,8 @@ fn instances_of_a_scene_are_counted_with_the_code_they_share() {
     assert_eq!(matte["operations"]["evaluations"], 1024);
 }
 
-/// Generates a scene anew in `out`, beside the materials and the scene file of the repository.
-fn generated(name: &str, out: &Path) -> String {
+/// Generates what belongs to a scene in `out`.
+fn generate(name: &str, out: &Path) {
     let run = Command::new(env!("CARGO"))
         .args([
             "run",
@@ -108,6 +108,11 @@ fn generated(name: &str, out: &Path) -> String {
         "{}",
         String::from_utf8_lossy(&run.stderr)
     );
+}
+
+/// A scene generated anew in `out`, beside copies of the scene file and of the materials.
+fn generated(name: &str, out: &Path) -> String {
+    generate(name, out);
     for folder in ["materials", "materials/textures"] {
         std::fs::create_dir_all(out.join(folder)).expect("a folder");
         for entry in std::fs::read_dir(root().join(folder))
@@ -123,6 +128,57 @@ fn generated(name: &str, out: &Path) -> String {
     let scene = format!("examples/{name}/scene.toml");
     std::fs::copy(root().join(&scene), out.join(&scene)).expect("it is copied");
     out.join(&scene).display().to_string()
+}
+
+/// Means of the materials of a generated crossover scene, by name.
+fn means(scene: &Path) -> Vec<(String, f64)> {
+    let scene = scene.display().to_string();
+    let json = impasto(&["cost", &scene, "--format", "json", "--samples", "64"])
+        .exits(0)
+        .json();
+    let materials = json["materials"].as_array().expect("a list").iter();
+    let mean = |m: &serde_json::Value| m["operations"]["mean"].as_f64().expect("it is used");
+    materials
+        .map(|m| (m["name"].as_str().expect("a name").to_owned(), mean(m)))
+        .collect()
+}
+
+#[test]
+fn crossover_scenes_differ_in_their_number_and_nothing_else() {
+    let folder = folder();
+    generate("crossover", folder.path());
+    let folder = folder.path().join("examples/crossover/generated");
+    let index = std::fs::read_to_string(folder.join("index.json")).expect("the index");
+    let index: serde_json::Value = serde_json::from_str(&index).expect("JSON");
+    let mut plain = 0.0;
+    let mut seen = 0;
+    for entry in index.as_array().expect("a list") {
+        let scene = entry["scene"].as_str().expect("a scene");
+        let number = entry["number"].as_u64().expect("a number");
+        let found = means(&folder.join(scene));
+        seen += 1;
+        if entry["family"] == "materials" {
+            assert_eq!(found.len() as u64, number, "{scene} shares code");
+            assert!(
+                found.iter().all(|(_, mean)| (400.0..2000.0).contains(mean)),
+                "{scene}: {found:?}"
+            );
+            continue;
+        }
+        let [(_, mean)] = found.as_slice() else {
+            panic!("{scene} has several materials");
+        };
+        if number == 0 {
+            plain = *mean;
+        }
+        // None is left out, and little is added.
+        let each = (mean - plain) / number.max(1) as f64;
+        assert!(
+            number == 0 || (450.0..520.0).contains(&each),
+            "{scene}: {each} operations a noise"
+        );
+    }
+    assert_eq!(seen, 13);
 }
 
 /// Do two lines of a table say the same? Numbers may differ by 2 %: sines round differently on

@@ -24,7 +24,7 @@ const MATERIALS: &[MtlEntry] = &[
     MtlEntry::glossy("glass", [0.0, 0.0, 0.0], 1.0, 1000.0),
     MtlEntry::glossy("chrome", [0.0, 0.0, 0.0], 0.6, 200.0),
     MtlEntry::glossy("wall", [0.72, 0.70, 0.66], 0.03, 20.0),
-    MtlEntry::diffuse("ceiling", [0.82, 0.82, 0.80]),
+    MtlEntry::glossy("ceiling", [0.80, 0.80, 0.78], 0.02, 8.0),
     MtlEntry::glossy("timber", [0.30, 0.15, 0.07], 0.04, 60.0),
     MtlEntry::glossy("black", [0.02, 0.02, 0.022], 0.04, 120.0),
     MtlEntry::glossy("paper", [0.80, 0.79, 0.75], 0.02, 10.0),
@@ -33,7 +33,7 @@ const MATERIALS: &[MtlEntry] = &[
     MtlEntry::glossy("screen", [0.01, 0.012, 0.015], 0.04, 500.0),
     MtlEntry::glossy("leaf", [0.05, 0.16, 0.03], 0.03, 40.0),
     MtlEntry::glossy("leaf_light", [0.11, 0.24, 0.05], 0.03, 40.0),
-    MtlEntry::diffuse("earth", [0.05, 0.035, 0.025]),
+    MtlEntry::glossy("earth", [0.05, 0.035, 0.025], 0.02, 8.0),
 ];
 
 /// Where the plants stand.

@@ -10,6 +10,7 @@ mod check;
 mod city;
 mod conference;
 mod cornell;
+mod crossover;
 mod glasses;
 mod image_file;
 mod mesh;
@@ -35,7 +36,7 @@ use obj::MtlEntry;
 #[derive(clap::Args, Debug)]
 pub(crate) struct ScenesArgs {
     /// What to generate: cornell, carpaint, city, conference, glasses, materials_preview,
-    /// swatches, textures
+    /// swatches, crossover, textures
     /// [default: all of them]
     names: Vec<String>,
     /// Folder that takes the place of the repository's root
@@ -55,7 +56,7 @@ struct Recipe {
     generate: fn() -> Result<Vec<GeneratedFile>, String>,
 }
 
-const RECIPES: [Recipe; 8] = [
+const RECIPES: [Recipe; 9] = [
     Recipe {
         name: "cornell",
         generate: || {
@@ -98,6 +99,10 @@ const RECIPES: [Recipe; 8] = [
     Recipe {
         name: "swatches",
         generate: || Ok(swatches_files()),
+    },
+    Recipe {
+        name: "crossover",
+        generate: || Ok(crossover::files()),
     },
     Recipe {
         name: "textures",

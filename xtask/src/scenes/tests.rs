@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use super::check::{defects, is_closed, pieces, signed_volume};
 use super::*;
 
-static MODELS: LazyLock<[(&str, Model); 8]> = LazyLock::new(|| {
+static MODELS: LazyLock<[(&str, Model); 10]> = LazyLock::new(|| {
     [
         ("cornell", cornell::build()),
         ("carpaint", carpaint::build()),
@@ -17,6 +17,8 @@ static MODELS: LazyLock<[(&str, Model); 8]> = LazyLock::new(|| {
         ("materials_preview", preview::build()),
         ("swatches", swatches::ball()),
         ("swatches' stage", swatches::stage()),
+        ("crossover", crossover::ball()),
+        ("crossover's panel", crossover::panel()),
     ]
 });
 
@@ -62,6 +64,7 @@ fn things_that_need_an_inside_are_closed_and_face_outward() {
         ("glasses", &["glass", "amber", "mint", "ice", "ruby"]),
         ("materials_preview", &["sample", "foot"]),
         ("swatches", &["ball"]),
+        ("crossover", &["ball"]),
     ];
     for (name, materials) in closed {
         let mesh = &model(name).mesh;
@@ -100,10 +103,11 @@ fn files_are_the_same_bytes_everywhere() {
         ("cornell", 0xd86f_b89e_4359_fdea),
         ("carpaint", 0x23de_92b5_453e_c6ff),
         ("city", 0x1892_751e_7868_db51),
-        ("conference", 0x6b60_06a3_a190_d63e),
+        ("conference", 0xd5c0_9aa4_7ee3_579d),
         ("glasses", 0xe15b_2cd8_f4c2_4a97),
         ("materials_preview", 0x71ca_6aa9_bf62_72ff),
         ("swatches", 0xc4b6_a67a_64f1_22dd),
+        ("crossover", 0x3344_8263_48ef_db90),
         ("textures", 0x0cdf_4d4d_b6dd_e235),
     ];
     assert_eq!(digests, expected, "{digests:#x?}");
