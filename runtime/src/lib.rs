@@ -22,6 +22,7 @@ mod pool;
 mod profile;
 mod queues;
 pub mod random;
+pub mod rays;
 pub mod render;
 pub mod report;
 mod resources;

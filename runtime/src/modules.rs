@@ -261,25 +261,11 @@ impl Composer<'_> {
             && bvh::provides_steps(&self.world.parts.bvh)
     }
 
-    /// Constants and entry point of a kernel whose threads fetch the rays of `queue`.
     fn fetch_shell(&self, queue: usize) -> String {
-        let flags = [
-            ("lanes", bvh::asks_for_lane(&self.world.parts.bvh)),
-            ("together", self.technique.leaves == Leaves::Together),
-        ];
-        let mut out = String::new();
-        for (name, value) in [
-            ("CONSUMED_QUEUE", queue as u32),
-            ("FETCH_LIMIT", self.sizes.fetch_limit),
-            ("FETCH_PERCENT", FETCH_PERCENT),
-            ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
-        ] {
-            out += &format!("const {name}: u32 = {value}u;\n");
-        }
-        out += "const COUNTER_RAYS_FETCHED: u32 = \
-                COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE;\n";
-        out += include_str!("kernels/subgroup.wgsl");
-        out + &preprocess(include_str!("kernels/fetch.wgsl"), &flags)
+        let counter = "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE";
+        let limit = self.sizes.fetch_limit;
+        let part = &self.world.parts.bvh;
+        fetch_shell(queue as u32, counter, &self.technique, part, limit)
     }
 
     /// The first queue whose rays are fetched; those after it are too.
@@ -433,6 +419,33 @@ impl Composer<'_> {
             cases.join(" ")
         )
     }
+}
+
+/// Constants and entry point of a kernel whose threads fetch the rays of `queue`, each no more than
+/// `limit` on average; `counter` is the index of the counter of those fetched.
+pub(crate) fn fetch_shell(
+    queue: u32,
+    counter: &str,
+    technique: &Technique,
+    bvh: &ShaderPart,
+    limit: u32,
+) -> String {
+    let flags = [
+        ("lanes", bvh::asks_for_lane(bvh)),
+        ("together", technique.leaves == Leaves::Together),
+    ];
+    let mut out = String::new();
+    for (name, value) in [
+        ("CONSUMED_QUEUE", queue),
+        ("FETCH_LIMIT", limit),
+        ("FETCH_PERCENT", FETCH_PERCENT),
+        ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
+    ] {
+        out += &format!("const {name}: u32 = {value}u;\n");
+    }
+    out += &format!("const COUNTER_RAYS_FETCHED: u32 = {counter};\n");
+    out += include_str!("kernels/subgroup.wgsl");
+    out + &preprocess(include_str!("kernels/fetch.wgsl"), &flags)
 }
 
 /// A kernel that evaluates no material.

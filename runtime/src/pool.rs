@@ -68,25 +68,35 @@ pub(crate) fn sizes(
         .min(enough)
         .min(fits)
         .clamp(1, 1 << 30);
+    dispatch_sizes(gpu, pool, options.technique.workgroup)
+}
+
+/// The sizes of dispatches over `items` slots, with workgroups of so many threads if it is said.
+pub(crate) fn dispatch_sizes(
+    gpu: &Gpu,
+    items: u32,
+    workgroup: Option<u32>,
+) -> Result<Sizes, RuntimeError> {
+    let limits = gpu.device.limits();
     let fetch_limit = match gpu.is_software() {
         true => SOFTWARE_FETCH_LIMIT,
         false => FETCH_LIMIT,
     };
     Ok(Sizes {
-        pool,
-        workgroup: workgroup(&limits, options)?,
-        threads: THREADS.min(pool).max(pool.div_ceil(fetch_limit)),
+        pool: items,
+        workgroup: workgroup_size(&limits, workgroup)?,
+        threads: THREADS.min(items).max(items.div_ceil(fetch_limit)),
         fetch_limit,
         row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
     })
 }
 
 /// Threads of a workgroup, within the GPU's limits.
-fn workgroup(limits: &wgpu::Limits, options: &RenderOptions) -> Result<u32, RuntimeError> {
+fn workgroup_size(limits: &wgpu::Limits, wanted: Option<u32>) -> Result<u32, RuntimeError> {
     let most = limits
         .max_compute_invocations_per_workgroup
         .min(limits.max_compute_workgroup_size_x);
-    match options.technique.workgroup {
+    match wanted {
         Some(threads) if threads == 0 || threads > most => Err(RuntimeError::Setting {
             setting: "workgroup",
             value: threads.to_string(),

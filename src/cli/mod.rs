@@ -18,6 +18,7 @@ mod eval;
 mod explain;
 mod info;
 mod interrupt;
+mod rays;
 mod render;
 mod technique;
 
@@ -70,6 +71,8 @@ enum Command {
     Eval(eval::EvalArgs),
     /// Render a scene
     Render(Box<render::RenderArgs>),
+    /// Time ray casts alone, by every technique
+    Rays(rays::RaysArgs),
     /// Show the GPU that would be rendered on, and its limits
     Info(info::GpuArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
@@ -106,6 +109,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Cost(args) => cost::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
+        Command::Rays(args) => rays::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),

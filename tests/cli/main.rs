@@ -5,4 +5,5 @@ mod common;
 mod cost;
 mod emit_check;
 mod eval;
+mod rays;
 mod render;

@@ -1,0 +1,94 @@
+//! `impasto rays`: ray casts alone, by every technique, on the same rays.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use impasto::runtime::rays::{RayOptions, RayRate, measure, techniques};
+use impasto::runtime::technique::{Choice, Technique};
+
+use super::info::GpuArgs;
+use super::render::parse_size;
+use super::{Failure, Global, Outcome, print};
+
+#[derive(Args)]
+pub(super) struct RaysArgs {
+    /// The scene, a TOML file; its materials and lights do not matter
+    scene: PathBuf,
+    /// Size of the picture whose camera rays are the first set, as in 1024x1024
+    #[arg(long, value_name = "WxH", default_value = "1024x1024", value_parser = parse_size)]
+    size: (u32, u32),
+    /// How often each cast is timed; the median counts
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    repetitions: u32,
+    /// Threads of a workgroup
+    #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    workgroup: Option<u32>,
+    /// Seed of scattered directions
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
+    let failure = |error: String| Failure::Error(error);
+    let scene = impasto::load(&args.scene).map_err(|e| failure(e.to_string()))?;
+    let gpu = args.gpu.open()?;
+    let set_workgroup = |technique| Technique {
+        workgroup: args.workgroup,
+        ..technique
+    };
+    let options = RayOptions {
+        size: args.size,
+        repetitions: args.repetitions,
+        techniques: techniques(&gpu).into_iter().map(set_workgroup).collect(),
+        seed: args.seed,
+    };
+    let mut progress = |technique: &Technique| global.detail(&names(technique).join(" "));
+    let rates = measure(&gpu, &scene, &options, &mut progress);
+    let rates = rates.map_err(|e| failure(e.to_string()))?;
+    if global.json() {
+        let report = serde_json::json!({
+            "adapter": gpu.info(),
+            "scene": scene.name,
+            "triangles": scene.mesh.len(),
+            "rates": rates,
+        });
+        return print(&format!("{report:#}\n"));
+    }
+    print(&table(&options.techniques, &rates))
+}
+
+fn names(technique: &Technique) -> [&'static str; 5] {
+    [
+        technique.traversal.name(),
+        technique.stack.name(),
+        technique.planes.name(),
+        technique.leaves.name(),
+        technique.ray_fetch.name(),
+    ]
+}
+
+/// A line a technique, a column a set of rays, in millions of rays a second. A mark says that
+/// some rays hit something else than by the default technique.
+fn table(techniques: &[Technique], rates: &[RayRate]) -> String {
+    let sets = rates.len() / techniques.len().max(1);
+    let head = ["traversal", "stack", "planes", "leaves", "fetch"];
+    let mut out: String = head.map(|name| format!("{name:<11}")).concat();
+    for rate in rates.iter().take(sets) {
+        out += &format!("{:>11}", rate.rays);
+    }
+    out += "   (millions of rays a second)\n";
+    for (technique, rates) in techniques.iter().zip(rates.chunks(sets.max(1))) {
+        out += &names(technique).map(|name| format!("{name:<11}")).concat();
+        for rate in rates {
+            let mark = if rate.astray > 0 { "*" } else { "" };
+            out += &format!("{:>11}", format!("{mark}{:.1}", rate.mrays_per_second));
+        }
+        out += "\n";
+    }
+    if rates.iter().any(|rate| rate.astray > 0) {
+        out += "* some rays hit something else than by the first technique (--format json counts them)\n";
+    }
+    out
+}
