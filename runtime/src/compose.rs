@@ -33,13 +33,14 @@ pub(crate) enum Access {
 }
 
 /// The runtime's own buffers: name, type, access.
-pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 6] = [
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 7] = [
     ("run", "Run", Access::Uniform),
     ("state", "array<vec4<u32>>", Access::ReadWrite),
     ("queues", "array<u32>", Access::ReadWrite),
     ("counters", "array<atomic<u32>>", Access::ReadWrite),
     ("film", "array<atomic<u32>>", Access::ReadWrite),
     ("arguments", "array<u32>", Access::ReadWrite),
+    ("bins", "array<atomic<u32>>", Access::ReadWrite),
 ];
 
 /// Members of the uniform `run`, the settings that do not change a kernel's text.
@@ -157,6 +158,7 @@ impl Composer<'_> {
                 let part = parts.media.part.as_ref();
                 part.map_or_else(String::new, |part| part.wgsl.clone())
             }
+            Part::Order => crate::order::bins(parts.bounds),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
         }

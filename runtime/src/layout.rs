@@ -7,6 +7,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::error::RuntimeError;
 use crate::queues::{Counters, Queues};
 use crate::state::{self, Needs};
+use crate::technique::{RayOrder, Technique};
 use crate::world::World;
 
 /// The layout of one plan.
@@ -27,15 +28,18 @@ impl Layout {
         world: &World,
         materials: &[MaterialInfo],
         plan: &Plan,
+        technique: &Technique,
     ) -> Result<Self, RuntimeError> {
         check_plan(plan, materials.len())?;
-        let needs = needs(world, materials);
+        let wavefront = plan.organisation == Organisation::Wavefront;
+        let mut needs = needs(world, materials);
+        needs.order = wavefront && technique.ray_order == RayOrder::Binned;
         let queued = plan.kernels.iter().filter(|k| k.form != Form::Inline);
         let queues = Queues {
             materials: queued.count(),
             shadow_rays: needs.shadow_rays,
+            ordered: needs.order,
         };
-        let wavefront = plan.organisation == Organisation::Wavefront;
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
             kernels: if wavefront { plan.kernels.len() } else { 1 },
@@ -47,6 +51,14 @@ impl Layout {
             counters,
             wavefront,
         })
+    }
+
+    /// Words that the queues take for each slot of the pool.
+    pub(crate) fn queue_words(&self) -> u64 {
+        match self.wavefront {
+            true => self.queues.regions() as u64,
+            false => 0,
+        }
     }
 
     /// Bytes of path state in memory; a megakernel has it in registers.
@@ -70,6 +82,7 @@ fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
         absorption: media.absorb,
         overlap: media.overlap,
         varying_emission: materials.iter().any(|m| m.varying_emission),
+        order: false,
     }
 }
 

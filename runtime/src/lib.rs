@@ -16,6 +16,7 @@ mod layout;
 pub mod lights;
 pub mod media;
 mod modules;
+mod order;
 pub mod output;
 mod parallel;
 mod pool;

@@ -7,6 +7,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::bvh;
 use crate::compose::Binding;
 use crate::layout::Layout;
+use crate::order;
 use crate::queues::Queues;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{STAGES, StageId};
@@ -129,10 +130,44 @@ impl Composer<'_> {
         recipes.extend(self.material_kernels());
         recipes.push(self.prepare("prepare_rays", rays..queues.count(), false));
         if self.layout.needs.met(Need::ShadowRays) {
+            recipes.extend(self.order(StageId::BinShadow, queues.shadow()));
             recipes.push(self.stage(StageId::Shadow, queues.shadow()));
         }
+        recipes.extend(self.order(StageId::BinExtension, rays));
         recipes.push(self.stage(StageId::Extension, rays));
         recipes
+    }
+
+    /// The kernels that put a queue of rays in order, if that is wanted: `count` is the stage that
+    /// counts them.
+    fn order(&self, count: StageId, queue: usize) -> Vec<Recipe> {
+        let stage = count.stage();
+        if !self.layout.needs.met(stage.need) {
+            return Vec::new();
+        }
+        let name = |what: &str| stage.name.replace("bin", what);
+        let scan = order::constants() + include_str!("kernels/order_scan.wgsl");
+        let scatter = order::constants()
+            + &self.layout.queues.constants()
+            + &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n")
+            + &format!("const CONSUMED_REGION: u32 = {queue}u;\n")
+            + include_str!("kernels/order_scatter.wgsl")
+            + &preprocess(include_str!("kernels/shell.wgsl"), &[("queued", true)]);
+        vec![
+            self.stage(count, queue),
+            recipe(&name("scan"), Vec::new(), Feed::Once, scan),
+            recipe(&name("scatter"), Vec::new(), Feed::Queue(queue), scatter),
+        ]
+    }
+
+    /// Where the items of a queue are, for a stage that consumes it.
+    fn region(&self, stage: StageId, queue: usize) -> usize {
+        match stage {
+            StageId::Shadow | StageId::Extension if self.layout.needs.order => {
+                self.layout.queues.region_ordered()
+            }
+            _ => queue,
+        }
     }
 
     pub(crate) fn infos(&self, members: &[usize]) -> Vec<&MaterialInfo> {
@@ -161,6 +196,7 @@ impl Composer<'_> {
             media: all.media && (absorption || has(|m| m.transmissive || m.inputs.exterior_ior)),
             absorption,
             overlap: false,
+            order: false,
             varying_emission: has(|m| m.varying_emission),
         }
     }
@@ -210,7 +246,7 @@ impl Composer<'_> {
             let queue = self.layout.queues.material(position);
             let shell = self.shell(&Shell {
                 run: format!("material(slot, {instance});"),
-                consumes: Some(queue),
+                consumes: Some((queue, queue)),
                 sorts: false,
                 casts: true,
                 casts_shadows: self.needs_of(&planned.materials).shadow_rays,
@@ -232,17 +268,23 @@ impl Composer<'_> {
     fn stage(&self, id: StageId, queue: usize) -> Recipe {
         let name = id.stage().name;
         if self.fetches(id) {
-            return recipe(name, vec![id], Feed::Queue(queue), self.fetch_shell(queue));
+            let shell = self.fetch_shell(id, queue);
+            return recipe(name, vec![id], Feed::Queue(queue), shell);
         }
         let starts = id == StageId::NewPath;
-        let arguments = if starts { "slot, item" } else { "slot" };
+        let counts = matches!(id, StageId::BinShadow | StageId::BinExtension);
+        let arguments = if starts || counts {
+            "slot, item"
+        } else {
+            "slot"
+        };
         let shell = self.shell(&Shell {
             run: format!("{name}({arguments});"),
-            consumes: Some(queue),
+            consumes: Some((queue, self.region(id, queue))),
             sorts: false,
             casts: starts,
             casts_shadows: false,
-            traverses: !starts,
+            traverses: !(starts || counts),
         });
         recipe(name, vec![id], Feed::Queue(queue), shell)
     }
@@ -261,11 +303,13 @@ impl Composer<'_> {
             && bvh::provides_steps(&self.world.parts.bvh)
     }
 
-    fn fetch_shell(&self, queue: usize) -> String {
+    fn fetch_shell(&self, id: StageId, queue: usize) -> String {
         let counter = "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE";
         let limit = self.sizes.fetch_limit;
         let part = &self.world.parts.bvh;
-        fetch_shell(queue as u32, counter, &self.technique, part, limit)
+        let region = self.region(id, queue);
+        format!("const CONSUMED_REGION: u32 = {region}u;\n")
+            + &fetch_shell(queue as u32, counter, &self.technique, part, limit)
     }
 
     /// The first queue whose rays are fetched; those after it are too.
@@ -343,8 +387,9 @@ impl Composer<'_> {
         let pushes = shell.sorts || shell.casts;
         let subgroups = pushes && self.technique.append == Append::Subgroup;
         let mut out = self.layout.queues.constants();
-        if let Some(queue) = shell.consumes {
+        if let Some((queue, region)) = shell.consumes {
             out += &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n");
+            out += &format!("const CONSUMED_REGION: u32 = {region}u;\n");
         }
         if pushes {
             let rays = self.layout.queues.extension();
@@ -465,8 +510,8 @@ fn recipe(name: &str, stages: Vec<StageId>, feed: Feed, shell: String) -> Recipe
 struct Shell {
     /// The call of the stage.
     run: String,
-    /// The queue it reads; every slot if `None`.
-    consumes: Option<usize>,
+    /// The queue it reads, and where its items are; every slot if `None`.
+    consumes: Option<(usize, usize)>,
     /// Whether it pushes to the queues of new paths and materials.
     sorts: bool,
     /// Whether it pushes to the queue of extension rays.

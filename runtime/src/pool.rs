@@ -49,7 +49,7 @@ pub(crate) fn sizes(
     gpu.check_binding_size("the film", film)?;
     // State and queues are one buffer each.
     let state_bytes = layout.path_bytes();
-    let queue_bytes = 4 * layout.counters.queues as u64;
+    let queue_bytes = 4 * layout.queue_words();
     let slot_bytes = state_bytes.max(queue_bytes).max(1);
     if let Some(pool) = options.pool {
         let bytes = u64::from(pool) * slot_bytes;

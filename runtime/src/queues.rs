@@ -4,13 +4,17 @@
 use std::fmt::Write;
 
 /// Which queues a wavefront has, in the order of the buffer: new paths, one a queued material
-/// kernel, extension rays and, if light is sampled, shadow rays. Each has room for the pool.
+/// kernel, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
+/// are ordered, there is as much room for the queue in that order, and for each of its items'
+/// bin and rank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Queues {
     /// Material kernels with a queue.
     pub materials: usize,
     /// Whether shadow rays are cast.
     pub shadow_rays: bool,
+    /// Whether rays are cast in an order of their own.
+    pub ordered: bool,
 }
 
 impl Queues {
@@ -33,6 +37,16 @@ impl Queues {
         2 + self.materials + usize::from(self.shadow_rays)
     }
 
+    /// Where a queue of rays is put in order, of those in the buffer.
+    pub(crate) fn region_ordered(self) -> usize {
+        self.count()
+    }
+
+    /// How often the pool there is room for.
+    pub(crate) fn regions(self) -> usize {
+        self.count() + if self.ordered { 3 } else { 0 }
+    }
+
     pub(crate) fn constants(self) -> String {
         let mut out = format!(
             "const QUEUE_NEW_PATH: u32 = {}u;\nconst QUEUE_EXTENSION: u32 = {}u;\n",
@@ -41,6 +55,11 @@ impl Queues {
         );
         if self.shadow_rays {
             let _ = writeln!(out, "const QUEUE_SHADOW: u32 = {}u;", self.shadow());
+        }
+        if self.ordered {
+            for (at, name) in (self.count()..).zip(["ORDERED", "BINS", "RANKS"]) {
+                let _ = writeln!(out, "const REGION_{name}: u32 = {at}u;");
+            }
         }
         out
     }
@@ -189,6 +208,7 @@ mod tests {
         let queues = Queues {
             materials: 3,
             shadow_rays: true,
+            ordered: false,
         };
         assert_eq!(queues.shadow() + 1, queues.count());
         let counters = Counters {

@@ -143,7 +143,7 @@ impl<'g> Renderer<'g> {
         check_settings(world, options)?;
         let (materials, instances) = (source.infos(), source.instances());
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
-        let layout = Layout::new(world, &materials, plan)?;
+        let layout = Layout::new(world, &materials, plan, &technique)?;
         let sizes = pool::sizes(gpu, world, &layout, options)?;
         let mut composer = Composer {
             world,

@@ -5,8 +5,8 @@ use crate::error::RuntimeError;
 use crate::film;
 use crate::gpu::Gpu;
 use crate::modules::{Composer, Kernel};
-use crate::random;
 use crate::render::RenderOptions;
+use crate::{order, random};
 
 /// Every buffer, by the index that kernels bind it at.
 #[derive(Debug)]
@@ -194,7 +194,9 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
     match name {
         "run" => 4 * RUN_MEMBERS.len() as u64,
         "state" => pool * layout.path_bytes(),
-        "queues" => 4 * pool * queues,
+        "queues" => 4 * pool * layout.queue_words(),
+        "bins" if layout.needs.order => 8 * u64::from(order::BINS),
+        "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,
         _ => {

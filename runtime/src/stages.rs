@@ -6,7 +6,9 @@
 //! from the table (which text a kernel is composed of, which queues there are) is derived in
 //! `modules` and `queues`. A new stage is one file in `kernels/` and one row here.
 
-use crate::state::Need::{self, Absorption, Always, Media, Overlap, ShadowRays};
+use crate::state::Need::{
+    self, Absorption, Always, Media, Order, Overlap, ShadowOrder, ShadowRays,
+};
 
 /// The stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,8 +19,12 @@ pub(crate) enum StageId {
     NewPath,
     /// Evaluates the material that was hit.
     Material,
+    /// Counts shadow rays by what they will meet.
+    BinShadow,
     /// Asks whether a light sample is seen.
     Shadow,
+    /// Counts extension rays by what they will meet.
+    BinExtension,
     /// Finds what the path's next segment hits.
     Extension,
 }
@@ -44,6 +50,8 @@ pub(crate) enum Part {
     Media,
     /// Ray casts.
     Traversal,
+    /// What rays are ordered by.
+    Order,
     /// Generated material code with what it reads.
     Materials,
 }
@@ -65,7 +73,7 @@ pub(crate) struct Stage {
 
 /// Every stage, in the order of an iteration. Shadow rays come before extension rays because
 /// those overwrite the hit.
-pub(crate) const STAGES: [Stage; 5] = [
+pub(crate) const STAGES: [Stage; 7] = [
     Stage {
         id: StageId::Logic,
         name: "logic",
@@ -103,11 +111,25 @@ pub(crate) const STAGES: [Stage; 5] = [
         need: Always,
     },
     Stage {
+        id: StageId::BinShadow,
+        name: "bin_shadow",
+        body: include_str!("kernels/bin_shadow.wgsl"),
+        parts: &[(Part::Order, Always)],
+        need: ShadowOrder,
+    },
+    Stage {
         id: StageId::Shadow,
         name: "shadow",
         body: include_str!("kernels/shadow.wgsl"),
         parts: &[(Part::Geometry, Always), (Part::Traversal, Always)],
         need: ShadowRays,
+    },
+    Stage {
+        id: StageId::BinExtension,
+        name: "bin_extension",
+        body: include_str!("kernels/bin_extension.wgsl"),
+        parts: &[(Part::Order, Always)],
+        need: Order,
     },
     Stage {
         id: StageId::Extension,

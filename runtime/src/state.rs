@@ -7,7 +7,9 @@
 
 use std::fmt::Write;
 
-use crate::stages::StageId::{self, Extension, Logic, Material, NewPath, Shadow};
+use crate::stages::StageId::{
+    self, BinExtension, BinShadow, Extension, Logic, Material, NewPath, Shadow,
+};
 use crate::technique::StateLayout;
 
 /// Bytes that every field takes.
@@ -26,6 +28,10 @@ pub(crate) enum Need {
     Absorption,
     /// Media of different priority, of which one may hide the boundaries of another.
     Overlap,
+    /// Extension rays that are cast in another order than they were asked for.
+    Order,
+    /// The same for shadow rays.
+    ShadowOrder,
 }
 
 /// What a scene has, from which it follows what must exist.
@@ -41,6 +47,8 @@ pub(crate) struct Needs {
     pub overlap: bool,
     /// A material emits light that depends on the point or direction.
     pub varying_emission: bool,
+    /// Rays are cast in an order of their own.
+    pub order: bool,
 }
 
 impl Needs {
@@ -52,6 +60,8 @@ impl Needs {
             Need::Media => self.media,
             Need::Absorption => self.absorption,
             Need::Overlap => self.overlap,
+            Need::Order => self.order,
+            Need::ShadowOrder => self.order && self.shadow_rays,
         }
     }
 }
@@ -119,14 +129,14 @@ pub(crate) const FIELDS: [Field; 10] = [
         name: "ray_origin",
         components: &[("origin", Vec3), ("pixel", U32)],
         need: Always,
-        readers: &[Logic, Material, Extension],
+        readers: &[Logic, Material, BinExtension, Extension],
         writers: &[NewPath, Material],
     },
     Field {
         name: "ray_direction",
         components: &[("direction", Vec3), ("sample", U32)],
         need: Always,
-        readers: &[Logic, Material, Extension],
+        readers: &[Logic, Material, BinExtension, Extension],
         writers: &[NewPath, Material],
     },
     // What it hit: distance, barycentrics, primitive. Until the next extension ray is cast,
@@ -168,14 +178,14 @@ pub(crate) const FIELDS: [Field; 10] = [
         name: "shadow_ray",
         components: &[("direction", Vec3), ("distance", F32)],
         need: ShadowRays,
-        readers: &[Material, Shadow],
+        readers: &[Material, BinShadow, Shadow],
         writers: &[Logic, Material],
     },
     Field {
         name: "shadow_origin",
         components: &[("origin", Vec3), ("skip", U32)],
         need: ShadowRays,
-        readers: &[Shadow],
+        readers: &[BinShadow, Shadow],
         writers: &[Material],
     },
     // Its radiance over its density, and the density (0: a discrete light).
@@ -340,8 +350,17 @@ mod tests {
         absorption: true,
         overlap: true,
         varying_emission: true,
+        order: true,
     };
-    const EVERY_STAGE: [StageId; 5] = [Logic, NewPath, Material, Shadow, Extension];
+    const EVERY_STAGE: [StageId; 7] = [
+        Logic,
+        NewPath,
+        Material,
+        BinShadow,
+        Shadow,
+        BinExtension,
+        Extension,
+    ];
 
     /// naga lays a field's structure out on exactly the words that the accessors pack.
     #[test]

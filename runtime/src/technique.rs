@@ -142,6 +142,8 @@ choices! {
     RayOrder {
         /// As they were asked for
         Queue = "queue",
+        /// By the cell of the scene where they begin and the octant of their direction
+        Binned = "binned",
     }
 }
 

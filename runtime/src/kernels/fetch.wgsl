@@ -36,7 +36,7 @@ fn main(
             let rank = lanes_before(idle, subgroup_lane);
             let item = first + rank;
             if !live && rank < count && item < items {
-                slot = queues[CONSUMED_QUEUE * POOL_SIZE + item];
+                slot = queues[CONSUMED_REGION * POOL_SIZE + item];
                 walk = begin_ray(slot);
                 live = true;
             }

@@ -19,7 +19,7 @@ fn main(
 #if queued
     let in_range = item < atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
     if in_range {
-        slot = queues[CONSUMED_QUEUE * POOL_SIZE + item];
+        slot = queues[CONSUMED_REGION * POOL_SIZE + item];
     }
 #else
     let in_range = item < POOL_SIZE;

@@ -144,6 +144,7 @@ impl<'g> Caster<'g> {
             ("ROW_GROUPS", sizes.row_groups),
             ("NOTHING", u32::MAX),
             ("COUNTER_TAKEN", 0),
+            ("CONSUMED_REGION", 0),
         ] {
             text += &format!("const {name}: u32 = {value}u;\n");
         }

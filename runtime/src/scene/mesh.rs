@@ -43,6 +43,14 @@ impl Mesh {
         self.positions.is_empty()
     }
 
+    /// The corners of the smallest box around it; of no size at the origin if there is no triangle.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let corners = self.positions.iter().flatten().copied();
+        let both = corners.map(|corner| [corner, corner]);
+        let grow = |[low, high]: [Vec3; 2], [a, b]: [Vec3; 2]| [low.min(a), high.max(b)];
+        both.reduce(grow).unwrap_or_default()
+    }
+
     /// Drops lists that say nothing.
     pub(super) fn simplify(&mut self) {
         if self.normals.iter().all(Option::is_none) {

@@ -9,6 +9,7 @@
 //! | `media` | `active_medium`, `media_beyond`, `transmittance`, ... | `geometry` |
 //! | `texture` | `texture_fetch` | |
 
+use glam::Vec3;
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 
 use super::surface::{geometry_part, surface_part};
@@ -27,6 +28,8 @@ pub struct SceneParts {
     pub geometry: ShaderPart,
     /// Ray casts.
     pub bvh: ShaderPart,
+    /// The corners of a box around everything, in metres.
+    pub bounds: [Vec3; 2],
     /// Positions, normals and coordinates of hits.
     pub surface: ShaderPart,
     /// Light samples and the emission that paths run into. `light_hit` is the emission of
@@ -65,6 +68,7 @@ impl SceneParts {
                 &media.of_instance,
             ),
             bvh: bvh.part(technique),
+            bounds: scene.mesh.bounds(),
             surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
             lights: lights.part,
             media,

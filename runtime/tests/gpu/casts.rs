@@ -3,7 +3,7 @@
 
 use impasto_runtime::render::{RenderOptions, Rendering};
 use impasto_runtime::technique::{
-    Choice, Leaves, Planes, RayFetch, Regeneration, Stack, Technique, Traversal,
+    Choice, Leaves, Planes, RayFetch, RayOrder, Regeneration, Stack, Technique, Traversal,
 };
 
 use crate::scene::{load, render, room};
@@ -30,7 +30,7 @@ fn picture(strategy: &str, technique: Technique) -> Rendering {
 /// ray through their common edge hits may depend on the order in which they are tested, and what
 /// rounds differently then goes another way on the mirrored ball; that is rare and no bias.
 #[track_caller]
-fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) {
+fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) -> Rendering {
     let rendering = picture(strategy, technique);
     let pixels = rendering.film.pixels.iter().flatten();
     let differences = pixels.zip(reference.film.pixels.iter().flatten());
@@ -48,6 +48,7 @@ fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) {
         differences.len()
     );
     assert!(bias.abs() < 1e-3, "{bias}");
+    rendering
 }
 
 /// Every tree and stack, each with one ray a thread and with threads that stay.
@@ -104,5 +105,47 @@ fn every_way_of_casting_finds_the_same_hits_in_a_megakernel() {
             };
             assert_same("mega", technique, &reference);
         }
+    }
+}
+
+/// Rays are sorted by kernels that exist only if that is asked for, and what they hit does not
+/// depend on when they are cast.
+#[test]
+fn rays_may_be_cast_in_another_order() {
+    let kernels = |rendering: &Rendering| -> Vec<String> {
+        let kernels = rendering.report.kernels.iter();
+        kernels.map(|kernel| kernel.name.clone()).collect()
+    };
+    let reference = picture("own", Technique::default());
+    let names = kernels(&reference);
+    assert!(
+        names.iter().all(|name| !name.starts_with("scatter")),
+        "{names:?}"
+    );
+    for (ray_fetch, ..) in RayFetch::ALL {
+        let technique = Technique {
+            ray_order: RayOrder::Binned,
+            ray_fetch: *ray_fetch,
+            ..Technique::default()
+        };
+        let ordered = assert_same("own", technique, &reference);
+        let names = kernels(&ordered);
+        for kernel in [
+            "bin_shadow",
+            "scan_shadow",
+            "scatter_shadow",
+            "bin_extension",
+        ] {
+            assert!(
+                names.iter().any(|name| name == kernel),
+                "{kernel} of {names:?}"
+            );
+        }
+        let items = |name: &str| {
+            let kernel = ordered.report.kernels.iter().find(|k| k.name == name);
+            kernel.map(|kernel| kernel.items)
+        };
+        assert!(items("extension").is_some_and(|items| items > 10_000));
+        assert_eq!(items("scatter_extension"), items("extension"));
     }
 }

@@ -279,6 +279,7 @@ impl Planes {
             max_depth: self.max_depth,
             roulette_start: 1000,
             parts: SceneParts {
+                bounds: [Vec3::NEG_ONE, Vec3::ONE],
                 geometry: ShaderPart {
                     wgsl: GEOMETRY.to_string(),
                     buffers: vec![BufferData::new("planes", "array<vec4<u32>>", &rows)],
