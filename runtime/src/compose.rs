@@ -6,6 +6,7 @@
 
 use impasto_compiler::abi::{InputSet, MATERIAL_OF, MaterialInfo};
 
+use crate::fingerprint::Fingerprint;
 use crate::modules::{Composer, Kernel, Recipe};
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
@@ -122,7 +123,7 @@ impl Composer<'_> {
             ("MAX_DEPTH", world.max_depth),
             ("ROULETTE_START", world.roulette_start),
             ("NOTHING", u32::MAX),
-            ("FILM_COUNT_PLANE", film::COUNT_PLANE),
+            ("FILM_COUNT_PLANE", film::COUNT_PLANE as u32),
             (
                 "COUNTER_NONFINITE",
                 self.layout.counters.nonfinite(nonfinite) as u32,
@@ -216,6 +217,35 @@ impl Composer<'_> {
 
     /// The buffers of all parts of the scene, and the tables of its materials.
     pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
+        self.parts()
+            .flat_map(|part| &part.buffers)
+            .chain(self.tables)
+    }
+
+    /// A fingerprint of what is rendered: everything that decides what a path is worth, and
+    /// nothing of how the work is organised.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let world = self.world;
+        let all: Vec<usize> = (0..self.materials.len()).collect();
+        let mut fingerprint = Fingerprint::new();
+        for number in [world.max_depth, world.roulette_start] {
+            fingerprint.add(&number.to_le_bytes());
+        }
+        fingerprint.add(world.camera.wgsl(world.width, world.height).as_bytes());
+        fingerprint.add(self.source.wgsl(&all).as_bytes());
+        fingerprint.add(self.source.lookup_wgsl().as_bytes());
+        for part in self.parts() {
+            fingerprint.add(part.wgsl.as_bytes());
+        }
+        for buffer in self.scene_buffers() {
+            fingerprint.add(buffer.name.as_bytes());
+            fingerprint.add(&buffer.bytes);
+        }
+        fingerprint.finish()
+    }
+
+    /// Random numbers and the parts of the scene.
+    fn parts(&self) -> impl Iterator<Item = &ShaderPart> {
         let parts = &self.world.parts;
         let parts: [Option<&ShaderPart>; 7] = [
             Some(&self.random),
@@ -226,8 +256,7 @@ impl Composer<'_> {
             parts.media.part.as_ref(),
             parts.texture.as_ref(),
         ];
-        let parts = parts.into_iter().flatten();
-        parts.flat_map(|part| &part.buffers).chain(self.tables)
+        parts.into_iter().flatten()
     }
 }
 

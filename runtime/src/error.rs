@@ -89,6 +89,17 @@ pub enum RuntimeError {
     /// The scene cannot be rendered as it is.
     #[error(transparent)]
     Scene(#[from] crate::scene::SceneError),
+    /// A film file or checkpoint cannot be used.
+    #[error("cannot use the film `{}`: {reason}", path.display())]
+    FilmFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// What a render should go on from is no beginning of it.
+    #[error("this render cannot go on from the film given: {0}")]
+    OtherRender(String),
     /// A picture could not be written.
     #[error("cannot write `{}`: {reason}", path.display())]
     Output {

@@ -1,13 +1,15 @@
 //! The film: sums of radiance as the kernels keep them, and the picture they amount to.
 //!
-//! `kernels/film.wgsl` adds in 64-bit fixed point, in two words a channel. The host divides by
-//! each pixel's own number of samples, so a render that is stopped still gives a picture.
+//! `kernels/film.wgsl` adds in 96-bit fixed point, in three words a channel. Sums of disjoint
+//! ranges of samples therefore add up to exactly the sums of one render of all of them.
 
-/// Words of the film buffer for one pixel: low and high words of three sums, and a count.
-/// They are planes, each of one word a pixel.
-pub(crate) const PLANES: u32 = 7;
+/// Words of a sum, from the lowest.
+const SUM_WORDS: usize = 3;
+/// Words of the film buffer for one pixel: three sums and a count. They are planes, each of one
+/// word a pixel.
+pub(crate) const PLANES: usize = 3 * SUM_WORDS + 1;
 /// The plane that counts a pixel's samples.
-pub(crate) const COUNT_PLANE: u32 = 6;
+pub(crate) const COUNT_PLANE: usize = PLANES - 1;
 /// What one unit of a sum is worth.
 const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
 
@@ -25,34 +27,89 @@ pub struct Film {
 }
 
 impl Film {
-    /// The picture of the words of a film buffer.
-    pub(crate) fn from_words(width: u32, height: u32, words: &[u32]) -> Self {
-        let count = (width as usize) * (height as usize);
-        let plane = |index: usize| words.get(index * count..(index + 1) * count).unwrap_or(&[]);
-        let samples = plane(COUNT_PLANE as usize).to_vec();
-        let mut pixels = vec![[0.0; 3]; count];
-        for channel in 0..3 {
-            let (low, high) = (plane(2 * channel), plane(2 * channel + 1));
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                let sum = u64::from(low[i]) | u64::from(high[i]) << 32;
-                pixel[channel] = mean(sum, samples[i]);
-            }
-        }
-        Self {
-            width,
-            height,
-            pixels,
-            samples,
-        }
-    }
-
     /// Samples in all.
     pub fn total_samples(&self) -> u64 {
         self.samples.iter().map(|n| u64::from(*n)).sum()
     }
 }
 
-fn mean(sum: u64, samples: u32) -> f32 {
+/// Exact sums of radiance: the words of a film buffer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sums {
+    width: u32,
+    height: u32,
+    words: Vec<u32>,
+}
+
+impl Sums {
+    /// The sums in a film buffer of a picture's size; `None` if that is not how many words it has.
+    pub(crate) fn new(width: u32, height: u32, words: Vec<u32>) -> Option<Self> {
+        let expected = (width as usize) * (height as usize) * PLANES;
+        (words.len() == expected).then_some(Self {
+            width,
+            height,
+            words,
+        })
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// The words of the film buffer, plane by plane.
+    pub(crate) fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// The words of one plane.
+    pub(crate) fn plane(&self, index: usize) -> &[u32] {
+        let count = self.pixel_count();
+        self.words
+            .get(index * count..(index + 1) * count)
+            .unwrap_or(&[])
+    }
+
+    /// Means of the samples.
+    pub fn picture(&self) -> Film {
+        let samples = self.plane(COUNT_PLANE).to_vec();
+        let pixel = |i: usize| [0, 1, 2].map(|channel| mean(self.sum(channel, i), samples[i]));
+        Film {
+            width: self.width,
+            height: self.height,
+            pixels: (0..self.pixel_count()).map(pixel).collect(),
+            samples,
+        }
+    }
+
+    /// Adds the sums of other samples of a picture of the same size.
+    pub(crate) fn add(&mut self, other: &Sums) {
+        let count = self.pixel_count();
+        for pixel in 0..count {
+            for channel in 0..3 {
+                let sum = self.sum(channel, pixel) + other.sum(channel, pixel);
+                for word in 0..SUM_WORDS {
+                    let at = (SUM_WORDS * channel + word) * count + pixel;
+                    self.words[at] = (sum >> (32 * word)) as u32;
+                }
+            }
+            let at = COUNT_PLANE * count + pixel;
+            self.words[at] = self.words[at].saturating_add(other.words[at]);
+        }
+    }
+
+    fn pixel_count(&self) -> usize {
+        (self.width as usize) * (self.height as usize)
+    }
+
+    /// The sum of one pixel in units.
+    fn sum(&self, channel: usize, pixel: usize) -> u128 {
+        let word = |k: usize| u128::from(self.plane(SUM_WORDS * channel + k)[pixel]);
+        word(0) | word(1) << 32 | word(2) << 64
+    }
+}
+
+fn mean(sum: u128, samples: u32) -> f32 {
     if samples == 0 {
         return 0.0;
     }
@@ -63,19 +120,52 @@ fn mean(sum: u64, samples: u32) -> f32 {
 mod tests {
     use super::*;
 
+    /// One pixel's film.
+    fn pixel(sums: [u128; 3], samples: u32) -> Sums {
+        let words = sums
+            .iter()
+            .flat_map(|s| [0, 32, 64].map(|at| (s >> at) as u32));
+        let words = words.chain([samples]).collect();
+        Sums::new(1, 1, words).expect("a pixel's words")
+    }
+
     #[test]
-    fn sums_are_read_across_both_words() {
-        // One pixel: 2^32 units are 256; three samples of 256 + 2^-24 each, one channel empty.
-        let sum: u64 = 3 * ((1 << 32) + 1);
-        let words = [sum as u32, (sum >> 32) as u32, 1 << 24, 0, 0, 0, 3];
-        let film = Film::from_words(1, 1, &words);
+    fn sums_are_read_across_all_words() {
+        // 2^32 units are 256; three samples of 256 + 2^-24 each, one channel empty.
+        let film = pixel([3 * ((1 << 32) + 1), 1 << 24, 0], 3).picture();
         assert_eq!(film.pixels, [[256.0 + 1.0 / 16777216.0, 1.0 / 3.0, 0.0]]);
         assert_eq!(film.total_samples(), 3);
     }
 
     #[test]
     fn a_pixel_without_samples_is_black() {
-        let film = Film::from_words(1, 1, &[0; 7]);
-        assert_eq!(film.pixels, [[0.0; 3]]);
+        assert_eq!(pixel([0; 3], 0).picture().pixels, [[0.0; 3]]);
+    }
+
+    /// The most samples there can be, all of the largest value, and of the smallest.
+    #[test]
+    fn the_extremes_of_samples_and_values_fit() {
+        let (samples, unit) = (u128::from(u32::MAX), 1);
+        let largest = 1u128 << (32 + 24);
+        assert!(samples * largest < 1 << (32 * SUM_WORDS));
+        let film = pixel([samples * largest, samples * unit, 0], u32::MAX).picture();
+        assert_eq!(
+            film.pixels,
+            [[f32::powi(2.0, 32), f32::powi(2.0, -24), 0.0]]
+        );
+    }
+
+    #[test]
+    fn sums_add_with_every_carry() {
+        let values = [(1u128 << 32) - 1, (1 << 64) - 1, (1 << 56) + 12345];
+        let mut sum = pixel(values, 100_000_000);
+        sum.add(&pixel([1, 1, (1 << 80) + (1 << 63)], 3));
+        let expected = [1 << 32, 1 << 64, (1 << 80) + (1 << 63) + (1 << 56) + 12345];
+        assert_eq!(sum, pixel(expected, 100_000_003));
+    }
+
+    #[test]
+    fn a_film_of_another_size_is_none() {
+        assert_eq!(Sums::new(2, 1, vec![0; PLANES]), None);
     }
 }

@@ -42,7 +42,7 @@ pub fn write(film: &Film, path: &Path, exposure: f32) -> Result<(), RuntimeError
 }
 
 /// Writes a file through `content`, or leaves what was there before.
-fn replace(
+pub(crate) fn replace(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
 ) -> Result<(), String> {

@@ -45,7 +45,7 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, RuntimeError> {
     let limits = gpu.device.limits();
     let pixels = u64::from(world.width) * u64::from(world.height);
-    let film = pixels * u64::from(film::PLANES) * 4;
+    let film = pixels * film::PLANES as u64 * 4;
     gpu.check_binding_size("the film", film)?;
     // State and queues are one buffer each.
     let state_bytes = layout.path_bytes();

@@ -173,10 +173,16 @@ impl Counters {
         out
     }
 
+    /// The word that a scalar is kept in.
+    pub(crate) fn index(self, scalar: Scalar) -> usize {
+        // The table holds every scalar, which a test asserts.
+        let at = SCALARS.iter().position(|(s, _)| *s == scalar);
+        at.unwrap_or(0)
+    }
+
     /// A scalar's value in the words read back.
     pub(crate) fn scalar(self, words: &[u32], scalar: Scalar) -> u32 {
-        let at = SCALARS.iter().position(|(s, _)| *s == scalar);
-        at.and_then(|at| words.get(at)).copied().unwrap_or(0)
+        words.get(self.index(scalar)).copied().unwrap_or(0)
     }
 
     /// How many items of `queue` were consumed, in the words read back.

@@ -10,19 +10,19 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use impasto_compiler::Program;
-use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::Plan;
 
 use crate::error::RuntimeError;
-use crate::film::Film;
+use crate::film::{Film, Sums};
+use crate::film_file::{FilmFile, Identity, Range};
 use crate::gpu::{Gpu, Timing};
 use crate::layout::Layout;
-use crate::lights::LIGHT_ROW_BYTES;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
+use crate::passes::{Keeping, Passes};
 use crate::pool::{self, Pace};
 use crate::queues::{Queues, Scalar};
 use crate::random::{self, Demand};
-use crate::report::{MaterialReport, Report};
+use crate::report::{MaterialReport, Report, Resumed};
 use crate::resources::Resources;
 use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
@@ -76,6 +76,8 @@ pub struct Progress {
 pub struct Rendering {
     /// The picture.
     pub film: Film,
+    /// The exact sums that the picture is the mean of.
+    pub sums: FilmFile,
     /// What it took.
     pub report: Report,
 }
@@ -101,12 +103,58 @@ struct Facts {
     triangles: u64,
     max_depth: u32,
     pool: u32,
+    identity: Identity,
     materials: Vec<MaterialReport>,
     compile_seconds: f64,
 }
 
+/// A pass over some samples of every pixel.
+struct Pass {
+    /// When the render began.
+    begin: Instant,
+    /// Samples that an earlier run had taken.
+    resumed: u32,
+    /// Samples taken before this pass.
+    done: u32,
+    /// Samples of this pass.
+    samples: u32,
+    /// Which pass of this run it is, from 1.
+    number: u64,
+    /// Whether the render was asked to end.
+    stopped: bool,
+}
+
+impl Pass {
+    fn new(begin: Instant, resumed: u32) -> Self {
+        Self {
+            begin,
+            resumed,
+            done: resumed,
+            samples: 0,
+            number: 1,
+            stopped: false,
+        }
+    }
+
+    /// Goes on to the next.
+    fn advance(&mut self) {
+        self.done += self.samples;
+        self.number += 1;
+    }
+
+    /// What kernels are told.
+    fn options(&self, all: &RenderOptions) -> RenderOptions {
+        RenderOptions {
+            first_sample: all.first_sample + self.done,
+            samples: self.samples,
+            ..all.clone()
+        }
+    }
+}
+
 /// Submissions in flight.
 const FLIGHTS: usize = 2;
+
 impl<'g> Renderer<'g> {
     /// Prepares to render `scene`, whose materials compiled to `program`.
     pub fn new(
@@ -158,7 +206,7 @@ impl<'g> Renderer<'g> {
             subgroup_size: gpu.subgroup_size(),
             random: random::part(
                 options.technique.sampler,
-                demand(world, &materials, &layout),
+                Demand::of(world, &materials, layout.needs.shadow_rays),
             ),
         };
         if technique.profile {
@@ -180,6 +228,13 @@ impl<'g> Renderer<'g> {
             triangles: world.triangles,
             max_depth: world.max_depth,
             pool: sizes.pool,
+            identity: Identity {
+                width: world.width,
+                height: world.height,
+                seed: options.seed,
+                sampler: technique.sampler,
+                scene: composer.fingerprint(),
+            },
             materials: MaterialReport::of(&materials, &instances),
             compile_seconds: begin.elapsed().as_secs_f64(),
         };
@@ -201,35 +256,143 @@ impl<'g> Renderer<'g> {
             .map(|k| (k.recipe.name.as_str(), k.wgsl.as_str()))
     }
 
-    /// Renders. `progress` is called after each submission; when it breaks, the paths that
-    /// are finished by then make the picture, each pixel by its own number of samples.
+    /// Renders. `progress` is called after each submission; when it breaks, the samples that
+    /// were begun by then are finished for every pixel, and make the picture.
     pub fn render(
         &mut self,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Rendering, RuntimeError> {
-        let begin = Instant::now();
-        self.resources.clear(self.gpu);
-        let status = self.run(begin, progress)?;
-        let words = self.resources.read_film(self.gpu)?;
-        let film = Film::from_words(self.facts.width, self.facts.height, &words);
-        let report = self.report(&status, &film, begin.elapsed().as_secs_f64());
-        Ok(Rendering { film, report })
+        self.render_passes(None, progress)
     }
 
-    /// Submits iterations until no path is left or `progress` breaks.
+    /// Renders in passes, between which what is done can be kept and gone on from. The picture has
+    /// the same bits as without.
+    pub fn render_keeping(
+        &mut self,
+        keeping: Keeping<'_>,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        self.render_passes(Some(keeping), progress)
+    }
+
+    /// What the samples of this render must have in common with others to be merged with them.
+    pub fn identity(&self) -> &Identity {
+        &self.facts.identity
+    }
+
+    fn render_passes(
+        &mut self,
+        mut keeping: Option<Keeping<'_>>,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        let begin = Instant::now();
+        let start = keeping.as_mut().and_then(|k| k.start.take());
+        let resumed = self.take_up(start.as_ref())?;
+        drop(start);
+        let mut status = Status::new(self.schedule.steps.len());
+        let mut pass = Pass::new(begin, resumed.samples);
+        let every = keeping.as_ref().map(|k| k.every);
+        let mut passes = Passes::new(self.options.samples - resumed.samples, every);
+        let mut kept = begin;
+        loop {
+            let wanted = passes.next();
+            let Some(samples) = wanted.filter(|_| !pass.stopped) else {
+                break;
+            };
+            let pass_begin = Instant::now();
+            pass.samples = samples;
+            self.run(&mut pass, &mut status, progress)?;
+            passes.taken(pass.samples, pass_begin.elapsed());
+            pass.advance();
+            if let Some(keeping) = &mut keeping
+                && passes.next().is_some()
+                && 2 * kept.elapsed() >= keeping.every
+            {
+                (keeping.keep)(&self.sums(&status, &resumed, pass.done)?)?;
+                kept = Instant::now();
+            }
+        }
+        let sums = self.sums(&status, &resumed, pass.done)?;
+        if let Some(keeping) = &mut keeping {
+            (keeping.keep)(&sums)?;
+        }
+        let film = sums.sums.picture();
+        let report = self.report(&status, &film, resumed, begin.elapsed().as_secs_f64());
+        Ok(Rendering { film, sums, report })
+    }
+
+    /// Empties everything, then fills the film with the sums that are gone on from.
+    fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
+        self.resources.clear(self.gpu);
+        let Some(start) = start else {
+            return Ok(Resumed::default());
+        };
+        let (identity, options) = (self.identity(), &self.options);
+        let done = start.done_of(identity, options.first_sample, options.samples);
+        let samples = done.map_err(RuntimeError::OtherRender)?;
+        self.resources.write_film(self.gpu, start.sums.words());
+        Ok(Resumed {
+            samples,
+            nonfinite: start.nonfinite,
+            clamped: start.clamped,
+        })
+    }
+
+    /// What the film holds between two passes, when `done` samples are taken.
+    fn sums(
+        &self,
+        status: &Status,
+        resumed: &Resumed,
+        done: u32,
+    ) -> Result<FilmFile, RuntimeError> {
+        let (width, height) = (self.facts.width, self.facts.height);
+        let words = self.resources.read_film(self.gpu)?;
+        let sums = Sums::new(width, height, words);
+        let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
+        let dropped = self.dropped(status);
+        Ok(FilmFile {
+            identity: self.facts.identity,
+            nonfinite: resumed.nonfinite + dropped.0,
+            clamped: resumed.clamped + dropped.1,
+            ranges: vec![Range {
+                first: self.options.first_sample.into(),
+                count: done.into(),
+            }],
+            sums,
+        })
+    }
+
+    /// Samples that were no numbers, and samples cut, in the counters read last.
+    fn dropped(&self, status: &Status) -> (u64, u64) {
+        let counters = self.layout.counters;
+        let scalar = |s| u64::from(counters.scalar(&status.counters, s));
+        let by_kernels = (0..counters.kernels)
+            .filter_map(|kernel| status.counters.get(counters.nonfinite(kernel)));
+        let by_kernels: u64 = by_kernels.map(|n| u64::from(*n)).sum();
+        (
+            by_kernels + scalar(Scalar::FilmNonfinite),
+            scalar(Scalar::FilmClamped),
+        )
+    }
+
+    /// Submits iterations until no path of the pass is left. If `progress` breaks, the pass ends
+    /// with the sample that the last path to be begun is of.
     fn run(
         &self,
-        begin: Instant,
+        pass: &mut Pass,
+        status: &mut Status,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Status, RuntimeError> {
+    ) -> Result<(), RuntimeError> {
+        self.resources
+            .begin_pass(self.gpu, &pass.options(&self.options), &self.layout);
         let steps = self.schedule.steps.len();
-        let mut status = Status::new(steps);
         let mut flights: VecDeque<Flight> = VecDeque::new();
         let mut spare: Vec<Flight> = Vec::new();
         let mut pace = Pace::new(self.schedule.timing.max_dispatches() / steps as u32);
-        let mut now = self.progress(&status, begin);
-        let mut finished_at = 0;
+        let mut now = self.progress(None, pass);
+        let mut finished_at = status.iterations;
         let mut going = true;
+        let mut cut = false;
         loop {
             while going && flights.len() < FLIGHTS {
                 let ahead = flights.iter().map(Flight::iterations).sum();
@@ -238,23 +401,41 @@ impl<'g> Renderer<'g> {
                 flights.push_back(self.submit(flight, iterations));
             }
             let Some(mut flight) = flights.pop_front() else {
-                return Ok(status);
+                if !pass.stopped || cut {
+                    return Ok(());
+                }
+                // What the counters say is of now.
+                cut = true;
+                self.cut(pass, status);
+                now = self.progress(Some(status), pass);
+                going = now.paths < now.total;
+                continue;
             };
-            flight.land(self.gpu, &self.schedule, &mut status)?;
+            flight.land(self.gpu, &self.schedule, status)?;
             pace.adapt();
             spare.push(flight);
             let before = now.paths;
-            now = self.progress(&status, begin);
+            now = self.progress(Some(status), pass);
             status.history.push((now.paths, status.gpu_seconds));
             if now.paths > before {
                 finished_at = status.iterations;
             }
             self.check_stall(status.iterations - finished_at)?;
             going &= now.paths < now.total;
-            if progress(&now).is_break() {
+            if progress(&self.progress_of_all(&now, pass)).is_break() && !pass.stopped {
+                pass.stopped = true;
                 going = false;
             }
         }
+    }
+
+    /// Ends a pass with the sample whose paths were begun last.
+    fn cut(&self, pass: &mut Pass, status: &Status) {
+        let scalar = |s| self.layout.counters.scalar(&status.counters, s);
+        let begun = u32::from(scalar(Scalar::NextPixel) > 0);
+        pass.samples = pass.samples.min(scalar(Scalar::NextSample) + begun);
+        self.resources
+            .set_run(self.gpu, &pass.options(&self.options));
     }
 
     /// Fails if `iterations` in a row finished no path, which would go on for ever. A path takes
@@ -291,29 +472,46 @@ impl<'g> Renderer<'g> {
         flight
     }
 
-    /// How far the counters say the render is. A slot asks for a path at first and whenever
-    /// one is finished; a megakernel finishes what it was handed.
-    fn progress(&self, status: &Status, begin: Instant) -> Progress {
+    /// How many paths of this run the counters say are finished, of those until the end of the
+    /// pass. A slot asks for a path when a pass begins and whenever one is finished; a megakernel
+    /// finishes what it was handed. `None` if nothing is known of this pass yet.
+    fn progress(&self, status: Option<&Status>, pass: &Pass) -> Progress {
         let counters = self.layout.counters;
-        let pixels = u64::from(self.facts.width) * u64::from(self.facts.height);
-        let total = pixels * u64::from(self.options.samples);
-        let words = &status.counters;
-        let scalar = |s| u64::from(counters.scalar(words, s));
-        let paths = if self.layout.wavefront {
-            let asked = counters.items_of(words, Queues::NEW_PATH);
-            asked.saturating_sub(u64::from(self.facts.pool))
-        } else {
-            scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)
-        };
+        let pixels = self.pixels();
+        let before = pixels * u64::from(pass.done - pass.resumed);
+        let paths = status.map_or(before, |status| {
+            let words = &status.counters;
+            let scalar = |s| u64::from(counters.scalar(words, s));
+            if self.layout.wavefront {
+                let asked = counters.items_of(words, Queues::NEW_PATH);
+                asked.saturating_sub(u64::from(self.facts.pool) * pass.number)
+            } else {
+                before + scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)
+            }
+        });
         Progress {
-            paths,
-            total,
-            elapsed: begin.elapsed(),
+            paths: paths.max(before),
+            total: before + pixels * u64::from(pass.samples),
+            elapsed: pass.begin.elapsed(),
         }
     }
 
-    fn report(&self, status: &Status, film: &Film, wall_seconds: f64) -> Report {
+    /// The same of all samples that are asked for.
+    fn progress_of_all(&self, now: &Progress, pass: &Pass) -> Progress {
+        Progress {
+            paths: now.paths + self.pixels() * u64::from(pass.resumed),
+            total: self.pixels() * u64::from(self.options.samples),
+            ..*now
+        }
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.facts.width) * u64::from(self.facts.height)
+    }
+
+    fn report(&self, status: &Status, film: &Film, resumed: Resumed, wall_seconds: f64) -> Report {
         crate::report::Inputs {
+            resumed,
             gpu: self.gpu.info(),
             options: &self.options,
             layout: &self.layout,
@@ -362,22 +560,6 @@ fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeE
         return refuse("pool", "0".into(), "at least 1 path");
     }
     Ok(())
-}
-
-/// What the world asks of random numbers. One light leaves nothing to choose, but an environment
-/// map chooses a row by what is left of the choice.
-fn demand(world: &World, materials: &[MaterialInfo], layout: &Layout) -> Demand {
-    let lights = &world.parts.lights.buffers;
-    let one_light = |b: &BufferData| b.name == "light_table" && b.bytes.len() <= LIGHT_ROW_BYTES;
-    let has_map = lights.iter().any(|b| b.name == "environment_alias");
-    Demand {
-        lens: world.camera.lens_radius > 0.0,
-        lobes: materials.iter().any(|m| m.lobes > 1),
-        lights: layout.needs.shadow_rays,
-        light_choice: has_map || !lights.iter().any(one_light),
-        roulette_start: world.roulette_start,
-        max_depth: world.max_depth,
-    }
 }
 
 /// Runs an iteration without any work: some drivers finish building a kernel when it first

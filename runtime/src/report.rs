@@ -40,7 +40,10 @@ pub struct Report {
     pub instance_count: usize,
     /// The materials, in the order of the program.
     pub materials: Vec<MaterialReport>,
-    /// Paths finished. Fewer than pixels times samples if the render was stopped.
+    /// Samples in each pixel that were taken over from a checkpoint.
+    pub resumed_samples: u32,
+    /// Paths finished, those taken over included. Fewer than pixels times samples if the render
+    /// was stopped.
     pub paths: u64,
     /// Time the GPU was busy, without building pipelines.
     pub gpu_seconds: f64,
@@ -139,8 +142,20 @@ pub struct KernelReport {
     pub nonfinite_samples: u64,
 }
 
+/// What a render took over from an earlier run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Resumed {
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// Of which no number were so many.
+    pub nonfinite: u64,
+    /// And cut were so many.
+    pub clamped: u64,
+}
+
 /// What a report is made of.
 pub(crate) struct Inputs<'a> {
+    pub resumed: Resumed,
     pub gpu: GpuInfo,
     pub options: &'a RenderOptions,
     pub layout: &'a Layout,
@@ -156,7 +171,9 @@ pub(crate) struct Inputs<'a> {
 
 impl Inputs<'_> {
     pub(crate) fn report(self, status: &Status, film: &Film) -> Report {
-        let paths = film.total_samples();
+        let pixels = u64::from(film.width) * u64::from(film.height);
+        let all_paths = film.total_samples();
+        let paths = all_paths.saturating_sub(pixels * u64::from(self.resumed.samples));
         let gpu_seconds = if self.timed {
             status.gpu_seconds
         } else {
@@ -183,21 +200,21 @@ impl Inputs<'_> {
             material_count: self.materials.len(),
             instance_count: self.materials.iter().map(|m| m.instances.len()).sum(),
             materials: self.materials.to_vec(),
-            paths,
+            resumed_samples: self.resumed.samples,
+            paths: all_paths,
             gpu_seconds,
             timing: if self.timed { "timestamps" } else { "wall" },
             wall_seconds: self.wall_seconds,
             compile_seconds: self.compile_seconds,
             paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
-            steady_paths_per_second: status.steady_rate(
-                u64::from(film.width) * u64::from(film.height) * u64::from(self.options.samples),
-            ),
+            steady_paths_per_second: status
+                .steady_rate(pixels * u64::from(self.options.samples - self.resumed.samples)),
             path_state_bytes: self.layout.path_bytes(),
             pool_size: self.pool,
             iterations: status.iterations,
             kernels,
-            nonfinite_samples: dropped + scalar(Scalar::FilmNonfinite),
-            clamped_samples: scalar(Scalar::FilmClamped),
+            nonfinite_samples: self.resumed.nonfinite + dropped + scalar(Scalar::FilmNonfinite),
+            clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),
             lost_paths: scalar(Scalar::LostPaths),

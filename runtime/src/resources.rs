@@ -4,7 +4,10 @@ use crate::compose::{Access, OWN_BUFFERS, RUN_MEMBERS};
 use crate::error::RuntimeError;
 use crate::film;
 use crate::gpu::Gpu;
+use crate::layout::Layout;
 use crate::modules::{Composer, Kernel};
+use crate::queues::Scalar;
+use crate::random;
 use crate::render::RenderOptions;
 use crate::{order, random};
 
@@ -95,6 +98,26 @@ impl Resources {
             encoder.clear_buffer(&self.buffers[own(name)], 0, None);
         }
         gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Makes the pool take up samples again when every path of a pass is done. What the film
+    /// and the other counters hold stays.
+    pub(crate) fn begin_pass(&self, gpu: &Gpu, options: &RenderOptions, layout: &Layout) {
+        self.set_run(gpu, options);
+        for scalar in [Scalar::NextPixel, Scalar::NextSample] {
+            let at = layout.counters.index(scalar);
+            gpu.queue
+                .write_buffer(self.counters(), 4 * at as u64, &[0; 4]);
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(&self.buffers[own("state")], 0, None);
+        gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Puts words into the film.
+    pub(crate) fn write_film(&self, gpu: &Gpu, words: &[u32]) {
+        let film = &self.buffers[own("film")];
+        gpu.queue.write_buffer(film, 0, bytemuck::cast_slice(words));
     }
 
     /// The words of the film.
@@ -201,7 +224,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "arguments" => 12 * queues,
         _ => {
             let pixels = u64::from(composer.world.width) * u64::from(composer.world.height);
-            4 * pixels * u64::from(film::PLANES)
+            4 * pixels * film::PLANES as u64
         }
     }
 }

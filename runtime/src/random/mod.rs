@@ -6,8 +6,12 @@
 
 use std::fmt::Write;
 
+use impasto_compiler::abi::MaterialInfo;
+
+use crate::lights::LIGHT_ROW_BYTES;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Sampler;
+use crate::world::World;
 
 mod sobol;
 
@@ -47,6 +51,23 @@ pub struct Demand {
 }
 
 impl Demand {
+    /// What a world asks of random numbers, if `lights` are sampled. One light leaves nothing to
+    /// choose, but an environment map chooses a row by what is left of the choice.
+    pub(crate) fn of(world: &World, materials: &[MaterialInfo], lights: bool) -> Self {
+        let buffers = &world.parts.lights.buffers;
+        let one_light =
+            |b: &BufferData| b.name == "light_table" && b.bytes.len() <= LIGHT_ROW_BYTES;
+        let has_map = buffers.iter().any(|b| b.name == "environment_alias");
+        Self {
+            lens: world.camera.lens_radius > 0.0,
+            lobes: materials.iter().any(|m| m.lobes > 1),
+            lights,
+            light_choice: has_map || !buffers.iter().any(one_light),
+            roulette_start: world.roulette_start,
+            max_depth: world.max_depth,
+        }
+    }
+
     /// For every draw in turn, which of its numbers are used.
     fn draws(self) -> impl Iterator<Item = [bool; 4]> {
         let vertices = 1..=self.max_depth;

@@ -12,6 +12,7 @@ mod info;
 mod lights;
 mod media;
 mod ops;
+mod passes;
 mod planes;
 mod plans;
 mod random;

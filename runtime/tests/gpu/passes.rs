@@ -1,0 +1,238 @@
+//! Renders in parts: passes with a film that is kept between them, renders that go on from one,
+//! ranges of samples rendered apart, and renders that are stopped. All give the bits of the whole.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
+use impasto_compiler::partition::Strategy;
+use impasto_runtime::error::RuntimeError;
+use impasto_runtime::film_file::{FilmFile, Range};
+use impasto_runtime::passes::Keeping;
+use impasto_runtime::render::{Progress, RenderOptions, Renderer, Rendering};
+
+fn room() -> Room {
+    Room {
+        plate: true,
+        emitters: vec![3],
+        max_depth: 5,
+        roulette_start: 2,
+        width: 16,
+        height: 8,
+        materials: [0, 1, 0, 0, 1, 0, 2],
+        ..Room::default()
+    }
+}
+
+fn surfaces() -> Materials {
+    materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror])
+}
+
+fn renderer(strategy: Strategy, room: &Room, options: &RenderOptions) -> Renderer<'static> {
+    let surfaces = surfaces();
+    let plan = plan(strategy, &surfaces);
+    Renderer::from_world(gpu(), &room.world(), &surfaces, &plan, options)
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn whole(strategy: Strategy, options: &RenderOptions) -> Rendering {
+    renderer(strategy, &room(), options)
+        .render(&mut |_| ControlFlow::Continue(()))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Renders in passes of few samples; what was kept, and the end.
+fn in_passes(
+    strategy: Strategy,
+    options: &RenderOptions,
+    start: Option<FilmFile>,
+) -> Result<(Vec<FilmFile>, Rendering), RuntimeError> {
+    let mut kept = Vec::new();
+    let mut keep = |film: &FilmFile| {
+        kept.push(film.clone());
+        Ok(())
+    };
+    let keeping = Keeping {
+        start,
+        every: Duration::from_nanos(1),
+        keep: &mut keep,
+    };
+    let total = 16 * 8 * u64::from(options.samples);
+    let mut last = 0;
+    let progress = &mut |progress: &Progress| {
+        assert_eq!(progress.total, total);
+        assert!((last..=total).contains(&progress.paths), "{progress:?}");
+        last = progress.paths;
+        ControlFlow::Continue(())
+    };
+    let rendering = renderer(strategy, &room(), options).render_keeping(keeping, progress)?;
+    Ok((kept, rendering))
+}
+
+#[test]
+fn passes_give_the_bits_of_the_whole() {
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let options = RenderOptions {
+            first_sample: 3,
+            ..samples(6)
+        };
+        let reference = whole(strategy, &options);
+        let (kept, rendering) = in_passes(strategy, &options, None).expect("it renders");
+        assert_eq!(rendering.film, reference.film, "{strategy:?}");
+        assert_eq!(rendering.sums, reference.sums, "{strategy:?}");
+        assert_eq!(rendering.report.paths, reference.report.paths);
+        assert_eq!(rendering.report.resumed_samples, 0);
+        // A sample a pass, and what is kept of each is the render of so many samples.
+        assert_eq!(kept.len(), 6, "{strategy:?}");
+        for (count, film) in (1..).zip(&kept) {
+            let fewer = RenderOptions {
+                samples: count,
+                ..options.clone()
+            };
+            assert_eq!(*film, whole(strategy, &fewer).sums, "{strategy:?}: {count}");
+        }
+        let items = |r: &Rendering| {
+            r.report
+                .kernels
+                .iter()
+                .map(|k| (k.name.clone(), k.items))
+                .collect::<Vec<_>>()
+        };
+        let of_materials = |r| {
+            items(r)
+                .into_iter()
+                .filter(|(n, _)| n.starts_with("material"))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(of_materials(&rendering), of_materials(&reference));
+    }
+}
+
+#[test]
+fn a_render_goes_on_from_what_was_kept() {
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let options = samples(5);
+        let reference = whole(strategy, &options);
+        let (kept, _) = in_passes(strategy, &options, None).expect("it renders");
+        for start in kept {
+            let done = start.samples();
+            let (more, rendering) = in_passes(strategy, &options, Some(start)).expect("it goes on");
+            assert_eq!(rendering.sums, reference.sums, "{strategy:?} from {done}");
+            assert_eq!(u64::from(rendering.report.resumed_samples), done);
+            assert_eq!(rendering.report.paths, reference.report.paths);
+            assert_eq!(more.last(), Some(&reference.sums));
+        }
+        let longer = RenderOptions {
+            samples: 8,
+            ..options
+        };
+        let start = Some(reference.sums);
+        let (_, rendering) = in_passes(strategy, &longer, start).expect("it goes on");
+        assert_eq!(rendering.sums, whole(strategy, &longer).sums);
+    }
+}
+
+#[test]
+fn a_render_does_not_go_on_from_another() {
+    let film = whole(Strategy::Own, &samples(4)).sums;
+    let refused = |options: &RenderOptions, part: &str| {
+        let result = in_passes(Strategy::Own, options, Some(film.clone()));
+        let error = result.expect_err("refused").to_string();
+        assert!(error.contains(part), "{error}");
+    };
+    let seeded = RenderOptions {
+        seed: 9,
+        ..samples(8)
+    };
+    refused(&seeded, "the seed 9, the other 0");
+    refused(&samples(3), "more than the 3");
+    let later = RenderOptions {
+        first_sample: 1,
+        ..samples(8)
+    };
+    refused(&later, "starts at 1");
+}
+
+#[test]
+fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
+    let reference = whole(Strategy::Own, &samples(9));
+    // In other pools, and one of them in the other organisation of the same kernels.
+    let part = |first_sample, count, pool| {
+        let options = RenderOptions {
+            first_sample,
+            pool: Some(pool),
+            ..samples(count)
+        };
+        whole(Strategy::Own, &options).sums
+    };
+    let parts = [part(0, 4, 77), part(4, 1, 1), part(5, 4, 1000)];
+    for order in [[0, 1, 2], [2, 0, 1]] {
+        let mut merged = parts[order[0]].clone();
+        for next in &order[1..] {
+            merged.merge(&parts[*next]).expect("they belong together");
+        }
+        assert_eq!(merged, reference.sums);
+        assert_eq!(merged.sums.picture(), reference.film);
+    }
+    let mut twice = parts[0].clone();
+    assert!(twice.merge(&parts[0]).is_err_and(|e| e.contains("0 to 3")));
+}
+
+#[test]
+fn only_what_changes_the_picture_changes_its_identity() {
+    let identity = |room: Room, strategy, options: RenderOptions| {
+        *renderer(strategy, &room, &options).identity()
+    };
+    let base = identity(room(), Strategy::Own, samples(1));
+    let pool = RenderOptions {
+        pool: Some(99),
+        ..samples(7)
+    };
+    assert_eq!(identity(room(), Strategy::Mega, pool), base);
+    let deeper = Room {
+        max_depth: 6,
+        ..room()
+    };
+    let brighter = Room {
+        radiance: 1.5,
+        ..room()
+    };
+    let painted = Room {
+        materials: [0; 7],
+        ..room()
+    };
+    for other in [deeper, brighter, painted] {
+        assert_ne!(identity(other, Strategy::Own, samples(1)).scene, base.scene);
+    }
+}
+
+/// A stopped render is the render of fewer samples, not a mean of the shorter paths.
+#[test]
+fn a_stopped_render_is_one_of_fewer_samples() {
+    for strategy in [Strategy::Own, Strategy::Mega] {
+        let mut options = samples(1 << 20);
+        options.pool = Some(333);
+        let mut after = 40;
+        let stop = &mut |progress: &Progress| {
+            assert!(progress.paths < progress.total);
+            after -= 1;
+            match after > 0 {
+                true => ControlFlow::Continue(()),
+                false => ControlFlow::Break(()),
+            }
+        };
+        let stopped = renderer(strategy, &room(), &options).render(stop);
+        let stopped = stopped.unwrap_or_else(|e| panic!("{e}"));
+        let [Range { first: 0, count }] = stopped.sums.ranges[..] else {
+            panic!("{:?}", stopped.sums.ranges);
+        };
+        assert!((1..1 << 20).contains(&count), "{count}");
+        let same = RenderOptions {
+            samples: count as u32,
+            ..options
+        };
+        let reference = whole(strategy, &same);
+        assert_eq!(stopped.sums, reference.sums, "{strategy:?}");
+        assert_eq!(stopped.report.paths, reference.report.paths);
+    }
+}
