@@ -11,6 +11,7 @@ use impasto::compiler::diag::{self, Diagnostic};
 use impasto::compiler::source::SourceMap;
 
 mod check;
+mod checkpoint;
 mod completions;
 mod cost;
 mod emit;
@@ -18,6 +19,8 @@ mod eval;
 mod explain;
 mod info;
 mod interrupt;
+mod merge;
+mod outputs;
 mod rays;
 mod render;
 mod technique;
@@ -73,6 +76,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Time ray casts alone, by every technique
     Rays(rays::RaysArgs),
+    /// Merge parts of a render into one picture
+    Merge(merge::MergeArgs),
     /// Show the GPU that would be rendered on, and its limits
     Info(info::GpuArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
@@ -110,6 +115,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
         Command::Rays(args) => rays::run(&args, &global),
+        Command::Merge(args) => merge::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),
@@ -198,6 +204,11 @@ fn print(text: &str) -> Outcome {
         ))),
         _ => Ok(()),
     }
+}
+
+/// An error of the renderer.
+fn runtime(error: impasto::RuntimeError) -> Failure {
+    Failure::Error(error.to_string())
 }
 
 /// `1 error`, `2 errors`.

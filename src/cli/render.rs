@@ -4,34 +4,41 @@
 //! scene, its materials) is checked before the first sample is taken.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 use impasto::compiler::{self, Loader};
+use impasto::runtime::film_file::FilmFile;
 use impasto::runtime::media::MAX_NESTED;
-use impasto::runtime::output;
+use impasto::runtime::render::Progress;
 use impasto::runtime::report::{MaterialReport, Report};
 use impasto::runtime::scene::FilmSettings;
-use impasto::{
-    FileLoader, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene, Strategy, files,
-};
+use impasto::{FileLoader, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::checkpoint::CheckpointArgs;
 use super::info::GpuArgs;
+use super::outputs::{Outputs, parse_exposure};
 use super::technique::TechniqueArgs;
-use super::{Failure, Global, Outcome, interrupt, print};
+use super::{Failure, Global, Outcome, interrupt, print, runtime};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
     /// The scene, a TOML file
     scene: PathBuf,
-    /// The picture: `.exr` (linear radiance; a `.png` is written beside it) or `.png` alone
+    /// The picture: `.exr` (linear radiance; a `.png` is written beside it), `.png` alone, or `.film`
+    /// for a part that `impasto merge` takes
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Samples per pixel
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
+    /// Index of the first sample: ranges that do not overlap can be rendered apart and merged
+    #[arg(long, value_name = "INDEX", default_value_t = 0)]
+    samples_from: u32,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
     /// Width and height in pixels, as in 640x480; the scene's own otherwise
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
@@ -81,64 +88,12 @@ fn parse_strategy(name: &str) -> Result<Strategy, String> {
     })
 }
 
-fn parse_exposure(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(stops) if stops.abs() <= 64.0 => Ok(stops),
-        _ => Err("expected a number of stops from -64 to 64".into()),
-    }
-}
-
-/// The files that a run writes.
-struct Outputs<'a> {
-    exr: Option<&'a Path>,
-    png: PathBuf,
-    report: Option<&'a Path>,
-}
-
-impl<'a> Outputs<'a> {
-    /// What the arguments ask for, once it is sure that all of it can be written.
-    fn of(args: &'a RenderArgs) -> Result<Self, String> {
-        let extension = args
-            .out
-            .extension()
-            .unwrap_or_default()
-            .to_ascii_lowercase();
-        let exr = match extension.to_str() {
-            Some("exr") => Some(args.out.as_path()),
-            Some("png") => None,
-            _ => {
-                return Err(format!(
-                    "cannot write `{}`: pictures are .exr or .png files",
-                    args.out.display()
-                ));
-            }
-        };
-        let png = match exr {
-            Some(exr) => exr.with_extension("png"),
-            None => args.out.clone(),
-        };
-        let report = args.report.as_deref();
-        for path in exr.into_iter().chain([png.as_path()]).chain(report) {
-            files::check_writable(path)?;
-        }
-        Ok(Self { exr, png, report })
-    }
-
-    fn write(&self, rendering: &Rendering, args: &RenderArgs) -> Result<(), Failure> {
-        for path in self.exr.into_iter().chain([self.png.as_path()]) {
-            output::write(&rendering.film, path, args.exposure).map_err(runtime)?;
-        }
-        if let Some(path) = self.report {
-            let json = serde_json::to_string_pretty(&rendering.report)
-                .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
-            files::write_whole(path, format!("{json}\n").as_bytes())?;
-        }
-        Ok(())
-    }
-}
-
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
-    let outputs = Outputs::of(args)?;
+    let outputs = Outputs::of(&args.out)?;
+    if let Some(report) = &args.report {
+        files::check_writable(report)?;
+    }
+    let start = args.checkpoint.read()?;
     interrupt::install()?;
     let scene = load(args, global)?;
     let started = Instant::now();
@@ -148,13 +103,14 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let gpu = args.gpu.open()?;
     let mut renderer =
         Renderer::new(&gpu, &scene, &program, &plan, &args.options()).map_err(runtime)?;
-    let mut rendering = sample(&mut renderer, global).map_err(runtime)?;
+    let mut rendering = sample(&mut renderer, args, start, global)?;
     rendering.report.compile_seconds += material_seconds;
     if rendering.report.paths == 0 {
         global.note("interrupted before the first sample: nothing is written");
         return Err(Failure::Interrupted);
     }
-    outputs.write(&rendering, args)?;
+    outputs.write(&rendering.film, &rendering.sums, args.exposure)?;
+    write_report(&rendering.report, args)?;
     summarise(&rendering, &outputs, global);
     match is_complete(&rendering) {
         true => Ok(()),
@@ -166,6 +122,7 @@ impl RenderArgs {
     fn options(&self) -> RenderOptions {
         RenderOptions {
             samples: self.spp,
+            first_sample: self.samples_from,
             seed: self.seed,
             pool: self.pool,
             technique: self.technique.technique(),
@@ -174,8 +131,13 @@ impl RenderArgs {
     }
 }
 
-fn runtime(error: RuntimeError) -> Failure {
-    Failure::Error(error.to_string())
+fn write_report(report: &Report, args: &RenderArgs) -> Result<(), Failure> {
+    let Some(path) = &args.report else {
+        return Ok(());
+    };
+    let json = serde_json::to_string_pretty(report)
+        .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+    Ok(files::write_whole(path, format!("{json}\n").as_bytes())?)
 }
 
 /// The scene, at the size that was asked for. What is odd about it is noted.
@@ -215,17 +177,25 @@ fn compile(scene: &Scene, global: &Global) -> Result<Program, Failure> {
 }
 
 /// Takes all samples, or those until Ctrl-C.
-fn sample(renderer: &mut Renderer, global: &Global) -> Result<Rendering, RuntimeError> {
+fn sample(
+    renderer: &mut Renderer,
+    args: &RenderArgs,
+    start: Option<FilmFile>,
+    global: &Global,
+) -> Result<Rendering, Failure> {
     global.detail("samples are taken; Ctrl-C ends rendering and keeps the picture");
     let bar = progress_bar(global);
-    let rendering = renderer.render(&mut |progress| {
+    let mut progress = |progress: &Progress| {
         bar.set_length(progress.total);
         bar.set_position(progress.paths);
         match interrupt::requested() {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }
-    });
+    };
+    let rendering = args
+        .checkpoint
+        .render(renderer, start, global, &mut progress);
     bar.finish_and_clear();
     rendering
 }
@@ -240,13 +210,11 @@ fn is_complete(rendering: &Rendering) -> bool {
 /// What was written, and how it went.
 fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
     let report = &rendering.report;
-    let files = outputs.exr.into_iter().chain([outputs.png.as_path()]);
-    let files: Vec<String> = files.map(|path| path.display().to_string()).collect();
     let pixels = f64::from(report.width) * f64::from(report.height);
     let samples = report.paths as f64 / pixels;
     global.note(&format!(
         "wrote {} ({samples:.0} samples per pixel, {:.1} s, {:.2} Mpaths/s on {})",
-        files.join(" and "),
+        outputs.names(),
         report.wall_seconds,
         report.paths_per_second * 1e-6,
         report.adapter.name,

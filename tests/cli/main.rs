@@ -5,5 +5,6 @@ mod common;
 mod cost;
 mod emit_check;
 mod eval;
+mod film;
 mod rays;
 mod render;
