@@ -7,7 +7,6 @@ use crate::gpu::Gpu;
 use crate::layout::Layout;
 use crate::modules::{Composer, Kernel};
 use crate::queues::Scalar;
-use crate::random;
 use crate::render::RenderOptions;
 use crate::{order, random};
 
