@@ -159,7 +159,7 @@ impl Composer<'_> {
                 let part = parts.media.part.as_ref();
                 part.map_or_else(String::new, |part| part.wgsl.clone())
             }
-            Part::Order => crate::order::bins(parts.bounds),
+            Part::Order => crate::order::bins(self.technique.ray_order, parts.bounds),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
         }

@@ -33,7 +33,7 @@ impl Layout {
         check_plan(plan, materials.len())?;
         let wavefront = plan.organisation == Organisation::Wavefront;
         let mut needs = needs(world, materials);
-        needs.order = wavefront && technique.ray_order == RayOrder::Binned;
+        needs.order = wavefront && technique.ray_order != RayOrder::Queue;
         let queued = plan.kernels.iter().filter(|k| k.form != Form::Inline);
         let queues = Queues {
             materials: queued.count(),

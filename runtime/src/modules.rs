@@ -33,6 +33,8 @@ pub(crate) enum Feed {
     Fetched,
     /// One for every item of a queue, through indirect arguments.
     Queue(usize),
+    /// A number of workgroups.
+    Groups(u32),
     /// One workgroup.
     Once,
 }
@@ -146,8 +148,10 @@ impl Composer<'_> {
             return Vec::new();
         }
         let name = |what: &str| stage.name.replace("bin", what);
-        let scan = order::constants() + include_str!("kernels/order_scan.wgsl");
-        let scatter = order::constants()
+        let groups = order::scan_groups(self.technique.ray_order);
+        let scan =
+            order::constants(self.technique.ray_order) + include_str!("kernels/order_scan.wgsl");
+        let scatter = order::constants(self.technique.ray_order)
             + &self.layout.queues.constants()
             + &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n")
             + &format!("const CONSUMED_REGION: u32 = {queue}u;\n")
@@ -155,7 +159,7 @@ impl Composer<'_> {
             + &preprocess(include_str!("kernels/shell.wgsl"), &[("queued", true)]);
         vec![
             self.stage(count, queue),
-            recipe(&name("scan"), Vec::new(), Feed::Once, scan),
+            recipe(&name("scan"), Vec::new(), Feed::Groups(groups), scan),
             recipe(&name("scatter"), Vec::new(), Feed::Queue(queue), scatter),
         ]
     }

@@ -601,6 +601,7 @@ fn build_steps(
             bind_group: resources.bind_group(gpu, kernel, &layout),
             size: match kernel.recipe.feed {
                 Feed::Once => Size::Direct(1, 1),
+                Feed::Groups(groups) => Size::Direct(groups, 1),
                 Feed::Pool => Size::for_items(sizes.pool, sizes.workgroup, sizes.row_groups),
                 Feed::Fetched => Size::for_items(sizes.threads, sizes.workgroup, sizes.row_groups),
                 Feed::Queue(queue) => Size::Indirect(12 * queue as u64),

@@ -238,7 +238,7 @@ impl Inputs<'_> {
                 Feed::Queue(queue) => counters.items_of(&status.counters, queue),
                 Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
                 Feed::Pool | Feed::Fetched => paths,
-                Feed::Once => status.iterations,
+                Feed::Once | Feed::Groups(_) => status.iterations,
             },
             gpu_seconds: seconds,
             utilisation: None,

@@ -217,7 +217,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "run" => 4 * RUN_MEMBERS.len() as u64,
         "state" => pool * layout.path_bytes(),
         "queues" => 4 * pool * layout.queue_words(),
-        "bins" if layout.needs.order => 8 * u64::from(order::BINS),
+        "bins" if layout.needs.order => order::bytes(composer.technique.ray_order),
         "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,

@@ -142,8 +142,10 @@ choices! {
     RayOrder {
         /// As they were asked for
         Queue = "queue",
-        /// By the cell of the scene where they begin and the octant of their direction
-        Binned = "binned",
+        /// By the cell of the scene where they begin, of 512, and the octant of their direction
+        Coarse = "coarse",
+        /// The same with 32,768 cells
+        Fine = "fine",
     }
 }
 

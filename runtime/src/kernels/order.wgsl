@@ -3,7 +3,8 @@
 // Breadth-First Packet Traversal for GPU Ray Tracing", 2010, who sort by the same). Three
 // kernels: this one counts the rays of each bin, and notes each ray's bin and rank in it;
 // order_scan.wgsl turns counts into the places where bins begin, and order_scatter.wgsl writes the
-// queue again. bins[b] is the count of bin b, bins[BINS + b] its begin.
+// queue again. bins[b] is the count of bin b, bins[BINS + b] its begin, bins[2 BINS] the number of
+// places taken.
 
 fn bin_ray(item: u32, origin: vec3<f32>, direction: vec3<f32>) {
     let bin = ray_bin(origin, direction);
