@@ -19,10 +19,11 @@ use crate::world::{MaterialSource, World};
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
 
-/// A subgroup fetches rays when more than this share of its lanes has none (Aila and Laine 2009).
-const FETCH_PERCENT: u32 = 40;
+/// A subgroup fetches rays when more than this share of its lanes has none (Aila and Laine 2009);
+/// measured on an H200, as what follows (docs/measurements.md).
+const FETCH_PERCENT: u32 = 25;
 /// Triangles wait while less than this share of the lanes with a ray has any (Ylitie et al. 2017).
-const TRIANGLE_PERCENT: u32 = 20;
+const TRIANGLE_PERCENT: u32 = 35;
 
 /// What decides how many threads a kernel gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

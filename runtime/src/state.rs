@@ -122,7 +122,8 @@ pub(crate) struct Field {
 use Need::{Always, Media, ShadowRays};
 use Type::{F32, U32, Vec3, Words};
 
-/// Every field there is, in the order of memory.
+/// Every field there is, in the order of memory. Those that follow each other in pairs are those that
+/// stages access together.
 pub(crate) const FIELDS: [Field; 10] = [
     // The extension ray: from the camera or the last vertex.
     Field {
@@ -165,14 +166,6 @@ pub(crate) const FIELDS: [Field; 10] = [
         readers: &[Logic, Material],
         writers: &[NewPath, Logic, Material],
     },
-    // The media it is in; see `kernels/media.wgsl`.
-    Field {
-        name: "media",
-        components: &[("stack", Words)],
-        need: Media,
-        readers: &[Logic, Material, Extension],
-        writers: &[NewPath, Material, Extension],
-    },
     // The sample of a light: where it is, and the ray that asks whether it is seen.
     Field {
         name: "shadow_ray",
@@ -188,14 +181,6 @@ pub(crate) const FIELDS: [Field; 10] = [
         readers: &[BinShadow, Shadow],
         writers: &[Material],
     },
-    // Its radiance over its density, and the density (0: a discrete light).
-    Field {
-        name: "light_radiance",
-        components: &[("radiance", Vec3), ("light_pdf", F32)],
-        need: ShadowRays,
-        readers: &[Logic],
-        writers: &[Logic],
-    },
     // The path's throughput toward it (0: occluded), and the density with which the material
     // would have sampled that direction.
     Field {
@@ -204,6 +189,22 @@ pub(crate) const FIELDS: [Field; 10] = [
         need: ShadowRays,
         readers: &[Logic],
         writers: &[Material, Shadow],
+    },
+    // Its radiance over its density, and the density (0: a discrete light).
+    Field {
+        name: "light_radiance",
+        components: &[("radiance", Vec3), ("light_pdf", F32)],
+        need: ShadowRays,
+        readers: &[Logic],
+        writers: &[Logic],
+    },
+    // The media it is in; see `kernels/media.wgsl`.
+    Field {
+        name: "media",
+        components: &[("stack", Words)],
+        need: Media,
+        readers: &[Logic, Material, Extension],
+        writers: &[NewPath, Material, Extension],
     },
 ];
 
@@ -258,6 +259,13 @@ pub(crate) fn accessors(needs: Needs, stages: &[StageId], storage: Storage) -> S
     for (region, field) in fields(needs).enumerate() {
         let place = match storage {
             Storage::Memory(StateLayout::Arrays) => Some(format!("{region}u * POOL_SIZE + slot")),
+            Storage::Memory(StateLayout::Pairs) => {
+                let (first, half) = (region - region % 2, region % 2);
+                Some(match first + 1 < count {
+                    true => format!("{first}u * POOL_SIZE + 2u * slot + {half}u"),
+                    false => format!("{first}u * POOL_SIZE + slot"),
+                })
+            }
             Storage::Memory(StateLayout::Structures) => {
                 Some(format!("{count}u * slot + {region}u"))
             }

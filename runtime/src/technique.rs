@@ -81,6 +81,8 @@ choices! {
     StateLayout {
         /// A structure of arrays: neighbours read neighbouring words
         Arrays = "soa",
+        /// A structure of arrays of two fields each, as many as a sector of the cache holds
+        Pairs = "pairs",
         /// An array of structures: a path's words lie together
         Structures = "aos",
     }

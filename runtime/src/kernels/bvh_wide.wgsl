@@ -110,18 +110,24 @@ fn intersect_node(node: u32, walk: ptr<function, Walk>) {
     (*walk).leaves = vec2<u32>(bases.y, hits & 0x00ffffffu);
 }
 
+// The bits of floats, which as integers have the order of the floats where these are not negative.
+// Of negative ones the slab tests ask the sign alone, and three integers are compared at once.
+fn ordered(distances: vec4<f32>) -> vec4<i32> {
+    return bitcast<vec4<i32>>(distances);
+}
+
 // Slab tests of four children; one byte each in `child_meta`, `near` and `far`.
 fn intersect_children(
     child_meta: u32, octant: u32, scale: vec3<f32>, near_start: vec3<f32>, far_start: vec3<f32>,
     near: vec3<u32>, far: vec3<u32>, t_max: f32
 ) -> u32 {
     let t_near = max(
-        max(bytes(near.x) * scale.x + near_start.x, bytes(near.y) * scale.y + near_start.y),
-        max(bytes(near.z) * scale.z + near_start.z, vec4<f32>(0.0))
+        max(ordered(bytes(near.x) * scale.x + near_start.x), ordered(bytes(near.y) * scale.y + near_start.y)),
+        max(ordered(bytes(near.z) * scale.z + near_start.z), vec4<i32>(0))
     );
     let t_far = min(
-        min(bytes(far.x) * scale.x + far_start.x, bytes(far.y) * scale.y + far_start.y),
-        min(bytes(far.z) * scale.z + far_start.z, vec4<f32>(t_max))
+        min(ordered(bytes(far.x) * scale.x + far_start.x), ordered(bytes(far.y) * scale.y + far_start.y)),
+        min(ordered(bytes(far.z) * scale.z + far_start.z), ordered(vec4<f32>(t_max)))
     );
     // A leaf's meta byte is its triangles in unary (3 bits) and their offset (5 bits); an inner
     // child's is 1 and its slot plus 24, where the octant makes slots an order of visiting.
