@@ -34,10 +34,11 @@ pub fn of_scene(
     program: &Program,
     samples: usize,
 ) -> Result<Vec<MaterialCost>, OutOfFuel> {
-    let surfaces = surfaces(&scene.mesh, program);
+    let mesh = &*scene.sampled(SAMPLED_COPIES);
+    let surfaces = surfaces(mesh, program);
     measure(program, |material, info| {
         let mut inputs = Inputs::new(material as u64);
-        surfaces[material].points(&scene.mesh, samples, info.crosses, &mut inputs)
+        surfaces[material].points(mesh, samples, info.crosses, &mut inputs)
     })
 }
 
@@ -70,6 +71,9 @@ fn measure(
     };
     program.materials().enumerate().map(cost).collect()
 }
+
+/// About how many triangles of placed objects points are taken from.
+const SAMPLED_COPIES: usize = 4_000_000;
 
 /// The triangles of one material, by instance, each with the area up to its end.
 #[derive(Default)]

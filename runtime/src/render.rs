@@ -24,7 +24,7 @@ use crate::queues::{Queues, Scalar};
 use crate::random::{self, Demand};
 use crate::report::{MaterialReport, Report, Resumed};
 use crate::resources::Resources;
-use crate::scene::Scene;
+use crate::scene::{GeometryCounts, Scene};
 use crate::schedule::{Schedule, Size, Step};
 use crate::shader_part::BufferData;
 use crate::state;
@@ -100,7 +100,7 @@ struct Facts {
     strategy: String,
     width: u32,
     height: u32,
-    triangles: u64,
+    geometry: GeometryCounts,
     max_depth: u32,
     pool: u32,
     identity: Identity,
@@ -225,7 +225,7 @@ impl<'g> Renderer<'g> {
             strategy: plan.strategy.clone(),
             width: world.width,
             height: world.height,
-            triangles: world.triangles,
+            geometry: world.parts.counts,
             max_depth: world.max_depth,
             pool: sizes.pool,
             identity: Identity {
@@ -518,7 +518,7 @@ impl<'g> Renderer<'g> {
             kernels: &self.kernels,
             timed: self.schedule.timing != Timing::None,
             strategy: &self.facts.strategy,
-            triangles: self.facts.triangles,
+            geometry: self.facts.geometry,
             pool: self.facts.pool,
             materials: &self.facts.materials,
             compile_seconds: self.facts.compile_seconds,

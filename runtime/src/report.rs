@@ -10,6 +10,7 @@ use crate::layout::Layout;
 use crate::modules::{Feed, Kernel};
 use crate::queues::Scalar;
 use crate::render::RenderOptions;
+use crate::scene::GeometryCounts;
 use crate::status::Status;
 use crate::technique::Technique;
 
@@ -32,8 +33,14 @@ pub struct Report {
     pub first_sample: u32,
     /// The seed of all random numbers.
     pub seed: u32,
-    /// Triangles of the scene.
+    /// Triangles that are stored.
     pub triangles: u64,
+    /// Triangles that rays can hit: those of an object count once for each of its placements.
+    pub placed_triangles: u64,
+    /// Objects that are stored once and placed any number of times.
+    pub objects: u64,
+    /// Placements of objects.
+    pub placements: u64,
     /// Materials: each is a shader, compiled once.
     pub material_count: usize,
     /// Instances of materials: what the scene binds to geometry, each with its own parameters.
@@ -162,7 +169,7 @@ pub(crate) struct Inputs<'a> {
     pub kernels: &'a [Kernel],
     pub timed: bool,
     pub strategy: &'a str,
-    pub triangles: u64,
+    pub geometry: GeometryCounts,
     pub pool: u32,
     pub materials: &'a [MaterialReport],
     pub compile_seconds: f64,
@@ -196,7 +203,10 @@ impl Inputs<'_> {
             samples_per_pixel: self.options.samples,
             first_sample: self.options.first_sample,
             seed: self.options.seed,
-            triangles: self.triangles,
+            triangles: self.geometry.triangles,
+            placed_triangles: self.geometry.placed_triangles,
+            objects: self.geometry.objects,
+            placements: self.geometry.placements,
             material_count: self.materials.len(),
             instance_count: self.materials.iter().map(|m| m.instances.len()).sum(),
             materials: self.materials.to_vec(),

@@ -140,6 +140,14 @@ choices! {
         Persistent = "persistent",
     }
 
+    /// How geometry is stored that is repeated often enough to share it.
+    Copies {
+        /// Once, and placed by a second level of the acceleration structure
+        Shared = "shared",
+        /// As often as it is placed
+        Flat = "flat",
+    }
+
     /// In which order rays are cast.
     RayOrder {
         /// As they were asked for
@@ -176,6 +184,8 @@ pub struct Technique {
     pub leaves: Leaves,
     /// How threads get the rays of a queue; in a megakernel each has its own.
     pub ray_fetch: RayFetch,
+    /// How repeated geometry is stored.
+    pub copies: Copies,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
 }
@@ -224,6 +234,7 @@ mod tests {
         check_names::<Planes>();
         check_names::<Leaves>();
         check_names::<RayFetch>();
+        check_names::<Copies>();
         check_names::<RayOrder>();
     }
 }

@@ -25,8 +25,6 @@ pub struct World {
     pub roulette_start: u32,
     /// What kernels ask geometry, lights and textures through.
     pub parts: SceneParts,
-    /// Number of triangles, for the report.
-    pub triangles: u64,
 }
 
 impl World {
@@ -47,7 +45,6 @@ impl World {
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
             parts: SceneParts::build(scene, materials, instances, textures, technique)?,
-            triangles: scene.mesh.len() as u64,
         })
     }
 }

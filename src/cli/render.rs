@@ -225,6 +225,16 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
         super::count(report.instance_count, "instance"),
         material_list(report),
     ));
+    if report.placements > 0 {
+        let [objects, placements] = [report.objects, report.placements].map(|n| n as usize);
+        global.note(&format!(
+            "{} placed {} times: {} triangles, of which {} are stored",
+            super::count(objects, "object"),
+            placements,
+            report.placed_triangles,
+            report.triangles,
+        ));
+    }
     if report.nonfinite_samples > 0 {
         let lost = report.nonfinite_samples;
         global.note(&format!(

@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Leaves, Planes, RayFetch, RayOrder, Regeneration, Sampler, Stack, StateLayout,
-    Technique, Traversal,
+    Append, Choice, Copies, Leaves, Planes, RayFetch, RayOrder, Regeneration, Sampler, Stack,
+    StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -38,6 +38,9 @@ pub(super) struct TechniqueArgs {
     /// How threads get the rays of a queue
     #[arg(long, value_name = "NAME", default_value = default_name::<RayFetch>(), value_parser = named::<RayFetch>())]
     ray_fetch: RayFetch,
+    /// How geometry is stored that is repeated often enough to share it
+    #[arg(long, value_name = "NAME", default_value = default_name::<Copies>(), value_parser = named::<Copies>())]
+    copies: Copies,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
@@ -63,6 +66,7 @@ impl TechniqueArgs {
             planes: self.planes,
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,
+            copies: self.copies,
             ray_order: self.ray_order,
         }
     }

@@ -52,7 +52,7 @@ fn a_picture_a_look_at_it_and_a_report() {
 }
 
 /// What every report has; docs/report.md says what they mean.
-const REPORT_FIELDS: [&str; 13] = [
+const REPORT_FIELDS: [&str; 16] = [
     "adapter",
     "strategy",
     "samples_per_pixel",
@@ -66,6 +66,9 @@ const REPORT_FIELDS: [&str; 13] = [
     "nonfinite_samples",
     "queue_overflow",
     "triangles",
+    "placed_triangles",
+    "objects",
+    "placements",
 ];
 
 #[test]

@@ -120,6 +120,23 @@ impl Writer<'_> {
     }
 }
 
+/// Words of a node.
+pub(super) const NODE_WORDS: usize = 4;
+
+/// Makes nodes count their children from `node` on, and their triangles from `triangle`.
+pub(super) fn relocate(nodes: &mut [[u32; 4]], node: u32, triangle: u32) {
+    for words in nodes.chunks_exact_mut(NODE_WORDS) {
+        for side in [0, 2] {
+            words[side][3] = relocated(words[side][3], node, triangle);
+        }
+    }
+}
+
+/// A reference in nodes that were relocated.
+pub(super) fn relocated(reference: u32, node: u32, triangle: u32) -> u32 {
+    reference + if reference >= LEAF { triangle } else { node }
+}
+
 fn leaf(node: &Bvh2Node) -> u32 {
     LEAF | node.prim_count << COUNT_SHIFT | node.first_index
 }

@@ -5,6 +5,7 @@
 //! contiguous range and a *primitive* is an index in that order.
 
 mod binary;
+mod levels;
 mod text;
 mod wide;
 
@@ -19,6 +20,7 @@ use crate::scene::Mesh;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::{Stack, Technique, Traversal};
 
+pub use levels::{Levels, ObjectTree};
 pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
 
 /// The builder's settings. Which of several triangles at one distance a ray hits depends on
@@ -43,10 +45,7 @@ impl Bvh {
     /// Builds the structure that `traversal` names. Equal meshes give equal trees.
     pub fn build(mesh: &Mesh, traversal: Traversal) -> Bvh {
         let boxes: Vec<Aabb> = mesh.positions.iter().map(bounds).collect();
-        match traversal {
-            Traversal::Cwbvh => wide::layout(&binary_tree(&boxes)),
-            Traversal::Bvh2 => binary::layout(binary_tree(&boxes)),
-        }
+        tree_over(&boxes, traversal, wide::LEAF_SIZE)
     }
 
     /// For each primitive, the index of its triangle in the mesh.
@@ -63,6 +62,11 @@ impl Bvh {
     /// `trace_closest`, `trace_any` and the steps they are made of, as `technique` says; needs the
     /// geometry part.
     pub fn part(&self, technique: &Technique) -> ShaderPart {
+        self.part_of(technique, false)
+    }
+
+    /// The same, where the tree is one of placements if it is `placed`.
+    fn part_of(&self, technique: &Technique, placed: bool) -> ShaderPart {
         let mut buffers = vec![BufferData::new(
             "bvh_nodes",
             "array<vec4<u32>>",
@@ -72,9 +76,41 @@ impl Bvh {
             buffers.push(BufferData::new("bvh_parents", "array<u32>", &self.parents));
         }
         ShaderPart {
-            wgsl: text::casts(self.traversal, technique, self.root, self.depth),
+            wgsl: text::casts(self.traversal, technique, self.root, self.depth, placed),
             buffers,
         }
+    }
+
+    /// Adds the nodes of another tree, whose leaves count from `first`; returns the reference to
+    /// its root.
+    fn append(&mut self, other: &mut Bvh, first: u32) -> u32 {
+        let words = match self.traversal {
+            Traversal::Cwbvh => wide::NODE_WORDS,
+            Traversal::Bvh2 => binary::NODE_WORDS,
+        };
+        let whole = self.nodes.len().next_multiple_of(words);
+        self.nodes.resize(whole, [0; 4]);
+        let node = (whole / words) as u32;
+        let root = match self.traversal {
+            Traversal::Cwbvh => {
+                wide::relocate(&mut other.nodes, node, first);
+                other.root + node
+            }
+            Traversal::Bvh2 => {
+                binary::relocate(&mut other.nodes, node, first);
+                binary::relocated(other.root, node, first)
+            }
+        };
+        self.nodes.append(&mut other.nodes);
+        root
+    }
+}
+
+/// A tree over boxes, with at most `leaf_size` of them in a leaf of the wide layout.
+fn tree_over(boxes: &[Aabb], traversal: Traversal, leaf_size: u32) -> Bvh {
+    match traversal {
+        Traversal::Cwbvh => wide::layout(&binary_tree(boxes), leaf_size),
+        Traversal::Bvh2 => binary::layout(binary_tree(boxes)),
     }
 }
 

@@ -16,11 +16,13 @@ const SLACK: f32 = 1.0 / (1 << 20) as f32;
 const SHARED_BYTES: usize = 96;
 
 /// Everything a kernel needs to cast rays through a tree of `depth` inner nodes below `root`.
+/// If it is a tree of placements, `depth` counts the deepest tree of an object as well.
 pub(super) fn casts(
     traversal: Traversal,
     technique: &Technique,
     root: u32,
     depth: usize,
+    placed: bool,
 ) -> String {
     let stack = technique.stack;
     let binary = traversal == Traversal::Bvh2;
@@ -30,6 +32,7 @@ pub(super) fn casts(
         ("trail", stack == Stack::Trail),
         ("together", technique.leaves == Leaves::Together),
         ("mantissa", technique.planes == Planes::Mantissa),
+        ("placed", placed),
     ];
     let nodes = if binary {
         include_str!("../kernels/bvh_binary.wgsl")
@@ -39,6 +42,9 @@ pub(super) fn casts(
     let mut out = wgsl::constant_u32("BVH_ROOT", root) + &wgsl::constant_f32("BVH_SLACK", SLACK);
     out += &preprocess(include_str!("../kernels/bvh_cast.wgsl"), &flags);
     out += include_str!("../kernels/bvh_triangle.wgsl");
+    if placed {
+        out += &preprocess(include_str!("../kernels/bvh_placed.wgsl"), &flags);
+    }
     out += &preprocess(nodes, &flags);
     out += &match stack {
         Stack::Trail => trail(if binary { 1 } else { 8 }, depth),

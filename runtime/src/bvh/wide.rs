@@ -8,11 +8,11 @@ use super::{Bvh, NO_PARENT};
 use crate::technique::Traversal;
 
 /// Triangles of a leaf: as many as a node's meta byte can count.
-const LEAF_SIZE: u32 = 3;
+pub(super) const LEAF_SIZE: u32 = 3;
 
 /// Merges levels of the binary tree and compresses the boxes.
-pub(super) fn layout(tree: &Bvh2) -> Bvh {
-    let tree = bvh2_to_cwbvh(tree, LEAF_SIZE, true, false);
+pub(super) fn layout(tree: &Bvh2, leaf_size: u32) -> Bvh {
+    let tree = bvh2_to_cwbvh(tree, leaf_size, true, false);
     let parents = parents(&tree);
     Bvh {
         traversal: Traversal::Cwbvh,
@@ -21,6 +21,17 @@ pub(super) fn layout(tree: &Bvh2) -> Bvh {
         parents,
         order: tree.primitive_indices,
         root: 0,
+    }
+}
+
+/// Words of a node.
+pub(super) const NODE_WORDS: usize = 5;
+
+/// Makes nodes count their children from `node` on, and their triangles from `triangle`.
+pub(super) fn relocate(nodes: &mut [[u32; 4]], node: u32, triangle: u32) {
+    for words in nodes.chunks_exact_mut(NODE_WORDS) {
+        words[1][0] += node;
+        words[1][1] += triangle;
     }
 }
 

@@ -55,7 +55,11 @@ fn visit_node(walk: ptr<function, Walk>) {
 #endif
 }
 
+#if placed
+fn take_in_tree(walk: ptr<function, Walk>) -> bool {
+#else
 fn take_next(walk: ptr<function, Walk>) -> bool {
+#endif
     if (*walk).group != NO_NODE {
         return true;
     }
@@ -89,12 +93,21 @@ const OUTSIDE: f32 = 3.4e38;
 
 // Where the ray enters a box; OUTSIDE if it does not before the nearest hit.
 fn enter_box(low: vec3<u32>, high: vec3<u32>, walk: ptr<function, Walk>) -> f32 {
+#if placed
+    let origin = (*walk).origin;
+#else
     let origin = (*walk).frame.origin;
+#endif
     let inverse = (*walk).inverse;
     let t_low = (bitcast<vec3<f32>>(low) - origin) * inverse;
     let t_high = (bitcast<vec3<f32>>(high) - origin) * inverse;
+#if placed
+    let enter = min(t_low, t_high) - (*walk).padding;
+    let leave = max(t_low, t_high) + (*walk).padding;
+#else
     let enter = min(t_low, t_high);
     let leave = max(t_low, t_high);
+#endif
     let t_near = max(max(enter.x, enter.y), max(enter.z, 0.0));
     // Each of these is off by some units in its last place; boxes stay conservative if they
     // are left that much later (Ize, "Robust BVH Ray Traversal", 2013).

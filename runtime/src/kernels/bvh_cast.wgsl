@@ -23,6 +23,13 @@ struct Walk {
 #if wide
     octant: u32,        // see traversal_octant
 #endif
+#if placed
+    origin: vec3<f32>,  // the ray's, in the space of the tree that is walked
+    padding: vec3<f32>, // how much wider slabs are there, as distances along the ray
+    placement: u32,     // whose tree that is; NO_PLACEMENT for the tree of placements
+    places: vec2<u32>,  // placements still to be entered: the first one's index, and a bit each
+    outer: Group,       // what was left of the group of the tree of placements
+#endif
     skip: u32,          // the primitive that is not hit
     hit: Hit,           // the nearest so far; its t bounds what is looked for
     group: Group,       // nodes still to be visited, beside those on the stack
@@ -85,9 +92,17 @@ fn begin_walk(
     walk.leaves = vec2<u32>(0u);
     walk.stacked = stack_floor;
     walk.stack_floor = stack_floor;
+#if placed
+    walk.origin = origin;
+    walk.padding = vec3<f32>(0.0);
+    walk.placement = NO_PLACEMENT;
+    walk.places = vec2<u32>(0u);
+#endif
     start_nodes(&walk, root);
     return walk;
 }
+#if placed
+#else
 
 // Tests the next of walk.leaves, of which there must be one.
 fn visit_triangle(walk: ptr<function, Walk>) {
@@ -99,6 +114,7 @@ fn visit_triangle(walk: ptr<function, Walk>) {
         (*walk).hit = Hit(tuv.x, tuv.y, tuv.z, primitive);
     }
 }
+#endif
 
 // 1 / direction, with components too small to divide by replaced by tiny ones of the same sign:
 // slabs parallel to the ray then lie (finitely) far before or behind its origin, or contain it.

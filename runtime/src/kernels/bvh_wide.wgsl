@@ -34,7 +34,11 @@ fn visit_node(walk: ptr<function, Walk>) {
     intersect_node(node, walk);
 }
 
+#if placed
+fn take_in_tree(walk: ptr<function, Walk>) -> bool {
+#else
 fn take_next(walk: ptr<function, Walk>) -> bool {
+#endif
     if (*walk).group.y > 0x00ffffffu {
         return true;
     }
@@ -76,10 +80,18 @@ fn intersect_node(node: u32, walk: ptr<function, Walk>) {
     let bases = bvh_nodes[5u * node + 1u];
     let exponents = (vec3<u32>(head.w) >> vec3<u32>(0u, 8u, 16u)) & vec3<u32>(0xffu);
     let step = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * inverse;
+#if placed
+    let start = (bitcast<vec3<f32>>(head.xyz) - (*walk).origin) * inverse;
+#else
     let start = (bitcast<vec3<f32>>(head.xyz) - (*walk).frame.origin) * inverse;
+#endif
     // Rounding here and in the builder moves planes by some units in the last place of the
     // terms below; widening every slab by more than that keeps the boxes conservative.
+#if placed
+    let slack = BVH_SLACK * (abs(start) + 255.0 * abs(step)) + (*walk).padding;
+#else
     let slack = BVH_SLACK * (abs(start) + 255.0 * abs(step));
+#endif
 #if mantissa
     // See bytes: these are the planes of 1 + byte / 256.
     let near_start = (start - 256.0 * step) - slack;

@@ -1,6 +1,12 @@
+#if placed
+// Triangles in the space of their objects, in the order of the leaves of the objects' trees; the
+// world's own are an object, too. triangles[3t + k] is corner k in .xyz; .w of corner 0 is a row of
+// the placement's materials, of corner 1 the light.
+#else
 // The scene's triangles, in the order of the BVH's leaves: a primitive is an index into it.
 // triangles[3p + k] is corner k in .xyz; .w of corner 0 is the instance of a material, of corner 1
 // the light, of corner 2 the medium.
+#endif
 
 struct Triangle {
     a: vec3<f32>,
@@ -8,6 +14,8 @@ struct Triangle {
     c: vec3<f32>
 }
 
+#if placed
+#else
 fn triangle_vertices(primitive: u32) -> Triangle {
     return Triangle(
         bitcast<vec3<f32>>(triangles[3u * primitive].xyz),
@@ -31,6 +39,7 @@ fn primitive_light(primitive: u32) -> u32 {
 fn primitive_medium(primitive: u32) -> u32 {
     return triangles[3u * primitive + 2u].w;
 }
+#endif
 #endif
 
 // The vector area b - a cross c - a, scaled to unit length. Scaling the edges first keeps the

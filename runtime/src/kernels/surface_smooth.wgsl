@@ -3,10 +3,19 @@
 
 fn hit_normal(primitive: u32, uv: vec2<f32>) -> vec3<f32> {
     let geometric = hit_geometric_normal(primitive);
+#if placed
+    let place = place_of(primitive);
+    let row = vertex_normals[place.triangle];
+    let packed = select(row, row.xzyw, is_mirrored(place.placement));
+    let smooth_normal = (1.0 - uv.x - uv.y) * place_normal(place.placement, unpack_normal(packed.x))
+        + uv.x * place_normal(place.placement, unpack_normal(packed.y))
+        + uv.y * place_normal(place.placement, unpack_normal(packed.z));
+#else
     let packed = vertex_normals[primitive];
     let smooth_normal = (1.0 - uv.x - uv.y) * unpack_normal(packed.x)
         + uv.x * unpack_normal(packed.y)
         + uv.y * unpack_normal(packed.z);
+#endif
     // Zero and wild vertex normals leave the hemisphere of the geometric one.
     let usable = packed.w != 0u && dot(smooth_normal, geometric) > 1e-3;
     return normalize(select(geometric, smooth_normal, usable));

@@ -1,18 +1,32 @@
 // Texture coordinates, three pairs a primitive in vertex_uvs.
 
 fn hit_uv(primitive: u32, uv: vec2<f32>) -> vec2<f32> {
+#if placed
+    let corner = corners_of(primitive);
+    let a = vertex_uvs[corner.x];
+    let b = vertex_uvs[corner.y];
+    let c = vertex_uvs[corner.z];
+#else
     let a = vertex_uvs[3u * primitive];
     let b = vertex_uvs[3u * primitive + 1u];
     let c = vertex_uvs[3u * primitive + 2u];
+#endif
     return a + uv.x * (b - a) + uv.y * (c - a);
 }
 
 // Unit direction in which the first texture coordinate grows; zero where there is none.
 fn hit_tangent(primitive: u32) -> vec3<f32> {
     let triangle = triangle_vertices(primitive);
+#if placed
+    let corner = corners_of(primitive);
+    let a = vertex_uvs[corner.x];
+    let duv1 = vertex_uvs[corner.y] - a;
+    let duv2 = vertex_uvs[corner.z] - a;
+#else
     let a = vertex_uvs[3u * primitive];
     let duv1 = vertex_uvs[3u * primitive + 1u] - a;
     let duv2 = vertex_uvs[3u * primitive + 2u] - a;
+#endif
     let determinant = duv1.x * duv2.y - duv1.y * duv2.x;
     let tangent = ((triangle.b - triangle.a) * duv2.y - (triangle.c - triangle.a) * duv1.y)
         * sign(determinant);

@@ -6,7 +6,7 @@ use impasto_compiler::abi::Emission;
 use super::{Context, Kind, Sampled, area, luminance};
 
 pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
-    let mesh = &context.scene.mesh;
+    let mesh = context.mesh;
     let lights: Vec<Sampled> = (0..mesh.len())
         .filter_map(|triangle| {
             let info = context.instances.get(mesh.materials[triangle] as usize)?;

@@ -32,29 +32,32 @@ const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
 pub struct Lights {
     /// `sample_light`, `light_hit` and `light_escape`; needs the surface part.
     pub part: ShaderPart,
-    /// For each triangle of the mesh its index in the light table, or [`NO_LIGHT`].
+    /// For each triangle of the world its index in the light table, or [`NO_LIGHT`].
     pub of_triangle: Vec<u32>,
     /// Can any light be sampled?
     pub has_sampled: bool,
 }
 
 impl Lights {
-    /// The lights of `scene`, whose triangles are stored in `order` and whose bindings compiled
-    /// to `instances` with `media`.
+    /// The lights of `scene`, whose triangles in the world are those of `mesh`, the first
+    /// primitives in `order`, and which reaches from corner to corner of `bounds`. Its bindings
+    /// compiled to `instances` with `media`.
     pub fn build(
         scene: &Scene,
+        mesh: &Mesh,
+        bounds: [Vec3; 2],
         order: &[u32],
         instances: &[InstanceInfo],
         media: &Media,
     ) -> Lights {
-        let context = Context::new(scene, order, instances, media);
+        let context = Context::new(scene, mesh, bounds, order, instances, media);
         let mut kinds = Vec::new();
         let mut count = 0;
         for kind in KINDS {
             kinds.extend(kind(&context, count));
             count = kinds.iter().map(|k| k.lights.len() as u32).sum();
         }
-        let mut of_triangle = vec![NO_LIGHT; scene.mesh.len()];
+        let mut of_triangle = vec![NO_LIGHT; mesh.len()];
         for (index, light) in kinds.iter().flat_map(|k| &k.lights).enumerate() {
             for &triangle in &light.triangles {
                 of_triangle[triangle as usize] = index as u32;
@@ -84,17 +87,20 @@ pub fn check(scene: &Scene, instances: &[InstanceInfo]) -> Result<(), SceneError
 /// What the kinds read.
 struct Context<'a> {
     scene: &'a Scene,
+    mesh: &'a Mesh,
     instances: &'a [InstanceInfo],
     media: &'a Media,
     /// Triangle of the mesh to primitive.
     primitives: Vec<u32>,
-    /// Radius of a sphere around the mesh: what a light at infinity shines on.
+    /// Radius of a sphere around everything: what a light at infinity shines on.
     radius: f64,
 }
 
 impl<'a> Context<'a> {
     fn new(
         scene: &'a Scene,
+        mesh: &'a Mesh,
+        bounds: [Vec3; 2],
         order: &[u32],
         instances: &'a [InstanceInfo],
         media: &'a Media,
@@ -105,10 +111,11 @@ impl<'a> Context<'a> {
         }
         Context {
             scene,
+            mesh,
             instances,
             media,
             primitives,
-            radius: bounding_radius(&scene.mesh),
+            radius: bounding_radius(bounds),
         }
     }
 
@@ -279,9 +286,6 @@ fn area([a, b, c]: [Vec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-fn bounding_radius(mesh: &Mesh) -> f64 {
-    let mut points = mesh.positions.iter().flatten();
-    let first = points.next().copied().unwrap_or_default();
-    let (low, high) = points.fold((first, first), |(l, h), p| (l.min(*p), h.max(*p)));
+fn bounding_radius([low, high]: [Vec3; 2]) -> f64 {
     (0.5 * (high.as_dvec3() - low.as_dvec3()).length()).max(f64::MIN_POSITIVE)
 }

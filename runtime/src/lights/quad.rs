@@ -23,7 +23,7 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
 
 fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
     let of_quad = |light: &Option<u32>| *light == Some(index);
-    let lights = &context.scene.mesh.lights;
+    let lights = &context.mesh.lights;
     let first = lights.iter().position(of_quad)?;
     let area = quad.u.as_dvec3().cross(quad.v.as_dvec3()).length();
     let sides = if quad.two_sided { 2.0 } else { 1.0 };

@@ -101,6 +101,8 @@ pub fn measure(
     progress: &mut dyn FnMut(&Technique),
 ) -> Result<Vec<RayRate>, RuntimeError> {
     check(options)?;
+    // What is measured is one level; two take the same steps.
+    let scene = &*scene.flattened()?;
     let default = Technique::default();
     let reference = Bvh::build(&scene.mesh, default.traversal);
     let caster = Caster::new(gpu, scene, &reference, &default)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::diag::nearest;
 
-use super::description::{CameraMedium, GeometrySpec, MaterialSpec, ParamSpec};
+use super::description::{MaterialName, MaterialSpec, ParamSpec};
 use super::document::list;
 use super::{MaterialBinding, SceneError};
 
@@ -42,16 +42,17 @@ impl<'d> Bindings<'d> {
         }
     }
 
-    /// Indices of the materials of one geometry entry, for each name its OBJ file uses.
+    /// Indices of the materials of an OBJ file's faces, for each name it uses; those of
+    /// `override_by` for all, if it is given.
     pub(super) fn resolve(
         &mut self,
         path: &Path,
-        geometry: &GeometrySpec,
+        override_by: Option<&MaterialName>,
         names: &[String],
         library: &Library,
     ) -> Result<Vec<u32>, SceneError> {
-        let specs = match &geometry.material {
-            Some(name) => vec![self.overriding(name, geometry)?; names.len()],
+        let specs = match override_by {
+            Some(material) => vec![self.overriding(material)?; names.len()],
             None => self.of_names(path, names)?,
         };
         if let Some(missing) = &library.missing {
@@ -69,12 +70,12 @@ impl<'d> Bindings<'d> {
     }
 
     /// Indices of the materials that the camera is in. Nothing else need use them.
-    pub(super) fn of_camera(&mut self, media: &[CameraMedium]) -> Result<Vec<u32>, SceneError> {
-        let index = |medium: &CameraMedium| match self.find(&medium.name) {
+    pub(super) fn of_camera(&mut self, media: &[MaterialName]) -> Result<Vec<u32>, SceneError> {
+        let index = |medium: &MaterialName| match self.find(&medium.name) {
             Some(spec) => Ok(self.instantiate(spec, &medium.name, &Library::default())),
             None => {
                 let hint = self.suggestion(&medium.name);
-                Err(medium.no_such_material.clone().hint(hint))
+                Err(medium.missing.clone().hint(hint))
             }
         };
         media.iter().map(index).collect()
@@ -94,13 +95,14 @@ impl<'d> Bindings<'d> {
         self.specs.iter().position(|spec| spec.name == name)
     }
 
-    fn overriding(&self, name: &str, geometry: &GeometrySpec) -> Result<usize, SceneError> {
-        if let Some(spec) = self.find(name) {
-            return Ok(spec);
-        }
-        let error = geometry.no_such_material.clone();
-        let error = error.unwrap_or_else(|| SceneError::new(format!("no material `{name}`")));
-        Err(error.hint(self.suggestion(name)))
+    fn overriding(&self, material: &MaterialName) -> Result<usize, SceneError> {
+        let error = || {
+            material
+                .missing
+                .clone()
+                .hint(self.suggestion(&material.name))
+        };
+        self.find(&material.name).ok_or_else(error)
     }
 
     fn of_names(&self, path: &Path, names: &[String]) -> Result<Vec<usize>, SceneError> {

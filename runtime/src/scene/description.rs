@@ -6,7 +6,10 @@ use toml::de::DeValue;
 
 use super::document::{Document, Table, Value, numbers};
 use super::mtl::MtlValue;
-use super::{Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, SceneError};
+use super::placements::{self, PlacesSpec};
+use super::{
+    Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, SceneError, Transform,
+};
 use crate::media::MAX_NESTED;
 
 /// Pixels a side of the largest film.
@@ -18,7 +21,7 @@ pub(super) struct Description {
     pub(super) name: Option<String>,
     pub(super) camera: Camera,
     /// Materials whose interiors the camera is in, outermost first.
-    pub(super) camera_media: Vec<CameraMedium>,
+    pub(super) camera_media: Vec<MaterialName>,
     pub(super) film: FilmSettings,
     pub(super) integrator: Integrator,
     pub(super) geometry: Vec<GeometrySpec>,
@@ -27,24 +30,24 @@ pub(super) struct Description {
     pub(super) environment: Option<EnvironmentSpec>,
 }
 
-/// A material that the camera is in.
-pub(super) struct CameraMedium {
+/// The name of a material where something uses it.
+#[derive(Clone)]
+pub(super) struct MaterialName {
     pub(super) name: String,
     /// The error for a material of that name that does not exist, without hint.
-    pub(super) no_such_material: SceneError,
+    pub(super) missing: SceneError,
 }
 
 /// A `[[geometry]]` entry.
 pub(super) struct GeometrySpec {
     pub(super) obj: String,
-    pub(super) scale: f32,
-    /// Turns about the x, the y and the z axis, in this order, in degrees.
-    pub(super) rotate: Vec3,
-    pub(super) translate: Vec3,
+    /// From the OBJ file to where its places count from.
+    pub(super) transform: Transform,
     /// Material of all its faces, whatever the file says.
-    pub(super) material: Option<String>,
-    /// The error for a material of that name that does not exist, without hint.
-    pub(super) no_such_material: Option<SceneError>,
+    pub(super) material: Option<MaterialName>,
+    pub(super) places: PlacesSpec,
+    /// Is it stored once for all of its places? Decided by size if not said.
+    pub(super) share: Option<bool>,
 }
 
 /// A `[materials.NAME]` entry.
@@ -99,7 +102,7 @@ impl Description {
     }
 }
 
-fn camera(root: &mut Table) -> Result<(Camera, Vec<CameraMedium>), SceneError> {
+fn camera(root: &mut Table) -> Result<(Camera, Vec<MaterialName>), SceneError> {
     let hint = "add a [camera] table with `position`, `look_at` and `fov`";
     let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
     let mut table = value.table("[camera]")?;
@@ -138,7 +141,7 @@ fn camera(root: &mut Table) -> Result<(Camera, Vec<CameraMedium>), SceneError> {
 }
 
 /// One name, or several from the outermost medium inwards.
-fn camera_media(value: &Value) -> Result<Vec<CameraMedium>, SceneError> {
+fn camera_media(value: &Value) -> Result<Vec<MaterialName>, SceneError> {
     let expected = format!("the name of a material, or an array of at most {MAX_NESTED}");
     let names: Option<Vec<&str>> = match value.item() {
         DeValue::Array(items) => items.iter().map(|i| i.get_ref().as_str()).collect(),
@@ -146,9 +149,9 @@ fn camera_media(value: &Value) -> Result<Vec<CameraMedium>, SceneError> {
     };
     let names = names.filter(|names| names.len() <= MAX_NESTED);
     let names = names.ok_or_else(|| value.mismatch(&expected))?;
-    let medium = |name: &str| CameraMedium {
+    let medium = |name: &str| MaterialName {
         name: name.to_owned(),
-        no_such_material: value.error(format!("no material is called `{name}`")),
+        missing: value.error(format!("no material is called `{name}`")),
     };
     Ok(names.into_iter().map(medium).collect())
 }
@@ -192,24 +195,18 @@ fn geometry(root: &mut Table) -> Result<Vec<GeometrySpec>, SceneError> {
     let Some(value) = root.get("geometry") else {
         return Ok(Vec::new());
     };
+    let named = |v: &Value| -> Result<Option<MaterialName>, SceneError> {
+        let name = v.string()?.to_owned();
+        let missing = v.error(format!("no material is called `{name}`"));
+        Ok(Some(MaterialName { name, missing }))
+    };
     let entry = |mut table: Table| {
-        let positive = |v: &Value| v.float_where("a number above 0", |v| v > 0.0);
-        let material = table.get("material");
-        let missing = |v: &Value| {
-            let message = v
-                .string()
-                .map(|name| format!("no material is called `{name}`"));
-            message.map(|m| v.error(m))
-        };
         let spec = GeometrySpec {
             obj: table.require("obj")?.string()?.to_owned(),
-            scale: optional(&mut table, "scale", positive, 1.0)?,
-            rotate: optional(&mut table, "rotate", Value::vector, Vec3::ZERO)?,
-            translate: optional(&mut table, "translate", Value::vector, Vec3::ZERO)?,
-            no_such_material: material.as_ref().map(missing).transpose()?,
-            material: material
-                .map(|v| v.string().map(str::to_owned))
-                .transpose()?,
+            transform: placements::transform(&mut table)?,
+            material: optional(&mut table, "material", named, None)?,
+            places: placements::places(&mut table)?,
+            share: optional(&mut table, "share", |v| v.boolean().map(Some), None)?,
         };
         table.finish()?;
         Ok(spec)
@@ -376,7 +373,7 @@ fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> 
 }
 
 /// The value of an optional key as `read` reads it, or `default`.
-fn optional<'d, T>(
+pub(super) fn optional<'d, T>(
     table: &mut Table<'d>,
     key: &'static str,
     read: impl Fn(&Value<'d>) -> Result<T, SceneError>,

@@ -207,8 +207,7 @@ impl<'d> Value<'d> {
 
     /// Three finite numbers.
     pub(super) fn vector(&self) -> Result<Vec3, SceneError> {
-        let vector = numbers(self.item()).and_then(|v| <[f32; 3]>::try_from(v).ok());
-        let vector = vector.ok_or_else(|| self.mismatch("three finite numbers, as [x, y, z]"))?;
+        let vector: [f32; 3] = self.array("three finite numbers, as [x, y, z]")?;
         Ok(vector.into())
     }
 
@@ -233,15 +232,29 @@ impl<'d> Value<'d> {
     /// The tables of `[[name]]`.
     pub(super) fn tables(&self, name: &str) -> Result<Vec<Table<'d>>, SceneError> {
         let expected = format!("a list of tables: write [[{name}]]");
+        self.list_of_tables(&format!("[[{name}]]"), &expected)
+    }
+
+    /// The tables of a list, each of which errors call `name`.
+    pub(super) fn list_of_tables(
+        &self,
+        name: &str,
+        expected: &str,
+    ) -> Result<Vec<Table<'d>>, SceneError> {
         let list = self.item().as_array();
-        let list = list.ok_or_else(|| self.mismatch(&expected))?;
+        let list = list.ok_or_else(|| self.mismatch(expected))?;
         let table = |item: &'d Spanned<DeValue<'d>>| {
             let entries = item.get_ref().as_table();
-            let entries = entries.ok_or_else(|| self.mismatch(&expected))?;
-            let name = format!("[[{name}]]");
+            let entries = entries.ok_or_else(|| self.mismatch(expected))?;
             Ok(Table::at(self.document, name, item.span(), entries))
         };
         list.iter().map(table).collect()
+    }
+
+    /// `N` finite numbers.
+    pub(super) fn array<const N: usize>(&self, expected: &str) -> Result<[f32; N], SceneError> {
+        let array = numbers(self.item()).and_then(|v| v.try_into().ok());
+        array.ok_or_else(|| self.mismatch(expected))
     }
 }
 

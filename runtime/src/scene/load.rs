@@ -6,15 +6,12 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bindings::{Bindings, Library};
+use super::assemble::assemble;
+use super::bindings::Library;
 use super::description::{Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec};
 use super::document::Document;
-use super::mesh::Oddities;
 use super::obj::{self, Obj};
-use super::{
-    Environment, EnvironmentMap, EnvironmentSource, Light, MaterialBinding, Mesh, Scene,
-    SceneError, mtl,
-};
+use super::{Environment, EnvironmentMap, EnvironmentSource, Scene, SceneError, mtl};
 use crate::image_file;
 
 /// Texels of the largest environment map.
@@ -34,7 +31,9 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let description = Description::read(&Document::new(path, &text))?;
     let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let mut warnings = Vec::new();
-    let (mesh, materials, camera_media) = geometry(path, &base, &description, &mut warnings)?;
+    let sources = load_sources(&base, &description.geometry)?;
+    let assembled = assemble(path, &base, &description, &sources, &mut warnings)?;
+    drop(sources);
     let environment = description.environment.as_ref();
     let environment = environment
         .map(|e| load_environment(e, &base, &mut warnings))
@@ -43,11 +42,13 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         name: description.name.unwrap_or_else(|| default_name(path)),
         base,
         camera: description.camera,
-        camera_media,
+        camera_media: assembled.camera_media,
         film: description.film,
         integrator: description.integrator,
-        mesh,
-        materials,
+        mesh: assembled.mesh,
+        objects: assembled.objects,
+        placements: assembled.placements,
+        materials: assembled.materials,
         lights: description.lights,
         environment,
         warnings,
@@ -62,41 +63,10 @@ fn default_name(path: &Path) -> String {
 }
 
 /// An OBJ file with its MTL values.
-struct Source {
-    path: PathBuf,
-    obj: Obj,
-    library: Library,
-}
-
-/// The triangles, the materials they use, and those that the camera is in.
-fn geometry(
-    path: &Path,
-    base: &Path,
-    description: &Description,
-    warnings: &mut Vec<String>,
-) -> Result<(Mesh, Vec<MaterialBinding>, Vec<u32>), SceneError> {
-    let sources = load_sources(base, &description.geometry)?;
-    let mut bindings = Bindings::new(&description.materials);
-    let mut mesh = Mesh::default();
-    for spec in &description.geometry {
-        let source = &sources[&spec.obj];
-        let materials =
-            bindings.resolve(&source.path, spec, &source.obj.materials, &source.library)?;
-        let oddities = mesh.push_obj(&source.path, &source.obj, spec, &materials)?;
-        warnings.extend(geometry_warnings(&spec.obj, source, oddities));
-    }
-    for (index, light) in description.lights.iter().enumerate() {
-        if let Light::Quad(quad) = light {
-            mesh.push_quad(quad, index as u32);
-        }
-    }
-    if mesh.is_empty() {
-        let error = SceneError::in_file(path, "the scene has no geometry");
-        return Err(error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`"));
-    }
-    mesh.simplify();
-    let camera_media = bindings.of_camera(&description.camera_media)?;
-    Ok((mesh, bindings.finish(warnings), camera_media))
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    pub(super) obj: Obj,
+    pub(super) library: Library,
 }
 
 /// Every OBJ file that entries name, read once, by the name they use.
@@ -138,28 +108,6 @@ fn load_library(base: &Path, name: &str, obj: &Obj) -> Library {
         }
     }
     library
-}
-
-fn geometry_warnings(name: &str, source: &Source, oddities: Oddities) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let mut counted = |what: &str, count: usize| {
-        if count > 0 {
-            warnings.push(format!("{name}: {what}: {count}"));
-        }
-    };
-    counted("triangles without area, left out", oddities.without_area);
-    counted(
-        "triangles wound against their normals, turned over",
-        oddities.turned,
-    );
-    counted(
-        "faces of fewer than three corners, left out",
-        source.obj.thin_faces,
-    );
-    if let Some(missing) = &source.library.missing {
-        warnings.push(format!("{}; no material needs it", missing.clone()));
-    }
-    warnings
 }
 
 fn load_environment(

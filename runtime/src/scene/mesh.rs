@@ -1,20 +1,19 @@
-//! The triangles of a scene, in world space.
+//! Lists of triangles: those of a scene in world space, and those of an object in its own.
 
 use std::path::Path;
 
-use glam::{DMat3, DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
-use super::description::GeometrySpec;
 use super::obj::{Obj, ObjTriangle};
-use super::{QuadLight, SceneError};
+use super::{QuadLight, SceneError, Transform};
 
 /// Material of a triangle that has none: the geometry of a quad light.
 pub const NO_MATERIAL: u32 = u32::MAX;
 
 /// Largest coordinate in metres: products of three still fit a float.
-const MAX_COORDINATE: f32 = 1e12;
+pub(super) const MAX_COORDINATE: f32 = 1e12;
 
-/// Every triangle of a scene, one entry a triangle in each list.
+/// Triangles, one entry a triangle in each list.
 ///
 /// Vertices are counter-clockwise seen from outside, which defines the geometric normal.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,7 +25,8 @@ pub struct Mesh {
     pub normals: Vec<Option<[Vec3; 3]>>,
     /// Texture coordinates of the corners. Empty if no triangle has them.
     pub uvs: Vec<[Vec2; 3]>,
-    /// Index into [`super::Scene::materials`], or [`NO_MATERIAL`].
+    /// Index into [`super::Scene::materials`], or [`NO_MATERIAL`]; of an object, an index into
+    /// [`super::Placement::materials`].
     pub materials: Vec<u32>,
     /// Index into [`super::Scene::lights`] of the quad light it belongs to.
     pub lights: Vec<Option<u32>>,
@@ -70,11 +70,10 @@ impl Mesh {
             [corner, corner + u, opposite],
             [corner, opposite, corner + v],
         ] {
-            self.positions.push(positions);
-            self.normals.push(None);
-            self.uvs.push([Vec2::ZERO; 3]);
-            self.materials.push(NO_MATERIAL);
-            self.lights.push(Some(index));
+            self.push(positions, None, [Vec2::ZERO; 3], NO_MATERIAL);
+            if let Some(light) = self.lights.last_mut() {
+                *light = Some(index);
+            }
         }
     }
 
@@ -83,43 +82,127 @@ impl Mesh {
         &mut self,
         path: &Path,
         obj: &Obj,
-        spec: &GeometrySpec,
+        transform: &Transform,
         materials: &[u32],
     ) -> Result<Oddities, SceneError> {
-        let transform = Transform::new(spec);
         let mut oddities = Oddities::default();
+        let mirrored = transform.is_mirrored();
         for triangle in &obj.triangles {
-            let mut positions = triangle.positions.map(|p| transform.point(p));
-            let largest = positions
-                .iter()
-                .map(|p| p.abs().max_element())
-                .fold(0.0, f32::max);
-            if largest > MAX_COORDINATE {
-                let message = format!("the geometry reaches {largest:e} m from the origin");
-                return Err(SceneError::in_file(path, message).hint(format!(
-                    "coordinates may go up to {MAX_COORDINATE:e}; see `scale`"
-                )));
-            }
+            let positions = triangle.positions.map(|p| transform.point(p));
+            check_range(path, &positions)?;
             if !has_area(&positions) {
                 oddities.without_area += 1;
                 continue;
             }
-            let mut normals = vertex_normals(triangle, &transform);
-            let mut uvs = triangle.uvs.unwrap_or_default();
-            if normals.is_some_and(|n| faces_away(&positions, &n)) {
-                positions.swap(1, 2);
-                uvs.swap(1, 2);
-                normals.iter_mut().for_each(|n| n.swap(1, 2));
+            let normals = vertex_normals(triangle, transform);
+            let uvs = triangle.uvs.unwrap_or_default();
+            self.push(positions, normals, uvs, materials[triangle.material]);
+            if mirrored {
+                self.turn_last();
+            }
+            if self.is_last_against_its_normals() {
+                self.turn_last();
                 oddities.turned += 1;
             }
-            self.positions.push(positions);
-            self.normals.push(normals);
-            self.uvs.push(uvs);
-            self.materials.push(materials[triangle.material]);
-            self.lights.push(None);
         }
         Ok(oddities)
     }
+
+    /// Adds a copy of the triangles of `object` that `keep` keeps, with its materials looked up
+    /// in `materials`.
+    pub(super) fn push_copy(
+        &mut self,
+        object: &Mesh,
+        keep: impl Fn(usize) -> bool,
+        transform: &Transform,
+        materials: &[u32],
+    ) {
+        let mirrored = transform.is_mirrored();
+        for triangle in (0..object.len()).filter(|t| keep(*t)) {
+            let positions = object.positions[triangle].map(|p| transform.point(p));
+            if !has_area(&positions) {
+                continue;
+            }
+            let normals = object.normals.get(triangle).copied().flatten();
+            let normals = normals.map(|n| n.map(|n| transform.normal(n)));
+            let uvs = object.uvs.get(triangle).copied().unwrap_or_default();
+            let material = materials[object.materials[triangle] as usize];
+            self.push(positions, normals, uvs, material);
+            if mirrored {
+                self.turn_last();
+            }
+        }
+    }
+
+    fn push(
+        &mut self,
+        positions: [Vec3; 3],
+        normals: Option<[Vec3; 3]>,
+        uvs: [Vec2; 3],
+        material: u32,
+    ) {
+        self.positions.push(positions);
+        self.normals.push(normals);
+        self.uvs.push(uvs);
+        self.materials.push(material);
+        self.lights.push(None);
+    }
+
+    /// Makes the other side of the last triangle the outside.
+    fn turn_last(&mut self) {
+        if let Some(corners) = self.positions.last_mut() {
+            corners.swap(1, 2);
+        }
+        if let Some(corners) = self.uvs.last_mut() {
+            corners.swap(1, 2);
+        }
+        if let Some(Some(corners)) = self.normals.last_mut() {
+            corners.swap(1, 2);
+        }
+    }
+
+    /// Do the normals of the last triangle say that its inside is out?
+    fn is_last_against_its_normals(&self) -> bool {
+        match (self.positions.last(), self.normals.last()) {
+            (Some(corners), Some(Some(normals))) => faces_away(corners, normals),
+            _ => false,
+        }
+    }
+
+    /// The triangles that `keep` keeps.
+    pub(super) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Mesh {
+        let kept: Vec<usize> = (0..self.len()).filter(|t| keep(*t)).collect();
+        fn pick<T: Clone>(list: &[T], kept: &[usize]) -> Vec<T> {
+            kept.iter().filter_map(|&t| list.get(t).cloned()).collect()
+        }
+        let mut mesh = Mesh {
+            positions: pick(&self.positions, &kept),
+            normals: pick(&self.normals, &kept),
+            uvs: pick(&self.uvs, &kept),
+            materials: pick(&self.materials, &kept),
+            lights: pick(&self.lights, &kept),
+        };
+        mesh.simplify();
+        mesh
+    }
+
+    /// The lists that say nothing, made to say it for each triangle.
+    pub(super) fn spell_out(&mut self) {
+        self.normals.resize(self.len(), None);
+        self.uvs.resize(self.len(), [Vec2::ZERO; 3]);
+    }
+}
+
+fn check_range(path: &Path, positions: &[Vec3; 3]) -> Result<(), SceneError> {
+    let largest = positions.iter().map(|p| p.abs().max_element());
+    let largest = largest.fold(0.0, f32::max);
+    if largest <= MAX_COORDINATE {
+        return Ok(());
+    }
+    let message = format!("the geometry reaches {largest:e} m from the origin");
+    Err(SceneError::in_file(path, message).hint(format!(
+        "coordinates may go up to {MAX_COORDINATE:e}; see `scale`"
+    )))
 }
 
 /// What was strange about the triangles of a file.
@@ -146,40 +229,6 @@ fn faces_away([a, b, c]: &[Vec3; 3], normals: &[Vec3; 3]) -> bool {
 
 /// Unit vertex normals in world space, if the triangle has three that are not zero.
 fn vertex_normals(triangle: &ObjTriangle, transform: &Transform) -> Option<[Vec3; 3]> {
-    let normals = triangle.normals?.map(|n| transform.direction(n));
+    let normals = triangle.normals?.map(|n| transform.normal(n));
     normals.iter().all(|n| *n != Vec3::ZERO).then_some(normals)
-}
-
-/// Scale, then turns about x, y and z, then translation.
-struct Transform {
-    rotation: DMat3,
-    scale: f64,
-    translation: DVec3,
-}
-
-impl Transform {
-    fn new(spec: &GeometrySpec) -> Self {
-        let [x, y, z] = spec
-            .rotate
-            .to_array()
-            .map(|degrees| f64::from(degrees).to_radians());
-        let turns = [
-            DMat3::from_rotation_z(z),
-            DMat3::from_rotation_y(y),
-            DMat3::from_rotation_x(x),
-        ];
-        Transform {
-            rotation: turns[0] * turns[1] * turns[2],
-            scale: f64::from(spec.scale),
-            translation: spec.translate.as_dvec3(),
-        }
-    }
-
-    fn point(&self, p: Vec3) -> Vec3 {
-        (self.rotation * (self.scale * p.as_dvec3()) + self.translation).as_vec3()
-    }
-
-    fn direction(&self, d: Vec3) -> Vec3 {
-        (self.rotation * d.as_dvec3()).normalize_or_zero().as_vec3()
-    }
 }

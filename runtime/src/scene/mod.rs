@@ -4,9 +4,11 @@
 //! of the file format.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::Vec3;
 
+mod assemble;
 mod bindings;
 mod description;
 mod document;
@@ -16,12 +18,19 @@ mod mesh;
 mod mtl;
 mod obj;
 mod parts;
+mod placed;
+mod placements;
+mod split;
 pub mod surface;
+mod transform;
 
 pub use error::SceneError;
 pub use load::load;
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use parts::SceneParts;
+pub use placed::Placed;
+pub use split::{GeometryCounts, Split};
+pub use transform::Transform;
 
 /// Everything a scene file names, loaded and checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,8 +48,12 @@ pub struct Scene {
     pub film: FilmSettings,
     /// How long paths get.
     pub integrator: Integrator,
-    /// The triangles, those of quad lights included.
+    /// The triangles that are not part of an object, those of quad lights included.
     pub mesh: Mesh,
+    /// Meshes that are stored once and placed any number of times.
+    pub objects: Vec<Object>,
+    /// Where the objects are.
+    pub placements: Vec<Placement>,
     /// The materials that triangles use, in order of first use.
     pub materials: Vec<MaterialBinding>,
     /// Quad and distant lights in the order of the file.
@@ -49,6 +62,26 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Oddities that do not keep it from being rendered, for people to read.
     pub warnings: Vec<String>,
+}
+
+/// A mesh in coordinates of its own, shared by all of its placements.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// The OBJ file, as the scene names it.
+    pub name: String,
+    /// Its triangles; their materials are indices into [`Placement::materials`].
+    pub mesh: Mesh,
+}
+
+/// One occurrence of an object. (An *instance* is something else: a material with parameters.)
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placement {
+    /// Index into [`Scene::objects`].
+    pub object: u32,
+    /// From the object's space to the world. It can be undone.
+    pub transform: Transform,
+    /// For each material of the object an index into [`Scene::materials`].
+    pub materials: Arc<[u32]>,
 }
 
 /// A thin-lens camera.

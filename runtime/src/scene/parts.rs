@@ -13,12 +13,12 @@ use glam::Vec3;
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 
 use super::surface::{geometry_part, surface_part};
-use super::{Scene, SceneError};
+use super::{GeometryCounts, Placed, Scene, SceneError, Split};
 use crate::bvh::Bvh;
 use crate::lights::Lights;
 use crate::media::Media;
 use crate::shader_part::ShaderPart;
-use crate::technique::Technique;
+use crate::technique::{Stack, Technique};
 use crate::texture;
 
 /// Everything a kernel may include to read the scene.
@@ -43,6 +43,8 @@ pub struct SceneParts {
     /// Can any light be sampled? If not, no shadow ray is worth casting
     /// (`HAS_SAMPLED_LIGHTS` in WGSL).
     pub has_sampled_lights: bool,
+    /// How many triangles there are, for the report.
+    pub counts: GeometryCounts,
 }
 
 impl SceneParts {
@@ -56,24 +58,53 @@ impl SceneParts {
         technique: &Technique,
     ) -> Result<SceneParts, SceneError> {
         let texture = texture::part(textures, &scene.base)?;
-        let bvh = Bvh::build(&scene.mesh, technique.traversal);
         let media = Media::build(materials, instances, &scene.camera_media)?;
-        let lights = Lights::build(scene, bvh.order(), instances, &media);
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
+        let split = Split::new(scene, instances, technique.copies)?;
+        let lights = |order: &[u32]| {
+            Lights::build(scene, &split.world, split.bounds, order, instances, &media)
+        };
+        let (geometry, bvh, surface, lights) = if split.placements.is_empty() {
+            let mesh = &*split.world;
+            let bvh = Bvh::build(mesh, technique.traversal);
+            let lights = lights(bvh.order());
+            let of_triangle = &lights.of_triangle;
+            (
+                geometry_part(mesh, bvh.order(), of_triangle, &media.of_instance),
+                bvh.part(technique),
+                surface_part(mesh, bvh.order(), reads_uv),
+                lights,
+            )
+        } else {
+            check_stack(technique.stack)?;
+            let placed = Placed::build(&split, instances.len(), technique.traversal)?;
+            let lights = lights(placed.world_order());
+            (
+                placed.geometry_part(&lights.of_triangle, &media.of_instance),
+                placed.levels().part(technique),
+                placed.surface_part(reads_uv),
+                lights,
+            )
+        };
         Ok(SceneParts {
-            geometry: geometry_part(
-                &scene.mesh,
-                bvh.order(),
-                &lights.of_triangle,
-                &media.of_instance,
-            ),
-            bvh: bvh.part(technique),
-            bounds: scene.mesh.bounds(),
-            surface: surface_part(&scene.mesh, bvh.order(), reads_uv),
+            geometry,
+            bvh,
+            surface,
+            bounds: split.bounds,
             lights: lights.part,
+            has_sampled_lights: lights.has_sampled,
+            counts: split.counts(),
             media,
             texture,
-            has_sampled_lights: lights.has_sampled,
         })
     }
+}
+
+/// A trail says where a ray is in one tree, not in two.
+fn check_stack(stack: Stack) -> Result<(), SceneError> {
+    if stack != Stack::Trail {
+        return Ok(());
+    }
+    let message = "objects that are placed cannot be rendered without a stack (`--stack trail`)";
+    Err(SceneError::new(message).hint("choose another stack, or copy objects with `--copies flat`"))
 }

@@ -45,44 +45,51 @@ pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) 
 /// Texture coordinates are left out unless `reads_uv`. Needs the geometry part.
 pub fn surface_part(mesh: &Mesh, order: &[u32], reads_uv: bool) -> ShaderPart {
     let mut part = ShaderPart {
-        wgsl: offset_constants(mesh) + include_str!("../kernels/surface.wgsl"),
+        wgsl: offset_constants(mesh.bounds()) + include_str!("../kernels/surface.wgsl"),
         buffers: Vec::new(),
     };
     if mesh.normals.is_empty() {
         part.wgsl += include_str!("../kernels/surface_flat.wgsl");
     } else {
-        part.wgsl += include_str!("../kernels/surface_smooth.wgsl");
+        part.wgsl += &preprocess(include_str!("../kernels/surface_smooth.wgsl"), &[]);
         part.buffers.push(normals_buffer(mesh, order));
     }
     if mesh.uvs.is_empty() || !reads_uv {
         part.wgsl += include_str!("../kernels/surface_no_uv.wgsl");
     } else {
-        part.wgsl += include_str!("../kernels/surface_uv.wgsl");
+        part.wgsl += &preprocess(include_str!("../kernels/surface_uv.wgsl"), &[]);
         part.buffers.push(uvs_buffer(mesh, order));
     }
     part
 }
 
-fn offset_constants(mesh: &Mesh) -> String {
-    let corners = mesh.positions.iter().flatten();
-    let largest = corners.fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+/// What `offset_origin` moves rays by, in a scene between two corners.
+pub(super) fn offset_constants([low, high]: [Vec3; 2]) -> String {
+    let largest = low.abs().max(high.abs()).max_element();
     // The floor is positive even for a scene that is all zeros, so that it is an offset.
     let floor = (largest * OFFSET_FLOOR).max(f32::MIN_POSITIVE);
     wgsl::constant_f32("ORIGIN_OFFSET", OFFSET) + &wgsl::constant_f32("ORIGIN_OFFSET_FLOOR", floor)
 }
 
 fn normals_buffer(mesh: &Mesh, order: &[u32]) -> BufferData {
-    let pack = |&index: &u32| match mesh.normals[index as usize] {
-        Some([a, b, c]) => [pack_normal(a), pack_normal(b), pack_normal(c), 1],
-        None => [0; 4],
-    };
-    let rows: Vec<[u32; 4]> = order.iter().map(pack).collect();
+    let rows = order
+        .iter()
+        .map(|&i| pack_normals(mesh.normals[i as usize]));
+    let rows: Vec<[u32; 4]> = rows.collect();
     BufferData::new("vertex_normals", "array<vec4<u32>>", &rows)
 }
 
 fn uvs_buffer(mesh: &Mesh, order: &[u32]) -> BufferData {
     let rows: Vec<[Vec2; 3]> = order.iter().map(|&i| mesh.uvs[i as usize]).collect();
     BufferData::new("vertex_uvs", "array<vec2<f32>>", &rows)
+}
+
+/// Three vertex normals, and whether there are any.
+pub(super) fn pack_normals(normals: Option<[Vec3; 3]>) -> [u32; 4] {
+    match normals {
+        Some([a, b, c]) => [pack_normal(a), pack_normal(b), pack_normal(c), 1],
+        None => [0; 4],
+    }
 }
 
 /// Octahedral coordinates in two signed 16-bit fractions; see `unpack_normal` in WGSL.

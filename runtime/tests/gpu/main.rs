@@ -13,6 +13,7 @@ mod lights;
 mod media;
 mod ops;
 mod passes;
+mod placed;
 mod planes;
 mod plans;
 mod random;

@@ -7,7 +7,7 @@ use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::media::Media;
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
-use impasto_runtime::scene::{Camera, SceneParts};
+use impasto_runtime::scene::{Camera, GeometryCounts, SceneParts};
 use impasto_runtime::shader_part::{BufferData, ShaderPart};
 use impasto_runtime::world::{MaterialSource, World};
 use std::ops::ControlFlow;
@@ -290,8 +290,8 @@ impl Planes {
                 media,
                 texture: None,
                 has_sampled_lights: self.light != Light::None,
+                counts: GeometryCounts::default(),
             },
-            triangles: 0,
         }
     }
 }

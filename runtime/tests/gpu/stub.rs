@@ -11,7 +11,7 @@ use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::media::Media;
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
-use impasto_runtime::scene::{Camera, SceneParts};
+use impasto_runtime::scene::{Camera, GeometryCounts, SceneParts};
 use impasto_runtime::shader_part::{BufferData, ShaderPart};
 use impasto_runtime::world::{MaterialSource, World};
 
@@ -394,8 +394,8 @@ impl Room {
                 media: Media::default(),
                 texture: None,
                 has_sampled_lights: self.strategies != Strategies::Scattering,
+                counts: GeometryCounts::default(),
             },
-            triangles: 0,
         }
     }
 }

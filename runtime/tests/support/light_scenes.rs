@@ -34,6 +34,8 @@ pub(crate) fn dark_scene() -> Scene {
             roulette_start: 1,
         },
         mesh: Mesh::default(),
+        objects: Vec::new(),
+        placements: Vec::new(),
         materials: Vec::new(),
         lights: Vec::new(),
         environment: None,

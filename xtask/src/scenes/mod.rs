@@ -11,6 +11,7 @@ mod city;
 mod conference;
 mod cornell;
 mod crossover;
+mod forest;
 mod glasses;
 mod image_file;
 mod mesh;
@@ -35,8 +36,8 @@ use obj::MtlEntry;
 /// Arguments of `cargo xtask scenes`.
 #[derive(clap::Args, Debug)]
 pub(crate) struct ScenesArgs {
-    /// What to generate: cornell, carpaint, city, conference, glasses, materials_preview,
-    /// swatches, crossover, textures
+    /// What to generate: cornell, carpaint, city, conference, forest, glasses,
+    /// materials_preview, swatches, crossover, textures
     /// [default: all of them]
     names: Vec<String>,
     /// Folder that takes the place of the repository's root
@@ -56,7 +57,7 @@ struct Recipe {
     generate: fn() -> Result<Vec<GeneratedFile>, String>,
 }
 
-const RECIPES: [Recipe; 9] = [
+const RECIPES: [Recipe; 10] = [
     Recipe {
         name: "cornell",
         generate: || {
@@ -81,6 +82,10 @@ const RECIPES: [Recipe; 9] = [
             let folder = "examples/conference/generated";
             Ok(model_files(folder, "conference", &conference::build()))
         },
+    },
+    Recipe {
+        name: "forest",
+        generate: forest_files,
     },
     Recipe {
         name: "glasses",
@@ -190,6 +195,23 @@ fn swatches_files() -> Vec<GeneratedFile> {
         bytes: swatches::scene(swatches::BALLS),
     });
     files
+}
+
+fn forest_files() -> Result<Vec<GeneratedFile>, String> {
+    let folder = "examples/forest/generated";
+    let models = forest::models();
+    let mut files: Vec<GeneratedFile> = models
+        .iter()
+        .flat_map(|(name, model)| model_files(folder, name, model))
+        .collect();
+    for (name, bytes) in forest::placements() {
+        let path = format!("{folder}/{name}.txt");
+        files.push(GeneratedFile { path, bytes });
+    }
+    let path = format!("{folder}/sky.hdr");
+    let bytes = sky::sky()?;
+    files.push(GeneratedFile { path, bytes });
+    Ok(files)
 }
 
 fn city_files() -> Result<Vec<GeneratedFile>, String> {

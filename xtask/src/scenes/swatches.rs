@@ -166,17 +166,16 @@ fn color(index: usize, out: f64) -> [f64; 3] {
 /// The scene of `count` balls.
 pub(crate) fn scene(count: usize) -> Vec<u8> {
     let mut out = HEAD.to_owned();
-    out += "geometry = [\n  { obj = \"stage.obj\" },\n";
+    out += "geometry = [\n  { obj = \"stage.obj\" },\n  { obj = \"ball.obj\", placements = [\n";
     for i in 0..count {
         let Seed { center, radius, .. } = seed(i, count);
         let [x, y, z] = center.to_array();
         let _ = writeln!(
             out,
-            "  {{ obj = \"ball.obj\", scale = {radius:.5}, translate = [{x:.4}, {y:.4}, {z:.4}], \
-             material = \"b{i:03}\" }},"
+            "    {{ scale = {radius:.5}, translate = [{x:.4}, {y:.4}, {z:.4}], material = \"b{i:03}\" }},"
         );
     }
-    out += "]\n\n[materials]\n";
+    out += "  ] },\n]\n\n[materials]\n";
     out += "stage = { file = \"../../materials/matte.impasto\", params.albedo = [0.30, 0.28, 0.25] }\n";
     for i in 0..count {
         // A Fibonacci number of arms would make them straight; ten of them swirl.

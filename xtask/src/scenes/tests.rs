@@ -7,8 +7,9 @@ use std::sync::LazyLock;
 use super::check::{defects, is_closed, pieces, signed_volume};
 use super::*;
 
-static MODELS: LazyLock<[(&str, Model); 10]> = LazyLock::new(|| {
-    [
+static MODELS: LazyLock<Vec<(&str, Model)>> = LazyLock::new(|| {
+    let mut models = forest::models();
+    models.extend([
         ("cornell", cornell::build()),
         ("carpaint", carpaint::build()),
         ("city", city::build()),
@@ -19,7 +20,8 @@ static MODELS: LazyLock<[(&str, Model); 10]> = LazyLock::new(|| {
         ("swatches' stage", swatches::stage()),
         ("crossover", crossover::ball()),
         ("crossover's panel", crossover::panel()),
-    ]
+    ]);
+    models
 });
 
 fn model(name: &str) -> &'static Model {
@@ -104,9 +106,10 @@ fn files_are_the_same_bytes_everywhere() {
         ("carpaint", 0x23de_92b5_453e_c6ff),
         ("city", 0x1892_751e_7868_db51),
         ("conference", 0xd5c0_9aa4_7ee3_579d),
+        ("forest", 0xb6c5_568a_301d_dbbf),
         ("glasses", 0xe15b_2cd8_f4c2_4a97),
         ("materials_preview", 0x71ca_6aa9_bf62_72ff),
-        ("swatches", 0xc4b6_a67a_64f1_22dd),
+        ("swatches", 0x796a_4e01_0c1d_c438),
         ("crossover", 0x3344_8263_48ef_db90),
         ("textures", 0x0cdf_4d4d_b6dd_e235),
     ];

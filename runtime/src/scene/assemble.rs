@@ -1,0 +1,286 @@
+//! From entries and OBJ files to what a scene consists of: triangles in the world, and objects
+//! with their placements. Both give the same picture; this file decides which is which.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::bindings::Bindings;
+use super::description::{Description, GeometrySpec};
+use super::load::Source;
+use super::mesh::{MAX_COORDINATE, Oddities};
+use super::placements::{self, Places, PlacesSpec};
+use super::split::MAX_TRIANGLES;
+use super::{Light, MaterialBinding, Mesh, Object, Placement, SceneError, Transform};
+
+/// Copies of an OBJ file are shared if that saves so many triangles. Below, one level of
+/// hierarchy is faster than two, and memory no concern.
+const SHARE_FROM: usize = 1 << 16;
+
+/// What the `[[geometry]]` and `[[lights]]` of a scene come to.
+pub(super) struct Assembled {
+    pub(super) mesh: Mesh,
+    pub(super) objects: Vec<Object>,
+    pub(super) placements: Vec<Placement>,
+    pub(super) materials: Vec<MaterialBinding>,
+    pub(super) camera_media: Vec<u32>,
+}
+
+/// Puts together what `description` of the scene at `path` says of `sources`, by the names that
+/// its entries use.
+pub(super) fn assemble(
+    path: &Path,
+    base: &Path,
+    description: &Description,
+    sources: &BTreeMap<String, Source>,
+    warnings: &mut Vec<String>,
+) -> Result<Assembled, SceneError> {
+    let files = place_files(base, &description.geometry)?;
+    let entries: Vec<Entry> = description
+        .geometry
+        .iter()
+        .zip(&files)
+        .map(|(spec, file)| Entry {
+            spec,
+            source: &sources[&spec.obj],
+            places: match (&spec.places, file) {
+                (PlacesSpec::Listed(places), _) | (_, Some(places)) => places,
+                (PlacesSpec::File(_), None) => &NOWHERE,
+            },
+        })
+        .collect();
+    let mut assembly = Assembly {
+        path,
+        bindings: Bindings::new(&description.materials),
+        copies: copies(&entries),
+        mesh: Mesh::default(),
+        objects: Vec::new(),
+        placements: Vec::new(),
+        warnings,
+    };
+    for entry in &entries {
+        assembly.push(entry)?;
+    }
+    for (index, light) in description.lights.iter().enumerate() {
+        if let Light::Quad(quad) = light {
+            assembly.mesh.push_quad(quad, index as u32);
+        }
+    }
+    assembly.finish(description)
+}
+
+/// The places of entries that name a file of them.
+fn place_files(base: &Path, geometry: &[GeometrySpec]) -> Result<Vec<Option<Places>>, SceneError> {
+    let read = |spec: &GeometrySpec| match &spec.places {
+        PlacesSpec::File(name) => placements::read_file(&base.join(name)).map(Some),
+        PlacesSpec::Listed(_) => Ok(None),
+    };
+    geometry.iter().map(read).collect()
+}
+
+static NOWHERE: Places = Places {
+    list: Vec::new(),
+    materials: Vec::new(),
+};
+
+/// An entry with the files that it names.
+struct Entry<'d> {
+    spec: &'d GeometrySpec,
+    source: &'d Source,
+    places: &'d Places,
+}
+
+/// How often each OBJ file is placed by entries that leave the choice to us.
+fn copies<'d>(entries: &[Entry<'d>]) -> BTreeMap<&'d str, usize> {
+    let mut copies = BTreeMap::new();
+    for entry in entries.iter().filter(|e| e.spec.share.is_none()) {
+        *copies.entry(entry.spec.obj.as_str()).or_default() += entry.places.list.len();
+    }
+    copies
+}
+
+/// A scene that grows by entries.
+struct Assembly<'d, 'w> {
+    path: &'d Path,
+    bindings: Bindings<'d>,
+    copies: BTreeMap<&'d str, usize>,
+    mesh: Mesh,
+    objects: Vec<Object>,
+    placements: Vec<Placement>,
+    warnings: &'w mut Vec<String>,
+}
+
+impl<'d> Assembly<'d, '_> {
+    fn push(&mut self, entry: &Entry<'d>) -> Result<(), SceneError> {
+        let materials = self.materials(entry)?;
+        let oddities = match self.is_shared(entry) {
+            true => self.place(entry, &materials)?,
+            false => self.copy(entry, &materials)?,
+        };
+        self.warn(entry, oddities);
+        if self.stored() > MAX_TRIANGLES {
+            return Err(too_many_triangles(self.path));
+        }
+        Ok(())
+    }
+
+    fn is_shared(&self, entry: &Entry) -> bool {
+        let copies = self.copies.get(entry.spec.obj.as_str()).copied();
+        let saved = copies.unwrap_or(0).saturating_sub(1) as u64;
+        let triangles = entry.source.obj.triangles.len() as u64;
+        let is_worth_it = saved * triangles >= SHARE_FROM as u64;
+        entry.spec.share.unwrap_or(is_worth_it)
+    }
+
+    fn stored(&self) -> usize {
+        let objects = self.objects.iter().map(|o| o.mesh.len());
+        self.mesh.len() + objects.sum::<usize>()
+    }
+
+    /// The materials of each place.
+    fn materials(&mut self, entry: &Entry) -> Result<Vec<Arc<[u32]>>, SceneError> {
+        let Entry {
+            spec,
+            source,
+            places,
+        } = entry;
+        let mut known: BTreeMap<Option<usize>, Arc<[u32]>> = BTreeMap::new();
+        let mut each = Vec::with_capacity(places.list.len());
+        for place in &places.list {
+            if let Some(list) = known.get(&place.material) {
+                each.push(Arc::clone(list));
+                continue;
+            }
+            let own = place.material.map(|index| &places.materials[index]);
+            let name = own.or(spec.material.as_ref());
+            let (path, obj) = (&source.path, &source.obj);
+            let list = self
+                .bindings
+                .resolve(path, name, &obj.materials, &source.library)?;
+            let list: Arc<[u32]> = list.into();
+            known.insert(place.material, Arc::clone(&list));
+            each.push(list);
+        }
+        Ok(each)
+    }
+
+    /// Adds the triangles of every place to those in the world.
+    fn copy(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Oddities, SceneError> {
+        let Source { path, obj, .. } = entry.source;
+        let copies = entry.places.list.len();
+        let total = (copies as u64).saturating_mul(obj.triangles.len() as u64);
+        if total > MAX_TRIANGLES as u64 {
+            return Err(too_many_triangles(self.path));
+        }
+        let mut oddities = Oddities::default();
+        for (place, materials) in entry.places.list.iter().zip(materials) {
+            let transform = self.transform(entry, &place.transform)?;
+            let found = self.mesh.push_obj(path, obj, &transform, materials)?;
+            oddities.without_area += found.without_area;
+            oddities.turned += found.turned;
+        }
+        Ok(oddities)
+    }
+
+    /// Places the entry's object.
+    fn place(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Oddities, SceneError> {
+        let (object, oddities) = self.object(entry)?;
+        if self.placements.len() + materials.len() > placements::MAX_PLACEMENTS {
+            return Err(placements::too_many(self.path));
+        }
+        let mesh = &self.objects[object as usize].mesh;
+        if mesh.is_empty() {
+            return Ok(oddities);
+        }
+        let corners = mesh.positions.iter().flatten();
+        let largest = corners.fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+        for (place, materials) in entry.places.list.iter().zip(materials) {
+            let transform = self.transform(entry, &place.transform)?;
+            let columns = transform.matrix.abs();
+            let reach = columns * glam::DVec3::splat(largest.into()) + transform.translation.abs();
+            if reach.max_element() > f64::from(MAX_COORDINATE) {
+                let reach = reach.max_element() as f32;
+                let message = format!("the geometry reaches {reach:e} m from the origin");
+                let hint = format!("coordinates may go up to {MAX_COORDINATE:e}; see `scale`");
+                return Err(SceneError::in_file(&entry.source.path, message).hint(hint));
+            }
+            self.placements.push(Placement {
+                object,
+                transform,
+                materials: Arc::clone(materials),
+            });
+        }
+        Ok(oddities)
+    }
+
+    /// The object of the entry's OBJ file, and what is strange about it if it is new.
+    fn object(&mut self, entry: &Entry) -> Result<(u32, Oddities), SceneError> {
+        let name = &entry.spec.obj;
+        if let Some(known) = self.objects.iter().position(|o| o.name == *name) {
+            return Ok((known as u32, Oddities::default()));
+        }
+        let Source { path, obj, .. } = entry.source;
+        let slots: Vec<u32> = (0..obj.materials.len() as u32).collect();
+        let mut mesh = Mesh::default();
+        let oddities = mesh.push_obj(path, obj, &Transform::default(), &slots)?;
+        mesh.simplify();
+        let name = name.clone();
+        self.objects.push(Object { name, mesh });
+        Ok((self.objects.len() as u32 - 1, oddities))
+    }
+
+    /// From the OBJ file to the world.
+    fn transform(&self, entry: &Entry, place: &Transform) -> Result<Transform, SceneError> {
+        let transform = entry.spec.transform.then(place);
+        if transform.is_invertible() {
+            return Ok(transform);
+        }
+        let obj = &entry.spec.obj;
+        let message = format!("the transforms of `{obj}` and of its placement flatten it together");
+        Err(SceneError::in_file(self.path, message).hint("scale less unevenly"))
+    }
+
+    fn warn(&mut self, entry: &Entry, oddities: Oddities) {
+        let Entry { spec, source, .. } = entry;
+        let mut counted = |what: &str, count: usize| {
+            if count > 0 {
+                self.warnings.push(format!("{}: {what}: {count}", spec.obj));
+            }
+        };
+        counted("triangles without area, left out", oddities.without_area);
+        counted(
+            "triangles wound against their normals, turned over",
+            oddities.turned,
+        );
+        counted(
+            "faces of fewer than three corners, left out",
+            source.obj.thin_faces,
+        );
+        if let Some(missing) = &source.library.missing {
+            let warning = format!("{}; no material needs it", missing.clone());
+            self.warnings.push(warning);
+        }
+    }
+
+    fn finish(mut self, description: &Description) -> Result<Assembled, SceneError> {
+        if self.mesh.is_empty() && self.placements.is_empty() {
+            let error = SceneError::in_file(self.path, "the scene has no geometry");
+            return Err(error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`"));
+        }
+        self.mesh.simplify();
+        let camera_media = self.bindings.of_camera(&description.camera_media)?;
+        Ok(Assembled {
+            mesh: self.mesh,
+            objects: self.objects,
+            placements: self.placements,
+            materials: self.bindings.finish(self.warnings),
+            camera_media,
+        })
+    }
+}
+
+fn too_many_triangles(path: &Path) -> SceneError {
+    let message = format!("the scene stores more than {MAX_TRIANGLES} triangles");
+    SceneError::in_file(path, message)
+        .hint("copies of one OBJ file are stored once unless `share = false` says otherwise")
+}
