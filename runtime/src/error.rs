@@ -110,6 +110,16 @@ pub enum RuntimeError {
     },
 }
 
+impl RuntimeError {
+    /// With another hint, where a limit is too small.
+    pub(crate) fn with_hint(mut self, better: &'static str) -> Self {
+        if let Self::LimitTooSmall { hint, .. } = &mut self {
+            *hint = better;
+        }
+        self
+    }
+}
+
 fn no_adapter(wanted: Option<&str>, found: &[String]) -> String {
     match wanted {
         Some(wanted) if !found.is_empty() => format!(

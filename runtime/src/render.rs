@@ -549,11 +549,12 @@ fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeE
         return refuse("samples", "0".into(), "at least 1 sample a pixel");
     }
     if options.first_sample.checked_add(options.samples).is_none() {
-        let last = u64::from(options.first_sample) + u64::from(options.samples);
+        // The largest word stands for all samples of a pixel (kernels/random).
+        let last = u64::from(options.first_sample) + u64::from(options.samples) - 1;
         return refuse(
             "the last sample's index",
             last.to_string(),
-            "less than 2^32",
+            "at most 2^32 - 2",
         );
     }
     if options.pool == Some(0) {

@@ -7,6 +7,7 @@
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
 
 use crate::camera::CameraFrame;
+use crate::lights;
 use crate::scene::{Scene, SceneError, SceneParts};
 use crate::technique::Technique;
 
@@ -37,6 +38,7 @@ impl World {
         textures: &[TextureRef],
         technique: &Technique,
     ) -> Result<Self, SceneError> {
+        lights::check(scene, instances)?;
         let (width, height) = (scene.film.width, scene.film.height);
         Ok(Self {
             width,

@@ -6,5 +6,6 @@ mod cost;
 mod emit_check;
 mod eval;
 mod film;
+mod limits;
 mod rays;
 mod render;

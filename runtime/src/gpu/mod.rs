@@ -110,6 +110,13 @@ impl Gpu {
         self.adapter.get_info().subgroup_max_size
     }
 
+    /// Gives the device up as a driver does that a kernel takes too long: all that is asked of it
+    /// from now on fails. So that one can test what a render says then, and what it leaves.
+    #[doc(hidden)]
+    pub fn lose(&self) {
+        self.device.destroy();
+    }
+
     /// The first error since the device was opened, if there was any.
     pub(crate) fn check(&self) -> Result<(), RuntimeError> {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

@@ -10,6 +10,8 @@ mod film;
 mod furnace;
 mod info;
 mod lights;
+mod lost;
+mod many_lights;
 mod media;
 mod ops;
 mod passes;
