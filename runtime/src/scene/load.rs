@@ -79,10 +79,9 @@ fn no_triangle(path: &Path, names_none: bool) -> SceneError {
         let error = SceneError::in_file(path, "the scene has no geometry");
         return error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`");
     }
-    let error = SceneError::in_file(path, "no triangle of the scene has an area");
-    error.hint(
-        "all corners of each face lie on a line, in a point, or too near for single precision",
-    )
+    let message = "the scene has no geometry: no face of its OBJ files has an area";
+    let hint = "all corners of a face lie on a line, or too near for single precision";
+    SceneError::in_file(path, message).hint(hint)
 }
 
 /// The triangles, the materials they use, and those that the camera is in.
