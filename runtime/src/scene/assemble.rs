@@ -264,8 +264,7 @@ impl<'d> Assembly<'d, '_> {
 
     fn finish(mut self, description: &Description) -> Result<Assembled, SceneError> {
         if self.mesh.is_empty() && self.placements.is_empty() {
-            let error = SceneError::in_file(self.path, "the scene has no geometry");
-            return Err(error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`"));
+            return Err(no_triangle(self.path, description.geometry.is_empty()));
         }
         self.mesh.simplify();
         let camera_media = self.bindings.of_camera(&description.camera_media)?;
@@ -283,4 +282,15 @@ fn too_many_triangles(path: &Path) -> SceneError {
     let message = format!("the scene stores more than {MAX_TRIANGLES} triangles");
     SceneError::in_file(path, message)
         .hint("copies of one OBJ file are stored once unless `share = false` says otherwise")
+}
+
+/// A scene of nothing, because it names no geometry or because that has no extent.
+fn no_triangle(path: &Path, names_none: bool) -> SceneError {
+    if names_none {
+        let error = SceneError::in_file(path, "the scene has no geometry");
+        return error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`");
+    }
+    let message = "the scene has no geometry: no face of its OBJ files has an area";
+    let hint = "all corners of a face lie on a line, or too near for single precision";
+    SceneError::in_file(path, message).hint(hint)
 }

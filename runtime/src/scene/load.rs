@@ -67,51 +67,6 @@ pub(super) struct Source {
     pub(super) path: PathBuf,
     pub(super) obj: Obj,
     pub(super) library: Library,
-struct Source {
-    path: PathBuf,
-    obj: Obj,
-    library: Library,
-}
-
-/// A scene of nothing, because it names no geometry or because that has no extent.
-fn no_triangle(path: &Path, names_none: bool) -> SceneError {
-    if names_none {
-        let error = SceneError::in_file(path, "the scene has no geometry");
-        return error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`");
-    }
-    let message = "the scene has no geometry: no face of its OBJ files has an area";
-    let hint = "all corners of a face lie on a line, or too near for single precision";
-    SceneError::in_file(path, message).hint(hint)
-}
-
-/// The triangles, the materials they use, and those that the camera is in.
-fn geometry(
-    path: &Path,
-    base: &Path,
-    description: &Description,
-    warnings: &mut Vec<String>,
-) -> Result<(Mesh, Vec<MaterialBinding>, Vec<u32>), SceneError> {
-    let sources = load_sources(base, &description.geometry)?;
-    let mut bindings = Bindings::new(&description.materials);
-    let mut mesh = Mesh::default();
-    for spec in &description.geometry {
-        let source = &sources[&spec.obj];
-        let materials =
-            bindings.resolve(&source.path, spec, &source.obj.materials, &source.library)?;
-        let oddities = mesh.push_obj(&source.path, &source.obj, spec, &materials)?;
-        warnings.extend(geometry_warnings(&spec.obj, source, oddities));
-    }
-    for (index, light) in description.lights.iter().enumerate() {
-        if let Light::Quad(quad) = light {
-            mesh.push_quad(quad, index as u32);
-        }
-    }
-    if mesh.is_empty() {
-        return Err(no_triangle(path, description.geometry.is_empty()));
-    }
-    mesh.simplify();
-    let camera_media = bindings.of_camera(&description.camera_media)?;
-    Ok((mesh, bindings.finish(warnings), camera_media))
 }
 
 /// Every OBJ file that entries name, read once, by the name they use.
