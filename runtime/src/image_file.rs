@@ -1,8 +1,13 @@
 //! Image files, decoded to linear floats.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use image::{DynamicImage, ImageError, ImageReader, Limits};
+use image::codecs::hdr::HdrDecoder;
+use image::{
+    DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits,
+};
 
 use crate::scene::SceneError;
 
@@ -25,14 +30,25 @@ pub(crate) struct Picture {
 /// is used as it is.
 pub(crate) fn load(path: &Path, what: &str, is_color: bool) -> Result<Picture, SceneError> {
     let error = |message: String| SceneError::in_file(path, message);
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    let mut reader = reader.map_err(|e| error(format!("cannot read the {what}: {e}")))?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_DECODE_BYTES);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|e| decode_error(path, what, &e))?;
+    let unreadable = |e: std::io::Error| error(format!("cannot read the {what}: {e}"));
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let decoded = if file.fill_buf().map_err(unreadable)?.starts_with(b"#?RGBE") {
+        decode_rgbe(file, limits)
+    } else {
+        let mut reader = ImageReader::new(file);
+        // What the contents do not tell, the name may.
+        if let Ok(format) = ImageFormat::from_path(path) {
+            reader.set_format(format);
+        }
+        let mut reader = reader.with_guessed_format().map_err(unreadable)?;
+        reader.limits(limits);
+        reader.decode()
+    };
+    let image = decoded.map_err(|e| decode_error(path, what, &e))?;
     if image.width() == 0 || image.height() == 0 {
         return Err(error(format!("the {what} has no texels")));
     }
@@ -41,6 +57,14 @@ pub(crate) fn load(path: &Path, what: &str, is_color: bool) -> Result<Picture, S
         height: image.height(),
         texels: linear_texels(image, is_color),
     })
+}
+
+/// Radiance HDR as many programs begin it, after the example of Ward's own code: `#?RGBE` in place of
+/// `#?RADIANCE`.
+fn decode_rgbe(file: BufReader<File>, limits: Limits) -> ImageResult<DynamicImage> {
+    let mut decoder = HdrDecoder::new_nonstrict(file)?;
+    decoder.set_limits(limits)?;
+    DynamicImage::from_decoder(decoder)
 }
 
 fn decode_error(path: &Path, what: &str, cause: &ImageError) -> SceneError {
@@ -99,5 +123,27 @@ fn srgb_to_linear(encoded: f64) -> f64 {
         encoded / 12.92
     } else {
         ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_beginnings_of_radiance_files_are_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for start in ["#?RADIANCE", "#?RGBE"] {
+            let mut bytes = format!("{start}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").into_bytes();
+            bytes.extend([128, 64, 0, 129, 0, 0, 128, 130]);
+            let path = folder.path().join("p.hdr");
+            std::fs::write(&path, bytes).expect("it is written");
+            let picture = load(&path, "picture", true).expect(start);
+            assert_eq!((picture.width, picture.height), (2, 1));
+            assert_eq!(picture.texels[0][..3], [1.0, 0.5, 0.0]);
+            assert_eq!(picture.texels[1][..3], [0.0, 0.0, 2.0]);
+            std::fs::write(&path, start).expect("it is written");
+            assert!(load(&path, "picture", true).is_err(), "{start} alone");
+        }
     }
 }

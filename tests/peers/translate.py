@@ -1,0 +1,267 @@
+"""An Impasto scene as a dictionary that Mitsuba loads. What differs is named by `NEAREST`."""
+
+import tempfile
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+
+from geometry import load_obj, transformed, write_ply
+from impasto import Impasto, bound_material, load_mtl
+
+NEAREST = """Materials become their lobes at one point, seen from 37 degrees: patterns, noise and
+flakes are constant, a picture on a diffuse lobe is kept. Lobes that lie over each other become a
+`blendbsdf` by their shares. Blinn-Phong lobes become rough conductors of the same width."""
+
+
+def translate(scene: dict, impasto: Impasto, size: tuple[int, int] | None = None) -> dict:
+    """The dictionary of a scene from `impasto.load_scene`; meshes are written to a temporary
+    folder that lives as long as the dictionary."""
+    folder = tempfile.TemporaryDirectory(prefix="impasto-peer-")
+    width, height = size or (scene["film"]["width"], scene["film"]["height"])
+    out = {
+        "type": "scene",
+        "integrator": {
+            "type": "path",
+            "max_depth": scene["integrator"]["max_depth"],
+            "rr_depth": scene["integrator"]["roulette_start"],
+        },
+        "sensor": camera(scene["camera"], width, height),
+    }
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for number, (mesh, material) in enumerate(meshes(scene, impasto)):
+        low = np.minimum(low, mesh.positions.min(axis=(0, 1)))
+        high = np.maximum(high, mesh.positions.max(axis=(0, 1)))
+        path = Path(folder.name) / f"{number}.ply"
+        write_ply(mesh, path)
+        shape = {"type": "ply", "filename": str(path), "face_normals": mesh.normals is None}
+        shape["bsdf"] = bsdf(material, scene)
+        if material["emission"] is not None and max(material["emission"]) > 0:
+            shape["emitter"] = {"type": "area", "radiance": rgb(material["emission"])}
+        out[f"mesh_{number}"] = shape
+    reach = float(np.linalg.norm(high - low))
+    for number, light in enumerate(scene.get("lights", [])):
+        out |= {f"light_{number}_{i}": s for i, s in enumerate(lights(light, 0.5 * (low + high), reach))}
+    if "environment" in scene:
+        out["environment"] = environment(scene["environment"], scene["base"])
+    # Mitsuba reads the files when the dictionary is loaded.
+    out["_folder"] = folder
+    return out
+
+
+def load(dictionary: dict) -> "mi.Scene":
+    """The scene of a dictionary from `translate`."""
+    return mi.load_dict({k: v for k, v in dictionary.items() if not k.startswith("_")})
+
+
+def meshes(scene: dict, impasto: Impasto):
+    """Every mesh of a scene: triangles in world space, and the material that is bound to them."""
+    loaded: dict[Path, tuple] = {}
+    for spec in scene["geometry"]:
+        path = scene["base"] / spec["obj"]
+        if path not in loaded:
+            parts, libraries = load_obj(path)
+            mtl = {}
+            for library in libraries:
+                mtl |= load_mtl(library)
+            loaded[path] = (parts, mtl)
+        parts, mtl = loaded[path]
+        for part, mesh in parts.items():
+            name = spec.get("material", part.split("\0")[0])
+            yield transformed(mesh, spec), bound_material(scene, name, mtl, impasto)
+
+
+def rgb(value) -> dict:
+    return {"type": "rgb", "value": [float(x) for x in value]}
+
+
+# ---- Camera and lights -----------------------------------------------------------------------
+
+
+def camera(spec: dict, width: int, height: int) -> dict:
+    transform = mi.ScalarTransform4f().look_at(
+        origin=spec["position"], target=spec["look_at"], up=spec.get("up", [0, 1, 0])
+    )
+    distance = float(np.linalg.norm(np.subtract(spec["look_at"], spec["position"])))
+    out = {
+        "type": "perspective",
+        "fov": spec["fov"],
+        "fov_axis": "y",
+        "to_world": transform,
+        "near_clip": 1e-4 * distance,
+        "far_clip": 1e5 * distance,
+        "film": {
+            "type": "hdrfilm",
+            "width": width,
+            "height": height,
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": "box"},
+        },
+        "sampler": {"type": "independent"},
+    }
+    if spec.get("aperture", 0) > 0:
+        out["type"] = "thinlens"
+        out["aperture_radius"] = 0.5 * spec["aperture"]
+        out["focus_distance"] = spec.get("focus", distance)
+    return out
+
+
+def colour(value) -> list[float]:
+    return [float(value)] * 3 if isinstance(value, (int, float)) else [float(x) for x in value]
+
+
+def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
+    """The shapes and emitters of a light; `center` and `reach` are of the geometry."""
+    if spec["kind"] == "quad":
+        u, v = np.array(spec["u"], float), np.array(spec["v"], float)
+        corner = np.array(spec["corner"], float)
+        sides = [(u, v)] + ([(v, u)] if spec.get("two_sided") else [])
+        return [rectangle(corner, a, b, colour(spec["radiance"])) for a, b in sides]
+    to_light = np.array(spec["to_light"], float)
+    to_light /= np.linalg.norm(to_light)
+    irradiance = np.array(colour(spec["irradiance"]))
+    angle = np.radians(spec.get("angle", 0.0))
+    if angle == 0:
+        return [{"type": "directional", "direction": (-to_light).tolist(), "irradiance": rgb(irradiance)}]
+    # A disc of the same size, so far away that its rays are all but parallel.
+    distance = 1000.0 * reach
+    place = center + distance * to_light
+    up = [1, 0, 0] if abs(to_light[1]) > 0.9 else [0, 1, 0]
+    transform = mi.ScalarTransform4f().look_at(origin=place.tolist(), target=center.tolist(), up=up)
+    transform = transform @ mi.ScalarTransform4f().scale(float(distance * np.tan(0.5 * angle)))
+    radiance = irradiance / (np.pi * np.sin(0.5 * angle) ** 2)
+    return [
+        {
+            "type": "disk",
+            "to_world": transform,
+            "bsdf": {"type": "diffuse", "reflectance": rgb([0, 0, 0])},
+            "emitter": {"type": "area", "radiance": rgb(radiance)},
+        }
+    ]
+
+
+def rectangle(corner: np.ndarray, u: np.ndarray, v: np.ndarray, radiance: list[float]) -> dict:
+    matrix = np.eye(4)
+    normal = np.cross(u, v)
+    matrix[:3, 0], matrix[:3, 1] = 0.5 * u, 0.5 * v
+    matrix[:3, 2], matrix[:3, 3] = normal / np.linalg.norm(normal), corner + 0.5 * (u + v)
+    return {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f(matrix.tolist()),
+        "bsdf": {"type": "diffuse", "reflectance": rgb([0, 0, 0])},
+        "emitter": {"type": "area", "radiance": rgb(radiance)},
+    }
+
+
+def environment(spec: dict, base: Path) -> dict:
+    scale = np.array(colour(spec.get("scale", 1.0)))
+    if "file" not in spec:
+        return {"type": "constant", "radiance": rgb(np.array(colour(spec["color"])) * scale)}
+    bitmap = mi.Bitmap(str(base / spec["file"]))
+    bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
+    texels = resampled(np.array(bitmap) * scale)
+    # Mitsuba's left edge, and Impasto's middle, is -z.
+    turn = mi.ScalarTransform4f().rotate([0, 1, 0], 180.0 + spec.get("rotate", 0.0))
+    return {"type": "envmap", "bitmap": mi.Bitmap(texels.astype(np.float32)), "to_world": turn}
+
+
+def resampled(texels: np.ndarray) -> np.ndarray:
+    """A lat-long picture with texels where Mitsuba has them: at whole steps from the left edge, and
+    from pole to pole. Small pictures get more of them, so that bilinear lookups agree."""
+    height, width = texels.shape[:2]
+    factor = max(1, 1024 // width)
+    rows = np.arange(factor * height + 1) / factor - 0.5
+    columns = np.arange(factor * width) / factor - 0.5
+    top, left = np.floor(rows).astype(int), np.floor(columns).astype(int)
+    a, b = (rows - top)[:, None, None], (columns - left)[None, :, None]
+    y0, y1 = np.clip(top, 0, height - 1)[:, None], np.clip(top + 1, 0, height - 1)[:, None]
+    x0, x1 = (left % width)[None], ((left + 1) % width)[None]
+    upper = texels[y0, x0] * (1 - b) + texels[y0, x1] * b
+    lower = texels[y1, x0] * (1 - b) + texels[y1, x1] * b
+    return upper * (1 - a) + lower * a
+
+
+# ---- Materials -------------------------------------------------------------------------------
+
+
+def bsdf(material: dict, scene: dict) -> dict:
+    """The nearest BSDF of a material from `Impasto.material`."""
+    lobes = [(lobe, share(lobe)) for lobe in material["lobes"]]
+    lobes = [(lobe, s) for lobe, s in lobes if s > 1e-4]
+    if not lobes:
+        return {"type": "diffuse", "reflectance": rgb([0, 0, 0])}
+    for lobe, _ in lobes:
+        if lobe["bsdf"] in TRANSMISSIVE:
+            return plain(lobe, np.ones(3), material, scene)
+    total = sum(s for _, s in lobes)
+    result, covered = None, 0.0
+    for lobe, s in lobes:
+        color = np.array(lobe["weight"]) * np.array(lobe["albedo"]) * total / s
+        color = color / np.maximum(np.array(lobe["albedo"]), 1e-6)
+        one = plain(lobe, color, material, scene)
+        if one["type"] == "conductor" and len(lobes) > 1:
+            # Blends with a discrete part are biased in Mitsuba 3.9: README.md has the numbers.
+            one |= {"type": "roughconductor", "distribution": "ggx", "alpha": NEARLY_SMOOTH}
+        covered += s
+        if result is None:
+            result = one
+        else:
+            result = {"type": "blendbsdf", "weight": s / covered, "bsdf_0": result, "bsdf_1": one}
+    return {"type": "twosided", "nested": result}
+
+
+def share(lobe: dict) -> float:
+    return float(np.max(np.array(lobe["weight"]) * np.array(lobe["albedo"])))
+
+
+NEARLY_SMOOTH = 0.01
+"""The alpha of mirrors that are part of a blend."""
+
+TRANSMISSIVE = {"smooth_dielectric", "dielectric"}
+
+
+def plain(lobe: dict, color: np.ndarray, material: dict, scene: dict) -> dict:
+    """One lobe, whose light is multiplied by `color`."""
+    kind = lobe["bsdf"]
+    given = {a["name"]: a["value"] for a in lobe["arguments"]}
+    if kind in ("smooth_dielectric", "dielectric"):
+        out = {"type": "dielectric", "int_ior": given["ior"], "ext_ior": 1.0}
+        if "tint" in given:
+            out["specular_transmittance"] = rgb(given["tint"])
+        if kind == "dielectric" and given["roughness"] > 0:
+            out |= {"type": "roughdielectric", "distribution": "ggx", "alpha": given["roughness"] ** 2}
+        return out
+    if kind in ("conductor", "single_conductor"):
+        return {
+            "type": "roughconductor",
+            "distribution": "ggx",
+            "alpha": given["roughness"] ** 2,
+            "eta": rgb(given["ior"]),
+            "k": rgb(given["extinction"]),
+            "specular_reflectance": rgb(np.minimum(color, 1.0)),
+        }
+    albedo = np.minimum(color * np.array(lobe["albedo"]), 1.0)
+    if kind in ("specular", "mirror", "smooth_conductor"):
+        return {"type": "conductor", "material": "none", "specular_reflectance": rgb(albedo)}
+    if kind in ("blinn_phong", "metal", "generalized_schlick"):
+        alpha = np.sqrt(2.0 / (given["exponent"] + 2.0)) if "exponent" in given else given["roughness"] ** 2
+        return {
+            "type": "roughconductor",
+            "distribution": "beckmann" if "exponent" in given else "ggx",
+            "material": "none",
+            "alpha": float(alpha),
+            "specular_reflectance": rgb(albedo),
+        }
+    return {"type": "diffuse", "reflectance": picture(material, scene) or rgb(albedo)}
+
+
+def picture(material: dict, scene: dict) -> dict | None:
+    """The picture of a material that reads exactly one."""
+    paths = [v for v in material["parameters"].values() if isinstance(v, str)]
+    if len(paths) != 1:
+        return None
+    for base in (scene["base"], Path(material["file"]).parent):
+        if (base / paths[0]).is_file():
+            return {"type": "bitmap", "filename": str(base / paths[0]), "wrap_mode": "repeat"}
+    return None
