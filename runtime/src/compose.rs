@@ -34,7 +34,7 @@ pub(crate) enum Access {
 }
 
 /// The runtime's own buffers: name, type, access.
-pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 7] = [
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 11] = [
     ("run", "Run", Access::Uniform),
     ("state", "array<vec4<u32>>", Access::ReadWrite),
     ("queues", "array<u32>", Access::ReadWrite),
@@ -42,6 +42,10 @@ pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 7] = [
     ("film", "array<atomic<u32>>", Access::ReadWrite),
     ("arguments", "array<u32>", Access::ReadWrite),
     ("bins", "array<atomic<u32>>", Access::ReadWrite),
+    ("extension_rays", "array<vec4<u32>>", Access::ReadWrite),
+    ("extension_hits", "array<vec4<u32>>", Access::ReadWrite),
+    ("shadow_rays", "array<vec4<u32>>", Access::ReadWrite),
+    ("shadow_results", "array<u32>", Access::ReadWrite),
 ];
 
 /// Members of the uniform `run`, the settings that do not change a kernel's text.
@@ -91,7 +95,7 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 8] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 9] {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
@@ -107,6 +111,7 @@ impl Composer<'_> {
             ),
             ("absorption", needs.absorption),
             ("overlap", needs.overlap),
+            ("requests", needs.requests),
             ("fetched", self.fetches(stage)),
             ("varying_emission", needs.varying_emission),
         ]

@@ -7,7 +7,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::error::RuntimeError;
 use crate::queues::{Counters, Queues};
 use crate::state::{self, Needs};
-use crate::technique::{RayOrder, Technique};
+use crate::technique::{RayData, RayOrder, Technique};
 use crate::world::World;
 
 /// The layout of one plan.
@@ -34,6 +34,9 @@ impl Layout {
         let wavefront = plan.organisation == Organisation::Wavefront;
         let mut needs = needs(world, materials);
         needs.order = wavefront && technique.ray_order != RayOrder::Queue;
+        // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
+        needs.requests =
+            wavefront && technique.ray_data == RayData::Requests && !needs.order && !needs.overlap;
         let queued = plan.kernels.iter().filter(|k| k.form != Form::Inline);
         let queues = Queues {
             materials: queued.count(),
@@ -53,6 +56,15 @@ impl Layout {
         })
     }
 
+    /// The technique as this layout has it: not every scene allows for each.
+    pub(crate) fn technique(&self, asked: Technique) -> Technique {
+        let ray_data = match self.needs.requests {
+            true => RayData::Requests,
+            false => RayData::Slots,
+        };
+        Technique { ray_data, ..asked }
+    }
+
     /// Words that the queues take for each slot of the pool.
     pub(crate) fn queue_words(&self) -> u64 {
         match self.wavefront {
@@ -61,7 +73,32 @@ impl Layout {
         }
     }
 
-    /// Bytes of path state in memory; a megakernel has it in registers.
+    /// Bytes of the buffers of rays and their results for a path, by the buffer's name.
+    pub(crate) fn ray_bytes(&self, buffer: &str) -> u64 {
+        let shadows = self.needs.requests && self.needs.shadow_rays;
+        match buffer {
+            "extension_rays" if self.needs.requests => 32,
+            "extension_hits" if self.needs.requests => 16,
+            "shadow_rays" if shadows => 32,
+            "shadow_results" if shadows => 4,
+            _ => 0,
+        }
+    }
+
+    /// Bytes of memory for a path: its state, and its rays where they are apart from it; a
+    /// megakernel has it in registers.
+    pub(crate) fn memory(&self) -> u64 {
+        let buffers = [
+            "extension_rays",
+            "extension_hits",
+            "shadow_rays",
+            "shadow_results",
+        ];
+        let rays: u64 = buffers.iter().map(|name| self.ray_bytes(name)).sum();
+        self.path_bytes() + rays
+    }
+
+    /// Bytes of the state of a path in memory.
     pub(crate) fn path_bytes(&self) -> u64 {
         if self.wavefront {
             state::path_bytes(self.needs)
@@ -83,6 +120,7 @@ fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
         overlap: media.overlap,
         varying_emission: materials.iter().any(|m| m.varying_emission),
         order: false,
+        requests: false,
     }
 }
 

@@ -157,7 +157,10 @@ impl Composer<'_> {
             + &format!("const CONSUMED_QUEUE: u32 = {queue}u;\n")
             + &format!("const CONSUMED_REGION: u32 = {queue}u;\n")
             + include_str!("kernels/order_scatter.wgsl")
-            + &preprocess(include_str!("kernels/shell.wgsl"), &[("queued", true)]);
+            + &preprocess(
+                include_str!("kernels/shell.wgsl"),
+                &[("queued", true), ("slots", true)],
+            );
         vec![
             self.stage(count, queue),
             recipe(&name("scan"), Vec::new(), Feed::Groups(groups), scan),
@@ -202,6 +205,7 @@ impl Composer<'_> {
             absorption,
             overlap: false,
             order: false,
+            requests: all.requests,
             varying_emission: has(|m| m.varying_emission),
         }
     }
@@ -312,9 +316,10 @@ impl Composer<'_> {
         let counter = "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE";
         let limit = self.sizes.fetch_limit;
         let part = &self.world.parts.bvh;
+        let slots = !self.layout.needs.requests;
         let region = self.region(id, queue);
         format!("const CONSUMED_REGION: u32 = {region}u;\n")
-            + &fetch_shell(queue as u32, counter, &self.technique, part, limit)
+            + &fetch_shell(queue as u32, counter, &self.technique, part, limit, slots)
     }
 
     /// The first queue whose rays are fetched; those after it are too.
@@ -390,6 +395,7 @@ impl Composer<'_> {
     /// Constants, request functions and entry point of a wavefront kernel.
     fn shell(&self, shell: &Shell) -> String {
         let pushes = shell.sorts || shell.casts;
+        let keeps = shell.casts && self.layout.needs.requests;
         let subgroups = pushes && self.technique.append == Append::Subgroup;
         let mut out = self.layout.queues.constants();
         if let Some((queue, region)) = shell.consumes {
@@ -410,6 +416,9 @@ impl Composer<'_> {
                 ("sorts", shell.sorts),
                 ("casts", shell.casts),
                 ("casts_shadows", shell.casts_shadows),
+                ("requests", self.layout.needs.requests),
+                ("rays", keeps),
+                ("shadows", keeps && shell.casts_shadows),
             ];
             out += &preprocess(include_str!("kernels/queue.wgsl"), &flags);
             out += &preprocess(self.append(), &flags);
@@ -423,7 +432,9 @@ impl Composer<'_> {
         out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
         let flags = [
             ("queued", shell.consumes.is_some()),
+            ("slots", !(shell.traverses && self.layout.needs.requests)),
             ("pushes", pushes),
+            ("keeps", keeps),
             ("subgroups", subgroups),
             (
                 "lanes",
@@ -472,15 +483,17 @@ impl Composer<'_> {
 }
 
 /// Constants and entry point of a kernel whose threads fetch the rays of `queue`, each no more than
-/// `limit` on average; `counter` is the index of the counter of those fetched.
+/// `limit` on average. Its items are `slots`, or the rays themselves; `counter` is the index of the counter of those fetched.
 pub(crate) fn fetch_shell(
     queue: u32,
     counter: &str,
     technique: &Technique,
     bvh: &ShaderPart,
     limit: u32,
+    slots: bool,
 ) -> String {
     let flags = [
+        ("slots", slots),
         ("lanes", bvh::asks_for_lane(bvh)),
         ("together", technique.leaves == Leaves::Together),
     ];

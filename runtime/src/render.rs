@@ -192,6 +192,11 @@ impl<'g> Renderer<'g> {
         let (materials, instances) = (source.infos(), source.instances());
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
         let layout = Layout::new(world, &materials, plan, &technique)?;
+        let technique = layout.technique(technique);
+        let options = &RenderOptions {
+            technique,
+            ..options.clone()
+        };
         let sizes = pool::sizes(gpu, world, &layout, options)?;
         let mut composer = Composer {
             world,

@@ -219,7 +219,7 @@ impl Inputs<'_> {
             paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
             steady_paths_per_second: status
                 .steady_rate(pixels * u64::from(self.options.samples - self.resumed.samples)),
-            path_state_bytes: self.layout.path_bytes(),
+            path_state_bytes: self.layout.memory(),
             pool_size: self.pool,
             iterations: status.iterations,
             kernels,

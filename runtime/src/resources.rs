@@ -221,6 +221,9 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,
+        "extension_rays" | "extension_hits" | "shadow_rays" | "shadow_results" => {
+            pool * layout.ray_bytes(name)
+        }
         _ => {
             let pixels = u64::from(composer.world.width) * u64::from(composer.world.height);
             4 * pixels * film::PLANES as u64

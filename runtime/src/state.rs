@@ -22,6 +22,10 @@ pub(crate) enum Need {
     Always,
     /// A light that can be sampled, and a material that light can be sampled for.
     ShadowRays,
+    /// The same, where rays are part of the path's state.
+    SlotShadows,
+    /// Rays in buffers of their own.
+    Requests,
     /// A medium that some result depends on.
     Media,
     /// A medium that absorbs light.
@@ -39,6 +43,8 @@ pub(crate) enum Need {
 pub(crate) struct Needs {
     /// Light is sampled somewhere.
     pub shadow_rays: bool,
+    /// Rays are in buffers of their own.
+    pub requests: bool,
     /// Paths carry the media they are in.
     pub media: bool,
     /// A medium absorbs light.
@@ -57,6 +63,8 @@ impl Needs {
         match need {
             Need::Always => true,
             Need::ShadowRays => self.shadow_rays,
+            Need::SlotShadows => self.shadow_rays && !self.requests,
+            Need::Requests => self.requests,
             Need::Media => self.media,
             Need::Absorption => self.absorption,
             Need::Overlap => self.overlap,
@@ -119,12 +127,12 @@ pub(crate) struct Field {
     pub writers: &'static [StageId],
 }
 
-use Need::{Always, Media, ShadowRays};
+use Need::{Always, Media, Requests, ShadowRays, SlotShadows};
 use Type::{F32, U32, Vec3, Words};
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 10] = [
+pub(crate) const FIELDS: [Field; 11] = [
     // The extension ray: from the camera or the last vertex.
     Field {
         name: "ray_origin",
@@ -147,7 +155,7 @@ pub(crate) const FIELDS: [Field; 10] = [
         components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
         need: Always,
         readers: &[Logic, Material, Extension],
-        writers: &[NewPath, Extension],
+        writers: &[NewPath, Logic, Extension],
     },
     // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle
     // with which the extension ray was sampled (0: a discrete direction).
@@ -177,7 +185,7 @@ pub(crate) const FIELDS: [Field; 10] = [
     Field {
         name: "shadow_origin",
         components: &[("origin", Vec3), ("skip", U32)],
-        need: ShadowRays,
+        need: SlotShadows,
         readers: &[BinShadow, Shadow],
         writers: &[Material],
     },
@@ -197,6 +205,19 @@ pub(crate) const FIELDS: [Field; 10] = [
         need: ShadowRays,
         readers: &[Logic],
         writers: &[Logic],
+    },
+    // The places of its rays in buffers of their own, where their results will be.
+    Field {
+        name: "requests",
+        components: &[
+            ("extension", U32),
+            ("shadow", U32),
+            ("unused0", U32),
+            ("unused1", U32),
+        ],
+        need: Requests,
+        readers: &[Logic],
+        writers: &[NewPath, Material],
     },
     // The media it is in; see `kernels/media.wgsl`.
     Field {
@@ -354,6 +375,7 @@ mod tests {
 
     const EVERYTHING: Needs = Needs {
         shadow_rays: true,
+        requests: false,
         media: true,
         absorption: true,
         overlap: true,
@@ -373,41 +395,47 @@ mod tests {
     /// naga lays a field's structure out on exactly the words that the accessors pack.
     #[test]
     fn fields_fill_four_words_as_naga_lays_them_out() {
-        let text = format!(
-            "const POOL_SIZE: u32 = 1u;\n\
-             @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
-            accessors(
-                EVERYTHING,
-                &EVERY_STAGE,
-                Storage::Memory(StateLayout::Arrays)
-            )
-        );
-        let module = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
-        let mut layouter = naga::proc::Layouter::default();
-        layouter.update(module.to_ctx()).expect("a layout");
-        for field in &FIELDS {
-            let (handle, ty) = module
-                .types
-                .iter()
-                .find(|(_, ty)| ty.name.as_deref() == Some(&type_name(field)))
-                .expect("the field's structure");
-            assert_eq!(
-                u64::from(layouter[handle].size),
-                FIELD_BYTES,
-                "{}",
-                field.name
+        let requests = Needs {
+            requests: true,
+            ..EVERYTHING
+        };
+        for needs in [EVERYTHING, requests] {
+            let text = format!(
+                "const POOL_SIZE: u32 = 1u;\n\
+                 @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
+                accessors(needs, &EVERY_STAGE, Storage::Memory(StateLayout::Arrays))
             );
-            let naga::TypeInner::Struct { members, .. } = &ty.inner else {
-                panic!("{} is no structure", field.name);
-            };
-            let mut words = 0;
-            for ((name, ty), member) in field.components.iter().zip(members) {
-                assert_eq!(member.name.as_deref(), Some(*name));
-                assert_eq!(member.offset as usize, words * 4, "{}.{name}", field.name);
-                words += ty.words();
+            let module = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
+            let mut layouter = naga::proc::Layouter::default();
+            layouter.update(module.to_ctx()).expect("a layout");
+            for field in fields(needs) {
+                check_layout(field, &module, &layouter);
             }
-            assert_eq!(words * 4, FIELD_BYTES as usize);
         }
+    }
+
+    fn check_layout(field: &Field, module: &naga::Module, layouter: &naga::proc::Layouter) {
+        let (handle, ty) = module
+            .types
+            .iter()
+            .find(|(_, ty)| ty.name.as_deref() == Some(&type_name(field)))
+            .expect("the field's structure");
+        assert_eq!(
+            u64::from(layouter[handle].size),
+            FIELD_BYTES,
+            "{}",
+            field.name
+        );
+        let naga::TypeInner::Struct { members, .. } = &ty.inner else {
+            panic!("{} is no structure", field.name);
+        };
+        let mut words = 0;
+        for ((name, ty), member) in field.components.iter().zip(members) {
+            assert_eq!(member.name.as_deref(), Some(*name));
+            assert_eq!(member.offset as usize, words * 4, "{}.{name}", field.name);
+            words += ty.words();
+        }
+        assert_eq!(words * 4, FIELD_BYTES as usize);
     }
 
     #[test]

@@ -148,6 +148,14 @@ choices! {
         Flat = "flat",
     }
 
+    /// Where ray casts find rays, and leave what they hit.
+    RayData {
+        /// In the path's state
+        Slots = "slots",
+        /// In buffers of their own, in the order of requests (Laine et al. 2013, section 4.2)
+        Requests = "requests",
+    }
+
     /// In which order rays are cast.
     RayOrder {
         /// As they were asked for
@@ -186,6 +194,8 @@ pub struct Technique {
     pub ray_fetch: RayFetch,
     /// How repeated geometry is stored.
     pub copies: Copies,
+    /// Where ray casts find rays.
+    pub ray_data: RayData,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
 }
@@ -235,6 +245,7 @@ mod tests {
         check_names::<Leaves>();
         check_names::<RayFetch>();
         check_names::<Copies>();
+        check_names::<RayData>();
         check_names::<RayOrder>();
     }
 }

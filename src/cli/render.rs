@@ -126,7 +126,6 @@ impl RenderArgs {
             seed: self.seed,
             pool: self.pool,
             technique: self.technique.technique(),
-            ..RenderOptions::default()
         }
     }
 }

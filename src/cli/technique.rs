@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Copies, Leaves, Planes, RayFetch, RayOrder, Regeneration, Sampler, Stack,
-    StateLayout, Technique, Traversal,
+    Append, Choice, Copies, Leaves, Planes, RayData, RayFetch, RayOrder, Regeneration, Sampler,
+    Stack, StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -41,6 +41,9 @@ pub(super) struct TechniqueArgs {
     /// How geometry is stored that is repeated often enough to share it
     #[arg(long, value_name = "NAME", default_value = default_name::<Copies>(), value_parser = named::<Copies>())]
     copies: Copies,
+    /// Where ray casts find rays, and leave what they hit
+    #[arg(long, value_name = "NAME", default_value = default_name::<RayData>(), value_parser = named::<RayData>())]
+    ray_data: RayData,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
@@ -67,6 +70,7 @@ impl TechniqueArgs {
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,
             copies: self.copies,
+            ray_data: self.ray_data,
             ray_order: self.ray_order,
         }
     }

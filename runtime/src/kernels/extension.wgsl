@@ -1,29 +1,50 @@
 // Finds what a path's next segment hits.
 
+#if requests
+// A request's ray: where it begins and the primitive it begins on; its direction.
+fn extension_request(request: u32) -> array<vec4<u32>, 2> {
+    return array<vec4<u32>, 2>(extension_rays[2u * request], extension_rays[2u * request + 1u]);
+}
+
+fn keep_hit(request: u32, hit: Hit) {
+    extension_hits[request] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(hit.t, hit.u, hit.v)), hit.primitive);
+}
+#else
+fn extension_request(slot: u32) -> array<vec4<u32>, 2> {
+    let origin = bitcast<vec3<u32>>(load_ray_origin(slot).origin);
+    let direction = bitcast<vec3<u32>>(load_ray_direction(slot).direction);
+    return array<vec4<u32>, 2>(vec4<u32>(origin, load_hit(slot).primitive), vec4<u32>(direction, 0u));
+}
+
+fn keep_hit(slot: u32, hit: Hit) {
+    store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
+}
+#endif
+
 #if fetched
-fn begin_ray(slot: u32) -> Walk {
-    let start = load_ray_origin(slot).origin;
-    let direction = load_ray_direction(slot).direction;
-    return begin_walk(BVH_ROOT, 0u, start, direction, 3.0e38, load_hit(slot).primitive);
+fn begin_ray(request: u32) -> Walk {
+    let ray = extension_request(request);
+    let start = bitcast<vec3<f32>>(ray[0].xyz);
+    return begin_walk(BVH_ROOT, 0u, start, bitcast<vec3<f32>>(ray[1].xyz), 3.0e38, ray[0].w);
 }
 
 fn is_decided(hit: Hit) -> bool {
     return false;
 }
 
-fn end_ray(slot: u32, hit: Hit) {
-    store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
+fn end_ray(request: u32, hit: Hit) {
+    keep_hit(request, hit);
 }
 #else
-fn extension(slot: u32) {
-    let start = load_ray_origin(slot);
-    let ray = load_ray_direction(slot);
+fn extension(request: u32) {
+    let ray = extension_request(request);
+    let start = bitcast<vec3<f32>>(ray[0].xyz);
+    let direction = bitcast<vec3<f32>>(ray[1].xyz);
 #if overlap
-    let hit = trace_to_boundary(slot, start.origin, ray.direction, load_hit(slot).primitive);
+    keep_hit(request, trace_to_boundary(request, start, direction, ray[0].w));
 #else
-    let hit = trace_closest(start.origin, ray.direction, 3.0e38, load_hit(slot).primitive);
+    keep_hit(request, trace_closest(start, direction, 3.0e38, ray[0].w));
 #endif
-    store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
 }
 #endif
 #if overlap

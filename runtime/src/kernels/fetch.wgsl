@@ -36,7 +36,11 @@ fn main(
             let rank = lanes_before(idle, subgroup_lane);
             let item = first + rank;
             if !live && rank < count && item < items {
+#if slots
                 slot = queues[CONSUMED_REGION * POOL_SIZE + item];
+#else
+                slot = item;
+#endif
                 walk = begin_ray(slot);
                 live = true;
             }

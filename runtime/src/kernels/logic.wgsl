@@ -28,7 +28,12 @@ fn logic(slot: u32) {
 #endif
     // A throughput of zero says that scattering failed and no ray was cast.
     if any(carried.throughput > vec3<f32>(0.0)) {
+#if requests
+        hit = requested_hit(load_requests(slot).extension);
+        store_hit(slot, hit);
+#else
         hit = load_hit(slot);
+#endif
 #if absorption
         carried.throughput *= transmittance(load_media(slot).stack, hit.t);
         store_throughput(slot, carried);
@@ -88,6 +93,11 @@ fn survival_probability(throughput: vec3<f32>) -> f32 {
 #if shadow_rays
 // The light sample of the last vertex; the shadow ray has zeroed its throughput if occluded.
 fn sampled_light(slot: u32) -> vec3<f32> {
+#if requests
+    if shadow_results[load_requests(slot).shadow] != 0u {
+        return vec3<f32>(0.0);
+    }
+#endif
     let reach = load_light_throughput(slot);
     let light = load_light_radiance(slot);
     // Scattering cannot hit a discrete light (pdf 0), so its sample counts fully.
@@ -107,5 +117,13 @@ fn choose_light(slot: u32, position: vec3<f32>, bits: vec4<u32>) -> u32 {
     store_shadow_ray(slot, PathShadowRay(light.wi, light.distance));
     store_light_radiance(slot, PathLightRadiance(light.radiance, light.pdf));
     return PATH_LIT;
+}
+#endif
+#if requests
+
+// What the ray cast of a request found.
+fn requested_hit(request: u32) -> PathHit {
+    let words = extension_hits[request];
+    return PathHit(bitcast<f32>(words.x), bitcast<f32>(words.y), bitcast<f32>(words.z), words.w);
 }
 #endif

@@ -47,7 +47,7 @@ fn material(slot: u32, instance: u32) {
         let start = leave_surface(position, side, scattered.wi);
         store_ray_origin(slot, PathRayOrigin(start, origin.pixel));
         store_ray_direction(slot, PathRayDirection(scattered.wi, arrived.sample));
-        request_extension();
+        request_extension(start, scattered.wi, hit.primitive);
     }
 #if changes_medium
     if scattered.transmitted > 0.5 {
@@ -66,9 +66,13 @@ fn material(slot: u32, instance: u32) {
         store_light_throughput(slot, PathLightThroughput(reach, scattered.light_pdf));
         if any(reach > vec3<f32>(0.0)) {
             let start = leave_surface(position, side, wl);
+            let way = aim(light, start - position);
+#if requests
+#else
             store_shadow_origin(slot, PathShadowOrigin(start, hit.primitive));
-            store_shadow_ray(slot, aim(light, start - position));
-            request_shadow();
+            store_shadow_ray(slot, way);
+#endif
+            request_shadow(start, hit.primitive, way.direction, way.distance);
         }
     }
 #endif
@@ -101,5 +105,12 @@ fn aim(light: PathShadowRay, moved: vec3<f32>) -> PathShadowRay {
     let to_light = light.direction * light.distance - moved;
     let distance = length(to_light);
     return PathShadowRay(to_light / max(distance, 1e-30), distance * 0.9999);
+}
+#endif
+#if requests
+
+// Keeps where the results of the path's ray casts will be.
+fn keep_requests(slot: u32, extension: u32, shadow: u32) {
+    store_requests(slot, PathRequests(extension, shadow, 0u, 0u));
 }
 #endif

@@ -18,14 +18,14 @@ fn request_material(instance: u32) {
     wanted_instance = instance;
 }
 
-fn request_extension() {
+fn request_extension(origin: vec3<f32>, direction: vec3<f32>, skip: u32) {
     wants_extension = true;
 }
 
 #if shadow_rays
 var<private> wants_shadow: bool = false;
 
-fn request_shadow() {
+fn request_shadow(origin: vec3<f32>, skip: u32, direction: vec3<f32>, distance: f32) {
     wants_shadow = true;
 }
 

@@ -21,5 +21,12 @@ fn new_path(slot: u32, item: u32) {
 #if media
     store_media(slot, PathMedia(CAMERA_MEDIA));
 #endif
-    request_extension();
+    request_extension(ray.origin, ray.direction, NOTHING);
 }
+#if requests
+
+// Keeps where the results of the path's ray casts will be.
+fn keep_requests(slot: u32, extension: u32, shadow: u32) {
+    store_requests(slot, PathRequests(extension, shadow, 0u, 0u));
+}
+#endif

@@ -1,28 +1,50 @@
 // Asks whether a light sample is seen from its vertex; one that is not reaches the path by
 // no throughput.
 
-#if fetched
-fn begin_ray(slot: u32) -> Walk {
+#if requests
+// A request's ray: where it begins and the primitive it begins on; its direction and length.
+fn shadow_request(request: u32) -> array<vec4<u32>, 2> {
+    return array<vec4<u32>, 2>(shadow_rays[2u * request], shadow_rays[2u * request + 1u]);
+}
+
+fn keep_shadow(request: u32, blocked: bool) {
+    shadow_results[request] = select(0u, 1u, blocked);
+}
+#else
+fn shadow_request(slot: u32) -> array<vec4<u32>, 2> {
     let start = load_shadow_origin(slot);
     let ray = load_shadow_ray(slot);
-    return begin_walk(BVH_ROOT, 0u, start.origin, ray.direction, ray.distance, start.skip);
+    return array<vec4<u32>, 2>(
+        vec4<u32>(bitcast<vec3<u32>>(start.origin), start.skip),
+        vec4<u32>(bitcast<vec3<u32>>(ray.direction), bitcast<u32>(ray.distance))
+    );
+}
+
+fn keep_shadow(slot: u32, blocked: bool) {
+    if blocked {
+        store_light_throughput(slot, PathLightThroughput(vec3<f32>(0.0), 0.0));
+    }
+}
+#endif
+
+#if fetched
+fn begin_ray(request: u32) -> Walk {
+    let ray = shadow_request(request);
+    let way = bitcast<vec4<f32>>(ray[1]);
+    return begin_walk(BVH_ROOT, 0u, bitcast<vec3<f32>>(ray[0].xyz), way.xyz, way.w, ray[0].w);
 }
 
 fn is_decided(hit: Hit) -> bool {
     return hit.primitive != NO_PRIMITIVE;
 }
 
-fn end_ray(slot: u32, hit: Hit) {
-    if is_decided(hit) {
-        store_light_throughput(slot, PathLightThroughput(vec3<f32>(0.0), 0.0));
-    }
+fn end_ray(request: u32, hit: Hit) {
+    keep_shadow(request, is_decided(hit));
 }
 #else
-fn shadow(slot: u32) {
-    let start = load_shadow_origin(slot);
-    let ray = load_shadow_ray(slot);
-    if trace_any(start.origin, ray.direction, ray.distance, start.skip) {
-        store_light_throughput(slot, PathLightThroughput(vec3<f32>(0.0), 0.0));
-    }
+fn shadow(request: u32) {
+    let ray = shadow_request(request);
+    let way = bitcast<vec4<f32>>(ray[1]);
+    keep_shadow(request, trace_any(bitcast<vec3<f32>>(ray[0].xyz), way.xyz, way.w, ray[0].w));
 }
 #endif

@@ -18,9 +18,11 @@ fn main(
     var slot = item;
 #if queued
     let in_range = item < atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
+#if slots
     if in_range {
         slot = queues[CONSUMED_REGION * POOL_SIZE + item];
     }
+#endif
 #else
     let in_range = item < POOL_SIZE;
 #endif
@@ -29,5 +31,10 @@ fn main(
     }
 #if pushes
     push_requests(lane, slot);
+#endif
+#if keeps
+    if is_ray_wanted() {
+        keep_requests(slot, extension_place, shadow_place);
+    }
 #endif
 }

@@ -159,10 +159,11 @@ impl<'g> Caster<'g> {
                 &self.technique,
                 &self.parts[1],
                 sizes.fetch_limit,
+                true,
             )
         } else {
             let lanes = bvh::asks_for_lane(&self.parts[1]);
-            let flags = [("lanes", lanes), ("queued", true)];
+            let flags = [("lanes", lanes), ("queued", true), ("slots", true)];
             String::from("const CONSUMED_QUEUE: u32 = 0u;\n")
                 + &preprocess(include_str!("../kernels/shell.wgsl"), &flags)
         };

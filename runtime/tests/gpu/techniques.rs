@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::render::{RenderOptions, Rendering};
-use impasto_runtime::technique::{Append, Choice, Regeneration, StateLayout, Technique};
+use impasto_runtime::technique::{Append, Choice, RayData, Regeneration, StateLayout, Technique};
 
 fn surfaces() -> Materials {
     materials(&[
@@ -70,6 +70,16 @@ fn assert_equal<C: Choice + Debug>(strategy: Strategy, set: impl Fn(&mut Techniq
 fn queues_are_appended_to_in_any_way() {
     for strategy in [Strategy::Own, Strategy::Shared] {
         assert_equal::<Append>(strategy, |t, value| t.append = value);
+    }
+}
+
+#[test]
+fn rays_may_lie_in_buffers_of_their_own() {
+    for append in [Append::Workgroup, Append::Subgroup] {
+        assert_equal::<RayData>(Strategy::Own, |t, value| {
+            t.append = append;
+            t.ray_data = value;
+        });
     }
 }
 
