@@ -240,3 +240,20 @@ fn run_words(options: &RenderOptions) -> [u32; RUN_MEMBERS.len()] {
         _ => 0,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_are_told_a_hashed_seed_and_the_range_of_samples() {
+        let options = RenderOptions {
+            seed: 4,
+            first_sample: 5,
+            samples: 6,
+            ..RenderOptions::default()
+        };
+        assert_eq!(run_words(&options)[..3], [random::hash_seed(4), 5, 6]);
+        assert_eq!(RUN_MEMBERS[..3], ["seed", "first_sample", "samples"]);
+    }
+}

@@ -66,6 +66,19 @@ fn samples_beyond_the_films_range_are_clamped_and_counted() {
     }
 }
 
+/// 2^32 - 1 is 65535 times 65537: a word that is filled to the last and must not carry.
+#[test]
+fn a_full_word_does_not_carry() {
+    for value in [65_537.0 * f32::powi(2.0, -24), 65_537.0 * 256.0] {
+        let rendering = sky(value, 65_535);
+        assert!(
+            red(&rendering).all(|v| v == f64::from(value)),
+            "{value}: {:?}",
+            rendering.film
+        );
+    }
+}
+
 /// 2^17 samples of the largest value make a sum of 2^73 units, in the highest word.
 #[test]
 fn the_largest_samples_do_not_wrap_a_sum() {
