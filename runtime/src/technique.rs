@@ -116,28 +116,20 @@ choices! {
         Trail = "trail",
     }
 
-    /// How the bytes of compressed nodes become numbers.
-    Planes {
-        /// By converting integers
-        Convert = "convert",
-        /// By putting them in the mantissa of a number between 1 and 2
-        Mantissa = "mantissa",
-    }
-
-    /// When a ray cast tests the triangles that it comes to.
+    /// When threads that fetch rays test triangles.
     Leaves {
+        /// When enough threads of a subgroup have some (Ylitie et al. 2017)
+        Together = "together",
         /// Right after the node that they are in
         AtOnce = "at-once",
-        /// When most threads of a subgroup have some (Aila and Laine 2009, Ylitie et al. 2017)
-        Together = "together",
     }
 
     /// How threads get the rays of a queue.
     RayFetch {
-        /// One ray a thread
-        Thread = "thread",
         /// Threads stay and take new rays when many of a subgroup have none (Aila and Laine 2009)
         Persistent = "persistent",
+        /// One ray a thread
+        Thread = "thread",
     }
 
     /// How geometry is stored that is repeated often enough to share it.
@@ -186,9 +178,7 @@ pub struct Technique {
     pub traversal: Traversal,
     /// Where casts keep the nodes they have yet to visit.
     pub stack: Stack,
-    /// How the bytes of compressed nodes become numbers.
-    pub planes: Planes,
-    /// When casts test triangles.
+    /// When threads that fetch rays test triangles; others do it at once.
     pub leaves: Leaves,
     /// How threads get the rays of a queue; in a megakernel each has its own.
     pub ray_fetch: RayFetch,
@@ -241,7 +231,6 @@ mod tests {
         check_names::<Regeneration>();
         check_names::<Traversal>();
         check_names::<Stack>();
-        check_names::<Planes>();
         check_names::<Leaves>();
         check_names::<RayFetch>();
         check_names::<Copies>();

@@ -6,7 +6,7 @@ use glam::{DVec3, EulerRot, Quat, Vec3};
 use impasto_runtime::bvh::Bvh;
 use impasto_runtime::scene::surface::{geometry_part, surface_part};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
-use impasto_runtime::technique::{Choice, Leaves, Planes, Stack, Technique, Traversal};
+use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
 use support::{Random, Row, floats, row, run};
 
 const MISS: u32 = u32::MAX;
@@ -48,25 +48,14 @@ struct Built {
     mesh: Mesh,
 }
 
-/// Every tree with every stack, the other choices in turn.
+/// Every tree with every stack.
 fn ways() -> Vec<Technique> {
     let mut ways = Vec::new();
     for (traversal, ..) in Traversal::ALL {
         for (stack, ..) in Stack::ALL {
-            let even = ways.len() % 2 == 0;
             ways.push(Technique {
                 traversal: *traversal,
                 stack: *stack,
-                planes: if even {
-                    Planes::Convert
-                } else {
-                    Planes::Mantissa
-                },
-                leaves: if even {
-                    Leaves::AtOnce
-                } else {
-                    Leaves::Together
-                },
                 ..Technique::default()
             });
         }

@@ -59,11 +59,10 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     print(&table(&options.techniques, &rates))
 }
 
-fn names(technique: &Technique) -> [&'static str; 5] {
+fn names(technique: &Technique) -> [&'static str; 4] {
     [
         technique.traversal.name(),
         technique.stack.name(),
-        technique.planes.name(),
         technique.leaves.name(),
         technique.ray_fetch.name(),
     ]
@@ -73,7 +72,7 @@ fn names(technique: &Technique) -> [&'static str; 5] {
 /// some rays hit something else than by the default technique.
 fn table(techniques: &[Technique], rates: &[RayRate]) -> String {
     let sets = rates.len() / techniques.len().max(1);
-    let head = ["traversal", "stack", "planes", "leaves", "fetch"];
+    let head = ["traversal", "stack", "leaves", "fetch"];
     let mut out: String = head.map(|name| format!("{name:<11}")).concat();
     for rate in rates.iter().take(sets) {
         out += &format!("{:>11}", rate.rays);

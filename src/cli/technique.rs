@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Copies, Leaves, Planes, RayData, RayFetch, RayOrder, Regeneration, Sampler,
+    Append, Choice, Copies, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
     Stack, StateLayout, Technique, Traversal,
 };
 
@@ -29,10 +29,7 @@ pub(super) struct TechniqueArgs {
     /// Where ray casts keep the nodes they have yet to visit
     #[arg(long, value_name = "NAME", default_value = default_name::<Stack>(), value_parser = named::<Stack>())]
     stack: Stack,
-    /// How the bytes of compressed nodes become numbers
-    #[arg(long, value_name = "NAME", default_value = default_name::<Planes>(), value_parser = named::<Planes>())]
-    planes: Planes,
-    /// When ray casts test triangles
+    /// When threads that fetch rays test triangles
     #[arg(long, value_name = "NAME", default_value = default_name::<Leaves>(), value_parser = named::<Leaves>())]
     leaves: Leaves,
     /// How threads get the rays of a queue
@@ -66,7 +63,6 @@ impl TechniqueArgs {
             workgroup: self.workgroup,
             traversal: self.traversal,
             stack: self.stack,
-            planes: self.planes,
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,
             copies: self.copies,

@@ -12,7 +12,7 @@ fn every_technique_is_timed_and_finds_what_the_others_find() {
     let rates = json["rates"].as_array().expect("a list");
     let mut techniques = BTreeSet::new();
     for rate in rates {
-        let names = ["traversal", "stack", "planes", "leaves", "ray_fetch"];
+        let names = ["traversal", "stack", "leaves", "ray_fetch"];
         techniques.insert(names.map(|name| rate[name].as_str().expect("a name")));
         let count = rate["count"].as_u64().expect("a number");
         let hits = rate["hits"].as_u64().expect("a number");

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::shader_part::ShaderPart;
-use crate::technique::{Leaves, Planes, Stack, Technique, Traversal};
+use crate::technique::{Stack, Technique, Traversal};
 use crate::text::{mentions, preprocess};
 use crate::wgsl;
 
@@ -30,8 +30,6 @@ pub(super) fn casts(
         ("binary", binary),
         ("wide", !binary),
         ("trail", stack == Stack::Trail),
-        ("together", technique.leaves == Leaves::Together),
-        ("mantissa", technique.planes == Planes::Mantissa),
         ("placed", placed),
     ];
     let nodes = if binary {

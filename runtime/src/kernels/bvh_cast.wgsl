@@ -56,15 +56,6 @@ fn trace(
     var walk = begin_walk(root, stack_floor, origin, direction, t_max, skip);
     loop {
         visit_node(&walk);
-#if together
-        // Threads wait here until each of them has triangles, or is done.
-        while walk.leaves.y == 0u {
-            if !take_next(&walk) {
-                break;
-            }
-            visit_node(&walk);
-        }
-#endif
         while walk.leaves.y != 0u {
             visit_triangle(&walk);
             if any_hit && walk.hit.primitive != NO_PRIMITIVE {

@@ -92,16 +92,6 @@ fn intersect_node(node: u32, walk: ptr<function, Walk>) {
 #else
     let slack = BVH_SLACK * (abs(start) + 255.0 * abs(step));
 #endif
-#if mantissa
-    // See bytes: these are the planes of 1 + byte / 256.
-    let near_start = (start - 256.0 * step) - slack;
-    let far_start = (start - 256.0 * step) + slack;
-    let scale = 256.0 * step;
-#else
-    let near_start = start - slack;
-    let far_start = start + slack;
-    let scale = step;
-#endif
 
     let x = bvh_nodes[5u * node + 2u];
     let y = bvh_nodes[5u * node + 3u];
@@ -114,9 +104,9 @@ fn intersect_node(node: u32, walk: ptr<function, Walk>) {
     let far_y = select(y.zw, y.xy, flip.y);
     let far_z = select(z.zw, z.xy, flip.z);
 
-    let hits = intersect_children(bases.z, octant, scale, near_start, far_start,
+    let hits = intersect_children(bases.z, octant, step, start - slack, start + slack,
             vec3<u32>(near_x.x, near_y.x, near_z.x), vec3<u32>(far_x.x, far_y.x, far_z.x), t_max)
-        | intersect_children(bases.w, octant, scale, near_start, far_start,
+        | intersect_children(bases.w, octant, step, start - slack, start + slack,
             vec3<u32>(near_x.y, near_y.y, near_z.y), vec3<u32>(far_x.y, far_y.y, far_z.y), t_max);
     (*walk).group = Group(bases.x, (hits & 0xff000000u) | (head.w >> 24u));
     (*walk).leaves = vec2<u32>(bases.y, hits & 0x00ffffffu);
@@ -130,16 +120,16 @@ fn ordered(distances: vec4<f32>) -> vec4<i32> {
 
 // Slab tests of four children; one byte each in `child_meta`, `near` and `far`.
 fn intersect_children(
-    child_meta: u32, octant: u32, scale: vec3<f32>, near_start: vec3<f32>, far_start: vec3<f32>,
+    child_meta: u32, octant: u32, step: vec3<f32>, near_start: vec3<f32>, far_start: vec3<f32>,
     near: vec3<u32>, far: vec3<u32>, t_max: f32
 ) -> u32 {
     let t_near = max(
-        max(ordered(bytes(near.x) * scale.x + near_start.x), ordered(bytes(near.y) * scale.y + near_start.y)),
-        max(ordered(bytes(near.z) * scale.z + near_start.z), vec4<i32>(0))
+        max(ordered(bytes(near.x) * step.x + near_start.x), ordered(bytes(near.y) * step.y + near_start.y)),
+        max(ordered(bytes(near.z) * step.z + near_start.z), vec4<i32>(0))
     );
     let t_far = min(
-        min(ordered(bytes(far.x) * scale.x + far_start.x), ordered(bytes(far.y) * scale.y + far_start.y)),
-        min(ordered(bytes(far.z) * scale.z + far_start.z), ordered(vec4<f32>(t_max)))
+        min(ordered(bytes(far.x) * step.x + far_start.x), ordered(bytes(far.y) * step.y + far_start.y)),
+        min(ordered(bytes(far.z) * step.z + far_start.z), ordered(vec4<f32>(t_max)))
     );
     // A leaf's meta byte is its triangles in unary (3 bits) and their offset (5 bits); an inner
     // child's is 1 and its slot plus 24, where the octant makes slots an order of visiting.
@@ -152,14 +142,6 @@ fn intersect_children(
     return hits.x | hits.y | hits.z | hits.w;
 }
 
-#if mantissa
-// 1 + b / 256 for each byte b: its bits are the upper ones of a mantissa.
-fn bytes(word: u32) -> vec4<f32> {
-    let mantissas = vec4<u32>(word << 15u, word << 7u, word >> 1u, word >> 9u) & vec4<u32>(0x7f8000u);
-    return bitcast<vec4<f32>>(mantissas | vec4<u32>(0x3f800000u));
-}
-#else
 fn bytes(word: u32) -> vec4<f32> {
     return vec4<f32>(unpack4xU8(word));
 }
-#endif

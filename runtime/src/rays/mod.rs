@@ -14,7 +14,7 @@ use crate::bvh::Bvh;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
-use crate::technique::{Choice, Leaves, Planes, RayFetch, Stack, Technique, Traversal};
+use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
 
 use caster::Caster;
 use sets::{RaySet, SetKind};
@@ -52,38 +52,34 @@ pub struct RayRate {
     pub traversal: Traversal,
     /// Where casts kept the nodes that they had yet to visit.
     pub stack: Stack,
-    /// How the bytes of compressed nodes became numbers.
-    pub planes: Planes,
-    /// When casts tested triangles.
+    /// When threads that fetched rays tested triangles; others did at once.
     pub leaves: Leaves,
     /// How threads got rays.
     pub ray_fetch: RayFetch,
 }
 
-/// Every technique of casting rays that a GPU can run. Those that differ in nothing but what
-/// a binary tree has not are there once.
+/// Every technique of casting rays that a GPU can run. Threads that do not fetch rays test
+/// triangles at once.
 pub fn techniques(gpu: &Gpu) -> Vec<Technique> {
-    let mut all = vec![Technique::default()];
+    let mut all = vec![Technique::default().within(gpu)];
     for (traversal, ..) in Traversal::ALL {
         for (stack, ..) in Stack::ALL {
-            for (planes, ..) in Planes::ALL {
-                for (leaves, ..) in Leaves::ALL {
-                    for (ray_fetch, ..) in RayFetch::ALL {
-                        let technique = Technique {
-                            traversal: *traversal,
-                            stack: *stack,
-                            planes: *planes,
-                            leaves: *leaves,
-                            ray_fetch: *ray_fetch,
-                            ..Technique::default()
-                        };
-                        all.push(technique.within(gpu));
-                    }
-                }
+            for (ray_fetch, leaves) in [
+                (RayFetch::Persistent, Leaves::Together),
+                (RayFetch::Persistent, Leaves::AtOnce),
+                (RayFetch::Thread, Leaves::AtOnce),
+            ] {
+                let technique = Technique {
+                    traversal: *traversal,
+                    stack: *stack,
+                    leaves,
+                    ray_fetch,
+                    ..Technique::default()
+                };
+                all.push(technique.within(gpu));
             }
         }
     }
-    all.retain(|t| t.traversal == Traversal::Cwbvh || t.planes == Planes::default());
     let mut distinct: Vec<Technique> = Vec::new();
     for technique in all {
         if !distinct.contains(&technique) {
@@ -103,7 +99,7 @@ pub fn measure(
     check(options)?;
     // What is measured is one level; two take the same steps.
     let scene = &*scene.flattened()?;
-    let default = Technique::default();
+    let default = Technique::default().within(gpu);
     let reference = Bvh::build(&scene.mesh, default.traversal);
     let caster = Caster::new(gpu, scene, &reference, &default)?;
     let mut sets = Vec::new();
@@ -169,7 +165,6 @@ fn rate(
         mrays_per_second: count as f64 * 1e-6 / seconds.max(1e-12),
         traversal: technique.traversal,
         stack: technique.stack,
-        planes: technique.planes,
         leaves: technique.leaves,
         ray_fetch: technique.ray_fetch,
     })

@@ -2,9 +2,7 @@
 //! mirrored ball of a thousand triangles in it, do not depend on them.
 
 use impasto_runtime::render::{RenderOptions, Rendering};
-use impasto_runtime::technique::{
-    Choice, Leaves, Planes, RayFetch, RayOrder, Regeneration, Stack, Technique, Traversal,
-};
+use impasto_runtime::technique::{Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal};
 
 use crate::scene::{load, render, room};
 use crate::stub::{gpu, samples};
@@ -51,27 +49,31 @@ fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) -> R
     rendering
 }
 
-/// Every tree and stack, each with one ray a thread and with threads that stay.
+/// One ray a thread, which tests triangles where it finds them.
+fn plain() -> Technique {
+    Technique {
+        ray_fetch: RayFetch::Thread,
+        leaves: Leaves::AtOnce,
+        ..Technique::default()
+    }
+}
+
+/// Every tree and stack, with one ray a thread and with threads that stay, which test triangles
+/// at once or together.
 fn ways() -> Vec<Technique> {
     let mut ways = Vec::new();
     for (traversal, ..) in Traversal::ALL {
         for (stack, ..) in Stack::ALL {
-            for (ray_fetch, ..) in RayFetch::ALL {
-                let odd = ways.len() % 4 / 2 == 1;
+            for (ray_fetch, leaves) in [
+                (RayFetch::Thread, Leaves::AtOnce),
+                (RayFetch::Persistent, Leaves::AtOnce),
+                (RayFetch::Persistent, Leaves::Together),
+            ] {
                 ways.push(Technique {
                     traversal: *traversal,
                     stack: *stack,
-                    ray_fetch: *ray_fetch,
-                    planes: if odd {
-                        Planes::Mantissa
-                    } else {
-                        Planes::Convert
-                    },
-                    leaves: if odd {
-                        Leaves::Together
-                    } else {
-                        Leaves::AtOnce
-                    },
+                    ray_fetch,
+                    leaves,
                     ..Technique::default()
                 });
             }
@@ -82,7 +84,7 @@ fn ways() -> Vec<Technique> {
 
 #[test]
 fn every_way_of_casting_finds_the_same_hits_in_a_wavefront() {
-    let reference = picture("own", Technique::default());
+    let reference = picture("own", plain());
     for technique in ways() {
         assert_same("own", technique, &reference);
     }
@@ -90,19 +92,9 @@ fn every_way_of_casting_finds_the_same_hits_in_a_wavefront() {
 
 #[test]
 fn every_way_of_casting_finds_the_same_hits_in_a_megakernel() {
-    let reference = picture(
-        "mega",
-        Technique {
-            regeneration: Regeneration::Never,
-            ..Technique::default()
-        },
-    );
+    let reference = picture("mega", plain());
     for technique in ways() {
         if technique.ray_fetch == RayFetch::Thread {
-            let technique = Technique {
-                regeneration: Regeneration::Never,
-                ..technique
-            };
             assert_same("mega", technique, &reference);
         }
     }
@@ -116,7 +108,7 @@ fn rays_may_be_cast_in_another_order() {
         let kernels = rendering.report.kernels.iter();
         kernels.map(|kernel| kernel.name.clone()).collect()
     };
-    let reference = picture("own", Technique::default());
+    let reference = picture("own", plain());
     let names = kernels(&reference);
     assert!(
         names.iter().all(|name| !name.starts_with("scatter")),
