@@ -325,32 +325,51 @@ fn rays_along_the_axes_see_walls_that_are_flat_along_an_axis() {
     }
 }
 
+/// From inside of a convex mesh through every vertex, every edge's midpoint and random points of
+/// edges; half of the rays are almost at right angles to an axis.
+fn rays_through_edges(built: &Built, center: Vec3, radius: f32, random: &mut Random) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for (corners, k) in built
+        .positions
+        .iter()
+        .flat_map(|c| (0..3).map(move |k| (c, k)))
+    {
+        let (p, q) = (corners[k], corners[(k + 1) % 3]);
+        for s in [0.0, 0.5, random.uniform(), random.uniform()] {
+            let target = p + s * (q - p);
+            let origin = center + 0.9 * radius * random.uniform() * random.direction();
+            rays.push(Ray::new(origin, target - origin));
+            let axis = random.bits() as usize % 3;
+            let inward = center - target;
+            let mut beside = target + 0.7 * inward;
+            beside[axis] = target[axis] + 1e-4 * (0.1 + random.uniform()) * inward[axis];
+            rays.push(Ray::new(beside, target - beside));
+        }
+    }
+    rays
+}
+
 #[test]
 fn no_ray_passes_between_triangles_of_a_closed_mesh() {
     for way in ways() {
-        // From inside, through every vertex, every edge's midpoint and random points of edges.
         let mut random = Random::new(2);
         for (center, radius) in [
             (Vec3::ZERO, 1.0),
             (Vec3::new(300.0, -20.0, 7.0), 2.0),
             (Vec3::ZERO, 1e-4),
         ] {
-            let built = build(sphere(center, radius, 24), way);
-            let origin = center + 0.3 * radius * random.direction();
-            let mut rays = Vec::new();
-            for corners in &built.positions {
-                for k in 0..3 {
-                    let (p, q) = (corners[k], corners[(k + 1) % 3]);
-                    for s in [0.0, 0.5, random.uniform(), random.uniform()] {
-                        rays.push(Ray::new(origin, p + s * (q - p) - origin));
-                    }
-                }
-            }
-            let leaks = cast(&built, &rays)
+            // The edges of the cube lie on the planes of boxes, which so have no room for error.
+            let cube = cube(8)
                 .iter()
-                .filter(|h| h.primitive == MISS)
-                .count();
-            assert_eq!(leaks, 0, "of {} rays, radius {radius}", rays.len());
+                .map(|t| t.map(|p| center + radius * p))
+                .collect();
+            for triangles in [sphere(center, radius, 24), cube] {
+                let built = build(triangles, way);
+                let rays = rays_through_edges(&built, center, radius, &mut random);
+                let hits = cast(&built, &rays);
+                let leaks = hits.iter().filter(|h| h.primitive == MISS).count();
+                assert_eq!(leaks, 0, "of {} rays, radius {radius}", rays.len());
+            }
         }
     }
 }
