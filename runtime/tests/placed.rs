@@ -12,7 +12,7 @@ use impasto_runtime::scene::{
     Mesh, NO_MATERIAL, Object, Placed, Placement, Scene, Split, Transform,
 };
 use impasto_runtime::shader_part::ShaderPart;
-use impasto_runtime::technique::{Copies, Leaves, Planes, Stack, Technique, Traversal};
+use impasto_runtime::technique::{Copies, Stack, Technique, Traversal};
 use support::light_scenes::dark_scene;
 use support::{Random, Row, floats, row, run};
 
@@ -290,8 +290,6 @@ fn ways() -> [Technique; 4] {
     };
     let other = |technique: Technique| Technique {
         stack: Stack::Workgroup,
-        leaves: Leaves::Together,
-        planes: Planes::Mantissa,
         ..technique
     };
     [plain, other(plain), binary, other(binary)]
