@@ -32,6 +32,8 @@ pub(crate) enum Feed {
     Pool,
     /// As many as fill the GPU; they fetch items until the pool's number is used up.
     Fetched,
+    /// As many as fill the GPU; they fetch items of a queue until it is used up.
+    FetchedQueue(usize),
     /// One for every item of a queue, through indirect arguments.
     Queue(usize),
     /// A number of workgroups.
@@ -278,7 +280,7 @@ impl Composer<'_> {
         let name = id.stage().name;
         if self.fetches(id) {
             let shell = self.fetch_shell(id, queue);
-            return recipe(name, vec![id], Feed::Queue(queue), shell);
+            return recipe(name, vec![id], Feed::FetchedQueue(queue), shell);
         }
         let starts = id == StageId::NewPath;
         let counts = matches!(id, StageId::BinShadow | StageId::BinExtension);
@@ -322,28 +324,18 @@ impl Composer<'_> {
             + &fetch_shell(queue as u32, counter, &self.technique, part, limit, slots)
     }
 
-    /// The first queue whose rays are fetched; those after it are too.
-    fn first_fetched(&self) -> Option<usize> {
-        let queues = self.layout.queues;
-        let extension = self.fetches(StageId::Extension).then(|| queues.extension());
-        let shadow = self.fetches(StageId::Shadow).then(|| queues.shadow());
-        extension.or(shadow)
-    }
-
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
     fn prepare(&self, name: &str, consumed: std::ops::Range<usize>, hands_out: bool) -> Recipe {
+        let fetched = STAGES.iter().any(|stage| self.fetches(stage.id));
         let flags = [
             ("queues", !consumed.is_empty()),
             ("work", hands_out),
             ("regenerates", self.regenerates()),
-            ("fetched", self.first_fetched().is_some()),
+            ("fetched", fetched),
         ];
-        let groups = self.sizes.threads.div_ceil(self.sizes.workgroup);
         let mut text = self.layout.queues.constants();
         for (name, value) in [
             ("PREPARE_SIZE", PREPARE_THREADS),
-            ("FIRST_FETCHED", self.first_fetched().unwrap_or(0) as u32),
-            ("FETCHING_GROUPS", groups),
             ("FIRST_CONSUMED", consumed.start as u32),
             ("END_CONSUMED", consumed.end as u32),
         ] {

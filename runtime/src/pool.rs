@@ -8,6 +8,7 @@ use crate::gpu::Gpu;
 use crate::layout::Layout;
 use crate::modules::Sizes;
 use crate::render::{Progress, RenderOptions};
+use crate::technique::Technique;
 use crate::world::World;
 
 /// Paths in flight by default, as in Laine et al. 2013. In a megakernel it bounds the work of
@@ -69,14 +70,14 @@ pub(crate) fn sizes(
         .min(enough)
         .min(fits)
         .clamp(1, 1 << 30);
-    dispatch_sizes(gpu, pool, options.technique.workgroup)
+    dispatch_sizes(gpu, pool, &options.technique)
 }
 
-/// The sizes of dispatches over `items` slots, with workgroups of so many threads if it is said.
+/// The sizes of dispatches over `items` slots.
 pub(crate) fn dispatch_sizes(
     gpu: &Gpu,
     items: u32,
-    workgroup: Option<u32>,
+    technique: &Technique,
 ) -> Result<Sizes, RuntimeError> {
     let limits = gpu.device.limits();
     let fetch_limit = match gpu.is_software() {
@@ -85,8 +86,12 @@ pub(crate) fn dispatch_sizes(
     };
     Ok(Sizes {
         pool: items,
-        workgroup: workgroup_size(&limits, workgroup)?,
-        threads: THREADS.min(items).max(items.div_ceil(fetch_limit)),
+        workgroup: workgroup_size(&limits, technique.workgroup)?,
+        threads: technique
+            .threads
+            .unwrap_or(THREADS)
+            .min(items)
+            .max(items.div_ceil(fetch_limit)),
         fetch_limit,
         row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
     })

@@ -609,7 +609,9 @@ fn build_steps(
                 Feed::Once => Size::Direct(1, 1),
                 Feed::Groups(groups) => Size::Direct(groups, 1),
                 Feed::Pool => Size::for_items(sizes.pool, sizes.workgroup, sizes.row_groups),
-                Feed::Fetched => Size::for_items(sizes.threads, sizes.workgroup, sizes.row_groups),
+                Feed::Fetched | Feed::FetchedQueue(_) => {
+                    Size::for_items(sizes.threads, sizes.workgroup, sizes.row_groups)
+                }
                 Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
             },
         })

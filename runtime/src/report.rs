@@ -245,7 +245,9 @@ impl Inputs<'_> {
             form: recipe.form,
             materials: recipe.members.iter().filter_map(name).collect(),
             items: match recipe.feed {
-                Feed::Queue(queue) => counters.items_of(&status.counters, queue),
+                Feed::Queue(queue) | Feed::FetchedQueue(queue) => {
+                    counters.items_of(&status.counters, queue)
+                }
                 Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
                 Feed::Pool | Feed::Fetched => paths,
                 Feed::Once | Feed::Groups(_) => status.iterations,

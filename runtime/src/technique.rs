@@ -166,6 +166,9 @@ pub struct Technique {
     pub profile: bool,
     /// Threads of a workgroup; chosen by the kind of plan and GPU if `None`.
     pub workgroup: Option<u32>,
+    /// Threads of kernels that fetch one item after another; as many as fill the GPU if `None`.
+    /// There are more if else each had to fetch very many.
+    pub threads: Option<u32>,
     /// Where random numbers come from.
     pub sampler: Sampler,
     /// How kernels append to queues.

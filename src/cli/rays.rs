@@ -23,6 +23,9 @@ pub(super) struct RaysArgs {
     /// Threads of a workgroup
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
+    /// Threads of kernels that fetch rays; as many as fill the GPU otherwise
+    #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    threads: Option<u32>,
     /// Seed of scattered directions
     #[arg(long, default_value_t = 0)]
     seed: u32,
@@ -34,14 +37,15 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     let failure = |error: String| Failure::Error(error);
     let scene = impasto::load(&args.scene).map_err(|e| failure(e.to_string()))?;
     let gpu = args.gpu.open()?;
-    let set_workgroup = |technique| Technique {
+    let set_sizes = |technique| Technique {
         workgroup: args.workgroup,
+        threads: args.threads,
         ..technique
     };
     let options = RayOptions {
         size: args.size,
         repetitions: args.repetitions,
-        techniques: techniques(&gpu).into_iter().map(set_workgroup).collect(),
+        techniques: techniques(&gpu).into_iter().map(set_sizes).collect(),
         seed: args.seed,
     };
     let mut progress = |technique: &Technique| global.detail(&names(technique).join(" "));

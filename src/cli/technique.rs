@@ -47,6 +47,9 @@ pub(super) struct TechniqueArgs {
     /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
+    /// Threads of kernels that fetch one item after another; as many as fill the GPU otherwise
+    #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
+    threads: Option<u32>,
     /// Count the lanes at work in every kernel (`utilisation` in the report; much slower)
     #[arg(long)]
     profile: bool,
@@ -61,6 +64,7 @@ impl TechniqueArgs {
             regeneration: self.regeneration,
             profile: self.profile,
             workgroup: self.workgroup,
+            threads: self.threads,
             traversal: self.traversal,
             stack: self.stack,
             leaves: self.leaves,

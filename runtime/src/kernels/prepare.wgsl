@@ -30,16 +30,11 @@ fn consume(queue: u32) {
     if before > 0xffffffffu - items {
         atomicAdd(&counters[COUNTER_ITEMS + 2u * queue + 1u], 1u);
     }
-    // Rows of groups, since a dimension has a limit.
 #if fetched
-    var groups = (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
-    if queue >= FIRST_FETCHED {
-        groups = min(groups, FETCHING_GROUPS);
-        atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
-    }
-#else
-    let groups = (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+    atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
 #endif
+    // Rows of groups, since a dimension has a limit.
+    let groups = (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
     arguments[3u * queue] = min(groups, ROW_GROUPS);
     arguments[3u * queue + 1u] = (groups + ROW_GROUPS - 1u) / ROW_GROUPS;
     arguments[3u * queue + 2u] = 1u;

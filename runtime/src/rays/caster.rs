@@ -135,7 +135,7 @@ impl<'g> Caster<'g> {
     }
 
     fn step(&self, own: &[wgpu::Buffer], count: u32, any_hit: bool) -> Result<Step, RuntimeError> {
-        let sizes = pool::dispatch_sizes(self.gpu, count, self.technique.workgroup)?;
+        let sizes = pool::dispatch_sizes(self.gpu, count, &self.technique)?;
         let persistent = self.technique.ray_fetch == RayFetch::Persistent;
         let mut text = self.declarations();
         for (name, value) in [
