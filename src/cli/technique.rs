@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Copies, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
-    Stack, StateLayout, Technique, Traversal,
+    Append, Choice, Copies, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler, Stack,
+    StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
