@@ -86,6 +86,68 @@ fn instances_of_a_scene_are_counted_with_the_code_they_share() {
     assert_eq!(matte["operations"]["evaluations"], 1024);
 }
 
+/// Two squares of one material that loops as often as its parameter says; the second has three
+/// times the area of the first.
+const LOOPS: [(&str, &str); 3] = [
+    (
+        "loops.impasto",
+        "use std::bsdf::diffuse;
+         material loops {
+             param turns: int = 1;
+             surface = diffuse(color(slow(position.x, turns)));
+         }
+         fn slow(x: float, turns: int) -> float {
+             var sum = x;
+             for i in 0 .. min(turns, 100) { sum = sqrt(sum + float(i)); }
+             sum
+         }\n",
+    ),
+    (
+        "squares.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 4 0 0\nv 4 1 0\n\
+         usemtl few\nf 1 2 3 4\nusemtl many\nf 2 5 6 3\n",
+    ),
+    (
+        "scene.toml",
+        "camera = { position = [0, 0, 5], look_at = [0, 0, 0], fov = 40 }
+         geometry = [{ obj = \"squares.obj\" }]
+         [materials]
+         few = { file = \"loops.impasto\", params.turns = 8 }
+         many = { file = \"loops.impasto\", params.turns = 40 }\n",
+    ),
+];
+
+#[test]
+fn instances_count_with_their_own_values_and_by_their_area() {
+    let folder = folder();
+    let [_, _, scene] = LOOPS.map(|(name, text)| write(folder.path(), name, text));
+    let json = impasto(&["cost", &scene, "--format", "json"])
+        .exits(0)
+        .json();
+    let found = &json["materials"][0];
+    assert_eq!(found["instances"], 2, "{found:#}");
+    let turns = found["operations"]["classes"]["turns"].as_f64();
+    // What evaluating a lobe loops itself is the same for both.
+    let plain = write(
+        folder.path(),
+        "plain.toml",
+        LOOPS[2]
+            .1
+            .replace("turns = 8", "turns = 0")
+            .replace("turns = 40", "turns = 0"),
+    );
+    let json = impasto(&["cost", &plain, "--format", "json"])
+        .exits(0)
+        .json();
+    let own = json["materials"][0]["operations"]["classes"]["turns"].as_f64();
+    let (turns, own) = (turns.expect("a number"), own.expect("a number"));
+    let expected = 0.25 * 8.0 + 0.75 * 40.0;
+    assert!(
+        (turns - own - expected).abs() < 0.1,
+        "{turns} less {own} is not {expected}"
+    );
+}
+
 /// Generates what belongs to a scene in `out`.
 fn generate(name: &str, out: &Path) {
     let run = Command::new(env!("CARGO"))

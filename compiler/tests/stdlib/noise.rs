@@ -384,6 +384,76 @@ fn flakes_cover_their_share_and_tilt_within_their_spread() {
     );
 }
 
+#[test]
+fn flakes_are_unrelated_to_their_neighbours() {
+    // Far enough apart to be other flakes, near enough to be neighbours.
+    let text = Text::new(
+        "use std::noise::{flakes, Flakes};
+         fn f(p: point) -> Flakes = flakes(p, normal(0.0, 0.0, 1.0), size: 1 mm, coverage: 0.5, spread: 0.3);",
+    );
+    let mut n = Numbers::new(10);
+    let points: Vec<[f64; 3]> = (0..20_000).map(|_| point(&mut n, 0.0, 1.0)).collect();
+    let here = many(&text, &points);
+    let uniform = here.iter().map(|v| v[4]).sum::<f64>() / 2e4;
+    assert!((uniform - 0.5).abs() < 0.01, "the mean id is {uniform}");
+    for axis in 0..3 {
+        let moved = points.iter().map(|p| {
+            let mut p = *p;
+            p[axis] += 2.5e-3;
+            p
+        });
+        let there = many(&text, &moved.collect::<Vec<_>>());
+        // Presence, tilt in x and y, and id.
+        for (column, name) in [(0, "weight"), (1, "x"), (2, "y"), (4, "id")] {
+            let series = |values: &[Vec<f64>]| values.iter().map(|v| v[column]).collect::<Vec<_>>();
+            let r = correlation(&series(&here), &series(&there));
+            assert!(r.abs() < 0.04, "{name} along axis {axis}: {r}");
+        }
+    }
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+        a.iter().zip(b).map(|(x, y)| f(x - ma, y - mb)).sum()
+    };
+    sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt()
+}
+
+#[test]
+fn the_gradient_of_perlin_noise_is_its_derivative() {
+    let text = Text::new(
+        "use std::noise::{perlin, perlin_gradient, PerlinGradient};
+         fn value(p: point) -> float = perlin(p, seed: 3);
+         fn both(p: point) -> PerlinGradient = perlin_gradient(p, seed: 3);",
+    );
+    let mut n = Numbers::new(11);
+    const STEP: f64 = 1e-5;
+    for _ in 0..500 {
+        let p = point(&mut n, 0.0, 40.0);
+        let both = text.call::<f64>("both", &[&p]);
+        let value = text.call::<f64>("value", &[&p])[0];
+        assert!(
+            (both[0] - value).abs() < 1e-12,
+            "at {p:?}: {both:?} and {value}"
+        );
+        for axis in 0..3 {
+            let beside = |by: f64| {
+                let mut p = p;
+                p[axis] += by;
+                text.call::<f64>("value", &[&p])[0]
+            };
+            let slope = (beside(STEP) - beside(-STEP)) / (2.0 * STEP);
+            let found = both[1 + axis];
+            assert!(
+                (found - slope).abs() < 1e-6,
+                "along {axis} at {p:?}: {found} for {slope}"
+            );
+        }
+    }
+}
+
 // ---- Patterns ----------------------------------------------------------------------------
 
 #[test]
