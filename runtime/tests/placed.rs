@@ -140,6 +140,16 @@ fn placed_parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
     ]
 }
 
+/// The logarithm of how many primitives a placement has at least.
+fn block_shift(geometry: &ShaderPart) -> u32 {
+    let (_, rest) = geometry
+        .wgsl
+        .split_once("BLOCK_SHIFT: u32 = ")
+        .expect("a constant");
+    let (digits, _) = rest.split_once('u').expect("of type u32");
+    digits.parse().expect("a number")
+}
+
 /// The same with its objects copied, and all triangles.
 fn flat_parts(scene: &Scene) -> ([ShaderPart; 3], Mesh) {
     let split = Split::new(scene, &instances(), Copies::Flat).expect("it fits");
@@ -188,6 +198,7 @@ struct Seen {
     instance: u32,
     medium: u32,
     light: u32,
+    barycentrics: Vec2,
 }
 
 fn look(parts: &[ShaderPart; 3], rays: &[Ray]) -> Vec<Seen> {
@@ -211,8 +222,8 @@ fn look(parts: &[ShaderPart; 3], rays: &[Ray]) -> Vec<Seen> {
         let uv = hit_uv(p, b);
         result[6u * i + 1u] = bitcast<vec4<u32>>(vec4<f32>(hit_position(p, b), uv.x));
         result[6u * i + 2u] = bitcast<vec4<u32>>(vec4<f32>(hit_geometric_normal(p), uv.y));
-        result[6u * i + 3u] = bitcast<vec4<u32>>(vec4<f32>(hit_normal(p, b), 0.0));
-        result[6u * i + 4u] = bitcast<vec4<u32>>(vec4<f32>(hit_tangent(p), 0.0));
+        result[6u * i + 3u] = bitcast<vec4<u32>>(vec4<f32>(hit_normal(p, b), b.x));
+        result[6u * i + 4u] = bitcast<vec4<u32>>(vec4<f32>(hit_tangent(p), b.y));
         result[6u * i + 5u] = vec4<u32>(primitive_instance(p), primitive_medium(p), primitive_light(p), 0u);";
     let parts: Vec<&ShaderPart> = parts.iter().collect();
     let rows = run(&parts, body, &input, rays.len(), 6 * rays.len());
@@ -230,6 +241,7 @@ fn look(parts: &[ShaderPart; 3], rays: &[Ray]) -> Vec<Seen> {
             instance: rows[5][0],
             medium: rows[5][1],
             light: rows[5][2],
+            barycentrics: Vec2::new(floats(rows[3])[3], floats(rows[4])[3]),
         }
     };
     rows.chunks(6).map(seen).collect()
@@ -302,6 +314,9 @@ fn placed_and_copied_objects_look_the_same() {
             let mut random = Random::new(7 + way as u64);
             let scene = crowd(&mut random, scale, world);
             let placed = placed_parts(&scene, &technique);
+            let shift = block_shift(&placed[0]);
+            let largest = scene.objects.iter().map(|o| o.mesh.len() as u32).max();
+            let largest = largest.expect("objects");
             let (flat, mesh) = flat_parts(&scene);
             let rays = rays_at(&mut random, 2000, scale);
             let (mut clear, mut instances) = (0, [false; 5]);
@@ -332,6 +347,8 @@ fn placed_and_copied_objects_look_the_same() {
                 );
                 let close = |a: Vec3, b: Vec3| a.distance(b) < 2e-3;
                 assert!(a.position.distance(b.position) < 2.0 * tolerance as f32);
+                let within = a.primitive & ((1 << shift) - 1);
+                assert!(within < largest, "{within} of {largest} triangles");
                 assert!(close(a.geometric, b.geometric), "{a:?} {b:?}");
                 assert!(close(a.normal, b.normal), "{a:?} {b:?}");
                 assert!(close(a.tangent, b.tangent), "{a:?} {b:?}");
@@ -413,19 +430,24 @@ fn no_ray_passes_between_triangles_of_a_placed_object() {
 fn rays_that_leave_a_placed_object_do_not_hit_it_again() {
     let mut random = Random::new(5);
     for transform in stretches() {
-        let scene = one_ball(16, transform);
+        let mut scene = one_ball(16, transform);
+        // Another one beside it, so that primitives are not triangles.
+        let mut away = scene.placements[0].clone();
+        let size = transform.matrix.abs() * DVec3::ONE;
+        let aside = 8.0 * size.max_element() as f32 * Vec3::X;
+        away.transform = transform.then(&Transform::new(Vec3::ONE, Vec3::ZERO, aside));
+        scene.placements.insert(0, away);
         let parts = placed_parts(&scene, &Technique::default());
-        let triangles = scene.objects[0].mesh.len() as u32;
-        let input: Vec<Row> = (0..20_000)
-            .map(|_| {
-                let (s, t) = (random.uniform(), random.uniform());
-                let (u, v) = if s + t > 1.0 {
-                    (1.0 - s, 1.0 - t)
-                } else {
-                    (s, t)
-                };
+        let inside = transform.point(Vec3::ZERO);
+        let towards: Vec<Ray> = (0..10_000)
+            .map(|_| Ray::new(inside, transform.point(random.direction()) - inside))
+            .collect();
+        let input: Vec<Row> = look(&parts, &towards)
+            .iter()
+            .map(|seen| {
                 let outward = u32::from(random.uniform() < 0.5);
-                [random.bits() % triangles, u.to_bits(), v.to_bits(), outward]
+                let [u, v] = seen.barycentrics.to_array().map(f32::to_bits);
+                [seen.primitive, u, v, outward]
             })
             .collect();
         let body = "
@@ -442,27 +464,47 @@ fn rays_that_leave_a_placed_object_do_not_hit_it_again() {
             input.len(),
             2 * input.len(),
         );
-        let rays: Vec<Ray> = input
-            .iter()
-            .zip(starts.chunks(2))
-            .map(|(at, pair)| {
+        let leaving = |random: &mut Random, skips: bool| -> Vec<Ray> {
+            let ray = |(at, pair): (&Row, &[Row])| {
                 let origin = Vec3::from_slice(&floats(pair[0]));
                 let side = Vec3::from_slice(&floats(pair[1]));
                 let tilt = random.direction();
                 let along = (tilt - tilt.dot(side) * side).normalize();
                 let direction = along + 2.0 * random.uniform().powi(3) * side;
-                Ray {
-                    skip: at[0],
-                    ..Ray::new(origin, direction)
+                let ray = Ray::new(origin, direction);
+                match skips {
+                    true => Ray { skip: at[0], ..ray },
+                    false => Ray::new(origin, -side),
                 }
-            })
-            .collect();
-        let seen = look(&parts, &rays);
+            };
+            input.iter().zip(starts.chunks(2)).map(ray).collect()
+        };
+        let shift = block_shift(&parts[0]);
+        let seen = look(&parts, &leaving(&mut random, true));
+        let again = |at: &Row, seen: &Seen| seen.any && seen.primitive >> shift == at[0] >> shift;
         let wrong = input
             .iter()
             .zip(&seen)
-            .filter(|(at, seen)| seen.any == (at[3] == 1));
+            .filter(|(at, seen)| again(at, seen) == (at[3] == 1));
         assert_eq!(wrong.count(), 0, "{transform:?}");
+        // Straight back through the triangle: it is what is hit, unless it is skipped.
+        let back = leaving(&mut random, false);
+        let hits = look(&parts, &back);
+        let own = input
+            .iter()
+            .zip(&hits)
+            .filter(|(at, seen)| seen.primitive == at[0]);
+        assert!(own.count() * 10 > 9 * input.len(), "{transform:?}");
+        let skipping = input.iter().zip(&back).map(|(at, ray)| Ray {
+            skip: at[0],
+            ..*ray
+        });
+        let hits = look(&parts, &skipping.collect::<Vec<_>>());
+        let own = input
+            .iter()
+            .zip(&hits)
+            .filter(|(at, seen)| seen.primitive == at[0]);
+        assert_eq!(own.count(), 0, "{transform:?}");
     }
 }
 
