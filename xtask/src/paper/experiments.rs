@@ -3,7 +3,14 @@
 use crate::shell::{self, Result};
 
 /// The sections of the page, in its order.
-pub(super) const SECTIONS: [&str; 5] = ["speed", "stages", "ablations", "utilisation", "crossover"];
+pub(super) const SECTIONS: [&str; 6] = [
+    "speed",
+    "stages",
+    "ablations",
+    "rays",
+    "utilisation",
+    "crossover",
+];
 
 /// A scene of the paper and what it reports of it (tables 1 and 2, on a Tesla K20).
 pub(super) struct Scene {
@@ -47,29 +54,40 @@ pub(super) const SCENES: [Scene; 3] = [
 const PAPER_POOL: &str = "--pool=1048576";
 
 /// A change of one technique against the defaults: what is varied, and the option.
-pub(super) const ABLATIONS: [(&str, &str); 24] = [
+pub(super) const ABLATIONS: [(&str, &str); 35] = [
     ("pool", "--pool=262144"),
     ("pool", "--pool=524288"),
     ("pool", PAPER_POOL),
     ("pool", "--pool=2097152"),
     ("pool", "--pool=4194304"),
     ("pool", "--pool=8388608"),
-    ("appending to queues", "--append=workgroup"),
-    ("appending to queues", "--append=subgroup"),
-    ("appending to queues", "--append=thread"),
-    ("path state", "--state=soa"),
-    ("path state", "--state=aos"),
-    ("random numbers", "--sampler=independent"),
-    ("random numbers", "--sampler=sobol"),
-    ("random numbers", "--sampler=owen"),
-    ("acceleration structure", "--traversal=cwbvh"),
-    ("acceleration structure", "--traversal=bvh2"),
-    ("order of rays", "--ray-order=queue"),
-    ("order of rays", "--ray-order=binned"),
     ("workgroup", "--workgroup=64"),
     ("workgroup", "--workgroup=128"),
     ("workgroup", "--workgroup=256"),
     ("workgroup", "--workgroup=512"),
+    ("random numbers", "--sampler=sobol"),
+    ("random numbers", "--sampler=owen"),
+    ("random numbers", "--sampler=independent"),
+    ("appending to queues", "--append=workgroup"),
+    ("appending to queues", "--append=subgroup"),
+    ("appending to queues", "--append=thread"),
+    ("path state", "--state=soa"),
+    ("path state", "--state=pairs"),
+    ("path state", "--state=aos"),
+    ("acceleration structure", "--traversal=cwbvh"),
+    ("acceleration structure", "--traversal=bvh2"),
+    ("stack", "--stack=private"),
+    ("stack", "--stack=workgroup"),
+    ("stack", "--stack=trail"),
+    ("triangles", "--leaves=together"),
+    ("triangles", "--leaves=at-once"),
+    ("threads and rays", "--ray-fetch=persistent"),
+    ("threads and rays", "--ray-fetch=thread"),
+    ("rays and results", "--ray-data=slots"),
+    ("rays and results", "--ray-data=requests"),
+    ("order of rays", "--ray-order=queue"),
+    ("order of rays", "--ray-order=coarse"),
+    ("order of rays", "--ray-order=fine"),
     ("runtime checks", "--checked"),
     ("validation of indirect arguments", "--validate-indirect"),
 ];

@@ -6,6 +6,7 @@
 
 mod experiments;
 mod page;
+mod rays;
 mod record;
 mod tables;
 
@@ -30,6 +31,9 @@ pub(crate) struct PaperArgs {
     /// Divide samples by this and render once instead of three times, for a quick look
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     quick: u32,
+    /// The kitchen of the crate obvhs (assets/kitchen.obj, unpacked) for the section `rays`
+    #[arg(long, value_name = "OBJ")]
+    kitchen: Option<PathBuf>,
     /// What measured, as the page should call it, such as a commit
     #[arg(long, value_name = "TEXT")]
     version: Option<String>,
@@ -61,6 +65,10 @@ pub(crate) fn run(args: &PaperArgs) -> Result {
             if paper.measure(&impasto, experiment)? {
                 paper.save(&json)?;
             }
+        }
+        if wanted("rays") {
+            rays::measure(&mut paper, &impasto, args.kitchen.as_deref())?;
+            paper.save(&json)?;
         }
     }
     let page = args.out.join("paper.md");

@@ -29,6 +29,7 @@ pub(super) fn page(paper: &Paper) -> String {
             "speed" => tables::speed(paper),
             "stages" => tables::stages(paper),
             "ablations" => tables::ablations(paper),
+            "rays" => super::rays::table(paper),
             "utilisation" => tables::utilisation(paper),
             _ => tables::crossover(paper),
         };

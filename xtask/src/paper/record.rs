@@ -6,6 +6,7 @@ use std::process::Command;
 use serde::{Deserialize, Serialize};
 
 use super::experiments::Experiment;
+use super::rays::Rays;
 use crate::shell::{self, Result};
 
 /// Everything that was measured: the contents of `paper.json`.
@@ -19,6 +20,9 @@ pub(super) struct Paper {
     pub adapter: Adapter,
     /// The renders, in the order of measuring.
     pub records: Vec<Record>,
+    /// Ray casts alone.
+    #[serde(default)]
+    pub rays: Vec<Rays>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -118,7 +118,13 @@ fn stage_of(kernel: &Kernel) -> Stage {
         "logic" => Stage::Logic,
         "new_path" => Stage::NewPath,
         "extension" | "shadow" => Stage::RayCasts,
-        name if name.starts_with("sort") => Stage::RayCasts,
+        // Sorting rays is part of casting them.
+        name if ["bin_", "scan_", "scatter_"]
+            .iter()
+            .any(|p| name.starts_with(p)) =>
+        {
+            Stage::RayCasts
+        }
         name if name.starts_with("prepare") => Stage::Queues,
         _ => Stage::Materials,
     }

@@ -1,0 +1,150 @@
+//! Ray casts alone: `impasto rays` on the paper's scenes, and on a kitchen that others know.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use serde::{Deserialize, Serialize};
+
+use super::experiments::SCENES;
+use super::record::Paper;
+use crate::shell::{self, Result};
+
+/// What `impasto rays` said of one scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Rays {
+    /// What was measured.
+    pub version: String,
+    /// The scene's title on the page.
+    pub title: String,
+    pub triangles: u64,
+    pub rates: Vec<Rate>,
+}
+
+/// A technique and a set of rays.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Rate {
+    pub rays: String,
+    pub count: u64,
+    pub astray: u64,
+    pub mrays_per_second: f64,
+    pub traversal: String,
+    pub stack: String,
+    pub leaves: String,
+    pub ray_fetch: String,
+}
+
+impl Rate {
+    fn technique(&self) -> [&str; 4] {
+        [&self.traversal, &self.stack, &self.leaves, &self.ray_fetch]
+    }
+}
+
+/// The answer of `impasto rays --format json`.
+#[derive(Deserialize)]
+struct Answer {
+    triangles: u64,
+    rates: Vec<Rate>,
+}
+
+/// Measures what is not there yet in this version.
+pub(super) fn measure(paper: &mut Paper, impasto: &Path, kitchen: Option<&Path>) -> Result {
+    let mut scenes: Vec<(String, std::path::PathBuf)> = SCENES
+        .iter()
+        .map(|s| {
+            let file = format!("examples/{}/scene.toml", s.folder);
+            (s.title.to_string(), shell::root().join(file))
+        })
+        .collect();
+    if let Some(obj) = kitchen {
+        scenes.push(("kitchen of obvhs".into(), kitchen_scene(obj)?));
+    }
+    for (title, scene) in scenes {
+        let known = paper.rays.iter().position(|r| r.title == title);
+        if known.is_some_and(|at| paper.rays[at].version == paper.version) {
+            continue;
+        }
+        eprintln!("[rays] {title}");
+        let mut command = Command::new(impasto);
+        command
+            .arg("rays")
+            .arg(&scene)
+            .args(["--quiet", "--format", "json"]);
+        let answer = shell::capture(&mut command)?;
+        let answer: Answer = serde_json::from_str(&answer).map_err(|e| format!("{title}: {e}"))?;
+        let rays = Rays {
+            version: paper.version.clone(),
+            title,
+            triangles: answer.triangles,
+            rates: answer.rates,
+        };
+        match known {
+            Some(at) => paper.rays[at] = rays,
+            None => paper.rays.push(rays),
+        }
+    }
+    Ok(())
+}
+
+/// A scene file beside the kitchen's OBJ file, which has no licence and is not part of the project.
+fn kitchen_scene(obj: &Path) -> Result<std::path::PathBuf> {
+    let name = obj.file_name().unwrap_or_default().to_string_lossy();
+    let material = shell::root().join("materials/matte.impasto");
+    let text = format!(
+        "[camera]\nposition = [3.2, 1.6, 2.2]\nlook_at = [0.0, 0.9, -0.5]\nfov = 60.0\n\n\
+         [[geometry]]\nobj = {name:?}\n\n\
+         [materials.\"*\"]\nfile = {:?}\n\n[environment]\ncolor = [1.0, 1.0, 1.0]\n",
+        material.display().to_string()
+    );
+    let scene = obj.with_extension("toml");
+    super::write_whole(&scene, &text)?;
+    Ok(scene)
+}
+
+/// The table: the default technique, and those that differ from it in one choice.
+pub(super) fn table(paper: &Paper) -> String {
+    let mut out = String::new();
+    for rays in &paper.rays {
+        let Some(default) = rays.rates.first().map(|r| r.technique().map(String::from)) else {
+            continue;
+        };
+        let sets = rays
+            .rates
+            .iter()
+            .take_while(|r| r.technique() == rays.rates[0].technique());
+        let sets: Vec<&str> = sets.map(|r| r.rays.as_str()).collect();
+        let _ = write!(
+            out,
+            "\n| {}, {} triangles | {} |\n|---|{}\n",
+            rays.title,
+            rays.triangles,
+            sets.join(" | "),
+            "---|".repeat(sets.len())
+        );
+        for rates in rays.rates.chunks(sets.len()) {
+            let technique = rates[0].technique();
+            let pairs = technique.iter().zip(&default);
+            let changed: Vec<&str> = pairs.filter(|(a, b)| a != b).map(|(a, _)| *a).collect();
+            let plain = technique[1] == default[1] && technique[3] == "thread";
+            if changed.len() > 1 && !(plain && technique[2] == "at-once") {
+                continue;
+            }
+            let name = match changed.is_empty() {
+                true => format!("default: {}", technique.join(", ")),
+                false => changed.join(", "),
+            };
+            let cells = rates.iter().map(|r| format!("{:.0}", r.mrays_per_second));
+            let cells: Vec<String> = cells.collect();
+            let _ = writeln!(out, "| {name} | {} |", cells.join(" | "));
+        }
+    }
+    if out.is_empty() {
+        return out;
+    }
+    format!(
+        "## Ray casts alone\n\n\
+         Millions of rays a second (`impasto rays SCENE`, medians of nine): those of the camera, diffusely scattered \
+         where these\nhit, once more, and shadow rays between hits. Techniques other than the default are named by what \
+         they change.\n{out}"
+    )
+}
