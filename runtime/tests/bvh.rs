@@ -74,7 +74,7 @@ fn mesh(positions: Vec<[Vec3; 3]>) -> Mesh {
 }
 
 fn build(positions: Vec<[Vec3; 3]>, technique: Technique) -> Built {
-    println!("{technique:?}");
+    eprintln!("{technique:?}");
     let mesh = mesh(positions);
     let bvh = Bvh::build(&mesh, technique.traversal);
     let mut order = bvh.order().to_vec();

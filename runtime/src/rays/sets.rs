@@ -199,3 +199,45 @@ impl Random {
         (self.bits() % count.max(1) as u64) as usize
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_scattered_by_their_cosine() {
+        let mut random = Random(1);
+        let point = Point {
+            position: Vec3::ZERO,
+            normal: Vec3::new(0.6, 0.0, -0.8),
+            triangle: 0,
+        };
+        let cosines = (0..10_000).map(|_| {
+            let direction = point.scatter(random.uniform(), random.uniform());
+            assert!((direction.length() - 1.0).abs() < 1e-5);
+            direction.dot(point.normal)
+        });
+        let cosines: Vec<f32> = cosines.collect();
+        assert!(cosines.iter().all(|c| *c > -1e-5));
+        // The mean is 2/3, with a standard error of 0.0024.
+        let mean = cosines.iter().sum::<f32>() / cosines.len() as f32;
+        assert!((mean - 2.0 / 3.0).abs() < 0.01, "{mean}");
+    }
+
+    #[test]
+    fn hits_differ_by_distance_and_shadows_by_whether_there_is_one() {
+        let hit = |t| {
+            Some(SurfaceHit {
+                t,
+                uv: [0.0; 2],
+                triangle: 0,
+            })
+        };
+        for kind in SetKind::ALL {
+            assert!(differ(&hit(1.0), &None, kind) && differ(&None, &hit(1.0), kind));
+            assert!(!differ(&None, &None, kind) && !differ(&hit(1.0), &hit(1.00001), kind));
+        }
+        assert!(differ(&hit(1.0), &hit(1.01), SetKind::Diffuse));
+        assert!(!differ(&hit(1.0), &hit(1.01), SetKind::Shadow));
+    }
+}

@@ -35,7 +35,7 @@ fn assert_same(strategy: &str, technique: Technique, reference: &Rendering) -> R
     let differences: Vec<f64> = differences.map(|(a, b)| f64::from(a - b)).collect();
     let astray = differences.iter().filter(|d| d.abs() > 1e-5).count();
     let bias = differences.iter().sum::<f64>() / differences.len() as f64;
-    println!("{strategy}, {technique:?}: {astray}, {bias}");
+    eprintln!("{strategy}, {technique:?}: {astray}, {bias}");
     let allowed = match (gpu().info().kind, technique.traversal) {
         ("software", Traversal::Cwbvh) => 0,
         _ => differences.len() / 8,
