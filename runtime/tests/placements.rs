@@ -151,10 +151,39 @@ fn too_many_copies_are_an_error_before_they_fill_the_memory() {
         (counts.triangles, counts.placed_triangles),
         (1000, 100_000_000)
     );
+    let error = Split::new(&shared, &[], Copies::Flat).expect_err("too many");
+    assert!(error.to_string().contains("100000000 triangles"), "{error}");
+    assert!(shared.flattened().is_err());
     let error = load_with(&files, &format!("{entry}share = false\n")).expect_err("too many");
     let text = error.to_string();
     assert!(text.contains("more than 89478485 triangles"), "{text}");
     assert!(text.contains("share = false"), "{text}");
+}
+
+#[test]
+fn a_sample_of_copies_has_something_of_everything() {
+    let mut places = String::from("x y z material\n");
+    for i in 0..1000 {
+        let _ = writeln!(places, "{i} 0 0 {}", if i == 777 { "red" } else { "blue" });
+    }
+    let files = [("s.obj", strip(10)), ("p.txt", places)];
+    let toml = "[[geometry]]\nobj = 't.obj'\n\
+                [[geometry]]\nobj = 's.obj'\nshare = true\nplacements = 'p.txt'\n";
+    let scene = load_with(&files, toml).expect("it loads");
+    let all = scene.sampled(usize::MAX);
+    assert_eq!(
+        (all.len(), *all == scene.flattened().expect("it fits").mesh),
+        (10_002, true)
+    );
+    let some = scene.sampled(1000);
+    assert!((900..1100).contains(&(some.len() - 2)), "{}", some.len());
+    // Each list of materials is there, and places from all of the file.
+    let lists: std::collections::BTreeSet<u32> = some.materials.iter().copied().collect();
+    assert_eq!(lists.len(), 3);
+    let far = some.positions.iter().filter(|p| p[0].x > 500.0).count();
+    assert!((350..650).contains(&far), "{far}");
+    let none = scene.sampled(0);
+    assert_eq!(none.len(), 2 + 2 * 10);
 }
 
 fn parts(scene: &Scene, technique: &Technique) -> Result<SceneParts, SceneError> {

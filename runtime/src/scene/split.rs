@@ -177,6 +177,9 @@ impl Scene {
                 mesh.push_copy(object, |_| true, transform, materials);
             }
         }
+        if let Cow::Owned(mesh) = &mut mesh {
+            mesh.simplify();
+        }
         mesh
     }
 }
