@@ -97,7 +97,7 @@ def _faces(lines: list[str], corners: int, form: str, tables: dict[str, np.ndarr
 
 
 def transformed(mesh: Mesh, spec: dict) -> Mesh:
-    """A mesh under `scale`, `rotate` and `translate` of a `[[geometry]]` entry."""
+    """A mesh under `scale`, `rotate` and `translate` of a `[[geometry]]` entry or a placement."""
     rotation = np.eye(3)
     for axis, degrees in enumerate(spec.get("rotate", [0, 0, 0])):
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
@@ -105,9 +105,14 @@ def transformed(mesh: Mesh, spec: dict) -> Mesh:
         turn = np.eye(3)
         turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
         rotation = turn @ rotation
-    positions = mesh.positions * spec.get("scale", 1.0) @ rotation.T
-    positions = positions + np.array(spec.get("translate", [0, 0, 0]))
-    normals = None if mesh.normals is None else mesh.normals @ rotation.T
+    scale = np.broadcast_to(np.array(spec.get("scale", 1.0), dtype=float), 3)
+    if (scale <= 0).any():
+        raise SystemExit("mirrored geometry is not taken over")
+    positions = (mesh.positions * scale) @ rotation.T + np.array(spec.get("translate", [0, 0, 0]))
+    normals = mesh.normals
+    if normals is not None:
+        normals = (normals / scale) @ rotation.T
+        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     return Mesh(positions, normals, mesh.uvs)
 
 

@@ -66,9 +66,14 @@ def meshes(scene: dict, impasto: Impasto):
                 mtl |= load_mtl(library)
             loaded[path] = (parts, mtl)
         parts, mtl = loaded[path]
-        for part, mesh in parts.items():
-            name = spec.get("material", part.split("\0")[0])
-            yield transformed(mesh, spec), bound_material(scene, name, mtl, impasto)
+        places = spec.get("placements", [{}])
+        if isinstance(places, str) or "matrix" in spec or any("matrix" in place for place in places):
+            raise SystemExit(f"{path}: files of placements and matrices are not taken over")
+        for place in places:
+            for part, mesh in parts.items():
+                name = place.get("material", spec.get("material", part.split("\0")[0]))
+                placed = transformed(transformed(mesh, spec), place)
+                yield placed, bound_material(scene, name, mtl, impasto)
 
 
 def rgb(value) -> dict:
