@@ -32,6 +32,7 @@ pub mod report;
 mod resources;
 pub mod scene;
 mod schedule;
+mod settings;
 pub mod shader_part;
 mod stages;
 mod state;

@@ -4,10 +4,11 @@
 //! whole samples, which can be kept and gone on from. A pass costs the time in which its last
 //! paths leave most of the pool idle; a pass of some seconds hardly notices.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::error::RuntimeError;
 use crate::film_file::FilmFile;
+use crate::render::RenderOptions;
 
 /// What a render that can be interrupted starts from and leaves behind.
 pub struct Keeping<'a> {
@@ -57,6 +58,50 @@ impl Passes {
         let growth = target.as_secs_f64() / took.as_secs_f64().max(1e-6);
         // Conversion saturates.
         self.next = (f64::from(samples) * growth.min(GROWTH)) as u32;
+    }
+}
+
+/// A pass over some samples of every pixel.
+pub(crate) struct Pass {
+    /// When the render began.
+    pub begin: Instant,
+    /// Samples that an earlier run had taken.
+    pub resumed: u32,
+    /// Samples taken before this pass.
+    pub done: u32,
+    /// Samples of this pass.
+    pub samples: u32,
+    /// Which pass of this run it is, from 1.
+    pub number: u64,
+    /// Whether the render was asked to end.
+    pub stopped: bool,
+}
+
+impl Pass {
+    pub(crate) fn new(begin: Instant, resumed: u32) -> Self {
+        Self {
+            begin,
+            resumed,
+            done: resumed,
+            samples: 0,
+            number: 1,
+            stopped: false,
+        }
+    }
+
+    /// Goes on to the next.
+    pub(crate) fn advance(&mut self) {
+        self.done += self.samples;
+        self.number += 1;
+    }
+
+    /// What kernels are told.
+    pub(crate) fn options(&self, all: &RenderOptions) -> RenderOptions {
+        RenderOptions {
+            first_sample: all.first_sample + self.done,
+            samples: self.samples,
+            ..all.clone()
+        }
     }
 }
 

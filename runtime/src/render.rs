@@ -18,7 +18,7 @@ use crate::film_file::{FilmFile, Identity, Range};
 use crate::gpu::{Gpu, Timing};
 use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
-use crate::passes::{Keeping, Passes};
+use crate::passes::{Keeping, Pass, Passes};
 use crate::pool::{self, Pace};
 use crate::queues::{Queues, Scalar};
 use crate::random::{self, Demand};
@@ -26,8 +26,8 @@ use crate::report::{MaterialReport, Report, Resumed};
 use crate::resources::Resources;
 use crate::scene::{GeometryCounts, Scene};
 use crate::schedule::{Schedule, Size, Step};
+use crate::settings;
 use crate::shader_part::BufferData;
-use crate::state;
 use crate::status::{Flight, Status};
 use crate::technique::Technique;
 use crate::world::{MaterialSource, World};
@@ -108,50 +108,6 @@ struct Facts {
     compile_seconds: f64,
 }
 
-/// A pass over some samples of every pixel.
-struct Pass {
-    /// When the render began.
-    begin: Instant,
-    /// Samples that an earlier run had taken.
-    resumed: u32,
-    /// Samples taken before this pass.
-    done: u32,
-    /// Samples of this pass.
-    samples: u32,
-    /// Which pass of this run it is, from 1.
-    number: u64,
-    /// Whether the render was asked to end.
-    stopped: bool,
-}
-
-impl Pass {
-    fn new(begin: Instant, resumed: u32) -> Self {
-        Self {
-            begin,
-            resumed,
-            done: resumed,
-            samples: 0,
-            number: 1,
-            stopped: false,
-        }
-    }
-
-    /// Goes on to the next.
-    fn advance(&mut self) {
-        self.done += self.samples;
-        self.number += 1;
-    }
-
-    /// What kernels are told.
-    fn options(&self, all: &RenderOptions) -> RenderOptions {
-        RenderOptions {
-            first_sample: all.first_sample + self.done,
-            samples: self.samples,
-            ..all.clone()
-        }
-    }
-}
-
 /// Submissions in flight.
 const FLIGHTS: usize = 2;
 
@@ -188,7 +144,7 @@ impl<'g> Renderer<'g> {
             technique,
             ..options.clone()
         };
-        check_settings(world, options)?;
+        settings::check(world, options)?;
         let (materials, instances) = (source.infos(), source.instances());
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
         let layout = Layout::new(world, &materials, plan, &technique)?;
@@ -531,41 +487,6 @@ impl<'g> Renderer<'g> {
         }
         .report(status, film)
     }
-}
-
-fn check_settings(world: &World, options: &RenderOptions) -> Result<(), RuntimeError> {
-    let refuse = |setting, value: String, expected: &str| {
-        Err(RuntimeError::Setting {
-            setting,
-            value,
-            expected: expected.to_string(),
-        })
-    };
-    let pixels = u64::from(world.width) * u64::from(world.height);
-    if pixels == 0 || pixels > 1 << 29 {
-        let size = format!("{} x {}", world.width, world.height);
-        return refuse("the picture's size", size, "1 to 2^29 pixels");
-    }
-    if world.max_depth == 0 || world.max_depth > state::MAX_DEPTH {
-        let expected = format!("1 to {} segments", state::MAX_DEPTH);
-        return refuse("max_depth", world.max_depth.to_string(), &expected);
-    }
-    if options.samples == 0 {
-        return refuse("samples", "0".into(), "at least 1 sample a pixel");
-    }
-    if options.first_sample.checked_add(options.samples).is_none() {
-        // The largest word stands for all samples of a pixel (kernels/random).
-        let last = u64::from(options.first_sample) + u64::from(options.samples) - 1;
-        return refuse(
-            "the last sample's index",
-            last.to_string(),
-            "at most 2^32 - 2",
-        );
-    }
-    if options.pool == Some(0) {
-        return refuse("pool", "0".into(), "at least 1 path");
-    }
-    Ok(())
 }
 
 /// Runs an iteration without any work: some drivers finish building a kernel when it first
