@@ -14,6 +14,7 @@ pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
     let lights: Vec<&DistantLight> = lights.collect();
     let sampled = lights.iter().map(|light| Sampled {
         power: luminance(light.irradiance) * context.cross_section(),
+        by_chance: !light.sample,
         ..Sampled::default()
     });
     (!lights.is_empty()).then(|| Kind {

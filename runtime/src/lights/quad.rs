@@ -29,7 +29,7 @@ fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
     let sides = if quad.two_sided { 2.0 } else { 1.0 };
     let power = std::f64::consts::PI * sides * area * luminance(quad.radiance);
     (power > 0.0).then(|| Sampled {
-        by_chance: false,
+        by_chance: !quad.sample,
         power,
         radiance: quad.radiance,
         primitive: context.primitives[first],

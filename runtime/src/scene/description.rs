@@ -320,6 +320,7 @@ fn quad(table: &mut Table) -> Result<QuadLight, SceneError> {
         v: table.require("v")?.vector()?,
         radiance: table.require("radiance")?.rgb()?,
         two_sided: optional(table, "two_sided", Value::boolean, false)?,
+        sample: optional(table, "sample", Value::boolean, true)?,
     };
     let corners = [
         quad.corner,
@@ -343,11 +344,18 @@ fn distant(table: &mut Table) -> Result<DistantLight, SceneError> {
     }
     let angle =
         |v: &Value| v.float_where("degrees from 0 to below 180", |v| (0.0..180.0).contains(&v));
-    Ok(DistantLight {
+    let light = DistantLight {
         to_light,
         irradiance: table.require("irradiance")?.rgb()?,
         angle: optional(table, "angle", angle, 0.0)?,
-    })
+        sample: optional(table, "sample", Value::boolean, true)?,
+    };
+    if light.angle == 0.0 && !light.sample {
+        return Err(table
+            .error("a distant light of a single direction is not sampled, so nothing would find it")
+            .hint("give it an `angle`, or leave `sample = false` out"));
+    }
+    Ok(light)
 }
 
 fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> {

@@ -167,6 +167,8 @@ pub struct QuadLight {
     pub radiance: Vec3,
     /// Does the back emit as well?
     pub two_sided: bool,
+    /// Do light samples pick points on it, or is it only found by chance?
+    pub sample: bool,
 }
 
 /// A light at infinity, of uniform radiance over a disc of directions.
@@ -178,6 +180,9 @@ pub struct DistantLight {
     pub irradiance: Vec3,
     /// Angular diameter in degrees, below 180; 0 is a single direction.
     pub angle: f32,
+    /// Do light samples pick directions in it, or is it only found by chance? A single direction
+    /// is always sampled.
+    pub sample: bool,
 }
 
 /// Radiance that comes from infinitely far away in all directions.

@@ -373,3 +373,33 @@ fn every_organisation_renders_the_same_scene() {
         }
     }
 }
+
+/// Lights that are found by chance give the light that sampled ones give, without a shadow ray.
+#[test]
+fn lights_give_as_much_whether_they_are_sampled_or_not() {
+    let quad = "[[lights]]\nkind = 'quad'\ncorner = [-0.8, 0.99, -0.8]\n\
+                u = [1.6, 0, 0]\nv = [0, 0, 1.6]\nradiance = [2, 2, 2]\n";
+    let sun = "[[lights]]\nkind = 'distant'\nto_light = [0, 0, 1]\nirradiance = 1\nangle = 120\n";
+    for light in [quad, sun] {
+        let toml = room(1.0, 0.0, 4).replace("glowing", "dull");
+        // The sun shines on a block without a room around it.
+        let toml = match light == sun {
+            true => toml
+                .replace("room.obj", "block.obj")
+                .replace("materials.wall", "materials.block"),
+            false => toml,
+        } + light;
+        let (scene, program) = load(&toml);
+        let sampled = render(&scene, &program, "wavefront", &samples(64));
+        let (scene, program) = load(&(toml + "sample = false\n"));
+        let found = render(&scene, &program, "wavefront", &samples(256));
+        assert!(found.report.kernels.iter().all(|k| k.name != "shadow"));
+        let (brightness, _) = mean(red(&sampled));
+        assert!(brightness > 1e-3, "{light}: {brightness}");
+        let (difference, error) = mean(red(&found).zip(red(&sampled)).map(|(a, b)| a - b));
+        assert!(
+            difference.abs() <= 4.0 * error,
+            "{light}: {difference} +- {error}"
+        );
+    }
+}

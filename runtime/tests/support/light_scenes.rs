@@ -77,6 +77,7 @@ pub(crate) fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3], radiance: f32) ->
         v: v.into(),
         radiance: Vec3::new(radiance, 0.5 * radiance, 0.25 * radiance),
         two_sided: false,
+        sample: true,
     }
 }
 
@@ -111,6 +112,7 @@ pub(crate) fn distant(to_light: [f32; 3], irradiance: f32, angle: f32) -> Light 
         to_light: Vec3::from(to_light).normalize(),
         irradiance: Vec3::splat(irradiance),
         angle,
+        sample: true,
     })
 }
 
