@@ -12,7 +12,7 @@ use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
 use crate::state::{self, Storage};
 use crate::text::{mentions, predicate, preprocess, without_comments};
-use crate::{film, profile};
+use crate::{film, profile, wgsl};
 
 /// A buffer as a kernel binds it, in group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,8 +119,8 @@ impl Composer<'_> {
 
     fn constants(&self, nonfinite: usize) -> String {
         let (world, sizes) = (self.world, self.sizes);
-        let mut out = String::new();
-        for (name, value) in [
+        let nonfinite = self.layout.counters.nonfinite(nonfinite);
+        let mut out = wgsl::constants_u32(&[
             ("POOL_SIZE", sizes.pool),
             ("WORKGROUP_SIZE", sizes.workgroup),
             ("ROW_GROUPS", sizes.row_groups),
@@ -129,13 +129,8 @@ impl Composer<'_> {
             ("ROULETTE_START", world.roulette_start),
             ("NOTHING", u32::MAX),
             ("FILM_COUNT_PLANE", film::COUNT_PLANE as u32),
-            (
-                "COUNTER_NONFINITE",
-                self.layout.counters.nonfinite(nonfinite) as u32,
-            ),
-        ] {
-            out += &format!("const {name}: u32 = {value}u;\n");
-        }
+            ("COUNTER_NONFINITE", nonfinite as u32),
+        ]);
         if self.layout.needs.media {
             let [a, b, c, d] = world.parts.media.camera;
             out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
@@ -144,9 +139,10 @@ impl Composer<'_> {
     }
 
     fn profile_constants(&self, kernel: usize) -> String {
-        let lanes = self.layout.counters.lanes(kernel);
-        let size = self.subgroup_size;
-        format!("const COUNTER_LANES: u32 = {lanes}u;\nconst SUBGROUP_SIZE: u32 = {size}u;\n")
+        wgsl::constants_u32(&[
+            ("COUNTER_LANES", self.layout.counters.lanes(kernel) as u32),
+            ("SUBGROUP_SIZE", self.subgroup_size),
+        ])
     }
 
     fn part(&self, part: Part, members: &[usize]) -> String {

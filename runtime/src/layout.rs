@@ -5,8 +5,9 @@ use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::error::RuntimeError;
+use crate::needs::Needs;
 use crate::queues::{Counters, Queues};
-use crate::state::{self, Needs};
+use crate::state;
 use crate::technique::{RayData, RayOrder, Technique};
 use crate::world::World;
 
@@ -32,7 +33,7 @@ impl Layout {
     ) -> Result<Self, RuntimeError> {
         check_plan(plan, materials.len())?;
         let wavefront = plan.organisation == Organisation::Wavefront;
-        let mut needs = needs(world, materials);
+        let mut needs = Needs::of(world, materials);
         needs.order = wavefront && technique.ray_order != RayOrder::Queue;
         // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
         needs.requests =
@@ -105,22 +106,6 @@ impl Layout {
         } else {
             0
         }
-    }
-}
-
-/// What a scene and its materials need.
-fn needs(world: &World, materials: &[MaterialInfo]) -> Needs {
-    let media = &world.parts.media;
-    Needs {
-        shadow_rays: world.parts.has_sampled_lights
-            && world.max_depth > 1
-            && materials.iter().any(|m| !m.delta_only),
-        media: media.part.is_some(),
-        absorption: media.absorb,
-        overlap: media.overlap,
-        varying_emission: materials.iter().any(|m| m.varying_emission),
-        order: false,
-        requests: false,
     }
 }
 

@@ -4,9 +4,9 @@
 //! through accessors and asks for further work through `request_*` functions, so that the
 //! same body runs as a kernel of the wavefront or as a step of the megakernel. What follows
 //! from the table (which text a kernel is composed of, which queues there are) is derived in
-//! `modules` and `queues`. A new stage is one file in `kernels/` and one row here.
+//! `modules`, `wavefront` and `queues`. A new stage is one file in `kernels/` and one row here.
 
-use crate::state::Need::{
+use crate::needs::Need::{
     self, Absorption, Always, Media, Order, Overlap, ShadowOrder, ShadowRays,
 };
 

@@ -23,6 +23,12 @@ pub(crate) fn constant_u32(name: &str, value: u32) -> String {
     format!("const {name}: u32 = {value}u;\n")
 }
 
+/// Such a line for each of some constants.
+pub(crate) fn constants_u32(constants: &[(&str, u32)]) -> String {
+    let line = |(name, value): &(&str, u32)| constant_u32(name, *value);
+    constants.iter().map(line).collect()
+}
+
 /// The line `const NAME: f32 = value;`.
 pub(crate) fn constant_f32(name: &str, value: f32) -> String {
     format!("const {name}: f32 = {};\n", float(value))

@@ -27,7 +27,6 @@ pub(super) fn casts(
     let stack = technique.stack;
     let binary = traversal == Traversal::Bvh2;
     let flags = [
-        ("binary", binary),
         ("wide", !binary),
         ("trail", stack == Stack::Trail),
         ("placed", placed),

@@ -7,7 +7,7 @@ fn main(
     @builtin(subgroup_invocation_id) lane_of_subgroup: u32, @builtin(local_invocation_index) lane: u32
 ) {
     subgroup_lane = lane_of_subgroup;
-#if lanes
+#if walk_lane
     walk_lane = lane;
 #endif
     let items = atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);

@@ -57,7 +57,7 @@ fn main(
     @builtin(subgroup_invocation_id) lane_of_subgroup: u32, @builtin(local_invocation_index) lane: u32
 ) {
     subgroup_lane = lane_of_subgroup;
-#if lanes
+#if walk_lane
     walk_lane = lane;
 #endif
     let lanes = lane_count(subgroupBallot(true));
@@ -99,7 +99,7 @@ fn main(
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-#if lanes
+#if walk_lane
     walk_lane = lane;
 #endif
     let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;

@@ -55,7 +55,7 @@ fn put(queue: u32, place: u32, slot: u32) {
     if place >= POOL_SIZE {
         return;
     }
-#if rays
+#if keeps
     if queue == QUEUE_EXTENSION {
         extension_rays[2u * place] = extension_ray[0];
         extension_rays[2u * place + 1u] = extension_ray[1];
@@ -63,7 +63,7 @@ fn put(queue: u32, place: u32, slot: u32) {
         return;
     }
 #endif
-#if shadows
+#if keeps_shadows
     if queue == QUEUE_SHADOW {
         shadow_rays[2u * place] = shadow_ray[0];
         shadow_rays[2u * place + 1u] = shadow_ray[1];
@@ -73,7 +73,7 @@ fn put(queue: u32, place: u32, slot: u32) {
 #endif
     queues[queue * POOL_SIZE + place] = slot;
 }
-#if rays
+#if keeps
 
 // The places of the thread's rays.
 var<private> extension_place: u32 = 0u;

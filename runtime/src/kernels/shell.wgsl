@@ -11,7 +11,7 @@ fn main(
 #if subgroups
     subgroup_lane = lane_of_subgroup;
 #endif
-#if lanes
+#if walk_lane
     walk_lane = lane;
 #endif
     let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;

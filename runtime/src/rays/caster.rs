@@ -6,15 +6,16 @@ use super::sets::{Ray, SurfaceHit};
 use crate::bvh::{self, Bvh};
 use crate::error::RuntimeError;
 use crate::gpu::{Gpu, Timing};
-use crate::modules::fetch_shell;
 use crate::pool;
 use crate::scene::Scene;
 use crate::scene::surface::geometry_part;
 use crate::schedule::{Schedule, Size, Step};
 use crate::shader_part::ShaderPart;
+use crate::shells::{EntryPoint, FetchShell};
 use crate::status::{Flight, Status};
-use crate::technique::{RayFetch, Technique};
+use crate::technique::{Leaves, RayFetch, Technique};
 use crate::text::preprocess;
+use crate::wgsl;
 
 /// The buffers of a kernel beside the scene's: name, type, access.
 const BUFFERS: [(&str, &str, &str); 4] = [
@@ -138,35 +139,18 @@ impl<'g> Caster<'g> {
         let sizes = pool::dispatch_sizes(self.gpu, count, &self.technique)?;
         let persistent = self.technique.ray_fetch == RayFetch::Persistent;
         let mut text = self.declarations();
-        for (name, value) in [
+        text += &wgsl::constants_u32(&[
             ("POOL_SIZE", count),
             ("WORKGROUP_SIZE", sizes.workgroup),
             ("ROW_GROUPS", sizes.row_groups),
             ("NOTHING", u32::MAX),
             ("COUNTER_TAKEN", 0),
             ("CONSUMED_REGION", 0),
-        ] {
-            text += &format!("const {name}: u32 = {value}u;\n");
-        }
+        ]);
         text.extend(self.parts.iter().map(|part| part.wgsl.as_str()));
         let flags = [("any_hit", any_hit), ("fetched", persistent)];
         text += &preprocess(include_str!("../kernels/rays.wgsl"), &flags);
-        text += &if persistent {
-            let counter = format!("{FETCHED}u");
-            fetch_shell(
-                0,
-                &counter,
-                &self.technique,
-                &self.parts[1],
-                sizes.fetch_limit,
-                true,
-            )
-        } else {
-            let lanes = bvh::asks_for_lane(&self.parts[1]);
-            let flags = [("lanes", lanes), ("queued", true), ("slots", true)];
-            String::from("const CONSUMED_QUEUE: u32 = 0u;\n")
-                + &preprocess(include_str!("../kernels/shell.wgsl"), &flags)
-        };
+        text += &self.shell(sizes.fetch_limit);
         crate::gpu::shader::validate("rays", &text)?;
         let layout = self.layout();
         let buffers = own.iter().chain(&self.scene_buffers);
@@ -194,6 +178,29 @@ impl<'g> Caster<'g> {
         };
         self.gpu.check()?;
         Ok(step)
+    }
+
+    /// The entry point: threads that fetch rays, or one thread a ray.
+    fn shell(&self, fetch_limit: u32) -> String {
+        let walk_lane = bvh::asks_for_lane(&self.parts[1]);
+        match self.technique.ray_fetch {
+            RayFetch::Persistent => FetchShell {
+                queue: 0,
+                counter: &format!("{FETCHED}u"),
+                limit: fetch_limit,
+                slots: true,
+                together: self.technique.leaves == Leaves::Together,
+                walk_lane,
+            }
+            .wgsl(),
+            RayFetch::Thread => {
+                let entry = EntryPoint {
+                    walk_lane,
+                    ..EntryPoint::of_slots_in_queue()
+                };
+                wgsl::constant_u32("CONSUMED_QUEUE", 0) + &entry.wgsl()
+            }
+        }
     }
 
     fn declarations(&self) -> String {

@@ -1,0 +1,185 @@
+//! The kernels of the wavefront, in the order of an iteration: which stages each runs, which queue
+//! feeds it, and what it asks for (Laine et al. 2013).
+
+use impasto_compiler::partition::Form;
+
+use crate::bvh;
+use crate::modules::{Composer, Feed, Recipe};
+use crate::needs::Need;
+use crate::order;
+use crate::queues::Queues;
+use crate::shells::{Consumed, EntryPoint, Shell};
+use crate::stages::StageId;
+use crate::technique::RayFetch;
+
+impl Composer<'_> {
+    /// The logic stage, the material stage with new paths, then ray casts. Kernels between
+    /// two prepare kernels may run in any order, but shadow rays before extension rays, which
+    /// overwrite the hit.
+    pub(crate) fn wavefront(&self) -> Vec<Recipe> {
+        let queues = self.layout.queues;
+        let rays = queues.extension();
+        let mut recipes = vec![
+            self.logic(),
+            self.prepare("prepare_materials", 0..rays, true),
+            self.stage(StageId::NewPath, Queues::NEW_PATH),
+        ];
+        recipes.extend(self.material_kernels());
+        recipes.push(self.prepare("prepare_rays", rays..queues.count(), false));
+        if self.layout.needs.met(Need::ShadowRays) {
+            recipes.extend(self.order(StageId::BinShadow, queues.shadow()));
+            recipes.push(self.stage(StageId::Shadow, queues.shadow()));
+        }
+        recipes.extend(self.order(StageId::BinExtension, rays));
+        recipes.push(self.stage(StageId::Extension, rays));
+        recipes
+    }
+
+    /// The logic kernel, which also evaluates the materials that have no queue.
+    fn logic(&self) -> Recipe {
+        let inline = self.plan.kernels.iter().enumerate();
+        let inline: Vec<_> = inline.filter(|(_, k)| k.form == Form::Inline).collect();
+        let members: Vec<usize> = inline
+            .iter()
+            .flat_map(|(_, k)| k.materials.clone())
+            .collect();
+        let mut stages = vec![StageId::Logic];
+        let mut run = "logic(slot);".to_string();
+        if !members.is_empty() {
+            stages.push(StageId::Material);
+            run += " if wanted_instance != NOTHING && wanted_work == NOTHING { \
+                     material(slot, wanted_instance); }";
+        }
+        let shell = self.shell(&Shell {
+            run,
+            sorts: true,
+            casts: !members.is_empty(),
+            casts_shadows: self.needs_of(&members).shadow_rays,
+            ..Shell::default()
+        });
+        Recipe {
+            name: StageId::Logic.stage().name.to_string(),
+            form: inline.first().map(|(_, kernel)| kernel.form),
+            stages,
+            members,
+            feed: Feed::Pool,
+            counter: inline.first().map_or(0, |(index, _)| *index),
+            shell,
+        }
+    }
+
+    /// The kernels that evaluate the materials of a queue each.
+    fn material_kernels(&self) -> impl Iterator<Item = Recipe> {
+        let kernels = self.plan.kernels.iter().enumerate();
+        let queued = kernels.filter(|(_, k)| k.form != Form::Inline);
+        queued.enumerate().map(|(position, (counter, planned))| {
+            let instance = match self.instances_of(&planned.materials)[..] {
+                [only] => format!("{only}u"),
+                _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
+            };
+            let queue = self.layout.queues.material(position);
+            let shell = self.shell(&Shell {
+                run: format!("material(slot, {instance});"),
+                consumes: Some(Consumed {
+                    queue,
+                    region: queue,
+                }),
+                casts: true,
+                casts_shadows: self.needs_of(&planned.materials).shadow_rays,
+                ..Shell::default()
+            });
+            Recipe {
+                name: planned.name.clone(),
+                form: Some(planned.form),
+                stages: vec![StageId::Material],
+                members: planned.materials.clone(),
+                feed: Feed::Queue(queue),
+                counter,
+                shell,
+            }
+        })
+    }
+
+    /// The instances of some materials.
+    fn instances_of(&self, members: &[usize]) -> Vec<usize> {
+        let instances = self.instances.iter().enumerate();
+        let members = instances.filter(|(_, i)| members.contains(&i.material));
+        members.map(|(index, _)| index).collect()
+    }
+
+    /// A kernel of one stage that reads `queue` and evaluates no material.
+    fn stage(&self, id: StageId, queue: usize) -> Recipe {
+        let name = id.stage().name;
+        let consumed = Consumed {
+            queue,
+            region: self.region(id, queue),
+        };
+        if self.fetches(id) {
+            let shell = self.fetch_shell(consumed);
+            return Recipe::plain(name, vec![id], Feed::FetchedQueue(queue), shell);
+        }
+        let starts = id == StageId::NewPath;
+        let counts = matches!(id, StageId::BinShadow | StageId::BinExtension);
+        let traverses = !(starts || counts);
+        let arguments = if traverses { "slot" } else { "slot, item" };
+        let shell = self.shell(&Shell {
+            run: format!("{name}({arguments});"),
+            consumes: Some(consumed),
+            casts: starts,
+            traverses,
+            ..Shell::default()
+        });
+        Recipe::plain(name, vec![id], Feed::Queue(queue), shell)
+    }
+
+    /// Where the items of a queue are, for a stage that consumes it.
+    fn region(&self, stage: StageId, queue: usize) -> usize {
+        match stage {
+            StageId::Shadow | StageId::Extension if self.layout.needs.order => {
+                self.layout.queues.region_ordered()
+            }
+            _ => queue,
+        }
+    }
+
+    /// Whether the threads of a stage stay, and take up one ray after another. Boundaries that are
+    /// crossed would have to be crossed in the midst of a cast.
+    pub(crate) fn fetches(&self, id: StageId) -> bool {
+        let possible = match id {
+            StageId::Shadow => true,
+            StageId::Extension => !self.layout.needs.overlap,
+            _ => false,
+        };
+        possible
+            && self.layout.wavefront
+            && self.technique.ray_fetch == RayFetch::Persistent
+            && bvh::provides_steps(&self.world.parts.bvh)
+    }
+
+    /// The kernels that put a queue of rays in order, if that is wanted: `count` is the stage that
+    /// counts them.
+    fn order(&self, count: StageId, queue: usize) -> Vec<Recipe> {
+        let stage = count.stage();
+        if !self.layout.needs.met(stage.need) {
+            return Vec::new();
+        }
+        let name = |what: &str| stage.name.replace("bin", what);
+        let order = self.technique.ray_order;
+        let scan = order::constants(order) + include_str!("kernels/order_scan.wgsl");
+        let consumed = Consumed {
+            queue,
+            region: queue,
+        };
+        let scatter = order::constants(order)
+            + &self.layout.queues.constants()
+            + &consumed.constants()
+            + include_str!("kernels/order_scatter.wgsl")
+            + &EntryPoint::of_slots_in_queue().wgsl();
+        let groups = Feed::Groups(order::scan_groups(order));
+        vec![
+            self.stage(count, queue),
+            Recipe::plain(&name("scan"), Vec::new(), groups, scan),
+            Recipe::plain(&name("scatter"), Vec::new(), Feed::Queue(queue), scatter),
+        ]
+    }
+}
