@@ -11,6 +11,7 @@ use crate::compose::Binding;
 use crate::layout::Layout;
 use crate::needs::Needs;
 use crate::shader_part::{BufferData, ShaderPart};
+use crate::shells::SUBGROUP;
 use crate::stages::{STAGES, StageId};
 use crate::technique::{Regeneration, Technique};
 use crate::text::preprocess;
@@ -192,7 +193,7 @@ impl Composer<'_> {
             };
             shell += &format!("const REGENERATION_SHARE: u32 = {share};\n");
             shell += &wgsl::constant_u32("FETCH_LIMIT", self.sizes.fetch_limit);
-            shell += include_str!("kernels/subgroup.wgsl");
+            shell += SUBGROUP;
         }
         let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));
         let stages = stages.map(|s| s.id).collect();

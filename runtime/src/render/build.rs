@@ -1,0 +1,173 @@
+//! Building a renderer: composing the kernels of a plan, making buffers, compiling pipelines.
+
+use std::time::Instant;
+
+use impasto_compiler::Program;
+use impasto_compiler::partition::Plan;
+
+use super::{Facts, RenderOptions, Renderer};
+use crate::error::RuntimeError;
+use crate::film_file::Identity;
+use crate::gpu::Gpu;
+use crate::layout::Layout;
+use crate::modules::{Composer, Feed, Kernel, Sizes};
+use crate::pool;
+use crate::random::{self, Demand};
+use crate::report::MaterialReport;
+use crate::resources::Resources;
+use crate::scene::Scene;
+use crate::schedule::{Schedule, Size, Step};
+use crate::settings;
+use crate::shader_part::BufferData;
+use crate::world::{MaterialSource, World};
+
+impl<'g> Renderer<'g> {
+    /// Prepares to render `scene`, whose materials compiled to `program`.
+    pub fn new(
+        gpu: &'g Gpu,
+        scene: &Scene,
+        program: &Program,
+        plan: &Plan,
+        options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        let world = World::new(
+            scene,
+            &program.infos(),
+            &MaterialSource::instances(program),
+            &program.textures(),
+            &options.technique,
+        )?;
+        Self::from_world(gpu, &world, program, plan, options)
+    }
+
+    /// Composes and builds the kernels of `plan` and uploads the world's buffers.
+    pub fn from_world(
+        gpu: &'g Gpu,
+        world: &World,
+        source: &dyn MaterialSource,
+        plan: &Plan,
+        options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        let begin = Instant::now();
+        let mut options = options.clone();
+        options.technique = options.technique.within(gpu);
+        settings::check(world, &options)?;
+        let (materials, instances) = (source.infos(), source.instances());
+        let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
+        let layout = Layout::new(world, &materials, plan, &options.technique)?;
+        options.technique = layout.technique(options.technique);
+        let technique = options.technique;
+        let sizes = pool::sizes(gpu, world, &layout, &options)?;
+        let mut composer = Composer {
+            world,
+            source,
+            materials: &materials,
+            instances: &instances,
+            tables: &tables,
+            plan,
+            layout,
+            sizes,
+            technique,
+            subgroup_size: gpu.subgroup_size(),
+            random: random::part(
+                technique.sampler,
+                Demand::of(world, &materials, layout.needs.shadow_rays),
+            ),
+        };
+        if technique.profile {
+            composer.layout.counters.profiled = composer.recipes().len();
+        }
+        let kernels = composer.kernels();
+        let resources = Resources::new(gpu, &composer, &options)?;
+        let steps = build_steps(gpu, &kernels, &resources, sizes)?;
+        let schedule = Schedule {
+            steps,
+            arguments: resources.arguments().clone(),
+            timing: gpu.timing,
+        };
+        warm_up(gpu, &resources, &schedule, &options)?;
+        let facts = Facts {
+            strategy: plan.strategy.clone(),
+            width: world.width,
+            height: world.height,
+            geometry: world.parts.counts,
+            max_depth: world.max_depth,
+            pool: sizes.pool,
+            identity: Identity {
+                width: world.width,
+                height: world.height,
+                seed: options.seed,
+                sampler: technique.sampler,
+                scene: composer.fingerprint(),
+            },
+            materials: MaterialReport::of(&materials, &instances),
+            compile_seconds: begin.elapsed().as_secs_f64(),
+        };
+        Ok(Self {
+            gpu,
+            options,
+            layout: composer.layout,
+            kernels,
+            resources,
+            schedule,
+            facts,
+        })
+    }
+}
+
+/// Runs an iteration without any work: some drivers finish building a kernel when it first
+/// runs, which would count as rendering.
+fn warm_up(
+    gpu: &Gpu,
+    resources: &Resources,
+    schedule: &Schedule,
+    options: &RenderOptions,
+) -> Result<(), RuntimeError> {
+    let no_work = RenderOptions {
+        samples: 0,
+        ..options.clone()
+    };
+    resources.set_run(gpu, &no_work);
+    resources.clear(gpu);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    schedule.record(&mut encoder, 1, None);
+    let index = gpu.queue.submit([encoder.finish()]);
+    gpu.wait(index)?;
+    resources.set_run(gpu, options);
+    Ok(())
+}
+
+/// Validates the kernels and builds their pipelines, several at a time.
+fn build_steps(
+    gpu: &Gpu,
+    kernels: &[Kernel],
+    resources: &Resources,
+    sizes: Sizes,
+) -> Result<Vec<Step>, RuntimeError> {
+    let build = |kernel: &Kernel| -> Result<Step, RuntimeError> {
+        let name = &kernel.recipe.name;
+        crate::gpu::shader::validate(name, &kernel.wgsl)?;
+        let layout = resources.bind_group_layout(gpu, kernel)?;
+        Ok(Step {
+            name: name.clone(),
+            pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
+            bind_group: resources.bind_group(gpu, kernel, &layout),
+            size: dispatch_size(kernel.recipe.feed, sizes),
+        })
+    };
+    let steps = crate::parallel::map(kernels, build);
+    gpu.check()?;
+    steps.into_iter().collect()
+}
+
+/// How many workgroups a kernel gets.
+fn dispatch_size(feed: Feed, sizes: Sizes) -> Size {
+    let threads = |count| Size::for_items(count, sizes.workgroup, sizes.row_groups);
+    match feed {
+        Feed::Once => Size::Direct(1, 1),
+        Feed::Groups(groups) => Size::Direct(groups, 1),
+        Feed::Pool => threads(sizes.pool),
+        Feed::Fetched | Feed::FetchedQueue(_) => threads(sizes.threads),
+        Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
+    }
+}

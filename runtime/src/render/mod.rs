@@ -1,0 +1,250 @@
+//! The renderer: pipelines and buffers for one plan over one world, and renders in passes.
+//!
+//! How a renderer comes to be is in `build`, the loop that runs a pass in `iterate`.
+
+mod build;
+mod iterate;
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use crate::error::RuntimeError;
+use crate::film::{Film, Sums};
+use crate::film_file::{FilmFile, Identity, Range};
+use crate::gpu::{Gpu, Timing};
+use crate::layout::Layout;
+use crate::modules::Kernel;
+use crate::passes::{Keeping, Pass, Passes};
+use crate::queues::Scalar;
+use crate::report::{MaterialReport, Report, Resumed};
+use crate::resources::Resources;
+use crate::scene::GeometryCounts;
+use crate::schedule::Schedule;
+use crate::status::Status;
+use crate::technique::Technique;
+
+/// What to render of a world.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// Samples in each pixel, at least 1.
+    pub samples: u32,
+    /// Index of each pixel's first sample: renders of disjoint ranges are independent and may
+    /// be averaged.
+    pub first_sample: u32,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Paths in flight; chosen by the size of the picture and the GPU if `None`.
+    pub pool: Option<u32>,
+    /// How the work is done.
+    pub technique: Technique,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            samples: 16,
+            first_sample: 0,
+            seed: 0,
+            pool: None,
+            technique: Technique::default(),
+        }
+    }
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Paths finished.
+    pub paths: u64,
+    /// Paths in all.
+    pub total: u64,
+    /// Time since the render began.
+    pub elapsed: Duration,
+}
+
+/// A finished (or stopped) render.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The picture.
+    pub film: Film,
+    /// The exact sums that the picture is the mean of.
+    pub sums: FilmFile,
+    /// What it took.
+    pub report: Report,
+}
+
+/// Everything that is needed to render a world by a plan, as often as wanted.
+#[derive(Debug)]
+pub struct Renderer<'g> {
+    gpu: &'g Gpu,
+    options: RenderOptions,
+    layout: Layout,
+    kernels: Vec<Kernel>,
+    resources: Resources,
+    schedule: Schedule,
+    facts: Facts,
+}
+
+/// What the report says of the world and the plan.
+#[derive(Debug)]
+struct Facts {
+    strategy: String,
+    width: u32,
+    height: u32,
+    geometry: GeometryCounts,
+    max_depth: u32,
+    pool: u32,
+    identity: Identity,
+    materials: Vec<MaterialReport>,
+    compile_seconds: f64,
+}
+
+impl<'g> Renderer<'g> {
+    /// The kernels' names and their WGSL, in the order of an iteration.
+    pub fn kernels(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.kernels
+            .iter()
+            .map(|k| (k.recipe.name.as_str(), k.wgsl.as_str()))
+    }
+
+    /// Renders. `progress` is called after each submission; when it breaks, the samples that
+    /// were begun by then are finished for every pixel, and make the picture.
+    pub fn render(
+        &mut self,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        self.render_passes(None, progress)
+    }
+
+    /// Renders in passes, between which what is done can be kept and gone on from. The picture has
+    /// the same bits as without.
+    pub fn render_keeping(
+        &mut self,
+        keeping: Keeping<'_>,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        self.render_passes(Some(keeping), progress)
+    }
+
+    /// What the samples of this render must have in common with others to be merged with them.
+    pub fn identity(&self) -> &Identity {
+        &self.facts.identity
+    }
+
+    fn render_passes(
+        &mut self,
+        mut keeping: Option<Keeping<'_>>,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Rendering, RuntimeError> {
+        let begin = Instant::now();
+        let start = keeping.as_mut().and_then(|k| k.start.take());
+        let resumed = self.take_up(start.as_ref())?;
+        drop(start);
+        let mut status = Status::new(self.schedule.steps.len());
+        let mut pass = Pass::new(begin, resumed.samples);
+        let every = keeping.as_ref().map(|k| k.every);
+        let mut passes = Passes::new(self.options.samples - resumed.samples, every);
+        let mut kept = begin;
+        loop {
+            let wanted = passes.next();
+            let Some(samples) = wanted.filter(|_| !pass.stopped) else {
+                break;
+            };
+            let pass_begin = Instant::now();
+            pass.samples = samples;
+            self.run(&mut pass, &mut status, progress)?;
+            passes.taken(pass.samples, pass_begin.elapsed());
+            pass.advance();
+            if let Some(keeping) = &mut keeping
+                && passes.next().is_some()
+                && 2 * kept.elapsed() >= keeping.every
+            {
+                (keeping.keep)(&self.sums(&status, &resumed, pass.done)?)?;
+                kept = Instant::now();
+            }
+        }
+        let sums = self.sums(&status, &resumed, pass.done)?;
+        if let Some(keeping) = &mut keeping {
+            (keeping.keep)(&sums)?;
+        }
+        let film = sums.sums.picture();
+        let report = self.report(&status, &film, resumed, begin.elapsed().as_secs_f64());
+        Ok(Rendering { film, sums, report })
+    }
+
+    /// Empties everything, then fills the film with the sums that are gone on from.
+    fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
+        self.resources.clear(self.gpu);
+        let Some(start) = start else {
+            return Ok(Resumed::default());
+        };
+        let (identity, options) = (self.identity(), &self.options);
+        let done = start.done_of(identity, options.first_sample, options.samples);
+        let samples = done.map_err(RuntimeError::OtherRender)?;
+        self.resources.write_film(self.gpu, start.sums.words());
+        Ok(Resumed {
+            samples,
+            nonfinite: start.nonfinite,
+            clamped: start.clamped,
+        })
+    }
+
+    /// What the film holds between two passes, when `done` samples are taken.
+    fn sums(
+        &self,
+        status: &Status,
+        resumed: &Resumed,
+        done: u32,
+    ) -> Result<FilmFile, RuntimeError> {
+        let (width, height) = (self.facts.width, self.facts.height);
+        let words = self.resources.read_film(self.gpu)?;
+        let sums = Sums::new(width, height, words);
+        let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
+        let dropped = self.dropped(status);
+        Ok(FilmFile {
+            identity: self.facts.identity,
+            nonfinite: resumed.nonfinite + dropped.0,
+            clamped: resumed.clamped + dropped.1,
+            ranges: vec![Range {
+                first: self.options.first_sample.into(),
+                count: done.into(),
+            }],
+            sums,
+        })
+    }
+
+    /// Samples that were no numbers, and samples cut, in the counters read last.
+    fn dropped(&self, status: &Status) -> (u64, u64) {
+        let counters = self.layout.counters;
+        let scalar = |s| u64::from(counters.scalar(&status.counters, s));
+        let by_kernels = (0..counters.kernels)
+            .filter_map(|kernel| status.counters.get(counters.nonfinite(kernel)));
+        let by_kernels: u64 = by_kernels.map(|n| u64::from(*n)).sum();
+        (
+            by_kernels + scalar(Scalar::FilmNonfinite),
+            scalar(Scalar::FilmClamped),
+        )
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.facts.width) * u64::from(self.facts.height)
+    }
+
+    fn report(&self, status: &Status, film: &Film, resumed: Resumed, wall_seconds: f64) -> Report {
+        crate::report::Inputs {
+            resumed,
+            gpu: self.gpu.info(),
+            options: &self.options,
+            layout: &self.layout,
+            kernels: &self.kernels,
+            timed: self.schedule.timing != Timing::None,
+            strategy: &self.facts.strategy,
+            geometry: self.facts.geometry,
+            pool: self.facts.pool,
+            materials: &self.facts.materials,
+            compile_seconds: self.facts.compile_seconds,
+            wall_seconds,
+        }
+        .report(status, film)
+    }
+}
