@@ -46,6 +46,14 @@ pub(crate) struct Consumed {
 }
 
 impl Consumed {
+    /// A queue whose items are where they were put.
+    pub(crate) fn unordered(queue: usize) -> Self {
+        Self {
+            queue,
+            region: queue,
+        }
+    }
+
     pub(crate) fn constants(self) -> String {
         wgsl::constants_u32(&[
             ("CONSUMED_QUEUE", self.queue as u32),

@@ -80,10 +80,7 @@ impl Composer<'_> {
             let queue = self.layout.queues.material(position);
             let shell = self.shell(&Shell {
                 run: format!("material(slot, {instance});"),
-                consumes: Some(Consumed {
-                    queue,
-                    region: queue,
-                }),
+                consumes: Some(Consumed::unordered(queue)),
                 casts: true,
                 casts_shadows: self.needs_of(&planned.materials).shadow_rays,
                 ..Shell::default()
@@ -110,10 +107,7 @@ impl Composer<'_> {
     /// A kernel of one stage that reads `queue` and evaluates no material.
     fn stage(&self, id: StageId, queue: usize) -> Recipe {
         let name = id.stage().name;
-        let consumed = Consumed {
-            queue,
-            region: self.region(id, queue),
-        };
+        let consumed = self.consumed(id, queue);
         if self.fetches(id) {
             let shell = self.fetch_shell(consumed);
             return Recipe::plain(name, vec![id], Feed::FetchedQueue(queue), shell);
@@ -132,13 +126,14 @@ impl Composer<'_> {
         Recipe::plain(name, vec![id], Feed::Queue(queue), shell)
     }
 
-    /// Where the items of a queue are, for a stage that consumes it.
-    fn region(&self, stage: StageId, queue: usize) -> usize {
+    /// A queue as a stage finds it: rays may have been put in order.
+    fn consumed(&self, stage: StageId, queue: usize) -> Consumed {
         match stage {
-            StageId::Shadow | StageId::Extension if self.layout.needs.order => {
-                self.layout.queues.region_ordered()
-            }
-            _ => queue,
+            StageId::Shadow | StageId::Extension if self.layout.needs.order => Consumed {
+                queue,
+                region: self.layout.queues.region_ordered(),
+            },
+            _ => Consumed::unordered(queue),
         }
     }
 
@@ -166,13 +161,9 @@ impl Composer<'_> {
         let name = |what: &str| stage.name.replace("bin", what);
         let order = self.technique.ray_order;
         let scan = order::constants(order) + include_str!("kernels/order_scan.wgsl");
-        let consumed = Consumed {
-            queue,
-            region: queue,
-        };
         let scatter = order::constants(order)
             + &self.layout.queues.constants()
-            + &consumed.constants()
+            + &Consumed::unordered(queue).constants()
             + include_str!("kernels/order_scatter.wgsl")
             + &EntryPoint::of_slots_in_queue().wgsl();
         let groups = Feed::Groups(order::scan_groups(order));

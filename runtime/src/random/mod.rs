@@ -4,13 +4,12 @@
 //! A draw gives four words at once, as a function of (pixel, sample, draw, seed); the functions
 //! are `kernels/random.wgsl` and a file a sampler beside it.
 
-use std::fmt::Write;
-
 use impasto_compiler::abi::MaterialInfo;
 
 use crate::lights::LIGHT_ROW_BYTES;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Sampler;
+use crate::wgsl;
 use crate::world::World;
 
 mod sobol;
@@ -113,7 +112,7 @@ pub fn part(sampler: Sampler, demand: Demand) -> ShaderPart {
         }
         Sampler::Sobol => {
             let draws = demand.dimensions();
-            let _ = writeln!(wgsl, "const SOBOL_DRAWS: u32 = {}u;", draws.len());
+            wgsl += &wgsl::constant_u32("SOBOL_DRAWS", draws.len() as u32);
             wgsl += include_str!("../kernels/random/sobol.wgsl");
             let of_draw = |d| sobol::tables(d, |point, index| point(index));
             draws.into_iter().flat_map(of_draw).collect()
@@ -147,13 +146,13 @@ fn constants() -> String {
     let mut out = String::new();
     for names in [&PATH_DRAWS[..], &VERTEX_DRAWS[..]] {
         for (index, name) in names.iter().enumerate() {
-            let _ = writeln!(out, "const {name}: u32 = {index}u;");
+            out += &wgsl::constant_u32(name, index as u32);
         }
     }
-    let _ = writeln!(out, "const DRAWS_PER_PATH: u32 = {}u;", PATH_DRAWS.len());
-    let count = VERTEX_DRAWS.len();
-    let _ = writeln!(out, "const DRAWS_PER_VERTEX: u32 = {count}u;");
-    out
+    out + &wgsl::constants_u32(&[
+        ("DRAWS_PER_PATH", PATH_DRAWS.len() as u32),
+        ("DRAWS_PER_VERTEX", VERTEX_DRAWS.len() as u32),
+    ])
 }
 
 /// A seed as the kernels get it: a bijection that spreads nearby seeds and powers of two over

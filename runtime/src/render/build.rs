@@ -87,21 +87,8 @@ impl<'g> Renderer<'g> {
         };
         warm_up(gpu, &resources, &schedule, &options)?;
         let facts = Facts {
-            strategy: plan.strategy.clone(),
-            width: world.width,
-            height: world.height,
-            geometry: world.parts.counts,
-            max_depth: world.max_depth,
-            pool: sizes.pool,
-            identity: Identity {
-                width: world.width,
-                height: world.height,
-                seed: options.seed,
-                sampler: technique.sampler,
-                scene: composer.fingerprint(),
-            },
-            materials: MaterialReport::of(&materials, &instances),
             compile_seconds: begin.elapsed().as_secs_f64(),
+            ..Facts::of(&composer, options.seed)
         };
         Ok(Self {
             gpu,
@@ -112,6 +99,31 @@ impl<'g> Renderer<'g> {
             schedule,
             facts,
         })
+    }
+}
+
+impl Facts {
+    /// What is known once kernels are composed; building them takes yet unknown time.
+    fn of(composer: &Composer<'_>, seed: u32) -> Self {
+        let world = composer.world;
+        let (width, height) = (world.width, world.height);
+        Self {
+            strategy: composer.plan.strategy.clone(),
+            width,
+            height,
+            geometry: world.parts.counts,
+            max_depth: world.max_depth,
+            pool: composer.sizes.pool,
+            identity: Identity {
+                width,
+                height,
+                seed,
+                sampler: composer.technique.sampler,
+                scene: composer.fingerprint(),
+            },
+            materials: MaterialReport::of(composer.materials, composer.instances),
+            compile_seconds: 0.0,
+        }
     }
 }
 
