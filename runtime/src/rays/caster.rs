@@ -1,6 +1,6 @@
 //! Casts sets of rays by one technique, with the shells that the wavefront's kernels have.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::sets::{Ray, SurfaceHit};
 use crate::bvh::{self, Bvh};
@@ -16,6 +16,9 @@ use crate::status::{Flight, Status};
 use crate::technique::{Leaves, RayFetch, Technique};
 use crate::text::preprocess;
 use crate::wgsl;
+
+/// Casts before those that are timed.
+const WARM_UP: Duration = Duration::from_millis(200);
 
 /// The buffers of a kernel beside the scene's: name, type, access.
 const BUFFERS: [(&str, &str, &str); 4] = [
@@ -77,7 +80,7 @@ impl<'g> Caster<'g> {
         })
     }
 
-    /// Casts `rays` once, and then `repetitions` times by the clock.
+    /// Casts `rays` for some time, and then `repetitions` times by the clock.
     pub(super) fn cast(
         &self,
         rays: &[Ray],
@@ -104,17 +107,21 @@ impl<'g> Caster<'g> {
             arguments: counters.clone(),
             timing: self.gpu.timing.min(Timing::AroundPass),
         };
-        let mut seconds = Vec::new();
-        for _ in 0..=repetitions {
+        let cast = || {
             self.gpu
                 .queue
                 .write_buffer(&counters, 0, bytemuck::cast_slice(&start));
-            seconds.push(self.run(&schedule, &counters)?);
+            self.run(&schedule, &counters)
+        };
+        // Some drivers finish building a kernel when it first runs; and a GPU that was idle, as while
+        // a tree was built, takes its time to get up to speed.
+        let begin = Instant::now();
+        cast()?;
+        while repetitions > 0 && begin.elapsed() < WARM_UP {
+            cast()?;
         }
-        // The first time some drivers finish building the kernel.
-        if repetitions > 0 {
-            seconds.remove(0);
-        }
+        let seconds: Result<_, _> = (0..repetitions).map(|_| cast()).collect();
+        let seconds: Vec<f64> = seconds?;
         let hits = self.read(&own[1])?;
         Ok(Cast { hits, seconds })
     }

@@ -40,6 +40,9 @@ impl Rate {
     }
 }
 
+/// Fewer rays than these are no measurement.
+const FEWEST: u64 = 50_000;
+
 /// The answer of `impasto rays --format json`.
 #[derive(Deserialize)]
 struct Answer {
@@ -113,6 +116,8 @@ pub(super) fn table(paper: &Paper) -> String {
             .iter()
             .take_while(|r| r.technique() == rays.rates[0].technique());
         let sets: Vec<&str> = sets.map(|r| r.rays.as_str()).collect();
+        // Where few rays are left, what is timed is the dispatch.
+        let told = |rate: &&Rate| rate.count >= FEWEST;
         let _ = write!(
             out,
             "\n| {}, {} triangles | {} |\n|---|{}\n",
@@ -133,7 +138,10 @@ pub(super) fn table(paper: &Paper) -> String {
                 true => format!("default: {}", technique.join(", ")),
                 false => changed.join(", "),
             };
-            let cells = rates.iter().map(|r| format!("{:.0}", r.mrays_per_second));
+            let cells = rates.iter().map(|r| match told(&r) {
+                true => format!("{:.0}", r.mrays_per_second),
+                false => "-".into(),
+            });
             let cells: Vec<String> = cells.collect();
             let _ = writeln!(out, "| {name} | {} |", cells.join(" | "));
         }
