@@ -92,20 +92,20 @@ fn what_is_repeated_often_is_shared_and_nothing_else() {
         )
     };
     let entry = "[[geometry]]\nobj = 's.obj'\n";
-    let twice = format!("{entry}translate = [9, 0, 0]\n{entry}");
-    // 65,536 triangles saved.
-    assert_eq!(counts(65_536, &twice), (0, 1, 2));
-    assert_eq!(counts(65_535, &twice), (2 * 65_535, 0, 0));
-    assert_eq!(counts(65_536, entry), (65_536, 0, 0));
-    let three = format!("{entry}placements = [{{}}, {{}}, {{}}]\n");
-    assert_eq!(counts(32_768, &three), (0, 1, 3));
+    let many = |times: usize| format!("{entry}placements = [{}]\n", "{}, ".repeat(times));
+    // 2^20 triangles saved.
+    assert_eq!(counts(4096, &many(257)), (0, 1, 257));
+    assert_eq!(counts(4095, &many(257)), (257 * 4095, 0, 0));
+    assert_eq!(counts(4096, &many(256)), (256 * 4096, 0, 0));
+    // Entries of the same file count together.
+    assert_eq!(counts(4096, &(many(256) + entry)), (0, 1, 257));
     assert_eq!(
-        counts(32_768, &format!("{three}share = false\n")),
-        (98_304, 0, 0)
+        counts(4096, &(many(257) + "share = false\n")),
+        (257 * 4096, 0, 0)
     );
-    // Entries that decide for themselves do not count.
-    let own = format!("{twice}share = false\n");
-    assert_eq!(counts(65_536, &own), (2 * 65_536, 0, 0));
+    // Those that decide for themselves do not count.
+    let own = many(257) + "share = false\n" + entry;
+    assert_eq!(counts(4096, &own), (258 * 4096, 0, 0));
     assert_eq!(counts(10, &format!("{entry}share = true\n")), (0, 1, 1));
 }
 

@@ -14,8 +14,8 @@ use super::split::MAX_TRIANGLES;
 use super::{Light, MaterialBinding, Mesh, Object, Placement, SceneError, Transform};
 
 /// Copies of an OBJ file are shared if that saves so many triangles. Below, one level of
-/// hierarchy is faster than two, and memory no concern.
-const SHARE_FROM: usize = 1 << 16;
+/// hierarchy is faster than two (docs/measurements.md), and memory no concern.
+const SHARE_FROM: usize = 1 << 20;
 
 /// What the `[[geometry]]` and `[[lights]]` of a scene come to.
 pub(super) struct Assembled {

@@ -18,6 +18,9 @@ pub(super) struct Rays {
     /// The scene's title on the page.
     pub title: String,
     pub triangles: u64,
+    /// What a reader must know of these numbers.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
     pub rates: Vec<Rate>,
 }
 
@@ -78,6 +81,7 @@ pub(super) fn measure(paper: &mut Paper, impasto: &Path, kitchen: Option<&Path>)
         let rays = Rays {
             version: paper.version.clone(),
             title,
+            note: String::new(),
             triangles: answer.triangles,
             rates: answer.rates,
         };
@@ -144,6 +148,9 @@ pub(super) fn table(paper: &Paper) -> String {
             });
             let cells: Vec<String> = cells.collect();
             let _ = writeln!(out, "| {name} | {} |", cells.join(" | "));
+        }
+        if !rays.note.is_empty() {
+            let _ = writeln!(out, "\n{}", rays.note);
         }
     }
     if out.is_empty() {
