@@ -108,3 +108,32 @@ fn write_whole(path: &Path, text: &str) -> Result {
     std::fs::write(&partial, text).map_err(failure)?;
     std::fs::rename(&partial, path).map_err(failure)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whoever changes the page or the numbers writes the page anew: `cargo xtask paper --page`.
+    #[test]
+    fn the_page_is_that_of_its_numbers() {
+        let docs = shell::root().join("docs");
+        let paper = Paper::load(&docs.join("paper.json")).expect("the numbers");
+        assert!(!paper.records.is_empty());
+        let written = std::fs::read_to_string(docs.join("paper.md")).expect("the page");
+        assert!(
+            written == page::page(&paper),
+            "docs/paper.md is not docs/paper.json's"
+        );
+    }
+
+    #[test]
+    fn every_experiment_is_told_from_the_others() {
+        let experiments = experiments::all(1).expect("experiments");
+        for (index, a) in experiments.iter().enumerate() {
+            for b in &experiments[..index] {
+                let same = a.section == b.section && a.scene == b.scene && a.label == b.label;
+                assert!(!same, "{} and {}", a.line(), b.line());
+            }
+        }
+    }
+}
