@@ -11,6 +11,15 @@ use crate::state;
 use crate::technique::{RayData, RayOrder, Technique};
 use crate::world::World;
 
+/// The buffers of rays and of their results in the order of requests: the name, bytes a path, and
+/// whether it is of shadow rays.
+pub(crate) const RAY_BUFFERS: [(&str, u64, bool); 4] = [
+    ("extension_rays", 32, false),
+    ("extension_hits", 16, false),
+    ("shadow_rays", 32, true),
+    ("shadow_results", 4, true),
+];
+
 /// The layout of one plan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
@@ -76,26 +85,21 @@ impl Layout {
 
     /// Bytes of the buffers of rays and their results for a path, by the buffer's name.
     pub(crate) fn ray_bytes(&self, buffer: &str) -> u64 {
-        let shadows = self.needs.requests && self.needs.shadow_rays;
-        match buffer {
-            "extension_rays" if self.needs.requests => 32,
-            "extension_hits" if self.needs.requests => 16,
-            "shadow_rays" if shadows => 32,
-            "shadow_results" if shadows => 4,
-            _ => 0,
-        }
+        let exists =
+            |of_shadows: bool| self.needs.requests && (!of_shadows || self.needs.shadow_rays);
+        let found = RAY_BUFFERS.iter().find(|(name, ..)| *name == buffer);
+        found.map_or(0, |(_, bytes, of_shadows)| {
+            u64::from(exists(*of_shadows)) * bytes
+        })
     }
 
     /// Bytes of memory for a path: its state, and its rays where they are apart from it; a
     /// megakernel has it in registers.
     pub(crate) fn memory(&self) -> u64 {
-        let buffers = [
-            "extension_rays",
-            "extension_hits",
-            "shadow_rays",
-            "shadow_results",
-        ];
-        let rays: u64 = buffers.iter().map(|name| self.ray_bytes(name)).sum();
+        let rays: u64 = RAY_BUFFERS
+            .iter()
+            .map(|(name, ..)| self.ray_bytes(name))
+            .sum();
         self.path_bytes() + rays
     }
 

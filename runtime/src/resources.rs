@@ -5,6 +5,7 @@ use crate::error::RuntimeError;
 use crate::film;
 use crate::gpu::Gpu;
 use crate::layout::Layout;
+use crate::layout::RAY_BUFFERS;
 use crate::modules::{Composer, Kernel};
 use crate::queues::Scalar;
 use crate::render::RenderOptions;
@@ -221,7 +222,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,
-        "extension_rays" | "extension_hits" | "shadow_rays" | "shadow_results" => {
+        name if RAY_BUFFERS.iter().any(|(buffer, ..)| *buffer == name) => {
             pool * layout.ray_bytes(name)
         }
         _ => {
