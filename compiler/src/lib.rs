@@ -38,6 +38,7 @@ pub mod parser;
 pub mod partition;
 pub mod passes;
 pub mod program;
+mod random;
 pub mod sema;
 pub mod source;
 

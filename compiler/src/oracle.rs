@@ -11,6 +11,7 @@ use crate::Program;
 use crate::ir::Function;
 use crate::ir::interp::{Interpreter, OutOfFuel};
 use crate::ir::value::Value;
+use crate::random::{STEP, SplitMix64};
 
 /// Layers that a walk may meet. What is left by then is a part in thousands even between two
 /// mirrors of reflectance 0.99.
@@ -181,19 +182,15 @@ fn survives(weight: &mut [f64; 3], numbers: &mut Numbers) -> bool {
     true
 }
 
-/// Uniform numbers in [0, 1): SplitMix64 (Steele, Lea and Flood 2014).
-struct Numbers(u64);
+/// Uniform numbers in [0, 1).
+struct Numbers(SplitMix64);
 
 impl Numbers {
     fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+        Self(SplitMix64(seed.wrapping_mul(STEP)))
     }
 
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (self.0.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 }

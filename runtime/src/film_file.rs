@@ -176,12 +176,11 @@ impl FilmFile {
     fn to_bytes(&self) -> Vec<u8> {
         let identity = &self.identity;
         let mut out = MAGIC.to_vec();
-        let mut words = vec![VERSION, identity.width, identity.height, identity.seed];
         let mut sampler = [0; SAMPLER_BYTES];
         for (to, from) in sampler.iter_mut().zip(identity.sampler.name().bytes()) {
             *to = from;
         }
-        for word in words.drain(..) {
+        for word in [VERSION, identity.width, identity.height, identity.seed] {
             out.extend(word.to_le_bytes());
         }
         out.extend(sampler);

@@ -185,6 +185,13 @@ impl Counters {
         words.get(self.index(scalar)).copied().unwrap_or(0)
     }
 
+    /// Samples dropped because a value was no number, by kernels and at the end of paths.
+    pub(crate) fn all_nonfinite(self, words: &[u32]) -> u64 {
+        let of_kernels = (0..self.kernels).filter_map(|kernel| words.get(self.nonfinite(kernel)));
+        let dropped: u64 = of_kernels.map(|n| u64::from(*n)).sum();
+        dropped + u64::from(self.scalar(words, Scalar::FilmNonfinite))
+    }
+
     /// How many items of `queue` were consumed, in the words read back.
     pub(crate) fn items_of(self, words: &[u32], queue: usize) -> u64 {
         long(words, self.items() + 2 * queue)

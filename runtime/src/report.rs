@@ -194,7 +194,6 @@ impl Inputs<'_> {
             })
             .collect();
         let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
-        let dropped: u64 = kernels.iter().map(|k| k.nonfinite_samples).sum();
         Report {
             strategy: self.strategy.to_string(),
             technique: self.options.technique,
@@ -223,7 +222,8 @@ impl Inputs<'_> {
             pool_size: self.pool,
             iterations: status.iterations,
             kernels,
-            nonfinite_samples: self.resumed.nonfinite + dropped + scalar(Scalar::FilmNonfinite),
+            nonfinite_samples: self.resumed.nonfinite
+                + self.layout.counters.all_nonfinite(&status.counters),
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),

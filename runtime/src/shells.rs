@@ -179,18 +179,21 @@ impl Composer<'_> {
             ("requests", requests),
             ("keeps", keeps),
             ("keeps_shadows", keeps && shell.casts_shadows),
+            ("subgroups", self.technique.append == Append::Subgroup),
         ];
-        let (append, helpers) = match self.technique.append {
-            Append::Workgroup => (include_str!("kernels/append/workgroup.wgsl"), ""),
-            Append::Subgroup => (include_str!("kernels/append/subgroup.wgsl"), SUBGROUP),
-            Append::Thread => (include_str!("kernels/append/thread.wgsl"), ""),
+        let one_by_one = preprocess(include_str!("kernels/append/one_by_one.wgsl"), &flags);
+        let append = match self.technique.append {
+            Append::Workgroup => preprocess(include_str!("kernels/append/workgroup.wgsl"), &flags),
+            Append::Subgroup => {
+                one_by_one + include_str!("kernels/append/subgroup.wgsl") + SUBGROUP
+            }
+            Append::Thread => one_by_one + include_str!("kernels/append/thread.wgsl"),
         };
         wgsl::constants_u32(&[
             ("FIRST_PUSHED", first as u32),
             ("PUSHED_QUEUES", (end - first) as u32),
         ]) + &preprocess(include_str!("kernels/queue.wgsl"), &flags)
-            + &preprocess(append, &flags)
-            + helpers
+            + &append
     }
 
     /// Constants and entry point of a kernel whose threads fetch the rays of a queue.

@@ -7,29 +7,7 @@ use impasto_runtime::bvh::Bvh;
 use impasto_runtime::scene::surface::{geometry_part, surface_part};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
-use support::{Random, Row, floats, row, run};
-
-const MISS: u32 = u32::MAX;
-
-#[derive(Clone, Copy)]
-struct Ray {
-    origin: Vec3,
-    direction: Vec3,
-    t_max: f32,
-    skip: u32,
-}
-
-impl Ray {
-    fn new(origin: Vec3, direction: Vec3) -> Ray {
-        let direction = direction.as_dvec3().normalize().as_vec3();
-        Ray {
-            origin,
-            direction,
-            t_max: 3e38,
-            skip: MISS,
-        }
-    }
-}
+use support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 
 #[derive(Clone, Copy, Debug)]
 struct Hit {
@@ -93,23 +71,12 @@ fn build(positions: Vec<[Vec3; 3]>, technique: Technique) -> Built {
 fn cast(built: &Built, rays: &[Ray]) -> Vec<Hit> {
     let no_lights = vec![u32::MAX; built.mesh.len()];
     let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights, &[]);
-    let input: Vec<Row> = rays
-        .iter()
-        .flat_map(|r| {
-            let [x, y, z] = r.direction.to_array().map(f32::to_bits);
-            [row(r.origin.extend(r.t_max).to_array()), [x, y, z, r.skip]]
-        })
-        .collect();
-    let body = "
-        let o = bitcast<vec4<f32>>(input[2u * i]);
-        let d = input[2u * i + 1u];
-        let direction = bitcast<vec3<f32>>(d.xyz);
-        let hit = trace_closest(o.xyz, direction, o.w, d.w);
-        let any = trace_any(o.xyz, direction, o.w, d.w);
+    let input = ray_rows(rays);
+    let body = CAST.to_owned() + "
         result[2u * i] = vec4<u32>(bitcast<u32>(hit.t), bitcast<u32>(hit.u), bitcast<u32>(hit.v), hit.primitive);
         result[2u * i + 1u] = vec4<u32>(select(0u, 1u, any));";
     let parts = [&geometry, &built.bvh.part(&built.technique)];
-    let rows = run(&parts, body, &input, rays.len(), 2 * rays.len());
+    let rows = run(&parts, &body, &input, rays.len(), 2 * rays.len());
     rows.chunks(2)
         .map(|pair| {
             let [t, u, v, _] = floats(pair[0]);

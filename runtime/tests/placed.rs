@@ -14,9 +14,7 @@ use impasto_runtime::scene::{
 use impasto_runtime::shader_part::ShaderPart;
 use impasto_runtime::technique::{Copies, Stack, Technique, Traversal};
 use support::light_scenes::dark_scene;
-use support::{Random, Row, floats, row, run};
-
-const MISS: u32 = u32::MAX;
+use support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 
 /// A ball around the origin with normals, texture coordinates and two materials.
 fn ball(n: usize) -> Mesh {
@@ -165,25 +163,6 @@ fn flat_parts(scene: &Scene) -> ([ShaderPart; 3], Mesh) {
     (parts, mesh)
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Ray {
-    origin: Vec3,
-    direction: Vec3,
-    t_max: f32,
-    skip: u32,
-}
-
-impl Ray {
-    fn new(origin: Vec3, direction: Vec3) -> Ray {
-        Ray {
-            origin,
-            direction: direction.as_dvec3().normalize().as_vec3(),
-            t_max: 3e38,
-            skip: MISS,
-        }
-    }
-}
-
 /// What a kernel learns of the nearest hit.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
@@ -202,19 +181,8 @@ struct Seen {
 }
 
 fn look(parts: &[ShaderPart; 3], rays: &[Ray]) -> Vec<Seen> {
-    let input: Vec<Row> = rays
-        .iter()
-        .flat_map(|r| {
-            let [x, y, z] = r.direction.to_array().map(f32::to_bits);
-            [row(r.origin.extend(r.t_max).to_array()), [x, y, z, r.skip]]
-        })
-        .collect();
-    let body = "
-        let o = bitcast<vec4<f32>>(input[2u * i]);
-        let d = input[2u * i + 1u];
-        let direction = bitcast<vec3<f32>>(d.xyz);
-        let hit = trace_closest(o.xyz, direction, o.w, d.w);
-        let any = trace_any(o.xyz, direction, o.w, d.w);
+    let input = ray_rows(rays);
+    let body = CAST.to_owned() + "
         result[6u * i] = vec4<u32>(bitcast<u32>(hit.t), hit.primitive, select(0u, 1u, any), 0u);
         if hit.primitive == NO_PRIMITIVE { return; }
         let p = hit.primitive;
@@ -226,7 +194,7 @@ fn look(parts: &[ShaderPart; 3], rays: &[Ray]) -> Vec<Seen> {
         result[6u * i + 4u] = bitcast<vec4<u32>>(vec4<f32>(hit_tangent(p), b.y));
         result[6u * i + 5u] = vec4<u32>(primitive_instance(p), primitive_medium(p), primitive_light(p), 0u);";
     let parts: Vec<&ShaderPart> = parts.iter().collect();
-    let rows = run(&parts, body, &input, rays.len(), 6 * rays.len());
+    let rows = run(&parts, &body, &input, rays.len(), 6 * rays.len());
     let seen = |rows: &[Row]| {
         let vector = |k: usize| Vec3::from_slice(&floats(rows[k]));
         Seen {

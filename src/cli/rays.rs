@@ -8,7 +8,7 @@ use impasto::runtime::technique::{Choice, Technique};
 
 use super::info::GpuArgs;
 use super::render::parse_size;
-use super::{Failure, Global, Outcome, print};
+use super::{Global, Outcome, print, runtime};
 
 #[derive(Args)]
 pub(super) struct RaysArgs {
@@ -34,8 +34,7 @@ pub(super) struct RaysArgs {
 }
 
 pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
-    let failure = |error: String| Failure::Error(error);
-    let scene = impasto::load(&args.scene).map_err(|e| failure(e.to_string()))?;
+    let scene = impasto::load(&args.scene).map_err(|e| e.to_string())?;
     let gpu = args.gpu.open()?;
     let set_sizes = |technique| Technique {
         workgroup: args.workgroup,
@@ -49,8 +48,7 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
         seed: args.seed,
     };
     let mut progress = |technique: &Technique| global.detail(&names(technique).join(" "));
-    let rates = measure(&gpu, &scene, &options, &mut progress);
-    let rates = rates.map_err(|e| failure(e.to_string()))?;
+    let rates = measure(&gpu, &scene, &options, &mut progress).map_err(runtime)?;
     if global.json() {
         let report = serde_json::json!({
             "adapter": gpu.info(),

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::inspect::At;
+use crate::random::SplitMix64;
 
 /// Half of the side of the cube in which [`Inputs::anywhere`] takes positions, in metres.
 const REACH: f64 = 2.0;
@@ -10,23 +11,20 @@ const REACH: f64 = 2.0;
 /// Inputs that look random and are the same in every run.
 #[derive(Clone, Debug)]
 pub struct Inputs {
-    state: u64,
+    numbers: SplitMix64,
 }
 
 impl Inputs {
     /// A sequence of its own for each seed.
     pub fn new(seed: u64) -> Self {
-        Self { state: seed }
+        Self {
+            numbers: SplitMix64(seed),
+        }
     }
 
-    /// A number in [0, 1). Source: Steele et al. 2014, "Fast Splittable Pseudorandom Number
-    /// Generators" (SplitMix64).
+    /// A number in [0, 1).
     pub fn unit(&mut self) -> f64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f64 / (1u64 << 24) as f64
+        (self.numbers.next() >> 40) as f64 / (1u64 << 24) as f64
     }
 
     /// A direction from the whole sphere.

@@ -200,30 +200,17 @@ impl<'g> Renderer<'g> {
         let words = self.resources.read_film(self.gpu)?;
         let sums = Sums::new(width, height, words);
         let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
-        let dropped = self.dropped(status);
+        let (counters, read) = (self.layout.counters, &status.counters);
         Ok(FilmFile {
             identity: self.facts.identity,
-            nonfinite: resumed.nonfinite + dropped.0,
-            clamped: resumed.clamped + dropped.1,
+            nonfinite: resumed.nonfinite + counters.all_nonfinite(read),
+            clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
             ranges: vec![Range {
                 first: self.options.first_sample.into(),
                 count: done.into(),
             }],
             sums,
         })
-    }
-
-    /// Samples that were no numbers, and samples cut, in the counters read last.
-    fn dropped(&self, status: &Status) -> (u64, u64) {
-        let counters = self.layout.counters;
-        let scalar = |s| u64::from(counters.scalar(&status.counters, s));
-        let by_kernels = (0..counters.kernels)
-            .filter_map(|kernel| status.counters.get(counters.nonfinite(kernel)));
-        let by_kernels: u64 = by_kernels.map(|n| u64::from(*n)).sum();
-        (
-            by_kernels + scalar(Scalar::FilmNonfinite),
-            scalar(Scalar::FilmClamped),
-        )
     }
 
     fn pixels(&self) -> u64 {

@@ -11,7 +11,7 @@ use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::report::Report;
 
-fn room() -> Room {
+pub fn room() -> Room {
     Room {
         plate: true,
         emitters: vec![3],
@@ -22,7 +22,7 @@ fn room() -> Room {
     }
 }
 
-fn surfaces() -> Materials {
+pub fn surfaces() -> Materials {
     materials(&[
         Kind::Diffuse(0.6),
         Kind::Failing(0.5),

@@ -3,29 +3,13 @@
 
 use std::fmt::Debug;
 
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
+use crate::plans::{room, surfaces};
+use crate::stub::{gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::render::{RenderOptions, Rendering};
 use impasto_runtime::technique::{Append, Choice, RayData, Regeneration, StateLayout, Technique};
 
-fn surfaces() -> Materials {
-    materials(&[
-        Kind::Diffuse(0.6),
-        Kind::Failing(0.5),
-        Kind::Mirror,
-        Kind::Glowing(0.3, 1.0),
-    ])
-}
-
 fn run(strategy: Strategy, technique: Technique) -> Rendering {
-    let room = Room {
-        plate: true,
-        emitters: vec![3],
-        max_depth: 6,
-        roulette_start: 3,
-        materials: [0, 1, 2, 0, 3, 1, 2],
-        ..Room::default()
-    };
     // A pool smaller than the picture, so that slots take path after path.
     let options = RenderOptions {
         pool: Some(700),
@@ -34,7 +18,7 @@ fn run(strategy: Strategy, technique: Technique) -> Rendering {
     };
     let surfaces = surfaces();
     render_plan(
-        &room.world(),
+        &room().world(),
         &surfaces,
         &plan(strategy, &surfaces),
         &options,

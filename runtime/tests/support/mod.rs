@@ -173,6 +173,47 @@ pub(crate) fn floats(row: Row) -> [f32; 4] {
     row.map(f32::from_bits)
 }
 
+/// No primitive, and what a ray that skips none says.
+pub(crate) const MISS: u32 = u32::MAX;
+
+/// A ray as tests cast it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ray {
+    pub(crate) origin: glam::Vec3,
+    pub(crate) direction: glam::Vec3,
+    pub(crate) t_max: f32,
+    pub(crate) skip: u32,
+}
+
+impl Ray {
+    pub(crate) fn new(origin: glam::Vec3, direction: glam::Vec3) -> Ray {
+        Ray {
+            origin,
+            direction: direction.as_dvec3().normalize().as_vec3(),
+            t_max: 3e38,
+            skip: MISS,
+        }
+    }
+}
+
+/// Rays as input of [`run`], two rows each, which [`CAST`] casts.
+pub(crate) fn ray_rows(rays: &[Ray]) -> Vec<Row> {
+    let rows = |r: &Ray| {
+        let [x, y, z] = r.direction.to_array().map(f32::to_bits);
+        [row(r.origin.extend(r.t_max).to_array()), [x, y, z, r.skip]]
+    };
+    rays.iter().flat_map(rows).collect()
+}
+
+/// WGSL that casts the ray of thread `i`: the nearest `hit`, and whether there is `any`.
+pub(crate) const CAST: &str = "
+        let o = bitcast<vec4<f32>>(input[2u * i]);
+        let d = input[2u * i + 1u];
+        let direction = bitcast<vec3<f32>>(d.xyz);
+        let hit = trace_closest(o.xyz, direction, o.w, d.w);
+        let any = trace_any(o.xyz, direction, o.w, d.w);
+";
+
 /// A small generator for test inputs: PCG, O'Neill 2014.
 pub(crate) struct Random(u64);
 

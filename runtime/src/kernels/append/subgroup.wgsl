@@ -1,21 +1,6 @@
 // Appends a subgroup's requests: one atomic operation a queue that some of its threads want
 // reserves the places of all that want it (Laine et al. 2013, section 4.4).
 
-// Appends the slot to every queue that its stage asked for. All threads of a subgroup call it.
-fn push_requests(lane: u32, slot: u32) {
-    // Stages diverge; here the threads come together again.
-    subgroupBarrier();
-#if sorts
-    append(wanted_work, wanted_work != NOTHING, slot);
-#endif
-#if casts
-    append(QUEUE_EXTENSION, wants_extension, slot);
-#endif
-#if casts_shadows
-    append(QUEUE_SHADOW, wants_shadow, slot);
-#endif
-}
-
 fn append(queue: u32, wanted: bool, slot: u32) {
     var pending = wanted;
     // A turn a queue: that of the first thread that still waits, for all that want the same.

@@ -1,0 +1,20 @@
+// Appends the slot to every queue that its stage asked for, one queue after another.
+#if subgroups
+// All threads of a subgroup call it.
+#endif
+fn push_requests(lane: u32, slot: u32) {
+#if subgroups
+    // Stages diverge; here the threads come together again.
+    subgroupBarrier();
+#endif
+#if sorts
+    append(wanted_work, wanted_work != NOTHING, slot);
+#endif
+#if casts
+    append(QUEUE_EXTENSION, wants_extension, slot);
+#endif
+#if casts_shadows
+    append(QUEUE_SHADOW, wants_shadow, slot);
+#endif
+}
+
