@@ -66,7 +66,7 @@ fn strategies_agree() {
     };
     let reference = pictures(Strategy::Own, Regeneration::Never);
     for (strategy, regeneration) in [
-        (Strategy::Shared, Regeneration::Never),
+        (Strategy::Mixed, Regeneration::Never),
         (Strategy::Mega, Regeneration::Never),
         (Strategy::Mega, Regeneration::Half),
         (Strategy::Mega, Regeneration::Always),

@@ -9,7 +9,7 @@
 //! WGSL is printed; the driver's machine code has more instructions where one operation takes
 //! several (a division, a sine, a guard) and fewer where it fuses two.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::inspect::{self, At};
 use crate::ir::interp::{Interpreter, OutOfFuel};
@@ -19,14 +19,16 @@ use crate::ops::Counts;
 use crate::program::Program;
 
 mod inputs;
+mod vector;
 
 pub use inputs::Inputs;
+pub use vector::{Cost, LANES};
 
 /// Most operations of all evaluations that one measurement makes.
 const FUEL: u64 = 1 << 34;
 
 /// Operations of one evaluation, over several.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Operations {
     /// How many evaluations were counted.
     pub evaluations: u64,
@@ -41,7 +43,7 @@ pub struct Operations {
 }
 
 /// Mean operations of one evaluation by class of hardware.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Classes {
     /// Float arithmetic.
     pub alu: f64,
@@ -53,6 +55,13 @@ pub struct Classes {
     pub texture: f64,
     /// Turns of loops.
     pub turns: f64,
+}
+
+impl Classes {
+    /// All classes together.
+    pub fn sum(&self) -> f64 {
+        self.alu + self.special + self.integer + self.texture + self.turns
+    }
 }
 
 /// The operations of material `material` of `program` over `inputs`: instances of it, and where

@@ -5,6 +5,14 @@
 
 use serde::{Deserialize, Serialize};
 
+pub mod model;
+pub mod profile;
+pub mod workload;
+
+pub use model::{Calibrated, Prediction, TimeModel};
+pub use profile::DeviceProfile;
+pub use workload::{Hits, Workload};
+
 /// How the stages of the path tracer are organised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -23,7 +31,10 @@ pub enum Form {
     Own,
     /// A switch over one queue.
     Mixed,
-    /// Evaluated inside another kernel, without a queue.
+    /// A queue a material and one dispatch over all of them, in which every workgroup evaluates one
+    /// material.
+    Binned,
+    /// Evaluated where the hit is found, without a queue.
     Inline,
 }
 
@@ -49,23 +60,30 @@ pub struct Plan {
     pub kernels: Vec<PlanKernel>,
 }
 
-/// A way to assign materials to kernels.
+/// A way to assign materials to kernels that needs to know nothing of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Strategy {
-    /// Wavefront; all materials share one kernel.
-    Shared,
     /// Wavefront; each material has its own kernel.
     Own,
+    /// Wavefront; all materials share one queue and kernel.
+    Mixed,
+    /// Wavefront; each material has its own queue, and one kernel works on all of them.
+    Binned,
+    /// Wavefront; materials are evaluated where hits are found.
+    Inline,
     /// One kernel for everything.
     Mega,
 }
 
 impl Strategy {
-    /// Every strategy with its name on the command line; the first is the default.
-    pub const ALL: [(Strategy, &'static str); 4] = [
-        (Strategy::Own, "wavefront"),
+    /// Every strategy with its name on the command line.
+    pub const ALL: [(Strategy, &'static str); 7] = [
         (Strategy::Own, "own"),
-        (Strategy::Shared, "shared"),
+        (Strategy::Own, "wavefront"),
+        (Strategy::Mixed, "mixed"),
+        (Strategy::Mixed, "shared"),
+        (Strategy::Binned, "binned"),
+        (Strategy::Inline, "inline"),
         (Strategy::Mega, "mega"),
     ];
 
@@ -74,38 +92,55 @@ impl Strategy {
         Self::ALL.iter().find(|(_, n)| *n == name).map(|(s, _)| *s)
     }
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        // The table holds every strategy.
+        let found = Self::ALL.iter().find(|(s, _)| *s == self);
+        found.map_or("", |(_, name)| name)
+    }
+
     /// The plan for materials called `names`, in program order.
     pub fn plan(self, names: &[String]) -> Plan {
-        let all: Vec<usize> = (0..names.len()).collect();
-        let kernel = |name: String, form, materials| PlanKernel {
-            name,
-            form,
-            materials,
-        };
-        let (strategy, organisation, kernels) = match self {
-            Strategy::Shared => (
-                "shared",
-                Organisation::Wavefront,
-                vec![kernel("material".into(), Form::Mixed, all)],
-            ),
-            Strategy::Mega => (
-                "mega",
-                Organisation::Mega,
-                vec![kernel("material".into(), Form::Inline, all)],
-            ),
+        let all = || (0..names.len()).collect::<Vec<usize>>();
+        let one = |form| vec![PlanKernel::new(form, all(), names)];
+        let (organisation, kernels) = match self {
             Strategy::Own => {
-                let own = |i: usize| kernel(format!("material_{}", names[i]), Form::Own, vec![i]);
+                let own = |i| PlanKernel::new(Form::Own, vec![i], names);
                 (
-                    "own",
                     Organisation::Wavefront,
-                    all.into_iter().map(own).collect(),
+                    all().into_iter().map(own).collect(),
                 )
             }
+            Strategy::Mixed => (Organisation::Wavefront, one(Form::Mixed)),
+            Strategy::Binned => (Organisation::Wavefront, one(Form::Binned)),
+            Strategy::Inline => (Organisation::Wavefront, one(Form::Inline)),
+            Strategy::Mega => (Organisation::Mega, one(Form::Inline)),
         };
         Plan {
-            strategy: strategy.into(),
+            strategy: self.name().into(),
             organisation,
             kernels,
+        }
+    }
+}
+
+impl PlanKernel {
+    /// A kernel over `materials`, ascending, called after the only one or after its form.
+    pub fn new(form: Form, materials: Vec<usize>, names: &[String]) -> Self {
+        let only = match materials[..] {
+            [only] => names.get(only).map(String::as_str),
+            _ => None,
+        };
+        let name = match form {
+            Form::Own => only.unwrap_or("own"),
+            Form::Mixed => "mixed",
+            Form::Binned => "binned",
+            Form::Inline => "inline",
+        };
+        Self {
+            name: format!("material_{name}"),
+            form,
+            materials,
         }
     }
 }

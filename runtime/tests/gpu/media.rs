@@ -105,7 +105,7 @@ fn of_media_that_overlap_the_one_of_higher_priority_is_there() {
     let (planes, solids) = filled_glass(7, 3);
     let reference = seen(planes.clone(), &solids, Strategy::Own);
     assert_layers(&reference, &layers(1.0, 1.5));
-    for strategy in [Strategy::Shared, Strategy::Mega] {
+    for strategy in [Strategy::Mixed, Strategy::Mega] {
         let other = seen(planes.clone(), &solids, strategy);
         if gpu().info().kind == "software" {
             assert!(other.film == reference.film, "{strategy:?} differs");

@@ -74,7 +74,7 @@ fn every_plan_renders_the_same_paths() {
     let surfaces = surfaces();
     let (reference, _) = run(&plan(Strategy::Own, &surfaces));
     for other in [
-        plan(Strategy::Shared, &surfaces),
+        plan(Strategy::Mixed, &surfaces),
         plan(Strategy::Mega, &surfaces),
         custom(&[
             (Form::Mixed, &[0, 2]),
@@ -92,7 +92,7 @@ fn every_plan_renders_the_same_paths() {
 #[test]
 fn kernels_count_their_items() {
     let (_, own) = run(&plan(Strategy::Own, &surfaces()));
-    let (_, shared) = run(&plan(Strategy::Shared, &surfaces()));
+    let (_, shared) = run(&plan(Strategy::Mixed, &surfaces()));
     let items = |report: &Report, name: &str| {
         let named = report.kernels.iter().filter(|k| k.name.starts_with(name));
         named.map(|k| k.items).sum::<u64>()

@@ -52,7 +52,7 @@ fn assert_equal<C: Choice + Debug>(strategy: Strategy, set: impl Fn(&mut Techniq
 
 #[test]
 fn queues_are_appended_to_in_any_way() {
-    for strategy in [Strategy::Own, Strategy::Shared] {
+    for strategy in [Strategy::Own, Strategy::Mixed] {
         assert_equal::<Append>(strategy, |t, value| t.append = value);
     }
 }
