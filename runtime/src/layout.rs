@@ -40,7 +40,7 @@ impl Layout {
         plan: &Plan,
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
-        check_plan(plan, materials.len())?;
+        check_plan(plan, materials)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
         let mut needs = Needs::of(world, materials);
         needs.order = wavefront && technique.ray_order != RayOrder::Queue;
@@ -113,27 +113,12 @@ impl Layout {
     }
 }
 
-/// Fails unless every material is in exactly one kernel.
-fn check_plan(plan: &Plan, count: usize) -> Result<(), RuntimeError> {
-    let refuse = |reason: String| {
-        Err(RuntimeError::Plan {
+/// Fails unless the plan keeps its rules for `materials`.
+fn check_plan(plan: &Plan, materials: &[MaterialInfo]) -> Result<(), RuntimeError> {
+    let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+    plan.check_named(&names)
+        .map_err(|error| RuntimeError::Plan {
             strategy: plan.strategy.clone(),
-            reason,
+            reason: error.to_string(),
         })
-    };
-    let mut planned: Vec<usize> = plan
-        .kernels
-        .iter()
-        .flat_map(|k| k.materials.clone())
-        .collect();
-    planned.sort_unstable();
-    if planned != (0..count).collect::<Vec<_>>() {
-        return refuse(format!(
-            "it assigns materials {planned:?}, and there are {count}, each to be assigned once"
-        ));
-    }
-    match plan.kernels.iter().find(|k| k.materials.is_empty()) {
-        Some(empty) => refuse(format!("kernel `{}` has no material", empty.name)),
-        None => Ok(()),
-    }
 }

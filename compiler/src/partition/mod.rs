@@ -5,12 +5,19 @@
 
 use serde::{Deserialize, Serialize};
 
+mod check;
+mod error;
+pub mod file;
 pub mod model;
 pub mod profile;
+mod strategy;
+pub mod text;
 pub mod workload;
 
+pub use error::PlanError;
 pub use model::{Calibrated, Prediction, TimeModel};
-pub use profile::DeviceProfile;
+pub use profile::{DeviceProfile, ProfileError};
+pub use strategy::Strategy;
 pub use workload::{Hits, Workload};
 
 /// How the stages of the path tracer are organised.
@@ -49,7 +56,8 @@ pub struct PlanKernel {
     pub materials: Vec<usize>,
 }
 
-/// Which kernels a renderer runs. Every material of the program is in exactly one of them.
+/// Which kernels a renderer runs. Every material of the program is in exactly one of them, or else
+/// unused ([`Plan::check`]).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Plan {
     /// The strategy that made it, as given on the command line.
@@ -58,68 +66,83 @@ pub struct Plan {
     pub organisation: Organisation,
     /// The material kernels.
     pub kernels: Vec<PlanKernel>,
+    /// Indices of the materials without a kernel, ascending: no surface of the scene binds them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unused: Vec<usize>,
 }
 
-/// A way to assign materials to kernels that needs to know nothing of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Strategy {
-    /// Wavefront; each material has its own kernel.
-    Own,
-    /// Wavefront; all materials share one queue and kernel.
-    Mixed,
-    /// Wavefront; each material has its own queue, and one kernel works on all of them.
-    Binned,
-    /// Wavefront; materials are evaluated where hits are found.
-    Inline,
-    /// One kernel for everything.
-    Mega,
-}
-
-impl Strategy {
-    /// Every strategy with its name on the command line.
-    pub const ALL: [(Strategy, &'static str); 7] = [
-        (Strategy::Own, "own"),
-        (Strategy::Own, "wavefront"),
-        (Strategy::Mixed, "mixed"),
-        (Strategy::Mixed, "shared"),
-        (Strategy::Binned, "binned"),
-        (Strategy::Inline, "inline"),
-        (Strategy::Mega, "mega"),
+impl Form {
+    /// Every form, with its name in partition strings, plan files and reports.
+    pub const ALL: [(Form, &'static str); 4] = [
+        (Form::Own, "own"),
+        (Form::Mixed, "mixed"),
+        (Form::Binned, "binned"),
+        (Form::Inline, "inline"),
     ];
 
-    /// The strategy called `name`.
-    pub fn from_name(name: &str) -> Option<Strategy> {
-        Self::ALL.iter().find(|(_, n)| *n == name).map(|(s, _)| *s)
+    /// The form called `name`.
+    pub fn from_name(name: &str) -> Option<Form> {
+        Self::ALL.iter().find(|(_, n)| *n == name).map(|(f, _)| *f)
     }
 
     /// Its name.
     pub fn name(self) -> &'static str {
-        // The table holds every strategy.
-        let found = Self::ALL.iter().find(|(s, _)| *s == self);
-        found.map_or("", |(_, name)| name)
+        match self {
+            Form::Own => "own",
+            Form::Mixed => "mixed",
+            Form::Binned => "binned",
+            Form::Inline => "inline",
+        }
+    }
+}
+
+impl Plan {
+    /// A wavefront of the kernels `groups`, in this order, for materials called `names`; `unused`
+    /// have none. Equal names of kernels are told apart by a number.
+    pub fn wavefront(
+        strategy: impl Into<String>,
+        groups: impl IntoIterator<Item = (Form, Vec<usize>)>,
+        mut unused: Vec<usize>,
+        names: &[String],
+    ) -> Plan {
+        let groups = groups.into_iter();
+        let kernels = groups.map(|(form, mut materials)| {
+            materials.sort_unstable();
+            PlanKernel::new(form, materials, names)
+        });
+        let mut kernels: Vec<PlanKernel> = kernels.collect();
+        number_equal_names(&mut kernels);
+        unused.sort_unstable();
+        Plan {
+            strategy: strategy.into(),
+            organisation: Organisation::Wavefront,
+            kernels,
+            unused,
+        }
     }
 
-    /// The plan for materials called `names`, in program order.
-    pub fn plan(self, names: &[String]) -> Plan {
-        let all = || (0..names.len()).collect::<Vec<usize>>();
-        let one = |form| vec![PlanKernel::new(form, all(), names)];
-        let (organisation, kernels) = match self {
-            Strategy::Own => {
-                let own = |i| PlanKernel::new(Form::Own, vec![i], names);
-                (
-                    Organisation::Wavefront,
-                    all().into_iter().map(own).collect(),
-                )
-            }
-            Strategy::Mixed => (Organisation::Wavefront, one(Form::Mixed)),
-            Strategy::Binned => (Organisation::Wavefront, one(Form::Binned)),
-            Strategy::Inline => (Organisation::Wavefront, one(Form::Inline)),
-            Strategy::Mega => (Organisation::Mega, one(Form::Inline)),
-        };
-        Plan {
-            strategy: self.name().into(),
-            organisation,
-            kernels,
+    /// The same plan without kernels for the materials `unused`, which no surface binds.
+    pub fn leaving_out(mut self, unused: &[usize]) -> Plan {
+        for kernel in &mut self.kernels {
+            kernel.materials.retain(|m| !unused.contains(m));
+        }
+        self.kernels.retain(|k| !k.materials.is_empty());
+        self.unused.extend(unused);
+        self.unused.sort_unstable();
+        self.unused.dedup();
+        self
+    }
+}
+
+/// Gives the second of equal names the number 2, the third 3.
+fn number_equal_names(kernels: &mut [PlanKernel]) {
+    let mut taken = std::collections::BTreeSet::new();
+    for kernel in kernels {
+        let base = kernel.name.clone();
+        let mut number = 2;
+        while !taken.insert(kernel.name.clone()) {
+            kernel.name = format!("{base}_{number}");
+            number += 1;
         }
     }
 }

@@ -41,6 +41,7 @@ fn custom(kernels: &[(Form, &[usize])]) -> Plan {
         strategy: "custom".into(),
         organisation: Organisation::Wavefront,
         kernels: kernels.iter().enumerate().map(kernel).collect(),
+        unused: Vec::new(),
     }
 }
 
