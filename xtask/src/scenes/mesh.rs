@@ -203,6 +203,21 @@ impl Mesh {
         self.uvs.extend(surface.uvs);
     }
 
+    /// Adds a surface whose triangles are of several materials: `material` is asked for each in turn.
+    pub(crate) fn add_by(
+        &mut self,
+        surface: Surface,
+        mut material: impl FnMut(usize) -> &'static str,
+    ) {
+        let offset = Offsets::of(&self.positions, &self.normals, &self.uvs);
+        for (index, triangle) in surface.triangles.iter().enumerate() {
+            self.part(material(index)).push(offset.shift(triangle));
+        }
+        self.positions.extend(surface.positions);
+        self.normals.extend(surface.normals);
+        self.uvs.extend(surface.uvs);
+    }
+
     /// Adds a copy of `model`, moved by `transform`.
     pub(crate) fn place(&mut self, model: &Mesh, transform: &DAffine3) {
         self.place_as(model, transform, |material| material);

@@ -15,6 +15,7 @@ mod forest;
 mod glasses;
 mod image_file;
 mod mesh;
+mod mixes;
 mod obj;
 mod plants;
 mod preview;
@@ -37,7 +38,7 @@ use obj::MtlEntry;
 #[derive(clap::Args, Debug)]
 pub(crate) struct ScenesArgs {
     /// What to generate: cornell, carpaint, city, conference, forest, glasses,
-    /// materials_preview, swatches, crossover, textures
+    /// materials_preview, swatches, crossover, mixes, textures
     /// [default: all of them]
     names: Vec<String>,
     /// Folder that takes the place of the repository's root
@@ -57,7 +58,7 @@ struct Recipe {
     generate: fn() -> Result<Vec<GeneratedFile>, String>,
 }
 
-const RECIPES: [Recipe; 10] = [
+const RECIPES: [Recipe; 11] = [
     Recipe {
         name: "cornell",
         generate: || {
@@ -108,6 +109,10 @@ const RECIPES: [Recipe; 10] = [
     Recipe {
         name: "crossover",
         generate: || Ok(crossover::files()),
+    },
+    Recipe {
+        name: "mixes",
+        generate: || Ok(mixes::files()),
     },
     Recipe {
         name: "textures",
