@@ -2,7 +2,7 @@
 //! exist, which queues there are, and where counters lie.
 
 use impasto_compiler::abi::MaterialInfo;
-use impasto_compiler::partition::{Form, Organisation, Plan};
+use impasto_compiler::partition::{Organisation, Plan};
 
 use crate::error::RuntimeError;
 use crate::needs::Needs;
@@ -47,14 +47,15 @@ impl Layout {
         // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
         needs.requests =
             wavefront && technique.ray_data == RayData::Requests && !needs.order && !needs.overlap;
-        let queued = plan.kernels.iter().filter(|k| k.form != Form::Inline);
+        let of_kernels = Queues::of_kernels(plan);
         let queues = Queues {
-            materials: queued.count(),
+            materials: of_kernels.iter().map(|queues| queues.len()).sum(),
             shadow_rays: needs.shadow_rays,
             ordered: needs.order,
         };
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
+            binned: wavefront && of_kernels.iter().any(|queues| queues.len() > 1),
             kernels: if wavefront { plan.kernels.len() } else { 1 },
             profiled: 0,
         };

@@ -1,6 +1,8 @@
 //! Which kernels a plan needs, and what each is made of: the megakernel here, those of the
 //! wavefront in `wavefront`. Their text is put together in `compose`.
 
+use std::collections::BTreeSet;
+use std::fmt::Write;
 use std::ops::Range;
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
@@ -10,6 +12,7 @@ use crate::bvh;
 use crate::compose::Binding;
 use crate::layout::Layout;
 use crate::needs::Needs;
+use crate::queues::Queues;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::shells::SUBGROUP;
 use crate::stages::{STAGES, StageId};
@@ -32,6 +35,13 @@ pub(crate) enum Feed {
     FetchedQueue(usize),
     /// One for every item of a queue, through indirect arguments.
     Queue(usize),
+    /// Workgroups enough for each of some consecutive queues, through the arguments of the first.
+    Queues {
+        /// The first.
+        first: usize,
+        /// How many.
+        count: usize,
+    },
     /// A number of workgroups.
     Groups(u32),
     /// One workgroup.
@@ -124,12 +134,18 @@ impl Composer<'_> {
             .collect()
     }
 
-    /// What every kernel is made of, in the same order.
+    /// What every kernel is made of, in the same order. Each has a name of its own.
     pub(crate) fn recipes(&self) -> Vec<Recipe> {
-        match self.plan.organisation {
+        let mut recipes = match self.plan.organisation {
             Organisation::Wavefront => self.wavefront(),
             Organisation::Mega => vec![self.prepare("prepare", 0..0, true), self.mega()],
+        };
+        let mut taken = BTreeSet::new();
+        for recipe in &mut recipes {
+            recipe.name = unused_name(&recipe.name, &taken);
+            taken.insert(recipe.name.clone());
         }
+        recipes
     }
 
     /// What the compiler says of some materials.
@@ -160,9 +176,15 @@ impl Composer<'_> {
 
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
     pub(crate) fn prepare(&self, name: &str, consumed: Range<usize>, hands_out: bool) -> Recipe {
+        let of_kernels = Queues::of_kernels(self.plan);
+        let binned: Vec<_> = of_kernels
+            .into_iter()
+            .filter(|queues| queues.len() > 1 && consumed.contains(&queues.start))
+            .collect();
         let fetched = STAGES.iter().any(|stage| self.fetches(stage.id));
         let flags = [
             ("queues", !consumed.is_empty()),
+            ("binned", !binned.is_empty()),
             ("work", hands_out),
             ("regenerates", self.regenerates()),
             ("fetched", fetched),
@@ -173,6 +195,7 @@ impl Composer<'_> {
                 ("FIRST_CONSUMED", consumed.start as u32),
                 ("END_CONSUMED", consumed.end as u32),
             ])
+            + &first_of_kernel(&binned)
             + &preprocess(include_str!("kernels/prepare.wgsl"), &flags);
         Recipe::plain(name, Vec::new(), Feed::Once, text)
     }
@@ -215,4 +238,27 @@ impl Composer<'_> {
             false => Feed::Pool,
         }
     }
+}
+
+/// `name`, with the lowest number from 2 on that makes it one that is not `taken`.
+fn unused_name(name: &str, taken: &BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    let mut names = std::iter::once(name.to_string()).chain(numbered);
+    names.find(|n| !taken.contains(n)).unwrap_or_default()
+}
+
+/// The WGSL function that gives the first queue of the kernel that works on a queue, where
+/// some kernels work on several each; nothing if none does.
+fn first_of_kernel(binned: &[Range<usize>]) -> String {
+    if binned.is_empty() {
+        return String::new();
+    }
+    let mut out = "fn first_of_kernel(queue: u32) -> u32 {\n".to_string();
+    for Range { start, end } in binned {
+        let _ = writeln!(
+            out,
+            "    if queue >= {start}u && queue < {end}u {{ return {start}u; }}"
+        );
+    }
+    out + "    return queue;\n}\n"
 }

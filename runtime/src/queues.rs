@@ -2,14 +2,17 @@
 //! the kernels (as WGSL constants) and for the host alike.
 
 use std::fmt::Write;
+use std::ops::Range;
 
-/// Which queues a wavefront has, in the order of the buffer: new paths, one a queued material
-/// kernel, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
+use impasto_compiler::partition::{Form, Plan};
+
+/// Which queues a wavefront has, in the order of the buffer: new paths, those of material
+/// kernels, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
 /// are ordered, there is as much room for the queue in that order, and for each of its items'
 /// bin and rank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Queues {
-    /// Material kernels with a queue.
+    /// Those of material kernels.
     pub materials: usize,
     /// Whether shadow rays are cast.
     pub shadow_rays: bool,
@@ -20,9 +23,20 @@ pub(crate) struct Queues {
 impl Queues {
     pub(crate) const NEW_PATH: usize = 0;
 
-    /// The queue of the `index`-th material kernel that has one.
-    pub(crate) fn material(self, index: usize) -> usize {
-        1 + index
+    /// Those of a plan's material kernels, in its order: none where materials are evaluated inline,
+    /// one for each member of a binned kernel, else one.
+    pub(crate) fn of_kernels(plan: &Plan) -> Vec<Range<usize>> {
+        let mut next = Self::NEW_PATH + 1;
+        let queues = plan.kernels.iter().map(|kernel| {
+            let begin = next;
+            next += match kernel.form {
+                Form::Inline => 0,
+                Form::Binned => kernel.materials.len(),
+                Form::Own | Form::Mixed => 1,
+            };
+            begin..next
+        });
+        queues.collect()
     }
 
     pub(crate) fn extension(self) -> usize {
@@ -112,7 +126,8 @@ const PUSHED_STRIDE: usize = 64;
 const FETCHED_OF: usize = PUSHED_STRIDE / 2;
 
 /// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
-/// when it was consumed, then items consumed in 64 bits, then one count of dropped samples for
+/// when it was consumed, if a kernel is binned the first of its workgroups that works on that queue,
+/// then items consumed in 64 bits, then one count of dropped samples for
 /// each kernel that evaluates materials; in a profiling build lanes at work and lanes in all for
 /// each kernel, in 64 bits; at last, apart from each other, the lengths of queues so
 /// far and, between those, how much threads have fetched of each.
@@ -120,6 +135,8 @@ const FETCHED_OF: usize = PUSHED_STRIDE / 2;
 pub(crate) struct Counters {
     /// Number of queues; 0 in a megakernel.
     pub queues: usize,
+    /// Whether a kernel works on several queues.
+    pub binned: bool,
     /// Number of kernels that evaluate materials.
     pub kernels: usize,
     /// Number of kernels whose lanes are counted.
@@ -131,8 +148,12 @@ impl Counters {
         SCALARS.len()
     }
 
-    fn items(self) -> usize {
+    fn first_groups(self) -> usize {
         self.taken() + self.queues
+    }
+
+    fn items(self) -> usize {
+        self.first_groups() + if self.binned { self.queues } else { 0 }
     }
 
     /// The word that counts samples dropped by the `kernel`-th kernel that evaluates materials.
@@ -164,8 +185,12 @@ impl Counters {
             ("PUSHED_STRIDE", PUSHED_STRIDE),
             ("FETCHED_OF", self.pushed() + FETCHED_OF),
             ("TAKEN", self.taken()),
+            ("FIRST_GROUP", self.first_groups()),
             ("ITEMS", self.items()),
         ];
+        let arrays = arrays
+            .into_iter()
+            .filter(|(name, _)| self.binned || *name != "FIRST_GROUP");
         let mut out = String::new();
         for (name, at) in scalars.chain(arrays) {
             let _ = writeln!(out, "const COUNTER_{name}: u32 = {at}u;");
@@ -215,6 +240,7 @@ fn long(words: &[u32], at: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use impasto_compiler::partition::{PlanKernel, Strategy};
 
     #[test]
     fn regions_do_not_overlap() {
@@ -226,6 +252,7 @@ mod tests {
         assert_eq!(queues.shadow() + 1, queues.count());
         let counters = Counters {
             queues: queues.count(),
+            binned: false,
             kernels: 4,
             profiled: 2,
         };
@@ -235,8 +262,28 @@ mod tests {
         assert!(counters.pushed() >= 11 + 3 * 6 + 4 + 2 * 4);
         assert_eq!(counters.utilisation(&words, 2), None);
         assert_eq!(counters.len(), counters.pushed() + 6 * PUSHED_STRIDE);
+        let binned = Counters {
+            binned: true,
+            ..counters
+        };
+        assert_eq!(binned.items(), counters.items() + 6);
         words[counters.items() + 2] = 5;
         words[counters.items() + 3] = 1;
         assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);
+    }
+
+    #[test]
+    fn a_binned_kernel_has_a_queue_for_each_member() {
+        let names: Vec<String> = ["a", "b", "c", "d", "e"].map(String::from).to_vec();
+        let kernel = |form, members: &[usize]| PlanKernel::new(form, members.to_vec(), &names);
+        let plan = Plan {
+            kernels: vec![
+                kernel(Form::Mixed, &[1, 4]),
+                kernel(Form::Inline, &[2]),
+                kernel(Form::Binned, &[0, 3]),
+            ],
+            ..Strategy::Own.plan(&names)
+        };
+        assert_eq!(Queues::of_kernels(&plan), [1..2, 2..2, 2..4]);
     }
 }

@@ -132,7 +132,7 @@ pub struct AdapterReport {
 pub struct KernelReport {
     /// Its name.
     pub name: String,
-    /// How it treats its materials (`own`, `mixed`, `inline`); absent if it evaluates none.
+    /// How it treats its materials (`own`, `mixed`, `binned`, `inline`); absent if it evaluates none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<impasto_compiler::partition::Form>,
     /// The names of the materials it evaluates.
@@ -248,6 +248,9 @@ impl Inputs<'_> {
                 Feed::Queue(queue) | Feed::FetchedQueue(queue) => {
                     counters.items_of(&status.counters, queue)
                 }
+                Feed::Queues { first, count } => (first..first + count)
+                    .map(|queue| counters.items_of(&status.counters, queue))
+                    .sum(),
                 Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
                 Feed::Pool | Feed::Fetched => paths,
                 Feed::Once | Feed::Groups(_) => status.iterations,

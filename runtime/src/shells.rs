@@ -1,6 +1,8 @@
 //! Shells: the WGSL around a stage that makes a kernel of the wavefront of it. A shell finds the
 //! thread's items, runs the stage, and appends what the stage asked for to queues.
 
+use std::collections::BTreeMap;
+
 use impasto_compiler::partition::Form;
 
 use crate::bvh;
@@ -26,6 +28,8 @@ pub(crate) struct Shell {
     pub run: String,
     /// The queue it reads; every slot if `None`.
     pub consumes: Option<Consumed>,
+    /// How many consecutive queues it reads from that one on, if several: each workgroup one.
+    pub binned: Option<usize>,
     /// Whether it pushes to the queues of new paths and materials.
     pub sorts: bool,
     /// Whether it pushes to the queue of extension rays.
@@ -67,6 +71,8 @@ impl Consumed {
 pub(crate) struct EntryPoint {
     /// Whether items are those of a queue; all slots of the pool otherwise.
     pub queued: bool,
+    /// Whether each workgroup reads another of several queues.
+    pub binned: bool,
     /// Whether items are slots, and not rays in buffers of their own.
     pub slots: bool,
     /// Whether it appends to queues.
@@ -92,6 +98,7 @@ impl EntryPoint {
     pub(crate) fn wgsl(self) -> String {
         let flags = [
             ("queued", self.queued),
+            ("binned", self.binned),
             ("slots", self.slots),
             ("pushes", self.pushes),
             ("keeps", self.keeps),
@@ -144,6 +151,7 @@ impl Composer<'_> {
         let requests = self.layout.needs.requests;
         let entry = EntryPoint {
             queued: shell.consumes.is_some(),
+            binned: shell.binned.is_some(),
             slots: !(shell.traverses && requests),
             pushes,
             keeps: shell.casts && requests,
@@ -153,6 +161,9 @@ impl Composer<'_> {
         let mut out = self.layout.queues.constants();
         if let Some(consumed) = shell.consumes {
             out += &consumed.constants();
+        }
+        if let Some(count) = shell.binned {
+            out += &wgsl::constant_u32("CONSUMED_QUEUES", count as u32);
         }
         if pushes {
             out += &self.pushes(shell);
@@ -211,29 +222,49 @@ impl Composer<'_> {
 
     /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.
     fn material_queue(&self) -> String {
-        let queued = self.plan.kernels.iter().filter(|k| k.form != Form::Inline);
-        let queues = queued.clone().count();
-        if queues == 0 || queues == 1 && self.plan.kernels.len() == 1 {
-            let queue = match queues {
-                0 => "NOTHING".to_string(),
-                _ => format!("{}u", self.layout.queues.material(0)),
-            };
-            return format!("fn material_queue(instance: u32) -> u32 {{ return {queue}; }}\n");
-        }
-        let mut cases: Vec<String> = queued
-            .enumerate()
-            .map(|(i, kernel)| {
-                let labels = case_labels(&kernel.materials);
-                format!(
-                    "case {labels}: {{ return {}u; }}",
-                    self.layout.queues.material(i)
-                )
+        let queues = self.queues_of_materials();
+        let all = queues.len() == self.materials.len();
+        let body = match queues.first() {
+            None => "return NOTHING;".to_string(),
+            Some((_, sole)) if all && queues.iter().all(|(_, queue)| queue == sole) => {
+                format!("return {sole}u;")
+            }
+            Some((_, first)) if all && queues.iter().all(|(m, queue)| *queue == first + m) => {
+                format!("return {first}u + material_of(instance);")
+            }
+            Some(_) => by_material(&queues),
+        };
+        format!("fn material_queue(instance: u32) -> u32 {{ {body} }}\n")
+    }
+
+    /// The materials that have a queue, ascending, each with that.
+    fn queues_of_materials(&self) -> Vec<(usize, usize)> {
+        let kernels = self.plan.kernels.iter().zip(Queues::of_kernels(self.plan));
+        let mut pairs: Vec<(usize, usize)> = kernels
+            .filter(|(kernel, _)| kernel.form != Form::Inline)
+            .flat_map(|(kernel, queues)| {
+                let last = queues.end - 1;
+                let queues = queues.chain(std::iter::repeat(last));
+                kernel.materials.iter().copied().zip(queues)
             })
             .collect();
-        cases.push("default: { return NOTHING; }".to_string());
-        format!(
-            "fn material_queue(instance: u32) -> u32 {{ switch material_of(instance) {{ {} }} }}\n",
-            cases.join(" ")
-        )
+        pairs.sort_unstable();
+        pairs
     }
+}
+
+/// A `switch` over materials that returns the queue of those that have one, ascending by material.
+fn by_material(queues: &[(usize, usize)]) -> String {
+    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (material, queue) in queues {
+        members.entry(*queue).or_default().push(*material);
+    }
+    let case = |(queue, members): (&usize, &Vec<usize>)| {
+        format!("case {}: {{ return {queue}u; }}", case_labels(members))
+    };
+    let cases: Vec<String> = members.iter().map(case).collect();
+    format!(
+        "switch material_of(instance) {{ {} default: {{ return NOTHING; }} }}",
+        cases.join(" ")
+    )
 }

@@ -68,19 +68,21 @@ impl Composer<'_> {
         }
     }
 
-    /// The kernels that evaluate the materials of a queue each.
+    /// The kernels that evaluate the materials of queues.
     fn material_kernels(&self) -> impl Iterator<Item = Recipe> {
         let kernels = self.plan.kernels.iter().enumerate();
-        let queued = kernels.filter(|(_, k)| k.form != Form::Inline);
-        queued.enumerate().map(|(position, (counter, planned))| {
+        let kernels = kernels.zip(Queues::of_kernels(self.plan));
+        let queued = kernels.filter(|((_, k), _)| k.form != Form::Inline);
+        queued.map(|((counter, planned), queues)| {
             let instance = match self.instances_of(&planned.materials)[..] {
                 [only] => format!("{only}u"),
                 _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
             };
-            let queue = self.layout.queues.material(position);
+            let (first, count) = (queues.start, queues.len());
             let shell = self.shell(&Shell {
                 run: format!("material(slot, {instance});"),
-                consumes: Some(Consumed::unordered(queue)),
+                consumes: Some(Consumed::unordered(first)),
+                binned: (count > 1).then_some(count),
                 casts: true,
                 casts_shadows: self.needs_of(&planned.materials).shadow_rays,
                 ..Shell::default()
@@ -90,7 +92,10 @@ impl Composer<'_> {
                 form: Some(planned.form),
                 stages: vec![StageId::Material],
                 members: planned.materials.clone(),
-                feed: Feed::Queue(queue),
+                feed: match count {
+                    1 => Feed::Queue(first),
+                    _ => Feed::Queues { first, count },
+                },
                 counter,
                 shell,
             }

@@ -4,9 +4,13 @@
 @compute @workgroup_size(PREPARE_SIZE)
 fn main(@builtin(local_invocation_index) lane: u32) {
 #if queues
+#if binned
+    place_groups(lane);
+#else
     for (var queue = FIRST_CONSUMED + lane; queue < END_CONSUMED; queue += PREPARE_SIZE) {
-        consume(queue);
+        dispatch(queue, consume(queue));
     }
+#endif
 #endif
 #if work
     if lane == 0u {
@@ -19,7 +23,8 @@ fn main(@builtin(local_invocation_index) lane: u32) {
 }
 
 #if queues
-fn consume(queue: u32) {
+// Empties a queue; how many workgroups work on what was in it.
+fn consume(queue: u32) -> u32 {
     let pushed = atomicExchange(&counters[COUNTER_PUSHED + COUNTER_PUSHED_STRIDE * queue], 0u);
     let items = min(pushed, POOL_SIZE);
     atomicStore(&counters[COUNTER_TAKEN + queue], items);
@@ -33,11 +38,56 @@ fn consume(queue: u32) {
 #if fetched
     atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
 #endif
-    // Rows of groups, since a dimension has a limit.
-    let groups = (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+    return (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+}
+
+// Writes the arguments of the kernel whose first queue it is: rows of groups, since a dimension
+// has a limit.
+fn dispatch(queue: u32, groups: u32) {
     arguments[3u * queue] = min(groups, ROW_GROUPS);
     arguments[3u * queue + 1u] = (groups + ROW_GROUPS - 1u) / ROW_GROUPS;
     arguments[3u * queue + 2u] = 1u;
+}
+#endif
+#if binned
+
+// Workgroups of the same kernel that come no later than a lane's, of the queues at hand.
+var<workgroup> sums: array<u32, PREPARE_SIZE>;
+
+// Gives each queue its place among the workgroups of its kernel: sums of groups over the queues of
+// a kernel, as many queues at a time as there are threads (Hillis and Steele 1986).
+fn place_groups(lane: u32) {
+    var carried = 0u;
+    for (var tile = FIRST_CONSUMED; tile < END_CONSUMED; tile += PREPARE_SIZE) {
+        let queue = tile + lane;
+        let first = first_of_kernel(queue);
+        var groups = 0u;
+        if queue < END_CONSUMED {
+            groups = consume(queue);
+        }
+        // The kernel may have begun in the tile before.
+        var end = groups + select(0u, carried, lane == 0u && queue > first);
+        // Queues of this tile that the kernel has before this one.
+        let before = min(queue - first, lane);
+        for (var step = 1u; step < PREPARE_SIZE; step *= 2u) {
+            sums[lane] = end;
+            workgroupBarrier();
+            if step <= before {
+                end += sums[lane - step];
+            }
+            workgroupBarrier();
+        }
+        sums[lane] = end;
+        workgroupBarrier();
+        carried = sums[PREPARE_SIZE - 1u];
+        workgroupBarrier();
+        if queue < END_CONSUMED {
+            atomicStore(&counters[COUNTER_FIRST_GROUP + queue], end - groups);
+            if first_of_kernel(queue + 1u) != first {
+                dispatch(first, end);
+            }
+        }
+    }
 }
 #endif
 

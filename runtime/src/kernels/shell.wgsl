@@ -14,13 +14,28 @@ fn main(
 #if walk_lane
     walk_lane = lane;
 #endif
-    let item = (group.y * ROW_GROUPS + group.x) * WORKGROUP_SIZE + lane;
+    let index = group.y * ROW_GROUPS + group.x;
+#if binned
+    find_bin(index, lane);
+    workgroupBarrier();
+    let item = (index - bin.first_group) * WORKGROUP_SIZE + lane;
+#else
+    let item = index * WORKGROUP_SIZE + lane;
+#endif
     var slot = item;
 #if queued
+#if binned
+    let in_range = item < bin.items;
+    let region = bin.queue;
+#else
     let in_range = item < atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
 #if slots
+    let region = CONSUMED_REGION;
+#endif
+#endif
+#if slots
     if in_range {
-        slot = queues[CONSUMED_REGION * POOL_SIZE + item];
+        slot = queues[region * POOL_SIZE + item];
     }
 #endif
 #else
@@ -38,3 +53,25 @@ fn main(
     }
 #endif
 }
+#if binned
+
+// The queue that a workgroup works on. Without items, as it begins, where the last row of
+// workgroups is longer than needed.
+struct Bin { queue: u32, first_group: u32, items: u32 }
+
+var<workgroup> bin: Bin;
+
+// Finds the queue of the workgroup with some index: threads look at a queue each, and at most one
+// finds that the workgroup is one of those that begin with the queue's first.
+fn find_bin(index: u32, lane: u32) {
+    for (var member = lane; member < CONSUMED_QUEUES; member += WORKGROUP_SIZE) {
+        let queue = CONSUMED_QUEUE + member;
+        let first_group = atomicLoad(&counters[COUNTER_FIRST_GROUP + queue]);
+        let items = atomicLoad(&counters[COUNTER_TAKEN + queue]);
+        // Of an earlier workgroup the difference wraps, and is beyond all items.
+        if index - first_group < (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE {
+            bin = Bin(queue, first_group, items);
+        }
+    }
+}
+#endif

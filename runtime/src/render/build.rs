@@ -180,6 +180,6 @@ fn dispatch_size(feed: Feed, sizes: Sizes) -> Size {
         Feed::Groups(groups) => Size::Direct(groups, 1),
         Feed::Pool => threads(sizes.pool),
         Feed::Fetched | Feed::FetchedQueue(_) => threads(sizes.threads),
-        Feed::Queue(queue) => Size::Indirect(12 * queue as u64),
+        Feed::Queue(queue) | Feed::Queues { first: queue, .. } => Size::Indirect(12 * queue as u64),
     }
 }

@@ -83,11 +83,186 @@ fn every_plan_renders_the_same_paths() {
             (Form::Own, &[3]),
         ]),
         custom(&[(Form::Inline, &[0, 1, 2, 3])]),
+        plan(Strategy::Binned, &surfaces),
     ] {
         let (film, report) = run(&other);
         assert_equal_but_for_rounding(&film, &reference);
         assert_eq!(report.queue_overflow, 0);
     }
+}
+
+/// Every way to part `members` into groups.
+fn partitions(members: &[usize]) -> Vec<Vec<Vec<usize>>> {
+    let Some((last, rest)) = members.split_last() else {
+        return vec![Vec::new()];
+    };
+    let mut all = Vec::new();
+    for groups in partitions(rest) {
+        for joined in 0..=groups.len() {
+            let mut groups = groups.clone();
+            match groups.get_mut(joined) {
+                Some(group) => group.push(*last),
+                None => groups.push(vec![*last]),
+            }
+            all.push(groups);
+        }
+    }
+    all
+}
+
+/// Every way to evaluate the groups, at most one of them inline.
+fn assignments(groups: &[Vec<usize>]) -> Vec<Vec<(Form, &[usize])>> {
+    let mut all = vec![Vec::new()];
+    for group in groups {
+        let forms: &[Form] = match group.len() {
+            1 => &[Form::Own, Form::Inline],
+            _ => &[Form::Mixed, Form::Binned, Form::Inline],
+        };
+        let is_inline = |kernels: &[(Form, &[usize])]| kernels.iter().any(|k| k.0 == Form::Inline);
+        let extended = all.iter().flat_map(|kernels| {
+            let allowed = forms
+                .iter()
+                .filter(|form| **form != Form::Inline || !is_inline(kernels));
+            allowed.map(|form| {
+                let mut kernels: Vec<(Form, &[usize])> = kernels.clone();
+                kernels.push((*form, group));
+                kernels
+            })
+        });
+        all = extended.collect();
+    }
+    all
+}
+
+/// Evaluations of each of `count` materials, where reports say them apart; all of them otherwise.
+fn evaluations(report: &Report) -> u64 {
+    let queued = report.kernels.iter().filter(|k| !k.materials.is_empty());
+    queued.map(|k| k.items).sum()
+}
+
+/// Four materials in every partition, each group in every form.
+#[test]
+fn every_assignment_renders_the_same_paths() {
+    let room = Room {
+        width: 8,
+        height: 8,
+        ..room()
+    };
+    let (world, surfaces) = (room.world(), surfaces());
+    let own = render_plan(
+        &world,
+        &surfaces,
+        &plan(Strategy::Own, &surfaces),
+        &samples(4),
+    );
+    let mut tried = 0;
+    for groups in partitions(&[0, 1, 2, 3]) {
+        for kernels in assignments(&groups) {
+            let rendering = render_plan(&world, &surfaces, &custom(&kernels), &samples(4));
+            assert_equal_but_for_rounding(&rendering.film, &own.film);
+            if kernels.iter().all(|(form, _)| *form != Form::Inline) {
+                let (a, b) = (evaluations(&rendering.report), evaluations(&own.report));
+                assert!(a.abs_diff(b) <= b / 100, "{kernels:?}: {a} and {b}");
+            }
+            tried += 1;
+        }
+    }
+    assert_eq!(tried, 94);
+}
+
+/// Queues of unequal length and more than the threads that prepare dispatches, workgroups from
+/// one thread up: every item finds its queue. (Mesa's software driver cannot nest a `switch` of more
+/// than about 80 cases.)
+#[test]
+fn binned_kernels_of_many_materials_evaluate_every_item() {
+    let kinds = (0..132).map(|i| Kind::Diffuse(0.2 + 0.005 * i as f32));
+    let surfaces = materials(&kinds.collect::<Vec<_>>());
+    let room = Room {
+        materials: [3, 131, 62, 64, 0, 128, 63],
+        width: 8,
+        height: 8,
+        ..room()
+    };
+    let world = room.world();
+    let render = |kernels: &[(Form, std::ops::Range<usize>)], workgroup| {
+        let members: Vec<Vec<usize>> = kernels.iter().map(|(_, m)| m.clone().collect()).collect();
+        let kernels = kernels.iter().zip(&members);
+        let kernels: Vec<(Form, &[usize])> = kernels.map(|((f, _), m)| (*f, &m[..])).collect();
+        let mut options = samples(8);
+        options.technique.workgroup = Some(workgroup);
+        render_plan(&world, &surfaces, &custom(&kernels), &options)
+    };
+    use Form::{Binned, Mixed, Own};
+    let mixed = render(&[(Mixed, 0..61), (Mixed, 61..129), (Mixed, 129..132)], 64);
+    let expected = evaluations(&mixed.report);
+    for workgroup in [1, 32, 256] {
+        let kernels = [
+            (Binned, 0..60),
+            (Own, 60..61),
+            (Binned, 61..129),
+            (Binned, 129..132),
+        ];
+        let binned = render(&kernels, workgroup);
+        assert_equal_but_for_rounding(&binned.film, &mixed.film);
+        let found = evaluations(&binned.report);
+        assert!(
+            found.abs_diff(expected) <= expected / 100,
+            "{found} and {expected}"
+        );
+    }
+}
+
+/// More workgroups than a dimension of a dispatch has: a binned kernel goes on in a second row, whose
+/// last workgroups have no queue.
+#[test]
+fn binned_kernels_go_on_in_a_second_row() {
+    let room = Room {
+        width: 280,
+        height: 256,
+        ..room()
+    };
+    let (world, surfaces) = (room.world(), surfaces());
+    let render = |strategy, workgroup| {
+        let mut options = samples(1);
+        options.technique.workgroup = Some(workgroup);
+        let plan = plan(strategy, &surfaces);
+        render_plan(&world, &surfaces, &plan, &options).film
+    };
+    let reference = render(Strategy::Own, 64);
+    assert_equal_but_for_rounding(&render(Strategy::Binned, 1), &reference);
+}
+
+/// A kernel by any name that has one material is the kernel that this material has of its own.
+#[test]
+fn kernels_of_one_material_have_the_same_text() {
+    let texts = |form| {
+        let surfaces = surfaces();
+        let plan = custom(&[(Form::Mixed, &[0, 1, 2]), (form, &[3])]);
+        let renderer = Renderer::from_world(gpu(), &room().world(), &surfaces, &plan, &samples(1))
+            .unwrap_or_else(|e| panic!("{e}"));
+        let texts = renderer.kernels().map(|(_, wgsl)| wgsl.to_string());
+        texts.collect::<Vec<_>>()
+    };
+    assert_eq!(texts(Form::Mixed), texts(Form::Own));
+    assert_eq!(texts(Form::Binned), texts(Form::Own));
+    assert!(!texts(Form::Own).concat().contains("FIRST_GROUP"));
+}
+
+/// Plans may call kernels what they like; reports tell them apart.
+#[test]
+fn kernels_of_the_same_name_are_numbered() {
+    let mut plan = custom(&[
+        (Form::Binned, &[0, 1]),
+        (Form::Own, &[2]),
+        (Form::Own, &[3]),
+    ]);
+    for kernel in &mut plan.kernels {
+        kernel.name = "new_path".into();
+    }
+    let (_, report) = run(&plan);
+    let names: Vec<&str> = report.kernels.iter().map(|k| k.name.as_str()).collect();
+    let expected = ["new_path", "new_path_2", "new_path_3", "new_path_4"];
+    assert_eq!(names[2..6], expected);
 }
 
 #[test]
