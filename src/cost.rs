@@ -2,7 +2,7 @@
 //! evaluation at points of the scene's own surfaces.
 
 use glam::{DVec2, DVec3};
-use impasto_compiler::cost::{self, Inputs, Operations};
+use impasto_compiler::cost::{self, Cost, Inputs, Operations};
 use impasto_compiler::inspect::At;
 use impasto_compiler::ir::interp::OutOfFuel;
 use impasto_compiler::{Program, abi::MaterialInfo};
@@ -20,8 +20,15 @@ pub struct MaterialCost {
     pub instances: usize,
     /// Its lobes after layering.
     pub lobes: usize,
-    /// Operations of one evaluation; none if it is on no surface of the scene.
-    pub operations: Option<Operations>,
+    /// What evaluating it costs; none if it is on no surface of the scene.
+    pub cost: Option<Cost>,
+}
+
+impl MaterialCost {
+    /// Operations of one evaluation.
+    pub fn operations(&self) -> Option<&Operations> {
+        self.cost.as_ref().map(|c| &c.operations)
+    }
 }
 
 /// The materials of `program`, which a scene's bindings compiled to, each evaluated at `samples`
@@ -66,7 +73,7 @@ fn measure(
             name: info.name.clone(),
             instances: instances.filter(|i| i.info.material == material).count(),
             lobes: info.lobes,
-            operations: cost::material(program, material, &points(material, info))?,
+            cost: cost::vector(program, material, &points(material, info))?,
         })
     };
     program.materials().enumerate().map(cost).collect()

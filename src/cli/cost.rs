@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use clap::Args;
-use impasto::compiler::cost::{self, Inputs, Operations};
+use impasto::compiler::cost::{self, Cost, Inputs, Operations};
 use impasto::compiler::{self, Loader, MaterialRequest, Program};
 use impasto::cost::{MaterialCost, anywhere, of_scene};
 use impasto::{FileLoader, Scene};
@@ -129,6 +129,17 @@ fn noise(samples: usize) -> Result<Vec<NoiseCost>, Failure> {
 }
 
 fn json(args: &CostArgs, materials: &[MaterialCost], noise: &[NoiseCost]) -> serde_json::Value {
+    let material = |m: &MaterialCost| {
+        json!({
+            "name": m.name,
+            "instances": m.instances,
+            "lobes": m.lobes,
+            "operations": m.operations(),
+            "cost": m.cost,
+            "efficiency": m.cost.as_ref().map(Cost::efficiency),
+        })
+    };
+    let materials: Vec<_> = materials.iter().map(material).collect();
     json!({
         "files": args.files,
         "samples": args.samples,
@@ -154,7 +165,7 @@ fn text(samples: usize, materials: &[MaterialCost], noise: &[NoiseCost]) -> Stri
         "", "mean", "least", "most", "float", "special", "integer", "texture", "turns"
     );
     for m in materials {
-        row(&mut out, width, &m.name, m.operations.as_ref());
+        row(&mut out, width, &m.name, m.operations());
     }
     out.push('\n');
     for n in noise {

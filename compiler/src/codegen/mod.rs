@@ -20,8 +20,10 @@ mod walk;
 
 pub use dispatch::lookup;
 use helpers::Helpers;
+pub(crate) use inliner::decide as inlined;
 pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
+pub(crate) use walk::used_uniforms;
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {

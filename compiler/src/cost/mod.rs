@@ -1,6 +1,7 @@
-//! What materials cost. So far: how many operations one evaluation takes, counted by running the
+//! What materials cost. How many operations one evaluation takes is counted by running the
 //! interpreter over many sampled inputs, so that branches and loops count as often as they are
-//! taken.
+//! taken, and so is how many a subgroup issues whose lanes are at different inputs. What does not
+//! depend on inputs (numbers alive at once, size) is read off the code.
 //!
 //! An *operation* is what one thread of a GPU does to one number: adding two vectors of three is
 //! three operations, a dot product six, a hash eight. Reading and choosing components, copies, calls
@@ -13,15 +14,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::inspect::{self, At};
 use crate::ir::interp::{Interpreter, OutOfFuel};
-use crate::ir::value::Value;
-use crate::ir::{Function, Module, Type};
 use crate::ops::Counts;
 use crate::program::Program;
 
 mod inputs;
+mod live;
+mod measure;
+mod size;
+mod subgroups;
 mod vector;
 
 pub use inputs::Inputs;
+pub use live::live;
+pub use measure::Measured;
 pub use vector::{Cost, LANES};
 
 /// Most operations of all evaluations that one measurement makes.
@@ -62,43 +67,32 @@ impl Classes {
     pub fn sum(&self) -> f64 {
         self.alu + self.special + self.integer + self.texture + self.turns
     }
+
+    /// The mean of what `evaluations` counted together.
+    fn mean(counts: &Counts, evaluations: u64) -> Self {
+        let mean = |n: u64| n as f64 / evaluations as f64;
+        Self {
+            alu: mean(counts.alu),
+            special: mean(counts.special),
+            integer: mean(counts.integer),
+            texture: mean(counts.texture),
+            turns: mean(counts.turns),
+        }
+    }
 }
 
-/// The operations of material `material` of `program` over `inputs`: instances of it, and where
-/// they are evaluated. `None` without inputs.
-///
-/// One evaluation is what a path asks at a surface: scattering, and emission where it varies.
-/// Textures are not read; each gives one half.
+/// What material `material` of `program` costs over `inputs`: instances of it, and where they are
+/// evaluated. `None` without inputs.
 ///
 /// # Errors
 /// If the evaluations take too long together.
-pub fn material(
+pub fn vector(
     program: &Program,
     material: usize,
     inputs: &[(usize, At)],
-) -> Result<Option<Operations>, OutOfFuel> {
-    let compiled = &program.compiled()[material];
-    let mut tally = Tally::default();
-    // Values of parameters are part of the interpreter's code: one interpreter an instance.
-    for of_one in inputs.chunk_by(|a, b| a.0 == b.0) {
-        let uniforms = &program.instances()[of_one[0].0].uniforms;
-        let mut run = Interpreter::<f32>::new(program.ir(), FUEL).with_uniforms(uniforms);
-        for (_, at) in of_one {
-            let [wo, wi, u] = [&at.wo[..], &at.wi[..], &at.u[..]].map(Value::vector);
-            let point = here(&compiled.evaluate, program.ir(), at);
-            run.run(&compiled.evaluate, vec![point, wo.clone(), wi, u])?;
-            if let Some(f) = compiled
-                .emission
-                .as_ref()
-                .filter(|_| compiled.info.varying_emission)
-            {
-                run.run(f, vec![here(f, program.ir(), at), wo])?;
-            }
-            tally.add(run.counts());
-        }
-        tally.before = Counts::default();
-    }
-    Ok(tally.operations())
+) -> Result<Option<Cost>, OutOfFuel> {
+    let measured = Measured::new(program, material, inputs)?;
+    Ok(measured.map(|m| m.cost()))
 }
 
 /// The operations of a function of the library, such as `std::noise::perlin`, with its defaults at
@@ -117,13 +111,6 @@ pub fn library_function(path: &str, inputs: &[At]) -> Result<Option<Operations>,
         tally.add(run.counts());
     }
     Ok(tally.operations())
-}
-
-fn here(f: &Function, module: &Module, at: &At) -> Value<f32> {
-    match f.params.first().map(|p| p.ty) {
-        Some(Type::Struct(id)) => inspect::point(at, &module.structs[id.index()]),
-        _ => Value::float(0.0),
-    }
 }
 
 /// Adds up evaluations.
@@ -150,20 +137,12 @@ impl Tally {
     }
 
     fn operations(&self) -> Option<Operations> {
-        let mean = |n: u64| n as f64 / self.evaluations as f64;
-        let total = &self.total;
         Some(Operations {
             evaluations: self.evaluations,
-            mean: mean(total.operations()),
+            mean: self.total.operations() as f64 / self.evaluations as f64,
             min: self.least?,
             max: self.most,
-            classes: Classes {
-                alu: mean(total.alu),
-                special: mean(total.special),
-                integer: mean(total.integer),
-                texture: mean(total.texture),
-                turns: mean(total.turns),
-            },
+            classes: Classes::mean(&self.total, self.evaluations),
         })
     }
 }

@@ -7,8 +7,10 @@
 
 mod code;
 mod lower;
+mod profile;
 
 use self::code::{Code, Ins, Numbers, Place};
+pub use self::profile::{Origin, Part};
 use super::value::{Real, Value};
 use super::{Const, ExprId, Function, FunctionId, Module};
 use crate::ops::{Counts, Op, Operands};
@@ -27,6 +29,8 @@ pub struct Interpreter<'a, F> {
     /// Expressions evaluated so far.
     executed: u64,
     codes: Vec<Code<F>>,
+    /// The functions that these are the code of, where they outlive the interpreter.
+    sources: Vec<Option<&'a Function>>,
     /// Index in `codes` of the module's functions, once they were called.
     known: Vec<Option<usize>>,
     /// Functions that `run` was given. They live as long as the module does, so that an address
@@ -34,6 +38,8 @@ pub struct Interpreter<'a, F> {
     others: Vec<(&'a Function, usize)>,
     /// The frames of all calls.
     stack: Numbers<F>,
+    /// Does each call have code of its own, which knows what it is made of?
+    apart: bool,
 }
 
 /// The work limit was reached.
@@ -52,7 +58,7 @@ struct Waiting {
 /// Why a function's code stopped.
 enum Stop {
     Call {
-        callee: u32,
+        call: u32,
         frame: Place,
         to: Place,
         next: usize,
@@ -70,9 +76,11 @@ impl<'a, F: Real> Interpreter<'a, F> {
             fuel,
             executed: 0,
             codes: Vec::new(),
+            sources: Vec::new(),
             known: vec![None; module.functions.len()],
             others: Vec::new(),
             stack: Numbers::new(),
+            apart: false,
         }
     }
 
@@ -81,6 +89,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
         self.uniforms = uniforms.iter().map(Value::constant).collect();
         // Their values are part of the code.
         self.codes.clear();
+        self.sources.clear();
         self.others.clear();
         self.known.fill(None);
         self
@@ -129,8 +138,9 @@ impl<'a, F: Real> Interpreter<'a, F> {
     /// Runs a function without parameters once, for the values of some of its expressions, which
     /// stand in no block within another.
     pub fn values(&mut self, f: &Function, of: &[ExprId]) -> Result<Vec<Value<F>>, OutOfFuel> {
-        let (code, places) = lower::lower(self.module, f, &self.uniforms, of);
+        let (code, places) = lower::lower(self.module, f, &self.uniforms, of, self.apart);
         self.codes.push(code);
+        self.sources.push(None);
         self.execute(self.codes.len() - 1)?;
         let value = |(&id, mut at): (&ExprId, Place)| {
             let structs = &self.module.structs;
@@ -148,9 +158,27 @@ impl<'a, F: Real> Interpreter<'a, F> {
         code
     }
 
-    fn lower(&mut self, f: &Function) -> usize {
-        let (code, _) = lower::lower(self.module, f, &self.uniforms, &[]);
+    /// The code that a call goes to.
+    fn callee(&mut self, caller: usize, call: usize) -> usize {
+        let made = self.codes[caller].calls[call];
+        if let Some(known) = made.code {
+            return known;
+        }
+        let code = if self.apart {
+            let code = self.lower(&self.module.functions[made.function.index()]);
+            self.codes[code].caller = Some((caller, made.expr));
+            code
+        } else {
+            self.known_code(made.function)
+        };
+        self.codes[caller].calls[call].code = Some(code);
+        code
+    }
+
+    fn lower(&mut self, f: &'a Function) -> usize {
+        let (code, _) = lower::lower(self.module, f, &self.uniforms, &[], self.apart);
         self.codes.push(code);
+        self.sources.push(Some(f));
         self.codes.len() - 1
     }
 
@@ -180,7 +208,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
         loop {
             match self.step(code, base, next)? {
                 Stop::Call {
-                    callee,
+                    call,
                     frame,
                     to,
                     next,
@@ -191,7 +219,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
                         base,
                         to: base.plus(to),
                     });
-                    code = self.known_code(FunctionId(callee));
+                    code = self.callee(code, call as usize);
                     base = base.plus(frame);
                     self.enter(code, base);
                 }
@@ -271,9 +299,9 @@ impl<'a, F: Real> Interpreter<'a, F> {
                     Some(texture) => fetch(texture, *op, floats, ints, at),
                     None => kernel(floats, ints, at),
                 },
-                Ins::Call { callee, frame, to } => {
+                Ins::Call { call, frame, to } => {
                     return Ok(Stop::Call {
-                        callee: *callee,
+                        call: *call,
                         frame: *frame,
                         to: *to,
                         next,

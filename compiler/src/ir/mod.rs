@@ -13,6 +13,7 @@ use crate::ops::Op;
 use crate::source::Span;
 
 pub mod build;
+mod count;
 pub mod interp;
 pub mod parse;
 pub mod print;

@@ -6,7 +6,7 @@
 //! of the material's parameters, zeros for variables) is copied in behind them by the call.
 
 use crate::ir::value::{Real, Value};
-use crate::ir::{Const, Struct, Type};
+use crate::ir::{Const, ExprId, FunctionId, Struct, Type};
 use crate::ops::{Counts, Kernel, Op, Operands};
 
 /// A position in both arrays, or a number of floats and ints.
@@ -182,12 +182,8 @@ pub(super) enum Ins<F> {
     Below { counter: u32, end: u32, exit: u32 },
     /// Adds one to `counter` and goes on at `top`.
     Next { counter: u32, top: u32 },
-    /// Calls a function whose frame begins at `frame`, where its arguments are.
-    Call {
-        callee: u32,
-        frame: Place,
-        to: Place,
-    },
+    /// Makes a call, whose frame begins at `frame`, where its arguments are.
+    Call { call: u32, frame: Place, to: Place },
     /// Ends the function.
     Return,
 }
@@ -199,12 +195,20 @@ pub(super) struct Code<F> {
     /// Where the image goes: behind the parameters.
     pub image_at: Place,
     pub image: Numbers<F>,
+    /// Values of the material's parameters: which, where they are in the image, their types.
+    pub uniforms: Vec<(u32, Place, Type)>,
     /// Size of the frame.
     pub size: Place,
     /// Where the result is, and its size.
     pub result: (Place, Place),
     /// What each run of operations does.
     pub runs: Vec<Run>,
+    /// What each run of operations is made of, where that was asked for.
+    pub parts: Vec<Part>,
+    /// Its calls.
+    pub calls: Vec<Call>,
+    /// The code and the expression that call it, where calls are kept apart.
+    pub caller: Option<(usize, ExprId)>,
 }
 
 /// A run of operations.
@@ -216,4 +220,24 @@ pub(super) struct Run {
     pub counts: Counts,
     /// How often it was executed.
     pub times: u64,
+}
+
+/// A part of a run of operations.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    /// The run.
+    pub run: u32,
+    /// What is evaluated; of a turn of a loop, its bound or test.
+    pub expr: ExprId,
+    /// What it counts as.
+    pub counts: Counts,
+}
+
+/// A call in code.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Call {
+    pub function: FunctionId,
+    pub expr: ExprId,
+    /// The function's code, once it was called.
+    pub code: Option<usize>,
 }

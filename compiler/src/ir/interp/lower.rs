@@ -5,24 +5,29 @@
 //! what a block computed is not visible after it, so its places are used again. A call's frame
 //! begins where the stack ends: whatever lies beyond is computed anew before it is read.
 
-use super::code::{Code, Ins, Numbers, Place, Run};
+use super::code::{Call, Code, Ins, Numbers, Part, Place, Run};
 use crate::ir::value::{Real, Value};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, LocalId, Module, Stmt, Type};
-use crate::ops::{self, Op};
+use crate::ops::{self, Counts, Op};
 
 /// The code of `f`, a function over `module`, and where it leaves the values of the expressions
-/// `kept`, which stand in no block within another.
+/// `kept`, which stand in no block within another. `in_parts`: the code knows what its runs of
+/// operations are made of.
 pub(super) fn lower<F: Real>(
     module: &Module,
     f: &Function,
     uniforms: &[Value<F>],
     kept: &[ExprId],
+    in_parts: bool,
 ) -> (Code<F>, Vec<Place>) {
     let mut l = Lowering {
         module,
         f,
         instructions: Vec::with_capacity(2 * f.exprs.len() + 8),
         runs: Vec::new(),
+        parts: in_parts.then(Vec::new),
+        calls: Vec::new(),
+        uniforms: Vec::new(),
         in_run: false,
         places: vec![Place::default(); f.exprs.len()],
         locals: Vec::with_capacity(f.locals.len()),
@@ -40,9 +45,13 @@ pub(super) fn lower<F: Real>(
     let code = Code {
         image_at,
         image,
+        uniforms: l.uniforms,
         size: l.size,
         result,
         runs: l.runs,
+        parts: l.parts.unwrap_or_default(),
+        calls: l.calls,
+        caller: None,
         instructions: l.instructions,
     };
     (code, places)
@@ -60,6 +69,10 @@ struct Lowering<'a, F> {
     f: &'a Function,
     instructions: Vec<Ins<F>>,
     runs: Vec<Run>,
+    /// What runs are made of, if that is asked for.
+    parts: Option<Vec<Part>>,
+    calls: Vec<Call>,
+    uniforms: Vec<(u32, Place, Type)>,
     /// Does the last run go on?
     in_run: bool,
     places: Vec<Place>,
@@ -95,6 +108,7 @@ impl<F: Real> Lowering<'_, F> {
                 }
                 ExprKind::Uniform(u) => {
                     self.places[i] = base.plus(image.len());
+                    self.uniforms.push((*u, image.len(), e.ty));
                     image.push(uniforms.get(*u as usize), e.ty, &self.module.structs);
                 }
                 ExprKind::Param(p) => self.places[i] = params[*p as usize],
@@ -179,6 +193,17 @@ impl<F: Real> Lowering<'_, F> {
         &mut self.runs[last]
     }
 
+    /// Counts an evaluation of `expr` as `counts`.
+    fn count(&mut self, expr: ExprId, counts: Counts) {
+        let run = self.run();
+        run.executed += 1;
+        run.counts.add(&counts, 1);
+        let run = self.runs.len() as u32 - 1;
+        if let Some(parts) = &mut self.parts {
+            parts.push(Part { run, expr, counts });
+        }
+    }
+
     // ---- Statements --------------------------------------------------------------------
 
     fn block(&mut self, block: &Block) {
@@ -204,7 +229,7 @@ impl<F: Real> Lowering<'_, F> {
                 low,
                 high,
                 body,
-            } => self.count(*local, *low, *high, body),
+            } => self.count_up(*local, *low, *high, body),
             Stmt::While {
                 head,
                 test,
@@ -234,7 +259,7 @@ impl<F: Real> Lowering<'_, F> {
         self.aim(past);
     }
 
-    fn count(&mut self, local: LocalId, low: ExprId, high: ExprId, body: &Block) {
+    fn count_up(&mut self, local: LocalId, low: ExprId, high: ExprId, body: &Block) {
         let before = self.top;
         let counter = self.reserve(Type::Int).ints;
         let (low, end) = (self.index(low), self.index(high));
@@ -249,7 +274,7 @@ impl<F: Real> Lowering<'_, F> {
             end,
             exit: 0,
         });
-        self.turn();
+        self.turn(high);
         let to = self.locals[local.index()].ints;
         self.emit(Ins::Ints {
             from: counter,
@@ -280,7 +305,7 @@ impl<F: Real> Lowering<'_, F> {
             end,
             exit: 0,
         });
-        self.turn();
+        self.turn(test);
         self.block(head);
         let done = self.emit(Ins::Unless(self.index(test), 0));
         self.in_run = false;
@@ -291,11 +316,13 @@ impl<F: Real> Lowering<'_, F> {
     }
 
     /// Counts a turn of a loop with the operations that follow.
-    fn turn(&mut self) {
+    fn turn(&mut self, test: ExprId) {
         self.in_run = false;
-        let run = self.run();
-        run.executed += 1;
-        run.counts.turns += 1;
+        let turn = Counts {
+            turns: 1,
+            ..Counts::default()
+        };
+        self.count(test, turn);
     }
 
     /// The body of a loop up to its end, and its jumps.
@@ -332,8 +359,8 @@ impl<F: Real> Lowering<'_, F> {
     // ---- Expressions -------------------------------------------------------------------
 
     fn eval(&mut self, id: ExprId) {
-        self.run().executed += 1;
         let (f, ty) = (self.f, self.f.ty(id));
+        self.count(id, f.counts(&self.module.structs, id));
         self.places[id.index()] = match &f.expr(id).kind {
             ExprKind::Op(op, args) => self.op(*op, args, ty),
             ExprKind::Load(local) => {
@@ -344,7 +371,7 @@ impl<F: Real> Lowering<'_, F> {
             }
             ExprKind::Compose(parts) => self.compose(ty, parts),
             ExprKind::Swizzle(value, components) => self.swizzle(*value, components),
-            ExprKind::Call(callee, args) => self.call(*callee, args, ty),
+            ExprKind::Call(callee, args) => self.call(id, *callee, args),
             ExprKind::Make(_, fields) => {
                 let to = self.reserve(ty);
                 self.place_all(fields, to);
@@ -361,7 +388,6 @@ impl<F: Real> Lowering<'_, F> {
         }
         let types: Vec<Type> = args.iter().map(|&a| self.f.ty(a)).collect();
         let components = op.components(&types);
-        self.run().counts.op(op, components);
         let to = self.reserve(ty);
         let result = match ty {
             Type::Bool | Type::Int => to.ints,
@@ -380,8 +406,6 @@ impl<F: Real> Lowering<'_, F> {
     /// A choice between ints, bools, matrices or structs: number by number.
     fn select(&mut self, args: &[ExprId], ty: Type) -> Place {
         let size = self.size_of(ty);
-        let numbers = (size.floats + size.ints) as usize;
-        self.run().counts.op(Op::Select, numbers);
         let to = self.take(size);
         let (cond, a, b) = (
             self.index(args[0]),
@@ -448,19 +472,20 @@ impl<F: Real> Lowering<'_, F> {
         sizes.fold(base, Place::plus)
     }
 
-    fn call(&mut self, callee: FunctionId, args: &[ExprId], ty: Type) -> Place {
-        self.run().counts.calls += 1;
-        let to = self.reserve(ty);
+    fn call(&mut self, id: ExprId, function: FunctionId, args: &[ExprId]) -> Place {
+        let to = self.reserve(self.f.ty(id));
         let frame = self.top;
         self.place_all(args, frame);
         let arguments = args.iter().map(|&a| self.size_of(self.f.ty(a)));
         let end = arguments.fold(frame, Place::plus);
         self.size = self.size.max(end);
-        self.emit(Ins::Call {
-            callee: callee.0,
-            frame,
-            to,
+        let call = self.calls.len() as u32;
+        self.calls.push(Call {
+            function,
+            expr: id,
+            code: None,
         });
+        self.emit(Ins::Call { call, frame, to });
         to
     }
 }

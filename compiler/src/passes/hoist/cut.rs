@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::Uses;
-use crate::ir::{ExprId, ExprKind, Function, Module, Type};
+use crate::ir::{ExprId, ExprKind, Function, Module};
 use crate::ops::{CostClass, Op};
 
 /// Where uniform work is cut: what becomes a value, and what the kernel makes of values.
@@ -76,24 +76,15 @@ fn sources(f: &Function, uses: &Uses, id: ExprId) -> Vec<ExprId> {
 /// Is it cheaper for a kernel to make a value from its sources than to read it?
 fn cheap(module: &Module, f: &Function, id: ExprId, sources: &[ExprId]) -> bool {
     let expr = f.expr(id);
-    let read: u32 = sources.iter().map(|&s| words(module, f.ty(s))).sum();
-    let made = words(module, expr.ty);
+    let read: usize = sources
+        .iter()
+        .map(|&s| f.ty(s).numbers(&module.structs))
+        .sum();
+    let made = expr.ty.numbers(&module.structs);
     match &expr.kind {
         ExprKind::Compose(_) | ExprKind::Make(..) | ExprKind::Swizzle(..) => read <= made,
         ExprKind::Op(Op::Neg, _) => read <= made,
         ExprKind::Op(op, _) => op.info().class == CostClass::Alu(1) && read < made,
         _ => false,
-    }
-}
-
-/// Words of 32 bits that a value takes.
-fn words(module: &Module, ty: Type) -> u32 {
-    match ty {
-        Type::Mat3 => 9,
-        Type::Struct(id) => {
-            let fields = module.structs[id.index()].fields.iter();
-            fields.map(|f| words(module, f.1)).sum()
-        }
-        _ => ty.width().unwrap_or(1) as u32,
     }
 }

@@ -1,0 +1,171 @@
+//! Runs a material on inputs and counts: operations, what subgroups issue, and where it all comes
+//! from.
+
+use super::size::Size;
+use super::subgroups::{BATCH, Subgroups};
+use super::{Classes, Cost, FUEL, Operations, live};
+use crate::codegen;
+use crate::inspect::{self, At};
+use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::value::Value;
+use crate::ir::{ExprKind, Function, Module, Type};
+use crate::ops::Counts;
+use crate::program::{CompiledMaterial, Program};
+
+/// Bytes of a row of the parameter table.
+const ROW: f64 = 16.0;
+
+/// Bytes that a texture lookup reads: what is known of the texture, and four texels of four half
+/// floats (`texture.wgsl`).
+const LOOKUP: f64 = 8.0 + 4.0 * 8.0;
+
+/// A material that was evaluated at some inputs.
+pub struct Measured<'p> {
+    program: &'p Program,
+    material: &'p CompiledMaterial,
+    run: Interpreter<'p, f32>,
+    subgroups: Subgroups,
+    evaluations: u64,
+    least: u64,
+    most: u64,
+}
+
+impl<'p> Measured<'p> {
+    /// Evaluates material `material` of `program` at `inputs`: instances of it, and where. `None`
+    /// without inputs.
+    ///
+    /// One evaluation is what a path asks at a surface: scattering, and emission where it varies.
+    /// Textures are not read; each gives one half.
+    ///
+    /// # Errors
+    /// If the evaluations take too long together.
+    pub fn new(
+        program: &'p Program,
+        material: usize,
+        inputs: &[(usize, At)],
+    ) -> Result<Option<Self>, OutOfFuel> {
+        let mut this = Self {
+            program,
+            material: &program.compiled()[material],
+            run: Interpreter::new(program.ir(), FUEL).with_calls_apart(),
+            subgroups: Subgroups::default(),
+            evaluations: 0,
+            least: u64::MAX,
+            most: 0,
+        };
+        // Every batch takes its inputs from all over the list.
+        let batches = inputs.len().div_ceil(BATCH);
+        for batch in 0..batches {
+            this.batch(inputs.iter().skip(batch).step_by(batches))?;
+        }
+        Ok((this.evaluations > 0).then_some(this))
+    }
+
+    fn batch<'i>(
+        &mut self,
+        inputs: impl Iterator<Item = &'i (usize, At)>,
+    ) -> Result<(), OutOfFuel> {
+        let mut batch = Vec::new();
+        let mut set = None;
+        for (instance, at) in inputs {
+            if set != Some(*instance) {
+                self.run
+                    .set_uniforms(&self.program.instances()[*instance].uniforms);
+                set = Some(*instance);
+            }
+            self.evaluate(at)?;
+            batch.push(self.count());
+        }
+        self.subgroups.add(&batch);
+        Ok(())
+    }
+
+    fn evaluate(&mut self, at: &At) -> Result<(), OutOfFuel> {
+        let module = self.program.ir();
+        let [wo, wi, u] = [&at.wo[..], &at.wi[..], &at.u[..]].map(Value::vector);
+        let evaluate = &self.material.evaluate;
+        let point = here(evaluate, module, at);
+        self.run.run(evaluate, vec![point, wo.clone(), wi, u])?;
+        if let Some(f) = varying(self.material) {
+            self.run.run(f, vec![here(f, module, at), wo])?;
+        }
+        Ok(())
+    }
+
+    /// How often the last evaluation executed each run.
+    fn count(&mut self) -> Vec<u32> {
+        let operations: Vec<u64> = self.run.runs().map(|c| c.operations()).collect();
+        // No evaluation that ends in time executes a run more often than this.
+        let times = self.run.take_times();
+        let times: Vec<u32> = times
+            .map(|n| u32::try_from(n).unwrap_or(u32::MAX))
+            .collect();
+        let all = times.iter().zip(operations);
+        let all = all.map(|(&n, operations)| u64::from(n) * operations).sum();
+        self.evaluations += 1;
+        self.least = self.least.min(all);
+        self.most = self.most.max(all);
+        times
+    }
+
+    /// What the material costs.
+    pub fn cost(&self) -> Cost {
+        let issued = std::array::from_fn(|i| self.issued(i));
+        let classes = self.issued(0);
+        let functions = || std::iter::once(&self.material.evaluate).chain(varying(self.material));
+        let module = self.program.ir();
+        let mut size = Size::default();
+        functions().for_each(|f| size.add(Size::of(module, f)));
+        let worst = functions().map(|f| live::live(module, f)).max();
+        Cost {
+            operations: Operations {
+                evaluations: self.evaluations,
+                mean: classes.sum(),
+                min: self.least,
+                max: self.most,
+                classes,
+            },
+            issued,
+            live: worst.unwrap_or(0),
+            code: u32::try_from(size.code).unwrap_or(u32::MAX),
+            loops: u32::try_from(size.loops).unwrap_or(u32::MAX),
+            bytes: ROW * rows(self.material) + LOOKUP * classes.texture,
+        }
+    }
+
+    /// What subgroups of `LANES[i]` lanes issue.
+    fn issued(&self, i: usize) -> Classes {
+        let (times, evaluations) = self.subgroups.sums(i);
+        let mut counts = Counts::default();
+        for (run, &times) in self.run.runs().zip(times) {
+            counts.add(&run, times);
+        }
+        Classes::mean(&counts, evaluations)
+    }
+}
+
+/// The function of a material's emission, where it is part of an evaluation.
+fn varying(material: &CompiledMaterial) -> Option<&Function> {
+    let varies = material.info.varying_emission;
+    material.emission.as_ref().filter(|_| varies)
+}
+
+fn here(f: &Function, module: &Module, at: &At) -> Value<f32> {
+    match f.params.first().map(|p| p.ty) {
+        Some(Type::Struct(id)) => inspect::point(at, &module.structs[id.index()]),
+        _ => Value::float(0.0),
+    }
+}
+
+/// How many rows of the parameter table an evaluation reads.
+fn rows(material: &CompiledMaterial) -> f64 {
+    let functions = std::iter::once(&material.evaluate).chain(varying(material));
+    let read = functions.flat_map(|f| {
+        let used = codegen::used_uniforms(f).into_iter();
+        used.filter_map(|id| match f.expr(id).kind {
+            ExprKind::Uniform(i) => Some(material.layout.places.get(i as usize)?.row),
+            _ => None,
+        })
+    });
+    read.collect::<std::collections::BTreeSet<u32>>().len() as f64
+}
