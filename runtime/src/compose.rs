@@ -177,14 +177,13 @@ impl Composer<'_> {
         out
     }
 
-    /// What the logic stage must know of every material, as functions of an instance.
+    /// What the logic stage must know of every material that paths can hit, as functions of an instance.
     fn fates(&self) -> String {
-        let infos = self.materials;
+        let (infos, planned) = (self.materials, self.planned());
         let smooth = |i: usize| !infos[i].delta_only;
         let emits = |i: usize| infos[i].varying_emission;
-        let mut out = predicate("scatters_sampled_light", infos.len(), smooth);
-        out += &predicate("needs_last_evaluation", infos.len(), emits);
-        out
+        predicate("scatters_sampled_light", &planned, smooth)
+            + &predicate("needs_last_evaluation", &planned, emits)
     }
 
     /// Declarations of the buffers that `text` mentions.

@@ -40,7 +40,7 @@ impl Layout {
         plan: &Plan,
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
-        check_plan(plan, materials)?;
+        check_plan(plan, materials, &world.parts.unbound)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
         let mut needs = Needs::of(world, materials);
         needs.order = wavefront && technique.ray_order != RayOrder::Queue;
@@ -114,12 +114,24 @@ impl Layout {
     }
 }
 
-/// Fails unless the plan keeps its rules for `materials`.
-fn check_plan(plan: &Plan, materials: &[MaterialInfo]) -> Result<(), RuntimeError> {
+/// Fails unless the plan keeps its rules for `materials`, and leaves out only those that are `unbound`.
+fn check_plan(
+    plan: &Plan,
+    materials: &[MaterialInfo],
+    unbound: &[usize],
+) -> Result<(), RuntimeError> {
     let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+    let refuse = |reason| RuntimeError::Plan {
+        strategy: plan.strategy.clone(),
+        reason,
+    };
     plan.check_named(&names)
-        .map_err(|error| RuntimeError::Plan {
-            strategy: plan.strategy.clone(),
-            reason: error.to_string(),
-        })
+        .map_err(|error| refuse(error.to_string()))?;
+    match plan.unused.iter().find(|m| !unbound.contains(m)) {
+        Some(missed) => Err(refuse(format!(
+            "it has no kernel for the material `{}`, which is on a surface of the scene",
+            names[*missed]
+        ))),
+        None => Ok(()),
+    }
 }

@@ -148,6 +148,12 @@ impl Composer<'_> {
         recipes
     }
 
+    /// The materials that some kernel evaluates, ascending.
+    pub(crate) fn planned(&self) -> Vec<usize> {
+        let all = 0..self.materials.len();
+        all.filter(|m| !self.plan.unused.contains(m)).collect()
+    }
+
     /// What the compiler says of some materials.
     pub(crate) fn infos(&self, members: &[usize]) -> Vec<&MaterialInfo> {
         members
@@ -222,7 +228,7 @@ impl Composer<'_> {
         let stages = stages.map(|s| s.id).collect();
         Recipe {
             form: Some(Form::Inline),
-            members: (0..self.materials.len()).collect(),
+            members: self.planned(),
             ..Recipe::plain("mega", stages, self.mega_feed(), shell)
         }
     }

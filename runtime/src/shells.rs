@@ -223,7 +223,7 @@ impl Composer<'_> {
     /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.
     fn material_queue(&self) -> String {
         let queues = self.queues_of_materials();
-        let all = queues.len() == self.materials.len();
+        let all = queues.len() == self.planned().len();
         let body = match queues.first() {
             None => "return NOTHING;".to_string(),
             Some((_, sole)) if all && queues.iter().all(|(_, queue)| queue == sole) => {

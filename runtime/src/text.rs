@@ -42,13 +42,13 @@ pub(crate) fn without_comments(text: &str) -> String {
     lines.join("\n")
 }
 
-/// A function of an instance that is true if its material is a given one of `count`. Where all
-/// are alike, nothing is looked up.
-pub(crate) fn predicate(name: &str, count: usize, holds: impl Fn(usize) -> bool) -> String {
-    let members: Vec<usize> = (0..count).filter(|i| holds(*i)).collect();
+/// A function of an instance, of some material `among` a few, that is true if that is one for which
+/// a condition `holds`. Where all are alike, nothing is looked up.
+pub(crate) fn predicate(name: &str, among: &[usize], holds: impl Fn(usize) -> bool) -> String {
+    let members: Vec<usize> = among.iter().copied().filter(|i| holds(*i)).collect();
     let body = match members.len() {
         0 => "return false;".to_string(),
-        n if n == count => "return true;".to_string(),
+        n if n == among.len() => "return true;".to_string(),
         _ => format!(
             "switch material_of(instance) {{ case {}: {{ return true; }} default: {{ return false; }} }}",
             case_labels(&members)
@@ -78,11 +78,11 @@ mod tests {
 
     #[test]
     fn predicates_look_up_what_differs() {
-        let none = predicate("p", 3, |_| false);
+        let none = predicate("p", &[0, 1, 2], |_| false);
         assert_eq!(none, "fn p(instance: u32) -> bool { return false; }\n");
-        let all = predicate("p", 3, |_| true);
+        let all = predicate("p", &[0, 2], |i| i != 1);
         assert_eq!(all, "fn p(instance: u32) -> bool { return true; }\n");
-        let some = predicate("p", 3, |i| i != 1);
+        let some = predicate("p", &[0, 1, 2], |i| i != 1);
         assert!(some.contains("switch material_of(instance) { case 0u, 2u: { return true; }"));
     }
 

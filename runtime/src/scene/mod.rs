@@ -10,6 +10,7 @@ use glam::Vec3;
 
 mod assemble;
 mod bindings;
+mod bound;
 mod description;
 mod document;
 mod error;

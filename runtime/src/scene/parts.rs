@@ -45,6 +45,8 @@ pub struct SceneParts {
     pub has_sampled_lights: bool,
     /// How many triangles there are, for the report.
     pub counts: GeometryCounts,
+    /// Indices of the materials that no triangle binds, ascending.
+    pub unbound: Vec<usize>,
 }
 
 impl SceneParts {
@@ -94,6 +96,7 @@ impl SceneParts {
             lights: lights.part,
             has_sampled_lights: lights.has_sampled,
             counts: split.counts(),
+            unbound: scene.unbound(materials.len(), instances),
             media,
             texture,
         })

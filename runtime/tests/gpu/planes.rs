@@ -291,6 +291,7 @@ impl Planes {
                 texture: None,
                 has_sampled_lights: self.light != Light::None,
                 counts: GeometryCounts::default(),
+                unbound: Vec::new(),
             },
         }
     }

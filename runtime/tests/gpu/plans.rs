@@ -391,6 +391,66 @@ fn plans_that_miss_or_repeat_a_material_are_refused() {
     }
 }
 
+/// What is on no surface needs no kernel, and none knows of it; what is on one does.
+#[test]
+fn unbound_materials_need_no_kernel() {
+    let surfaces = materials(&[
+        Kind::Diffuse(0.6),
+        Kind::Mirror,
+        Kind::Glowing(0.3, 1.0),
+        Kind::Diffuse(0.4),
+    ]);
+    let room = |unbound: &[usize]| Room {
+        materials: [0, 3, 0, 3, 0, 3, 0],
+        unbound: unbound.to_vec(),
+        ..room()
+    };
+    let groups: [&[(Form, &[usize])]; 4] = [
+        &[(Form::Own, &[0]), (Form::Own, &[3])],
+        &[(Form::Binned, &[0, 3])],
+        &[(Form::Own, &[3]), (Form::Inline, &[0])],
+        &[(Form::Mixed, &[0, 3])],
+    ];
+    let world = room(&[1, 2]).world();
+    let all = render_plan(
+        &world,
+        &surfaces,
+        &plan(Strategy::Own, &surfaces),
+        &samples(2),
+    );
+    for kernels in groups {
+        let plan = Plan {
+            unused: vec![1, 2],
+            ..custom(kernels)
+        };
+        let renderer = Renderer::from_world(gpu(), &world, &surfaces, &plan, &samples(1))
+            .unwrap_or_else(|e| panic!("{e}"));
+        let texts: String = renderer.kernels().map(|(_, wgsl)| wgsl).collect();
+        // A mirror and a glowing material would be looked up here.
+        for (question, answer) in [
+            ("scatters_sampled_light", true),
+            ("needs_last_evaluation", false),
+        ] {
+            let known = format!("fn {question}(instance: u32) -> bool {{ return {answer}; }}");
+            assert!(texts.contains(&known), "{kernels:?}: {question}");
+        }
+        let fewer = render_plan(&world, &surfaces, &plan, &samples(2));
+        assert_equal_but_for_rounding(&fewer.film, &all.film);
+        let refused =
+            Renderer::from_world(gpu(), &room(&[1]).world(), &surfaces, &plan, &samples(1));
+        let message = refused.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(
+            message.contains("`m2`") && message.contains("surface"),
+            "{message}"
+        );
+    }
+    // A megakernel leaves them out as well.
+    let mega = plan(Strategy::Mega, &surfaces).leaving_out(&[1, 2]);
+    let mega = render_plan(&world, &surfaces, &mega, &samples(2));
+    assert_equal_but_for_rounding(&mega.film, &all.film);
+    assert_eq!(mega.report.kernels[1].materials, ["m0", "m3"]);
+}
+
 #[test]
 fn settings_that_cannot_be_rendered_are_named() {
     let refused = |room: Room, options| {

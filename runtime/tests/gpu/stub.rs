@@ -203,6 +203,8 @@ pub struct Room {
     pub height: u32,
     /// The material of each wall and of the plate.
     pub materials: [u32; 7],
+    /// Materials that the room says are on none of these.
+    pub unbound: Vec<usize>,
 }
 
 impl Default for Room {
@@ -219,6 +221,7 @@ impl Default for Room {
             width: 24,
             height: 16,
             materials: [0; 7],
+            unbound: Vec::new(),
         }
     }
 }
@@ -395,6 +398,7 @@ impl Room {
                 texture: None,
                 has_sampled_lights: self.strategies != Strategies::Scattering,
                 counts: GeometryCounts::default(),
+                unbound: self.unbound.clone(),
             },
         }
     }
