@@ -34,7 +34,7 @@ pub(crate) enum Access {
 }
 
 /// The runtime's own buffers: name, type, access.
-pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 11] = [
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 12] = [
     ("run", "Run", Access::Uniform),
     ("state", "array<vec4<u32>>", Access::ReadWrite),
     ("queues", "array<u32>", Access::ReadWrite),
@@ -46,6 +46,7 @@ pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 11] = [
     ("extension_hits", "array<vec4<u32>>", Access::ReadWrite),
     ("shadow_rays", "array<vec4<u32>>", Access::ReadWrite),
     ("shadow_results", "array<u32>", Access::ReadWrite),
+    ("queue_table", "array<u32>", Access::Read),
 ];
 
 /// Members of the uniform `run`, the settings that do not change a kernel's text.

@@ -68,6 +68,11 @@ pub enum RuntimeError {
         /// Iterations that the longest path takes.
         expected: u64,
     },
+    /// Kernels are to be timed on a GPU that cannot.
+    #[error(
+        "the GPU `{0}` has no timestamps, by which kernels are timed\n  hint: choose another GPU (`--gpu`), or update its driver"
+    )]
+    NoTimestamps(String),
     /// A setting has a value that cannot be rendered.
     #[error("{setting} is {value}: expected {expected}")]
     Setting {

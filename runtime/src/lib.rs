@@ -14,6 +14,7 @@ pub mod film_file;
 mod fingerprint;
 pub mod gpu;
 mod image_file;
+pub mod lab;
 mod layout;
 pub mod lights;
 pub mod media;

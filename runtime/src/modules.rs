@@ -119,6 +119,9 @@ pub(crate) struct Composer<'a> {
     pub layout: Layout,
     pub sizes: Sizes,
     pub technique: Technique,
+    /// Whether kernels look the queue of a material up in the buffer `queue_table`, so that one logic
+    /// kernel serves many plans; otherwise it is part of their text.
+    pub queue_table: bool,
     /// Lanes of the GPU's largest subgroups.
     pub subgroup_size: u32,
     /// Random numbers of the sampler.

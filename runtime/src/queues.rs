@@ -144,8 +144,11 @@ pub(crate) struct Counters {
 }
 
 impl Counters {
+    /// The first words, which are the scalars, whatever the plan.
+    pub(crate) const SCALARS: usize = SCALARS.len();
+
     fn taken(self) -> usize {
-        SCALARS.len()
+        Self::SCALARS
     }
 
     fn first_groups(self) -> usize {
@@ -215,6 +218,11 @@ impl Counters {
         let of_kernels = (0..self.kernels).filter_map(|kernel| words.get(self.nonfinite(kernel)));
         let dropped: u64 = of_kernels.map(|n| u64::from(*n)).sum();
         dropped + u64::from(self.scalar(words, Scalar::FilmNonfinite))
+    }
+
+    /// The length of `queue` when it was consumed last, in the words read back.
+    pub(crate) fn taken_of(self, words: &[u32], queue: usize) -> u32 {
+        words.get(self.taken() + queue).copied().unwrap_or(0)
     }
 
     /// How many items of `queue` were consumed, in the words read back.

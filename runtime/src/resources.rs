@@ -87,6 +87,11 @@ impl Resources {
         &self.buffers[own("arguments")]
     }
 
+    /// One of the runtime's own buffers, such as `state`.
+    pub(crate) fn buffer(&self, name: &str) -> &wgpu::Buffer {
+        &self.buffers[own(name)]
+    }
+
     pub(crate) fn counters(&self) -> &wgpu::Buffer {
         &self.buffers[own("counters")]
     }
@@ -222,6 +227,8 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,
+        "queue_table" if composer.queue_table => 4 * composer.materials.len() as u64,
+        "queue_table" => 0,
         name if RAY_BUFFERS.iter().any(|(buffer, ..)| *buffer == name) => {
             pool * layout.ray_bytes(name)
         }

@@ -20,7 +20,7 @@ impl Size {
 }
 
 /// One dispatch of an iteration.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Step {
     pub name: String,
     pub pipeline: wgpu::ComputePipeline,

@@ -222,6 +222,11 @@ impl Composer<'_> {
 
     /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.
     fn material_queue(&self) -> String {
+        if self.queue_table {
+            return "fn material_queue(instance: u32) -> u32 { \
+                    return queue_table[material_of(instance)]; }\n"
+                .to_string();
+        }
         let queues = self.queues_of_materials();
         let all = queues.len() == self.planned().len();
         let body = match queues.first() {
@@ -238,7 +243,7 @@ impl Composer<'_> {
     }
 
     /// The materials that have a queue, ascending, each with that.
-    fn queues_of_materials(&self) -> Vec<(usize, usize)> {
+    pub(crate) fn queues_of_materials(&self) -> Vec<(usize, usize)> {
         let kernels = self.plan.kernels.iter().zip(Queues::of_kernels(self.plan));
         let mut pairs: Vec<(usize, usize)> = kernels
             .filter(|(kernel, _)| kernel.form != Form::Inline)

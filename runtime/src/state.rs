@@ -205,6 +205,15 @@ pub(crate) fn path_bytes(needs: Needs) -> u64 {
     fields(needs).count() as u64 * FIELD_BYTES
 }
 
+/// Bytes of state that `stage` loads and stores for a path, if it uses all of its fields.
+pub(crate) fn traffic(needs: Needs, stage: StageId) -> [u64; 2] {
+    let bytes = |touches: fn(&Field) -> &'static [StageId]| {
+        let touched = fields(needs).filter(|f| touches(f).contains(&stage));
+        touched.count() as u64 * FIELD_BYTES
+    };
+    [bytes(|f| f.readers), bytes(|f| f.writers)]
+}
+
 /// Where accessors find the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Storage {

@@ -68,6 +68,7 @@ impl<'g> Renderer<'g> {
             layout,
             sizes,
             technique,
+            queue_table: false,
             subgroup_size: gpu.subgroup_size(),
             random: random::part(
                 technique.sampler,
@@ -156,20 +157,29 @@ fn build_steps(
     resources: &Resources,
     sizes: Sizes,
 ) -> Result<Vec<Step>, RuntimeError> {
-    let build = |kernel: &Kernel| -> Result<Step, RuntimeError> {
-        let name = &kernel.recipe.name;
-        crate::gpu::shader::validate(name, &kernel.wgsl)?;
-        let layout = resources.bind_group_layout(gpu, kernel)?;
-        Ok(Step {
-            name: name.clone(),
-            pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
-            bind_group: resources.bind_group(gpu, kernel, &layout),
-            size: dispatch_size(kernel.recipe.feed, sizes),
-        })
-    };
+    let build = |kernel: &Kernel| build_step(gpu, kernel, resources, sizes);
     let steps = crate::parallel::map(kernels, build);
     gpu.check()?;
     steps.into_iter().collect()
+}
+
+/// Validates a kernel and builds its pipeline. What wgpu has to say against it comes through
+/// [`Gpu::check`].
+pub(crate) fn build_step(
+    gpu: &Gpu,
+    kernel: &Kernel,
+    resources: &Resources,
+    sizes: Sizes,
+) -> Result<Step, RuntimeError> {
+    let name = &kernel.recipe.name;
+    crate::gpu::shader::validate(name, &kernel.wgsl)?;
+    let layout = resources.bind_group_layout(gpu, kernel)?;
+    Ok(Step {
+        name: name.clone(),
+        pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
+        bind_group: resources.bind_group(gpu, kernel, &layout),
+        size: dispatch_size(kernel.recipe.feed, sizes),
+    })
 }
 
 /// How many workgroups a kernel gets.

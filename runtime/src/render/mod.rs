@@ -5,6 +5,8 @@
 mod build;
 mod iterate;
 
+pub(crate) use build::build_step;
+
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 

@@ -9,6 +9,7 @@ mod determinism;
 mod film;
 mod furnace;
 mod info;
+mod lab;
 mod lights;
 mod lost;
 mod many_lights;

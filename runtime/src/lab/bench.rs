@@ -1,0 +1,212 @@
+//! Timing: sequences of dispatches from the same restored state, again and again, by the GPU's
+//! timestamps.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::snapshot::Snapshot;
+use crate::error::RuntimeError;
+use crate::gpu::Gpu;
+use crate::queues::Counters;
+use crate::resources::Resources;
+use crate::schedule::Schedule;
+use crate::status::{Flight, Status};
+
+/// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
+const WARM_UP: Duration = Duration::from_millis(200);
+/// Runs that take turns. Each has buffers of its own to bring back what it counted.
+const TURNS: usize = 32;
+/// A run that takes longer is not repeated more often than [`FEW`] times.
+const LONG: f64 = 0.25;
+const FEW: u32 = 3;
+
+/// Dispatches from the restored state on.
+#[derive(Clone)]
+pub(super) struct Run {
+    pub schedule: Arc<Schedule>,
+    /// Which of them is of interest.
+    pub subject: usize,
+    /// The queue of each material, if its logic kernel asks for it.
+    pub table: Vec<u32>,
+    /// Where its counters are.
+    pub counters: Counters,
+    /// The queues whose items the subject works on; none if it works on all slots.
+    pub queues: Vec<usize>,
+    /// Slots.
+    pub pool: u32,
+}
+
+impl Run {
+    /// Items that its subject works on, by the counters read back.
+    pub(super) fn items(&self, words: &[u32]) -> u64 {
+        let taken = |queue: &usize| u64::from(self.counters.taken_of(words, *queue));
+        match &self.queues[..] {
+            [] => self.pool.into(),
+            queues => queues.iter().map(taken).sum(),
+        }
+    }
+}
+
+/// What one repetition of a run took.
+#[derive(Clone, Debug)]
+pub(super) struct Sample {
+    /// Seconds of each dispatch.
+    pub steps: Vec<f64>,
+    /// Seconds of all.
+    pub total: f64,
+    /// The counters thereafter.
+    pub counters: Vec<u32>,
+}
+
+/// Runs an iteration without restoring anything.
+pub(super) fn advance(gpu: &Gpu, run: &Run) -> Result<(), RuntimeError> {
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    run.schedule.record(&mut encoder, 1, None);
+    let index = gpu.queue.submit([encoder.finish()]);
+    gpu.wait(index)
+}
+
+/// Repeats each run, by turns with its neighbours, so that whatever slows the GPU down for a moment
+/// does not meet one of them only. The GPU is kept busy before.
+pub(super) fn time(
+    gpu: &Gpu,
+    resources: &Resources,
+    snapshot: &Snapshot,
+    runs: &[Run],
+    repetitions: u32,
+) -> Result<Vec<Vec<Sample>>, RuntimeError> {
+    let mut all = Vec::new();
+    for turn in runs.chunks(TURNS) {
+        let mut lanes = Lane::each(gpu, turn)?;
+        let begin = Instant::now();
+        let mut first = round(gpu, resources, snapshot, &mut lanes)?;
+        while begin.elapsed() < WARM_UP {
+            first = round(gpu, resources, snapshot, &mut lanes)?;
+        }
+        let long = first.iter().any(|sample| sample.total > LONG);
+        let mut samples = vec![Vec::new(); turn.len()];
+        for _ in 0..if long {
+            repetitions.min(FEW)
+        } else {
+            repetitions
+        } {
+            let round = round(gpu, resources, snapshot, &mut lanes)?;
+            for (samples, sample) in samples.iter_mut().zip(round) {
+                samples.push(sample);
+            }
+        }
+        all.extend(samples);
+    }
+    Ok(all)
+}
+
+/// A run with the buffers that bring its results back.
+struct Lane<'r> {
+    run: &'r Run,
+    flight: Flight,
+    queries: u32,
+}
+
+impl<'r> Lane<'r> {
+    fn each(gpu: &Gpu, runs: &'r [Run]) -> Result<Vec<Self>, RuntimeError> {
+        let lane = |run: &'r Run| {
+            let queries = run.schedule.timing.queries(run.schedule.steps.len() as u32);
+            let flight = Flight::new(gpu, run.counters.len(), queries)?;
+            Ok(Self {
+                run,
+                flight,
+                queries,
+            })
+        };
+        runs.iter().map(lane).collect()
+    }
+
+    fn depart(&mut self, gpu: &Gpu, resources: &Resources, snapshot: &Snapshot) {
+        let (run, flight) = (self.run, &mut self.flight);
+        if !run.table.is_empty() {
+            let table = resources.buffer("queue_table");
+            gpu.queue
+                .write_buffer(table, 0, bytemuck::cast_slice(&run.table));
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        snapshot.restore(&mut encoder, resources);
+        run.schedule.record(&mut encoder, 1, flight.queries());
+        flight.copy(&mut encoder, resources.counters(), self.queries);
+        flight.depart(gpu, encoder, 1);
+    }
+
+    fn land(&mut self, gpu: &Gpu) -> Result<Sample, RuntimeError> {
+        let mut status = Status::new(self.run.schedule.steps.len());
+        self.flight.land(gpu, &self.run.schedule, &mut status)?;
+        Ok(Sample {
+            steps: status.step_seconds,
+            total: status.gpu_seconds,
+            counters: status.counters,
+        })
+    }
+}
+
+/// Every run once; all are under way before the first is waited for.
+fn round(
+    gpu: &Gpu,
+    resources: &Resources,
+    snapshot: &Snapshot,
+    lanes: &mut [Lane<'_>],
+) -> Result<Vec<Sample>, RuntimeError> {
+    for lane in lanes.iter_mut() {
+        lane.depart(gpu, resources, snapshot);
+    }
+    lanes.iter_mut().map(|lane| lane.land(gpu)).collect()
+}
+
+/// The median of each step.
+pub(super) fn medians(samples: &[Sample]) -> Vec<f64> {
+    let steps = samples.first().map_or(0, |sample| sample.steps.len());
+    let of = |step| median(samples.iter().map(|sample| sample.steps[step]));
+    (0..steps).map(of).collect()
+}
+
+/// The number in the middle, 0 of none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    quantile(&sorted(values), 0.5)
+}
+
+/// Half of the distance between the quartiles.
+pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
+    let sorted = sorted(values);
+    0.5 * (quantile(&sorted, 0.75) - quantile(&sorted, 0.25))
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// Between the two nearest, in proportion.
+fn quantile(sorted: &[f64], at: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let place = at * last as f64;
+    let below = place as usize;
+    let above = (below + 1).min(last);
+    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_and_the_spread_of_few_numbers() {
+        let of = |values: &[f64]| {
+            let values = || values.iter().copied();
+            (median(values()), spread(values()))
+        };
+        assert_eq!(of(&[]), (0.0, 0.0));
+        assert_eq!(of(&[3.0]), (3.0, 0.0));
+        assert_eq!(of(&[9.0, 1.0, 2.0, 3.0, 4.0]), (3.0, 1.0));
+        assert_eq!(of(&[4.0, 1.0]), (2.5, 0.75));
+    }
+}

@@ -1,0 +1,208 @@
+//! From candidates to dispatches: composing the kernels around a kernel under test, and building
+//! each text once.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel};
+
+use super::bench::Run;
+use super::{Candidate, Lab, Unmeasured, names, own_plan};
+use crate::error::RuntimeError;
+use crate::gpu::Gpu;
+use crate::modules::{Composer, Feed, Kernel, Recipe, Sizes};
+use crate::render::build_step;
+use crate::resources::Resources;
+use crate::schedule::{Schedule, Step};
+
+/// Kernels built so far, by their text; or why they could not be.
+pub(super) type Cache = BTreeMap<String, Result<Step, Unmeasured>>;
+
+/// A run whose kernels are composed and not yet built.
+struct Composed {
+    kernels: Vec<Kernel>,
+    run: Run,
+}
+
+impl Lab<'_> {
+    /// The dispatches of each candidate.
+    pub(super) fn runs(
+        &mut self,
+        candidates: &[Candidate],
+    ) -> Result<Vec<Result<Run, Unmeasured>>, RuntimeError> {
+        let compose = |candidate: &Candidate| self.compose(candidate);
+        let composed: Vec<_> = candidates.iter().map(compose).collect();
+        let kernels = composed.iter().filter_map(|c| c.as_ref().ok());
+        let kernels: Vec<Kernel> = kernels.flat_map(|c| c.kernels.clone()).collect();
+        self.build(kernels)?;
+        let run = |composed: Result<Composed, Unmeasured>| self.finish(composed?);
+        Ok(composed.into_iter().map(run).collect())
+    }
+
+    /// The logic kernel alone, of a kernel a material.
+    pub(super) fn bare_logic(&mut self) -> Result<Run, RuntimeError> {
+        let plan = own_plan(&self.materials);
+        let composer = self.composer(&plan, false)?;
+        let logic = composer.recipes().swap_remove(0);
+        let composed = self.composed(&composer, vec![logic], Vec::new());
+        self.build(composed.kernels.clone())?;
+        let run = self.finish(composed);
+        run.map_err(RuntimeError::Validation)
+    }
+
+    /// All dispatches of an iteration.
+    pub(super) fn whole(&mut self, plan: &Plan) -> Result<Run, RuntimeError> {
+        if plan.organisation != Organisation::Wavefront {
+            return Err(RuntimeError::Plan {
+                strategy: plan.strategy.clone(),
+                reason: "a megakernel has no iterations to be timed".into(),
+            });
+        }
+        let composer = self.composer(plan, false)?;
+        let composed = self.composed(&composer, composer.recipes(), Vec::new());
+        self.build(composed.kernels.clone())?;
+        self.finish(composed).map_err(RuntimeError::Validation)
+    }
+
+    pub(super) fn recipes(&self, plan: &Plan) -> Result<Vec<Recipe>, RuntimeError> {
+        Ok(self.composer(plan, false)?.recipes())
+    }
+
+    fn compose(&self, candidate: &Candidate) -> Result<Composed, Unmeasured> {
+        let plan = self.plan_around(candidate)?;
+        let inline = candidate.form == Form::Inline;
+        let composer = self.composer(&plan, !inline);
+        let composer = composer.map_err(|error| error.to_string())?;
+        let mut recipes = composer.recipes();
+        if inline {
+            recipes.truncate(1);
+            return Ok(self.composed(&composer, recipes, Vec::new()));
+        }
+        let subject = recipes.iter().position(|recipe| {
+            recipe.form == Some(candidate.form) && recipe.members == candidate.members
+        });
+        let Some(subject) = subject else {
+            return Err("the plan has no such kernel".into());
+        };
+        // The logic kernel, and the one that counts what it has queued.
+        let recipes = vec![
+            recipes[0].clone(),
+            recipes[1].clone(),
+            recipes.swap_remove(subject),
+        ];
+        Ok(self.composed(&composer, recipes, composer.queue_table()))
+    }
+
+    /// A plan with the candidate first, and an own kernel for every other material.
+    fn plan_around(&self, candidate: &Candidate) -> Result<Plan, Unmeasured> {
+        let (form, members) = (candidate.form, &candidate.members);
+        let ascending = members.windows(2).all(|pair| pair[0] < pair[1]);
+        let known = members.iter().all(|m| *m < self.materials.len());
+        if members.is_empty() || !ascending || !known || form == Form::Own && members.len() > 1 {
+            return Err(format!(
+                "there is no kernel of form {form:?} over {members:?}"
+            ));
+        }
+        let own = own_plan(&self.materials);
+        if form == Form::Own {
+            return Ok(own);
+        }
+        let others = own.kernels.into_iter();
+        let others = others.filter(|kernel| !members.contains(&kernel.materials[0]));
+        let subject = PlanKernel::new(form, members.clone(), &names(&self.materials));
+        Ok(Plan {
+            kernels: std::iter::once(subject).chain(others).collect(),
+            ..own
+        })
+    }
+
+    fn composed(&self, composer: &Composer<'_>, recipes: Vec<Recipe>, table: Vec<u32>) -> Composed {
+        let subject = recipes.len() - 1;
+        let run = Run {
+            schedule: Arc::new(Schedule {
+                steps: Vec::new(),
+                arguments: self.resources.arguments().clone(),
+                timing: self.gpu.timing,
+            }),
+            subject,
+            table,
+            counters: composer.layout.counters,
+            queues: match recipes[subject].feed {
+                Feed::Queue(queue) => vec![queue],
+                Feed::Queues { first, count } => (first..first + count).collect(),
+                _ => Vec::new(),
+            },
+            pool: self.sizes.pool,
+        };
+        let kernels = recipes.into_iter().enumerate();
+        let kernels = kernels.map(|(index, recipe)| composer.compose(index, recipe));
+        Composed {
+            kernels: kernels.collect(),
+            run,
+        }
+    }
+
+    /// Builds the kernels that are not built yet, several at a time.
+    fn build(&mut self, kernels: Vec<Kernel>) -> Result<(), RuntimeError> {
+        let mut wanted: BTreeMap<String, Kernel> = BTreeMap::new();
+        for kernel in kernels {
+            if !self.cache.contains_key(&kernel.wgsl) {
+                wanted.insert(kernel.wgsl.clone(), kernel);
+            }
+        }
+        let wanted: Vec<Kernel> = wanted.into_values().collect();
+        let (gpu, resources, sizes) = (self.gpu, &self.resources, self.sizes);
+        let build = |kernel: &Kernel| build_one(gpu, resources, sizes, kernel);
+        let built = crate::parallel::map(&wanted, build);
+        self.gpu.check()?;
+        let texts = wanted.into_iter().map(|kernel| kernel.wgsl);
+        self.cache.extend(texts.zip(built));
+        Ok(())
+    }
+
+    fn finish(&self, composed: Composed) -> Result<Run, Unmeasured> {
+        let step = |kernel: &Kernel| match self.cache.get(&kernel.wgsl) {
+            Some(step) => step.clone(),
+            None => Err("it was not built".to_string()),
+        };
+        let steps: Result<Vec<Step>, Unmeasured> = composed.kernels.iter().map(step).collect();
+        Ok(Run {
+            schedule: Arc::new(Schedule {
+                steps: steps?,
+                arguments: composed.run.schedule.arguments.clone(),
+                timing: composed.run.schedule.timing,
+            }),
+            ..composed.run
+        })
+    }
+}
+
+impl Composer<'_> {
+    /// The queue of each material, or the largest number, as `queue_table` has it.
+    fn queue_table(&self) -> Vec<u32> {
+        let mut table = vec![u32::MAX; self.materials.len()];
+        for (material, queue) in self.queues_of_materials() {
+            table[material] = queue as u32;
+        }
+        table
+    }
+}
+
+/// What wgpu refuses is not the end of other measurements.
+fn build_one(
+    gpu: &Gpu,
+    resources: &Resources,
+    sizes: Sizes,
+    kernel: &Kernel,
+) -> Result<Step, Unmeasured> {
+    let filters = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::Internal];
+    let scopes = filters.map(|filter| gpu.device.push_error_scope(filter));
+    let built = build_step(gpu, kernel, resources, sizes);
+    // Scopes end in the reverse order of their beginnings.
+    for scope in scopes.into_iter().rev() {
+        if let Some(error) = pollster::block_on(scope.pop()) {
+            return Err(error.to_string());
+        }
+    }
+    built.map_err(|error| error.to_string())
+}

@@ -1,0 +1,84 @@
+//! What the iteration hits that is measured: counted on the host, from the queues themselves.
+
+use impasto_compiler::abi::MaterialInfo;
+use impasto_compiler::partition::workload::BLOCK;
+use impasto_compiler::partition::{Form, Hits, Plan, Workload};
+
+use super::{Candidate, Lab};
+use crate::error::RuntimeError;
+use crate::layout::Layout;
+use crate::stages::StageId;
+use crate::state;
+
+/// A workload of which only the plan-independent part is known.
+pub(super) fn empty(materials: &[MaterialInfo], layout: &Layout, pool: u32) -> Workload {
+    let hits = |material: &MaterialInfo| Hits {
+        material: material.name.clone(),
+        on_surface: true,
+        share: 0.0,
+        present: 0.0,
+    };
+    let [loads, stores] = state::traffic(layout.needs, StageId::Material).map(|b| b as f64);
+    Workload {
+        pool,
+        materials: materials.iter().map(hits).collect(),
+        loads,
+        stores,
+        logic_seconds: 0.0,
+        other_seconds: 0.0,
+    }
+}
+
+impl Lab<'_> {
+    /// Counts the hits of each material, and the blocks of neighbouring slots with any.
+    pub(super) fn count_hits(&mut self, own: &Plan) -> Result<(), RuntimeError> {
+        let pool = f64::from(self.sizes.pool);
+        let blocks = self.sizes.pool.div_ceil(BLOCK) as usize;
+        // Any kernel will do: all queues are filled before it.
+        let any = Candidate {
+            form: Form::Own,
+            members: vec![0],
+        };
+        let run = self.runs(&[any])?.swap_remove(0);
+        let run = run.map_err(RuntimeError::Validation)?;
+        let sample = self.time(std::slice::from_ref(&run))?.swap_remove(0);
+        let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
+        for material in 0..own.kernels.len() {
+            let queue = 1 + material;
+            let taken = run.counters.taken_of(counters, queue);
+            let mut met = vec![false; blocks];
+            for slot in self.read_queue(queue, taken)? {
+                if let Some(block) = met.get_mut((slot / BLOCK) as usize) {
+                    *block = true;
+                }
+            }
+            let present = met.iter().filter(|met| **met).count();
+            let hits = &mut self.workload.materials[material];
+            hits.share = f64::from(taken) / pool;
+            hits.present = present as f64 / blocks as f64;
+        }
+        Ok(())
+    }
+
+    /// The slots in a queue.
+    fn read_queue(&self, queue: usize, length: u32) -> Result<Vec<u32>, RuntimeError> {
+        if length == 0 {
+            return Ok(Vec::new());
+        }
+        let (gpu, queues) = (self.gpu, self.resources.buffer("queues"));
+        let size = 4 * u64::from(length);
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("queue readback"),
+            size,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let begin = 4 * queue as u64 * u64::from(self.sizes.pool);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(queues, begin, &staging, 0, size);
+        let index = gpu.queue.submit([encoder.finish()]);
+        gpu.read(&staging, index, size, |bytes| {
+            bytemuck::pod_collect_to_vec(bytes)
+        })
+    }
+}

@@ -1,0 +1,390 @@
+//! The laboratory: times single material kernels, and whole iterations of any plan, on the same hits.
+//!
+//! It renders by a kernel a material until paths of all lengths are mixed, and keeps a copy of what
+//! the paths are between two iterations. Before each measurement that copy is restored, so that
+//! every kernel finds the same hits whichever plan it belongs to. Filling the queues of a plan takes a
+//! logic kernel that sorts hits as the plan has it; here it looks the queue of a material up in a
+//! buffer, so that a few such kernels serve all subsets of the materials.
+
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
+use impasto_compiler::partition::{Form, Plan, Strategy, Workload};
+use serde::Serialize;
+
+use crate::error::RuntimeError;
+use crate::gpu::{Gpu, Timing};
+use crate::layout::Layout;
+use crate::modules::{Composer, Sizes};
+use crate::pool;
+use crate::random::{self, Demand};
+use crate::render::RenderOptions;
+use crate::resources::Resources;
+use crate::settings;
+use crate::shader_part::{BufferData, ShaderPart};
+use crate::technique::Technique;
+use crate::world::{MaterialSource, World};
+
+mod bench;
+mod candidates;
+mod hits;
+mod snapshot;
+
+use bench::{Run, Sample};
+use candidates::Cache;
+use snapshot::Snapshot;
+
+/// Samples of each pixel: more than any number of iterations uses up.
+const ENDLESS: u32 = 1 << 24;
+
+/// How to measure.
+#[derive(Clone, Debug)]
+pub struct LabOptions {
+    /// Paths in flight; chosen by the GPU if `None`.
+    pub pool: Option<u32>,
+    /// How the work is done.
+    pub technique: Technique,
+    /// Iterations before the copy is taken. Paths begin together, and are mixed after about as many
+    /// as the longest has segments.
+    pub warm_iterations: u32,
+    /// How often each kernel is timed; the median counts.
+    pub repetitions: u32,
+}
+
+impl Default for LabOptions {
+    fn default() -> Self {
+        Self {
+            pool: None,
+            technique: Technique::default(),
+            warm_iterations: 24,
+            repetitions: 9,
+        }
+    }
+}
+
+/// A kernel to be timed: a form, and the materials it evaluates, ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// How it treats its members; `Own` has one.
+    pub form: Form,
+    /// Indices of materials of the program.
+    pub members: Vec<usize>,
+}
+
+/// What a kernel took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Measured {
+    /// Median GPU seconds. Of inline materials those by which they make the logic kernel slower than it
+    /// is with a kernel a material; it may be below zero.
+    pub seconds: f64,
+    /// Half of the distance between the quartiles, in seconds.
+    pub spread: f64,
+    /// Items that it worked on; slots of the pool for the logic kernel.
+    pub items: u64,
+    /// Median GPU seconds of the logic kernel that filled its queues, or that it is part of.
+    pub logic_seconds: f64,
+}
+
+/// What an iteration of a plan took.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Iteration {
+    /// Median GPU seconds.
+    pub seconds: f64,
+    /// Half of the distance between the quartiles, in seconds.
+    pub spread: f64,
+    /// Median GPU seconds of each kernel, by its name, in order.
+    pub kernels: Vec<(String, f64)>,
+}
+
+/// Why a kernel or plan could not be measured; others can.
+pub type Unmeasured = String;
+
+/// A scene in mid-render.
+pub struct Lab<'a> {
+    gpu: &'a Gpu,
+    world: &'a World,
+    source: &'a dyn MaterialSource,
+    materials: Vec<MaterialInfo>,
+    instances: Vec<InstanceInfo>,
+    tables: Vec<BufferData>,
+    random: ShaderPart,
+    sizes: Sizes,
+    technique: Technique,
+    repetitions: u32,
+    resources: Resources,
+    snapshot: Snapshot,
+    cache: Cache,
+    workload: Workload,
+}
+
+impl<'a> Lab<'a> {
+    /// Renders `world` until paths are mixed, and measures what a plan takes beside its material
+    /// kernels.
+    ///
+    /// # Errors
+    /// If it cannot be rendered, or the GPU has no timestamps.
+    pub fn new(
+        gpu: &'a Gpu,
+        world: &'a World,
+        source: &'a dyn MaterialSource,
+        options: &LabOptions,
+    ) -> Result<Self, RuntimeError> {
+        if gpu.timing == Timing::None {
+            return Err(RuntimeError::NoTimestamps(gpu.info().name));
+        }
+        let mut render = RenderOptions {
+            samples: ENDLESS,
+            pool: options.pool,
+            technique: options.technique.within(gpu),
+            ..RenderOptions::default()
+        };
+        settings::check(world, &render)?;
+        let (materials, instances) = (source.infos(), source.instances());
+        let own = own_plan(&materials);
+        // No plan has more queues or counters: buffers of this layout do for all.
+        let mut layout = Layout::new(world, &materials, &own, &render.technique)?;
+        layout.counters.binned = true;
+        render.technique = layout.technique(render.technique);
+        let demand = Demand::of(world, &materials, layout.needs.shadow_rays);
+        let parts = Parts {
+            world,
+            source,
+            materials: &materials,
+            instances: &instances,
+            tables: &source
+                .tables()
+                .iter()
+                .map(BufferData::from)
+                .collect::<Vec<_>>(),
+            random: &random::part(render.technique.sampler, demand),
+            sizes: pool::sizes(gpu, world, &layout, &render)?,
+            technique: render.technique,
+            subgroup_size: gpu.subgroup_size(),
+        };
+        let resources = Resources::new(gpu, &parts.composer(&own, layout, true), &render)?;
+        let mut lab = Self {
+            gpu,
+            world,
+            source,
+            tables: parts.tables.to_vec(),
+            random: parts.random.clone(),
+            sizes: parts.sizes,
+            technique: parts.technique,
+            repetitions: options.repetitions.max(1),
+            snapshot: Snapshot::new(gpu, &resources)?,
+            resources,
+            cache: Cache::default(),
+            workload: hits::empty(&materials, &layout, parts.sizes.pool),
+            materials,
+            instances,
+        };
+        lab.begin(&own, options.warm_iterations)?;
+        Ok(lab)
+    }
+
+    /// Takes the copy, and measures what is asked of every plan.
+    fn begin(&mut self, own: &Plan, iterations: u32) -> Result<(), RuntimeError> {
+        let run = self.whole(own)?;
+        self.resources.clear(self.gpu);
+        for _ in 0..iterations.max(1) {
+            bench::advance(self.gpu, &run)?;
+        }
+        self.snapshot.take(self.gpu, &self.resources);
+        self.count_hits(own)?;
+        let samples = self.time(&[run])?;
+        let steps = bench::medians(&samples[0]);
+        let recipes = self.recipes(own)?;
+        let of_others = recipes.iter().zip(&steps).skip(1);
+        let of_others = of_others.filter(|(recipe, _)| recipe.form.is_none());
+        self.workload.logic_seconds = steps.first().copied().unwrap_or(0.0);
+        self.workload.other_seconds = of_others.map(|(_, seconds)| seconds).sum();
+        Ok(())
+    }
+
+    /// Paths in flight.
+    pub fn pool(&self) -> u32 {
+        self.sizes.pool
+    }
+
+    /// How often the materials are hit in the iteration that everything is measured in, and what it
+    /// takes beside material kernels if each has its own.
+    pub fn workload(&self) -> &Workload {
+        &self.workload
+    }
+
+    /// Times kernels; they are built several at a time. What cannot be measured is said, and keeps
+    /// nothing else from it.
+    ///
+    /// # Errors
+    /// If the GPU fails.
+    pub fn kernels(
+        &mut self,
+        candidates: &[Candidate],
+    ) -> Result<Vec<Result<Measured, Unmeasured>>, RuntimeError> {
+        let mut runs = self.runs(candidates)?;
+        // Inline materials are what they add to this.
+        runs.push(Ok(self.bare_logic()?));
+        let mut samples = self.time_those(&runs)?;
+        let bare = samples.pop().and_then(Result::ok).unwrap_or_default();
+        let bare = bench::median(bare.iter().map(|sample| sample.steps[0]));
+        let results = candidates.iter().zip(runs.iter().zip(samples));
+        let measured = results.map(|(candidate, (run, samples))| {
+            let (Ok(run), samples) = (run, samples?) else {
+                return Err(String::new());
+            };
+            Ok(measured(candidate, run, &samples, bare))
+        });
+        Ok(measured.collect())
+    }
+
+    /// Times one kernel.
+    ///
+    /// # Errors
+    /// If the GPU fails.
+    pub fn kernel(
+        &mut self,
+        form: Form,
+        members: &[usize],
+    ) -> Result<Result<Measured, Unmeasured>, RuntimeError> {
+        let members = members.to_vec();
+        let mut all = self.kernels(&[Candidate { form, members }])?;
+        Ok(all
+            .pop()
+            .unwrap_or_else(|| Err("nothing was measured".into())))
+    }
+
+    /// Times whole iterations of wavefront plans, ray casts included, as they run in a render.
+    ///
+    /// # Errors
+    /// If the GPU fails.
+    pub fn iterations(
+        &mut self,
+        plans: &[Plan],
+    ) -> Result<Vec<Result<Iteration, Unmeasured>>, RuntimeError> {
+        let mut runs = Vec::new();
+        for plan in plans {
+            runs.push(self.whole(plan).map_err(|error| error.to_string()));
+            self.gpu.check()?;
+        }
+        let samples = self.time_those(&runs)?;
+        let results = runs.iter().zip(samples).map(|(run, samples)| {
+            let (Ok(run), samples) = (run, samples?) else {
+                return Err(String::new());
+            };
+            let names = run.schedule.steps.iter().map(|step| step.name.clone());
+            let total = || samples.iter().map(|sample| sample.total);
+            Ok(Iteration {
+                seconds: bench::median(total()),
+                spread: bench::spread(total()),
+                kernels: names.zip(bench::medians(&samples)).collect(),
+            })
+        });
+        Ok(results.collect())
+    }
+
+    /// Samples of the runs that exist; of the others, why there are none.
+    fn time_those(
+        &self,
+        runs: &[Result<Run, Unmeasured>],
+    ) -> Result<Vec<Result<Vec<Sample>, Unmeasured>>, RuntimeError> {
+        let built: Vec<Run> = runs
+            .iter()
+            .filter_map(|r| r.as_ref().ok())
+            .cloned()
+            .collect();
+        let mut samples = self.time(&built)?.into_iter();
+        let of = |run: &Result<Run, Unmeasured>| match run {
+            Ok(_) => Ok(samples.next().unwrap_or_default()),
+            Err(why) => Err(why.clone()),
+        };
+        Ok(runs.iter().map(of).collect())
+    }
+
+    fn time(&self, runs: &[Run]) -> Result<Vec<Vec<Sample>>, RuntimeError> {
+        bench::time(
+            self.gpu,
+            &self.resources,
+            &self.snapshot,
+            runs,
+            self.repetitions,
+        )
+    }
+
+    /// What writes the kernels of a plan. With `queue_table` its logic kernel sorts as that says.
+    fn composer<'b>(
+        &'b self,
+        plan: &'b Plan,
+        queue_table: bool,
+    ) -> Result<Composer<'b>, RuntimeError> {
+        let parts = Parts {
+            world: self.world,
+            source: self.source,
+            materials: &self.materials,
+            instances: &self.instances,
+            tables: &self.tables,
+            random: &self.random,
+            sizes: self.sizes,
+            technique: self.technique,
+            subgroup_size: self.gpu.subgroup_size(),
+        };
+        let layout = Layout::new(self.world, &self.materials, plan, &self.technique)?;
+        Ok(parts.composer(plan, layout, queue_table))
+    }
+}
+
+/// What all plans have in common.
+struct Parts<'b> {
+    world: &'b World,
+    source: &'b dyn MaterialSource,
+    materials: &'b [MaterialInfo],
+    instances: &'b [InstanceInfo],
+    tables: &'b [BufferData],
+    random: &'b ShaderPart,
+    sizes: Sizes,
+    technique: Technique,
+    subgroup_size: u32,
+}
+
+impl<'b> Parts<'b> {
+    fn composer(&self, plan: &'b Plan, layout: Layout, queue_table: bool) -> Composer<'b> {
+        Composer {
+            world: self.world,
+            source: self.source,
+            materials: self.materials,
+            instances: self.instances,
+            tables: self.tables,
+            plan,
+            layout,
+            sizes: self.sizes,
+            technique: self.technique,
+            queue_table,
+            subgroup_size: self.subgroup_size,
+            random: self.random.clone(),
+        }
+    }
+}
+
+/// A kernel a material.
+fn own_plan(materials: &[MaterialInfo]) -> Plan {
+    Strategy::Own.plan(&names(materials))
+}
+
+fn names(materials: &[MaterialInfo]) -> Vec<String> {
+    materials.iter().map(|m| m.name.clone()).collect()
+}
+
+fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> Measured {
+    let step = |index: usize| move |sample: &Sample| sample.steps.get(index).copied();
+    let at = run.subject;
+    let times = || samples.iter().filter_map(step(at));
+    let logic_seconds = bench::median(samples.iter().filter_map(step(0)));
+    Measured {
+        seconds: match candidate.form {
+            Form::Inline => logic_seconds - bare,
+            _ => bench::median(times()),
+        },
+        spread: bench::spread(times()),
+        items: samples
+            .last()
+            .map_or(0, |sample| run.items(&sample.counters)),
+        logic_seconds,
+    }
+}

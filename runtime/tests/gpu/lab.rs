@@ -1,0 +1,162 @@
+//! The laboratory: kernels are timed on the hits of one iteration, whichever plan they belong to.
+
+use crate::plans::{room, surfaces};
+use crate::stub::{Materials, gpu, plan};
+use impasto_compiler::partition::{Form, Strategy};
+use impasto_runtime::error::RuntimeError;
+use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
+use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
+use impasto_runtime::world::World;
+
+const POOL: u32 = 4000;
+
+fn options() -> LabOptions {
+    LabOptions {
+        pool: Some(POOL),
+        warm_iterations: 8,
+        repetitions: 3,
+        ..LabOptions::default()
+    }
+}
+
+fn lab<'a>(world: &'a World, materials: &'a Materials) -> Lab<'a> {
+    Lab::new(gpu(), world, materials, &options()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn candidate(form: Form, members: &[usize]) -> Candidate {
+    Candidate {
+        form,
+        members: members.to_vec(),
+    }
+}
+
+fn measure(lab: &mut Lab<'_>, candidates: &[Candidate]) -> Vec<Measured> {
+    let all = lab.kernels(candidates).unwrap_or_else(|e| panic!("{e}"));
+    all.into_iter()
+        .map(|one| one.unwrap_or_else(|why| panic!("{why}")))
+        .collect()
+}
+
+#[test]
+fn a_kernel_works_on_the_hits_of_its_members_and_no_others() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let mut lab = lab(&world, &surfaces);
+    let hits: Vec<u64> = lab
+        .workload()
+        .materials
+        .iter()
+        .map(|hits| (hits.share * f64::from(POOL)).round() as u64)
+        .collect();
+    assert!(hits.iter().all(|n| *n > 0), "{hits:?}");
+    let candidates = [
+        candidate(Form::Own, &[2]),
+        candidate(Form::Mixed, &[0, 3]),
+        candidate(Form::Mixed, &[0, 1, 2, 3]),
+        candidate(Form::Binned, &[1, 2]),
+        candidate(Form::Binned, &[0, 1, 2, 3]),
+        candidate(Form::Own, &[0]),
+    ];
+    for (candidate, measured) in candidates.iter().zip(measure(&mut lab, &candidates)) {
+        let expected: u64 = candidate.members.iter().map(|m| hits[*m]).sum();
+        assert_eq!(measured.items, expected, "{candidate:?}");
+        assert!(measured.seconds > 0.0 && measured.logic_seconds > 0.0);
+    }
+    // The same hits again, whatever ran in between.
+    let plans = [Strategy::Own, Strategy::Mixed, Strategy::Binned].map(|s| plan(s, &surfaces));
+    for iteration in lab.iterations(&plans).unwrap_or_else(|e| panic!("{e}")) {
+        assert!(iteration.unwrap_or_else(|e| panic!("{e}")).seconds > 0.0);
+    }
+    assert_eq!(measure(&mut lab, &candidates[..1])[0].items, hits[2]);
+}
+
+#[test]
+fn neighbours_share_blocks_only_where_they_hit_the_same() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let lab = lab(&world, &surfaces);
+    let workload = lab.workload();
+    assert_eq!((workload.pool, lab.pool()), (POOL, POOL));
+    let mut all = 0.0;
+    for hits in &workload.materials {
+        all += hits.share;
+        // A block has at most 32 slots, and a material that is hit is in some block.
+        assert!(hits.present >= hits.share && hits.present <= 32.0 * hits.share);
+        assert!(hits.present <= 1.0);
+    }
+    assert!(all > 0.2 && all <= 1.0, "{all}");
+    // Fields of 16 bytes: light is sampled, and rays are in the path's state.
+    assert_eq!((workload.loads, workload.stores), (6.0 * 16.0, 7.0 * 16.0));
+    assert!(workload.logic_seconds > 0.0 && workload.other_seconds > 0.0);
+}
+
+#[test]
+fn an_iteration_takes_about_what_its_kernels_take() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let mut lab = lab(&world, &surfaces);
+    let own = plan(Strategy::Own, &surfaces);
+    let singles: Vec<Candidate> = (0..4).map(|m| candidate(Form::Own, &[m])).collect();
+    let kernels: f64 = measure(&mut lab, &singles).iter().map(|m| m.seconds).sum();
+    let added = kernels + lab.workload().logic_seconds + lab.workload().other_seconds;
+    let mut iterations = lab.iterations(&[own]).unwrap_or_else(|e| panic!("{e}"));
+    let whole = iterations.remove(0).unwrap_or_else(|e| panic!("{e}"));
+    let sum: f64 = whole.kernels.iter().map(|(_, seconds)| seconds).sum();
+    assert!((sum / whole.seconds - 1.0).abs() < 0.2);
+    // The processor has other things to do meanwhile.
+    let ratio = added / whole.seconds;
+    assert!((0.2..5.0).contains(&ratio), "{added} and {whole:?}");
+}
+
+#[test]
+fn inline_materials_are_what_they_add_to_logic() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let mut lab = lab(&world, &surfaces);
+    let all = candidate(Form::Inline, &[0, 1, 2, 3]);
+    let inline = measure(&mut lab, &[all])[0];
+    assert_eq!(inline.items, u64::from(POOL));
+    // Less than logic with them by what logic takes without.
+    assert!(inline.seconds < inline.logic_seconds && inline.logic_seconds > 0.0);
+}
+
+#[test]
+fn what_cannot_be_measured_keeps_nothing_else_from_it() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let mut lab = lab(&world, &surfaces);
+    let wrong = [
+        candidate(Form::Own, &[0, 1]),
+        candidate(Form::Mixed, &[]),
+        candidate(Form::Mixed, &[1, 0]),
+        candidate(Form::Mixed, &[0, 0]),
+        candidate(Form::Inline, &[4]),
+        candidate(Form::Mixed, &[0, 1]),
+    ];
+    let all = lab.kernels(&wrong).unwrap_or_else(|e| panic!("{e}"));
+    let (good, bad) = all.split_last().expect("results");
+    for one in bad {
+        let why = one.as_ref().expect_err("no kernel");
+        assert!(why.contains("no kernel"), "{why}");
+    }
+    assert!(good.as_ref().is_ok_and(|m| m.seconds > 0.0));
+    let mega = plan(Strategy::Mega, &surfaces);
+    let own = plan(Strategy::Own, &surfaces);
+    let iterations = lab.iterations(&[mega, own]);
+    let iterations = iterations.unwrap_or_else(|e| panic!("{e}"));
+    let why = iterations[0].as_ref().expect_err("no iterations");
+    assert!(why.contains("megakernel"), "{why}");
+    assert!(iterations[1].is_ok());
+}
+
+#[test]
+fn a_gpu_without_timestamps_is_refused() {
+    let options = GpuOptions {
+        timing: Timing::None,
+        ..GpuOptions::default()
+    };
+    let gpu = Gpu::new(&options).unwrap_or_else(|e| panic!("{e}"));
+    let (world, surfaces) = (room().world(), surfaces());
+    let refused = Lab::new(&gpu, &world, &surfaces, &LabOptions::default());
+    match refused.err() {
+        Some(error @ RuntimeError::NoTimestamps(_)) => {
+            assert!(error.to_string().contains("hint"), "{error}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
