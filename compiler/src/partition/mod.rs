@@ -10,6 +10,7 @@ mod error;
 pub mod file;
 pub mod model;
 pub mod profile;
+pub mod search;
 mod strategy;
 pub mod text;
 pub mod workload;
@@ -17,7 +18,8 @@ pub mod workload;
 pub use error::PlanError;
 pub use model::{Calibrated, Prediction, TimeModel};
 pub use profile::{DeviceProfile, ProfileError};
-pub use strategy::Strategy;
+pub use search::{Automatic, Exact, Groups, Heuristic, Problem, Search};
+pub use strategy::{Known, Needs, PAPER_OPERATIONS, STRATEGIES, Strategy, StrategyRow, Wanted};
 pub use workload::{Hits, Workload};
 
 /// How the stages of the path tracer are organised.

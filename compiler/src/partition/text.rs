@@ -304,13 +304,13 @@ mod tests {
         #[test]
         fn what_is_printed_reads_back(forms in prop::collection::vec(0..4usize, 5), groups in prop::collection::vec(0..5usize, 5)) {
             let mut kernels: Vec<(Form, Vec<usize>)> = Vec::new();
-            for group in 0..5 {
+            for (group, form) in forms.into_iter().enumerate() {
                 let members: Vec<usize> = (0..5).filter(|m| groups[*m] == group).collect();
-                let form = match (forms[group], members.len()) {
+                let form = match (form, members.len()) {
                     (_, 0) => continue,
                     (0, 2..) => Form::Mixed,
                     (3, _) if kernels.iter().any(|(f, _)| *f == Form::Inline) => Form::Binned,
-                    (form, _) => Form::ALL[form].0,
+                    (other, _) => Form::ALL[other].0,
                 };
                 kernels.push((form, members));
             }
