@@ -11,6 +11,7 @@ mod adapter;
 mod bless;
 mod demo;
 mod paper;
+mod partition;
 mod scenes;
 mod shell;
 mod test;
@@ -34,6 +35,8 @@ enum Command {
     Scenes(scenes::ScenesArgs),
     /// Measure the tables of the paper on this machine's GPU, and write docs/paper.md
     Paper(paper::PaperArgs),
+    /// Measure partitions of materials into kernels, and hold the automatic one against the best
+    Partition(partition::PartitionArgs),
 }
 
 fn main() -> ExitCode {
@@ -43,6 +46,7 @@ fn main() -> ExitCode {
         Command::Bless => bless::run(),
         Command::Scenes(args) => scenes::run(&args),
         Command::Paper(args) => paper::run(&args),
+        Command::Partition(args) => partition::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

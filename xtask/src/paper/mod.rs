@@ -46,8 +46,8 @@ pub(crate) fn run(args: &PaperArgs) -> Result {
     let json = args.out.join("paper.json");
     let mut paper = Paper::load(&json)?;
     if !args.page {
-        let impasto = command(args)?;
-        paper.version = version(args)?;
+        let impasto = command(args.impasto.as_deref())?;
+        paper.version = version(args.version.as_deref())?;
         let experiments = experiments::all(args.quick)?;
         let wanted =
             |section: &str| args.only.is_empty() || args.only.iter().any(|only| only == section);
@@ -77,9 +77,10 @@ pub(crate) fn run(args: &PaperArgs) -> Result {
     Ok(())
 }
 
-fn command(args: &PaperArgs) -> Result<PathBuf> {
-    if let Some(impasto) = &args.impasto {
-        return Ok(impasto.clone());
+/// The command to measure: `given`, or the one that is built from this checkout.
+pub(crate) fn command(given: Option<&Path>) -> Result<PathBuf> {
+    if let Some(impasto) = given {
+        return Ok(impasto.to_owned());
     }
     shell::section("Building impasto");
     shell::run(cargo().args(["build", "--release", "--package", "impasto"]))?;
@@ -87,9 +88,9 @@ fn command(args: &PaperArgs) -> Result<PathBuf> {
 }
 
 /// The commit that is measured, unless the caller knows better.
-fn version(args: &PaperArgs) -> Result<String> {
-    if let Some(version) = &args.version {
-        return Ok(version.clone());
+pub(crate) fn version(given: Option<&str>) -> Result<String> {
+    if let Some(version) = given {
+        return Ok(version.to_owned());
     }
     let mut git = std::process::Command::new("git");
     git.current_dir(shell::root())
@@ -99,7 +100,7 @@ fn version(args: &PaperArgs) -> Result<String> {
 }
 
 /// Writes a file so that it is never half-written.
-fn write_whole(path: &Path, text: &str) -> Result {
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result {
     let failure = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(failure)?;

@@ -157,6 +157,12 @@ pub(crate) fn run(args: &ScenesArgs) -> shell::Result {
     Ok(())
 }
 
+/// The index of mixes as it is written.
+#[cfg(test)]
+pub(crate) fn mixes_index() -> String {
+    mixes::index()
+}
+
 fn report(file: &GeneratedFile) -> Result<(), String> {
     let kib = file.bytes.len().div_ceil(1024);
     let triangles = if file.path.ends_with(".obj") {

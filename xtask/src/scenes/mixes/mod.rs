@@ -231,12 +231,14 @@ pub(crate) fn files() -> Vec<GeneratedFile> {
     for mix in &MIXES {
         push(format!("{}.toml", mix.name), scene(mix));
     }
-    let entries: Vec<String> = MIXES.iter().map(entry).collect();
-    push(
-        "index.json".into(),
-        format!("[\n{}\n]\n", entries.join(",\n")),
-    );
+    push("index.json".into(), index());
     files
+}
+
+/// The list of scenes, as JSON.
+pub(crate) fn index() -> String {
+    let entries: Vec<String> = MIXES.iter().map(entry).collect();
+    format!("[\n{}\n]\n", entries.join(",\n"))
 }
 
 /// Names and texts of the materials beside the scenes.

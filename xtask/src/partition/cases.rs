@@ -1,0 +1,174 @@
+//! What is measured: the paper's scenes and the mixes, each with two pools, and by which plans whole
+//! pictures are rendered.
+
+use serde::Deserialize;
+
+use crate::shell::{self, Result};
+
+/// A scene.
+#[derive(Clone, Debug)]
+pub(super) struct Case {
+    pub name: String,
+    pub about: String,
+    pub hits: String,
+    pub shares: String,
+    /// Its file, relative to the repository.
+    pub scene: String,
+    /// Samples a pixel of whole renders: enough for a second of an H200 or less.
+    pub samples: u32,
+    /// Is it one of the paper's, of which whole renders by all strategies are made?
+    pub paper: bool,
+}
+
+/// The pools: 2^20 paths, as in the paper, and 2^22.
+pub(super) const POOLS: [u64; 2] = [1 << 20, 1 << 22];
+/// The same where only the way is to be tried.
+pub(super) const QUICK_POOLS: [u64; 2] = [1 << 12, 1 << 13];
+
+const PAPER: [(&str, &str, u32); 3] = [
+    ("carpaint", "the paper's CARPAINT", 512),
+    ("city", "the paper's CITY", 96),
+    ("conference", "the paper's CONFERENCE", 96),
+];
+
+/// All scenes; the mixes from the index that `cargo xtask scenes mixes` writes.
+pub(super) fn all() -> Result<Vec<Case>> {
+    let paper = PAPER.map(|(name, about, samples)| Case {
+        name: name.into(),
+        about: about.into(),
+        hits: String::new(),
+        shares: String::new(),
+        scene: format!("examples/{name}/scene.toml"),
+        samples,
+        paper: true,
+    });
+    let mut out = Vec::from(paper);
+    let index = shell::root().join(MIXES).join("index.json");
+    let text = std::fs::read_to_string(&index).map_err(|e| {
+        let hint = "hint: `cargo xtask scenes` writes it";
+        format!("cannot read {}: {e}\n  {hint}", index.display())
+    })?;
+    out.extend(mixes(&text).map_err(|e| format!("cannot read {}: {e}", index.display()))?);
+    Ok(out)
+}
+
+const MIXES: &str = "examples/mixes/generated";
+
+/// The mixes of an index.
+fn mixes(index: &str) -> std::result::Result<Vec<Case>, serde_json::Error> {
+    #[derive(Deserialize)]
+    struct Entry {
+        name: String,
+        scene: String,
+        about: String,
+        hits: String,
+        shares: String,
+        materials: Vec<String>,
+    }
+    let entries: Vec<Entry> = serde_json::from_str(index)?;
+    let case = |entry: Entry| Case {
+        scene: format!("{MIXES}/{}", entry.scene),
+        samples: if entry.materials.len() > 8 { 24 } else { 48 },
+        name: entry.name,
+        about: entry.about,
+        hits: entry.hits,
+        shares: entry.shares,
+        paper: false,
+    };
+    Ok(entries.into_iter().map(case).collect())
+}
+
+/// Which whole renders are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Renders {
+    /// None
+    None,
+    /// Of the paper's scenes all, of mixes the chosen plan, mega, own and the paper's choice at 1 M paths
+    Some,
+    /// By every strategy of every scene
+    All,
+}
+
+/// A plan by which whole pictures are rendered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Way {
+    pub label: &'static str,
+    pub options: Vec<String>,
+}
+
+/// The ways to render a case whose chosen and best plans are known.
+pub(super) fn ways(
+    case: &Case,
+    first_pool: bool,
+    which: Renders,
+    auto: &str,
+    best: Option<&str>,
+) -> Vec<Way> {
+    let strategy = |label: &'static str| Way {
+        label,
+        options: vec![format!("--strategy={label}")],
+    };
+    let partition = |label, text: &str| Way {
+        label,
+        options: vec![format!("--partition={text}")],
+    };
+    let chosen = partition("auto's plan", auto);
+    let all = which == Renders::All || case.paper;
+    if which == Renders::None {
+        return Vec::new();
+    }
+    if !all {
+        let few = [chosen, strategy("mega"), strategy("own"), strategy("paper")];
+        return if first_pool { few.into() } else { Vec::new() };
+    }
+    let mut out = vec![chosen];
+    out.extend(
+        best.filter(|best| *best != auto)
+            .map(|best| partition("best", best)),
+    );
+    out.extend(["auto", "mega", "own", "paper", "mixed", "binned", "inline"].map(strategy));
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_index_of_mixes_is_read() {
+        let files = crate::scenes::mixes_index();
+        let cases = mixes(&files).expect("an index");
+        assert!(cases.len() >= 14);
+        for case in &cases {
+            assert!(
+                case.scene.ends_with(&format!("{}.toml", case.name)),
+                "{case:?}"
+            );
+            assert!(
+                ["random", "coherent"].contains(&case.hits.as_str()),
+                "{case:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn paper_scenes_are_rendered_by_all_strategies_and_mixes_by_few() {
+        let mut case = mixes(&crate::scenes::mixes_index())
+            .expect("an index")
+            .swap_remove(0);
+        let labels = |case: &Case, first, which| -> Vec<&str> {
+            let ways = ways(case, first, which, "own:a", Some("mixed:a,b"));
+            ways.iter().map(|way| way.label).collect()
+        };
+        assert_eq!(
+            labels(&case, true, Renders::Some),
+            ["auto's plan", "mega", "own", "paper"]
+        );
+        assert!(labels(&case, false, Renders::Some).is_empty());
+        assert!(labels(&case, true, Renders::None).is_empty());
+        case.paper = true;
+        assert_eq!(labels(&case, false, Renders::Some).len(), 9);
+        let same = ways(&case, true, Renders::All, "own:a", Some("own:a"));
+        assert!(same.iter().all(|way| way.label != "best"));
+    }
+}
