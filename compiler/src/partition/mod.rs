@@ -5,8 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
+#[cfg(test)]
+mod cases;
 mod check;
 mod error;
+pub mod explain;
 pub mod file;
 pub mod model;
 pub mod profile;

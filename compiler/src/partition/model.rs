@@ -119,7 +119,7 @@ impl Calibrated<'_> {
     }
 
     /// In how many subgroups a member of a kernel runs, and with how many lanes.
-    fn subgroups(&self, form: Form, member: usize, members: &[usize]) -> (f64, f64) {
+    pub fn subgroups(&self, form: Form, member: usize, members: &[usize]) -> (f64, f64) {
         let Some(hits) = self.workload.materials.get(member) else {
             return (0.0, 1.0);
         };

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::PlanError;
+use super::error::list;
+
 /// Lanes of the blocks of slots in which [`Hits::present`] is counted.
 pub const BLOCK: u32 = 32;
 
@@ -47,5 +50,148 @@ impl Hits {
             return if self.share >= 1.0 { 1.0 } else { most };
         }
         ((1.0 - self.present).ln() / (1.0 - self.share).ln()).clamp(1.0, most)
+    }
+}
+
+/// What makes a new file.
+const REMAKE: &str = "make a new one with `impasto plan SCENE --save-workload FILE`";
+
+impl Workload {
+    /// The workload that the JSON `text` describes, for materials called `names`, in their order.
+    ///
+    /// # Errors
+    /// If it is broken, of other materials, or has numbers that no scene has.
+    pub fn parse(text: &str, names: &[String]) -> Result<Self, PlanError> {
+        let refuse = |what: String| Err(PlanError::new(what).hint(REMAKE));
+        let broken = |e| PlanError::new(format!("the workload cannot be read: {e}")).hint(REMAKE);
+        let mut workload: Self = serde_json::from_str(text).map_err(broken)?;
+        let given: Vec<&str> = workload
+            .materials
+            .iter()
+            .map(|h| h.material.as_str())
+            .collect();
+        let named: Vec<&str> = names.iter().map(String::as_str).collect();
+        let without = |all: &[&str], some: &[&str]| -> Vec<String> {
+            let other = all.iter().filter(|name| !some.contains(name));
+            other.map(|name| (*name).to_owned()).collect()
+        };
+        let (extra, missing) = (without(&given, &named), without(&named, &given));
+        if let false = extra.is_empty() {
+            let extra = list(extra.iter().map(String::as_str));
+            return refuse(format!("the workload has {extra}, which the scene lacks"));
+        }
+        if let false = missing.is_empty() {
+            let missing = list(missing.iter().map(String::as_str));
+            return refuse(format!("the workload lacks {missing}, which the scene has"));
+        }
+        if given.len() != names.len() {
+            return refuse("the workload has a material twice".into());
+        }
+        let place = |h: &Hits| names.iter().position(|name| *name == h.material);
+        workload.materials.sort_by_key(place);
+        match workload.impossible() {
+            Some(what) => refuse(format!("the workload cannot be: {what}")),
+            None => Ok(workload),
+        }
+    }
+
+    /// What no scene has.
+    fn impossible(&self) -> Option<String> {
+        if self.pool == 0 {
+            return Some("its pool has no slots".into());
+        }
+        let hits = self.materials.iter();
+        let shares = hits.flat_map(|h| [("share", h, h.share), ("present", h, h.present)]);
+        let mut outside = shares.filter(|(_, _, value)| !(0.0..=1.0).contains(value));
+        if let Some((what, hits, value)) = outside.next() {
+            let of = &hits.material;
+            return Some(format!("`{what}` of `{of}` is {value}, which is no share"));
+        }
+        let sum: f64 = self.materials.iter().map(|h| h.share).sum();
+        if sum > 1.0 + 1e-6 {
+            return Some(format!("{sum} hits for each slot"));
+        }
+        let others = [
+            ("loads", self.loads),
+            ("stores", self.stores),
+            ("logic_seconds", self.logic_seconds),
+            ("other_seconds", self.other_seconds),
+        ];
+        let wrong = others
+            .iter()
+            .find(|(_, value)| !value.is_finite() || *value < 0.0);
+        wrong.map(|(name, value)| format!("`{name}` is {value}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"{"pool": 1024, "materials": [
+        {"material": "paint", "on_surface": true, "share": 0.25, "present": 0.5},
+        {"material": "glass", "on_surface": true, "share": 0.5, "present": 0.5}],
+        "loads": 64, "stores": 96, "logic_seconds": 0, "other_seconds": 1e-3}"#;
+
+    fn names() -> [String; 2] {
+        ["glass", "paint"].map(String::from)
+    }
+
+    #[test]
+    fn it_is_read_in_the_programs_order() {
+        let workload = Workload::parse(TEXT, &names()).expect("it is sound");
+        assert_eq!((workload.pool, workload.other_seconds), (1024, 1e-3));
+        let [glass, paint] = &workload.materials[..] else {
+            panic!("{workload:?}");
+        };
+        assert_eq!((glass.share, paint.share), (0.5, 0.25));
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_said() {
+        let refused = |text: &str, part: &str| {
+            let error = Workload::parse(text, &names()).expect_err(part).to_string();
+            assert!(
+                error.contains(part) && error.contains("--save-workload"),
+                "{error}"
+            );
+        };
+        refused(&TEXT[..200], "line ");
+        refused(
+            &TEXT.replace("\"loads\"", "\"load\""),
+            "missing field `loads`",
+        );
+        refused(
+            &TEXT.replace("glass", "water"),
+            "has `water`, which the scene lacks",
+        );
+        refused(
+            &TEXT.replace("\"glass\"", "\"paint\""),
+            "lacks `glass`, which the scene has",
+        );
+        refused(&TEXT.replace("1024", "0"), "no slots");
+        refused(
+            &TEXT.replace("0.25", "-0.25"),
+            "`share` of `paint` is -0.25",
+        );
+        refused(&TEXT.replace("0.25", "0.75"), "1.25 hits for each slot");
+        refused(&TEXT.replace("1e-3", "-1"), "`other_seconds` is -1");
+    }
+
+    #[test]
+    fn draws_tell_how_alike_neighbours_are() {
+        let hits = |share: f64, present| Hits {
+            material: String::new(),
+            on_surface: true,
+            share,
+            present,
+        };
+        assert!((hits(0.2, 0.2).draws() - 1.0).abs() < 1e-9);
+        assert!((hits(0.2, 1.0 - 0.8f64.powi(32)).draws() - 32.0).abs() < 1e-6);
+        assert!((hits(0.2, 1.0 - 0.8f64.powi(5)).draws() - 5.0).abs() < 1e-9);
+        assert_eq!(
+            (hits(0.0, 0.0).draws(), hits(1.0, 1.0).draws()),
+            (32.0, 1.0)
+        );
     }
 }

@@ -98,7 +98,7 @@ fn better(a: f64, b: f64) -> bool {
 }
 
 /// Kernels by their first members, inline last: the order in which plans have them.
-fn ordered(mut groups: Groups) -> Groups {
+pub(super) fn ordered(mut groups: Groups) -> Groups {
     groups.sort_by_key(|(form, members)| (*form == Form::Inline, members.first().copied()));
     groups
 }
