@@ -41,8 +41,13 @@ pub(super) struct Pair {
 }
 
 impl Pair {
+    /// How far the prediction is off, as a share. What an inline material adds to a kernel can be
+    /// measured as nothing or less; no prediction is right then.
     pub(super) fn error(self) -> f64 {
-        error(self.predicted, self.measured)
+        match self.measured > 0.0 {
+            true => error(self.predicted, self.measured),
+            false => f64::INFINITY,
+        }
     }
 }
 
@@ -133,10 +138,30 @@ impl<'a> Measured<'a> {
             "binned" => Some(Plan::new(vec![kernel(Form::Binned, self.used)])),
             "inline" => Some(Plan::new(vec![kernel(Form::Inline, self.used)])),
             _ => {
-                let listed = self.scene.plans.iter().find(|p| p.strategy == strategy)?;
+                let listed = self.scene.plans.iter().find(|p| p.strategy == strategy);
+                let Some(listed) = listed else {
+                    return self.threshold(strategy.strip_prefix("threshold=")?.parse().ok()?);
+                };
                 Plan::parse(&listed.partition, &names(self.scene)).ok()
             }
         }
+    }
+
+    /// A kernel for each material of so many operations and more, and a mixed one for the others; none if
+    /// the operations of one are not known.
+    fn threshold(&self, operations: f64) -> Option<Plan> {
+        let mut kernels = Vec::new();
+        let mut others: Set = 0;
+        for i in members(self.used) {
+            match self.scene.materials[i].operations? >= operations {
+                true => kernels.push((Form::Own, 1 << i)),
+                false => others |= 1 << i,
+            }
+        }
+        if others != 0 {
+            kernels.push(kernel(Form::Mixed, others));
+        }
+        Some(Plan::new(kernels))
     }
 
     /// Time of an iteration by the chosen plan over that by the best.
@@ -190,7 +215,7 @@ impl<'a> Measured<'a> {
             predicted: k.2,
             measured: k.3,
         };
-        chosen.map(pair).filter(|p| p.measured > 0.0).collect()
+        chosen.map(pair).collect()
     }
 
     /// Every plan up to [`EXHAUSTIVE`] materials and the listed ones beyond: the material kernels' times.
@@ -257,6 +282,7 @@ fn names(scene: &Scene) -> Vec<&str> {
 #[cfg(test)]
 mod tests {
     use super::super::fixture;
+    use super::super::results::{self, Material};
     use super::*;
 
     fn close(a: f64, b: f64) -> bool {
@@ -310,6 +336,80 @@ mod tests {
         assert!(
             kernels > whole && materials > whole,
             "what is known of both dilutes errors"
+        );
+    }
+
+    #[test]
+    fn strategies_that_are_not_listed_follow_from_operations() {
+        let mut scene = fixture::scene();
+        scene.plans.retain(|p| p.strategy != "threshold=1000");
+        let operations = [Some(1200.0), Some(300.0), Some(999.0)];
+        for (material, operations) in scene.materials.iter_mut().zip(operations) {
+            material.operations = operations;
+        }
+        let measured = Measured::new(&scene).expect("fits");
+        let regret = measured.regret_of("threshold=1000").expect("known");
+        assert!(
+            close(regret, 165.0 / 145.0),
+            "own:a|mixed:b,c and not {regret}"
+        );
+        scene.materials[1].operations = None;
+        let measured = Measured::new(&scene).expect("fits");
+        assert_eq!(measured.regret_of("threshold=1000"), None);
+    }
+
+    #[test]
+    fn beyond_six_materials_the_best_is_that_of_the_measured_kernels() {
+        let mut scene = fixture::scene();
+        let names = ["a", "b", "c", "d", "e", "f", "g"];
+        scene.materials = names
+            .iter()
+            .map(|name| Material {
+                name: (*name).into(),
+                ..scene.materials[0].clone()
+            })
+            .collect();
+        let own = |i| results::Kernel("own".into(), vec![i], 9e-6, 10e-6, 0.0);
+        scene.kernels = (0..names.len()).map(own).collect();
+        scene.kernels.push(results::Kernel(
+            "binned".into(),
+            vec![1, 4],
+            30e-6,
+            12e-6,
+            0.0,
+        ));
+        let all: Vec<String> = names.iter().map(|name| format!("own:{name}")).collect();
+        scene.auto = all.join("|");
+        scene.plans = vec![results::Plan {
+            strategy: "own".into(),
+            partition: scene.auto.clone(),
+            measured: None,
+        }];
+        let measured = Measured::new(&scene).expect("fits");
+        assert_eq!(
+            measured.text(&measured.best),
+            "own:a|own:c|own:d|own:f|own:g|binned:b,e"
+        );
+        assert!(close(measured.regret(), 170.0 / 162.0));
+        assert_eq!(
+            measured.material_plans().len(),
+            1,
+            "a sample, and no sums over all"
+        );
+        assert_eq!(measured.regret_of("mixed"), None);
+    }
+
+    #[test]
+    fn what_took_no_time_was_not_predicted() {
+        let pair = |measured| Pair {
+            predicted: 1e-6,
+            measured,
+        };
+        assert_eq!(pair(-1e-7).error(), f64::INFINITY);
+        assert!(close(pair(2e-6).error(), 0.5));
+        assert_eq!(
+            median_error(vec![pair(1e-6), pair(1e-6), pair(0.0)]),
+            Some(0.0)
         );
     }
 

@@ -7,6 +7,7 @@
 
 mod answer;
 mod cases;
+mod checks;
 #[cfg(test)]
 mod fixture;
 mod measured;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::checks;
 use super::measured::Measured;
 use super::results::Results;
 use super::tables;
@@ -27,9 +28,9 @@ pub(super) fn page(results: &Results, scenes: &[Measured]) -> String {
         tables::scenes(scenes),
         tables::regret(scenes),
         tables::differences(scenes),
-        tables::predictions(scenes),
-        tables::held_out(results),
-        tables::additivity(scenes),
+        checks::predictions(scenes),
+        checks::held_out(results),
+        checks::additivity(scenes),
         tables::renders(scenes),
     ];
     let sections: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();

@@ -1,12 +1,10 @@
-//! The sections of the page, each from what it needs; empty where nothing of it was measured.
+//! The sections of the page that say how good plans are, each empty where nothing of it was measured.
 
 use std::fmt::Write as _;
 
-use super::measured::{BASELINES, EXHAUSTIVE, Measured, correlation, median_error};
-use super::plans::Form;
+use super::measured::{BASELINES, EXHAUSTIVE, Measured, correlation};
 use super::plots::{mega_regret, paths};
-use super::results::Results;
-use super::statistics::{median, quantile, worst};
+use super::statistics::{median, worst};
 
 /// Scenes with so many materials say how long a large search takes.
 const MANY: u32 = 64;
@@ -89,16 +87,18 @@ fn place(scene: &Measured) -> String {
     format!("{}, {}", scene.scene.name, paths(scene.scene.pool))
 }
 
-fn percent(share: f64) -> String {
+/// As people write it.
+pub(super) fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-fn cell(value: Option<f64>) -> String {
+/// In a table.
+pub(super) fn cell(value: Option<f64>) -> String {
     value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
 }
 
 /// A partition in a table, where `|` would end the cell.
-fn code(partition: &str) -> String {
+pub(super) fn code(partition: &str) -> String {
     format!("`{}`", partition.replace('|', "\\|"))
 }
 
@@ -224,136 +224,6 @@ pub(super) fn differences(scenes: &[Measured]) -> String {
          In {count} of {} cases the chosen plan is the best. In the others it loses so much of an iteration:\n\n\
          | scene | pool | chosen | best | loss |\n|---|---|---|---|---|\n{rows}",
         scenes.len()
-    )
-}
-
-/// How far predictions are off.
-pub(super) fn predictions(scenes: &[Measured]) -> String {
-    if scenes.is_empty() {
-        return String::new();
-    }
-    let mut rows = String::new();
-    for scene in scenes {
-        let [kernels, materials, whole] =
-            scene.median_errors().map(|e| e.map_or("-".into(), percent));
-        let _ = writeln!(
-            rows,
-            "| {} | {} | {} | {kernels} | {materials} | {whole} |",
-            scene.scene.name,
-            paths(scene.scene.pool),
-            cell(scene.rank_correlation()),
-        );
-    }
-    let mut forms = String::new();
-    for form in Form::ALL {
-        let pairs: Vec<_> = scenes.iter().flat_map(|s| s.kernels(Some(form))).collect();
-        let bias = median(pairs.iter().map(|p| p.predicted / p.measured));
-        let (count, rank) = (pairs.len(), correlation(&pairs));
-        if let Some((error, bias)) = median_error(pairs).zip(bias) {
-            let name = form.name();
-            let _ = writeln!(
-                forms,
-                "| {name} | {count} | {} | {bias:.2} | {} |",
-                percent(error),
-                cell(rank)
-            );
-        }
-    }
-    format!(
-        "## Predictions\n\n\
-         ![Predicted against measured times of kernels](images/partition-kernels.svg)\n\n\
-         Errors are medians of |predicted / measured - 1|. In the median, predictions are *bias* times what was measured.\n\n\
-         | form | kernels | error | bias | rank correlation |\n|---|---|---|---|---|\n{forms}\n\
-         ![Predicted against measured times of plans](images/partition-plans.svg)\n\n\
-         Of a plan, the material kernels are predicted; the rest of an iteration is what the profiling pass of the scene \
-         measured.\n\n\
-         | scene | pool | rank correlation | kernel | plan's kernels | iteration |\n|---|---|---|---|---|---|\n{rows}"
-    )
-}
-
-/// What the device profile says of materials it was not fitted to.
-pub(super) fn held_out(results: &Results) -> String {
-    let Some(fit) = results.fit.filter(|fit| fit.points > 0) else {
-        return String::new();
-    };
-    format!(
-        "## Held out\n\n\
-         The profile `{}` was fitted to {} kernels with a median error of {} and a rank correlation of {:.3}. Fitted to half \
-         of\nthe materials, its median error is {} on kernels of the other half.\n",
-        results.profile,
-        fit.points,
-        percent(fit.median_error),
-        fit.rank_correlation,
-        percent(fit.held_out_error)
-    )
-}
-
-/// What plans drawn by lot are called among strategies.
-const BY_LOT: &str = "sample";
-/// Further from the sum than this is told apart.
-const ADDS_UP: f64 = 0.02;
-
-/// Whether whole iterations take as long as their kernels.
-pub(super) fn additivity(scenes: &[Measured]) -> String {
-    let all: Vec<_> = scenes
-        .iter()
-        .flat_map(|s| {
-            s.additivity()
-                .into_iter()
-                .map(move |(strategy, plan, ratio)| (s, strategy, plan, ratio))
-        })
-        .collect();
-    let off = |ratio: f64| (ratio - 1.0).abs();
-    let errors = || all.iter().map(|(_, _, _, ratio)| off(*ratio));
-    let (Some(middle), Some(most)) = (median(errors()), quantile(errors(), 0.95)) else {
-        return String::new();
-    };
-    let bias = median(all.iter().map(|(_, _, _, ratio)| *ratio)).unwrap_or(1.0);
-    let by_lot = |lot: bool| {
-        let errors = all
-            .iter()
-            .filter(|(_, strategy, _, _)| (*strategy == BY_LOT) == lot);
-        let errors: Vec<f64> = errors.map(|(_, _, _, ratio)| off(*ratio)).collect();
-        let within = errors.iter().filter(|e| **e <= ADDS_UP).count();
-        format!("{within} of {}", errors.len())
-    };
-    let mut outside: Vec<_> = all
-        .iter()
-        .filter(|(_, _, _, ratio)| off(*ratio) > ADDS_UP)
-        .collect();
-    outside.sort_by(|a, b| off(b.3).total_cmp(&off(a.3)));
-    let mut rows = String::new();
-    for (scene, strategy, plan, ratio) in outside.iter().take(20) {
-        let [name, pool] = [scene.scene.name.clone(), paths(scene.scene.pool)];
-        let plan = code(plan);
-        let _ = writeln!(
-            rows,
-            "| {name} | {pool} | {strategy} | {plan} | {ratio:.3} |"
-        );
-    }
-    let list = match outside.len() {
-        0 => String::new(),
-        n => format!(
-            "\nOf the {n} that are further off, the furthest:\n\n\
-             | scene | pool | strategy | partition | iteration over sum |\n|---|---|---|---|---|\n{rows}"
-        ),
-    };
-    let spread = median(
-        scenes
-            .iter()
-            .flat_map(|s| s.scene.kernels.iter().map(|k| k.4)),
-    )
-    .unwrap_or(0.0);
-    format!(
-        "## Do kernels add up?\n\n\
-         Whole iterations were timed as well: {} plans drawn by lot and {} of the strategies' are within 2 % of the sum of \
-         their\nparts. The median difference is {}, 95 % are within {}, and iterations take {bias:.3} times the sum in the \
-         median. The\nrepetitions of a kernel spread by {} in the median.\n{list}",
-        by_lot(true),
-        by_lot(false),
-        percent(middle),
-        percent(most),
-        percent(spread)
     )
 }
 
