@@ -82,6 +82,13 @@ mod tests {
         for line in [
             "| regret of every scene at most 1.05 | 1.103 (tiny, 1 M paths) | **missed** |",
             "| tiny | 1 M paths | `own:a\\|own:b\\|own:c` | `mixed:a,b\\|inline:c` | 10.3 % |",
+            "| own | 3 | 22.2 % | 0.78 | 0.500 |",
+            "0 of 1 plans drawn by lot and 3 of 3 of the strategies' are within 2 %",
+            "Of the 1 that are further off, the furthest:",
+            "| tiny | 1 M paths | sample | `own:b\\|binned:a,c` | 1.043 |",
+            "| tiny | 1 M paths | 110.0 | - | - | 55.0 | - |",
+            "| tiny | 1 M paths | 1.103 | 1.333 | 1.103 | 1.310 | 1.069 | 1.345 | 1.048 | 1.138 | 2.207 |",
+            "| tiny | three of a kind | random | even | 18 | all 22 | a 50 (90), b 25 (80), c 12 (12) |",
             "Machine: GPU (), Impasto abc",
         ] {
             let line = line.replace(" ()", "");

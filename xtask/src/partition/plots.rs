@@ -313,6 +313,42 @@ mod tests {
     }
 
     #[test]
+    fn what_was_predicted_too_long_is_above_the_diagonal() {
+        let pair = |predicted, measured| Pair {
+            predicted,
+            measured,
+        };
+        let series = [Series {
+            name: "one".into(),
+            color: BLUE,
+            points: vec![pair(1e-3, 1e-6), pair(1e-6, 1e-3), pair(1e-5, -1e-6)],
+        }];
+        let svg = scatter("title", &series);
+        let path = svg
+            .split("<path d=\"")
+            .find(|part| part.contains("stroke-width=\"5\""));
+        let points: Vec<Vec<f64>> = path
+            .and_then(|part| part.split('"').next())
+            .expect("points")
+            .split("h0")
+            .filter(|point| !point.is_empty())
+            .map(|point| {
+                point[1..]
+                    .split(' ')
+                    .map(|n| n.parse().expect("a number"))
+                    .collect()
+            })
+            .collect();
+        assert_eq!(
+            points.len(),
+            2,
+            "less than no time is on no logarithmic axis"
+        );
+        let (above, below) = (&points[0], &points[1]);
+        assert!(above[0] < below[0] && above[1] < below[1], "{points:?}");
+    }
+
+    #[test]
     fn at_most_so_many_are_drawn() {
         assert_eq!(thinned((0..7).collect(), 3), [0, 3, 6]);
         assert_eq!(thinned((0..3).collect(), 3), [0, 1, 2]);
