@@ -83,7 +83,8 @@ fn mixes(index: &str) -> std::result::Result<Vec<Case>, serde_json::Error> {
 pub(super) enum Renders {
     /// None
     None,
-    /// Of the paper's scenes all, of mixes the chosen plan, mega, own and the paper's choice at 1 M paths
+    /// By every strategy of the paper's scenes with the smallest pool; of the rest by the chosen plan, mega and
+    /// own, of mixes with the smallest pool alone
     Some,
     /// By every strategy of every scene
     All,
@@ -113,13 +114,13 @@ pub(super) fn ways(
         options: vec![format!("--partition={text}")],
     };
     let chosen = partition("auto's plan", auto);
-    let all = which == Renders::All || case.paper;
-    if which == Renders::None {
-        return Vec::new();
-    }
-    if !all {
-        let few = [chosen, strategy("mega"), strategy("own"), strategy("paper")];
-        return if first_pool { few.into() } else { Vec::new() };
+    let all = which == Renders::All || (case.paper && first_pool);
+    let few = case.paper || first_pool;
+    match which {
+        Renders::None => return Vec::new(),
+        _ if all => {}
+        _ if few => return vec![chosen, strategy("mega"), strategy("own")],
+        _ => return Vec::new(),
     }
     let mut out = vec![chosen];
     out.extend(
@@ -160,14 +161,14 @@ mod tests {
             let ways = ways(case, first, which, "own:a", Some("mixed:a,b"));
             ways.iter().map(|way| way.label).collect()
         };
-        assert_eq!(
-            labels(&case, true, Renders::Some),
-            ["auto's plan", "mega", "own", "paper"]
-        );
+        let few = ["auto's plan", "mega", "own"];
+        assert_eq!(labels(&case, true, Renders::Some), few);
         assert!(labels(&case, false, Renders::Some).is_empty());
         assert!(labels(&case, true, Renders::None).is_empty());
+        assert_eq!(labels(&case, false, Renders::All).len(), 9);
         case.paper = true;
-        assert_eq!(labels(&case, false, Renders::Some).len(), 9);
+        assert_eq!(labels(&case, true, Renders::Some).len(), 9);
+        assert_eq!(labels(&case, false, Renders::Some), few);
         let same = ways(&case, true, Renders::All, "own:a", Some("own:a"));
         assert!(same.iter().all(|way| way.label != "best"));
     }
