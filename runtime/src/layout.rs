@@ -58,6 +58,7 @@ impl Layout {
             binned: wavefront && of_kernels.iter().any(|queues| queues.len() > 1),
             kernels: if wavefront { plan.kernels.len() } else { 1 },
             profiled: 0,
+            hits: 0,
         };
         Ok(Self {
             needs,

@@ -45,4 +45,5 @@ mod text;
 pub mod texture;
 mod wavefront;
 mod wgsl;
+mod workload;
 pub mod world;

@@ -129,8 +129,9 @@ const FETCHED_OF: usize = PUSHED_STRIDE / 2;
 /// when it was consumed, if a kernel is binned the first of its workgroups that works on that queue,
 /// then items consumed in 64 bits, then one count of dropped samples for
 /// each kernel that evaluates materials; in a profiling build lanes at work and lanes in all for
-/// each kernel, in 64 bits; at last, apart from each other, the lengths of queues so
-/// far and, between those, how much threads have fetched of each.
+/// each kernel, in 64 bits; then, apart from each other, the lengths of queues so
+/// far and, between those, how much threads have fetched of each; at last, if hits are counted, for
+/// each material its hits and the blocks of slots with any, both in 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Counters {
     /// Number of queues; 0 in a megakernel.
@@ -141,6 +142,8 @@ pub(crate) struct Counters {
     pub kernels: usize,
     /// Number of kernels whose lanes are counted.
     pub profiled: usize,
+    /// Number of materials whose hits are counted.
+    pub hits: usize,
 }
 
 impl Counters {
@@ -173,9 +176,13 @@ impl Counters {
         self.lanes(self.profiled).next_multiple_of(PUSHED_STRIDE)
     }
 
+    fn hits(self) -> usize {
+        self.pushed() + PUSHED_STRIDE * self.queues
+    }
+
     /// Words in all.
     pub(crate) fn len(self) -> usize {
-        self.pushed() + PUSHED_STRIDE * self.queues
+        self.hits() + PUSHED_STRIDE * self.hits
     }
 
     pub(crate) fn constants(self) -> String {
@@ -190,10 +197,15 @@ impl Counters {
             ("TAKEN", self.taken()),
             ("FIRST_GROUP", self.first_groups()),
             ("ITEMS", self.items()),
+            ("HITS", self.hits()),
+            ("HITS_STRIDE", PUSHED_STRIDE),
         ];
-        let arrays = arrays
-            .into_iter()
-            .filter(|(name, _)| self.binned || *name != "FIRST_GROUP");
+        let exists = |name: &str| match name {
+            "FIRST_GROUP" => self.binned,
+            "HITS" | "HITS_STRIDE" => self.hits > 0,
+            _ => true,
+        };
+        let arrays = arrays.into_iter().filter(|(name, _)| exists(name));
         let mut out = String::new();
         for (name, at) in scalars.chain(arrays) {
             let _ = writeln!(out, "const COUNTER_{name}: u32 = {at}u;");
@@ -230,6 +242,12 @@ impl Counters {
         long(words, self.items() + 2 * queue)
     }
 
+    /// Hits of a material, and blocks of slots with any, if they are counted.
+    pub(crate) fn hits_of(self, words: &[u32], material: usize) -> [u64; 2] {
+        let at = self.hits() + PUSHED_STRIDE * material;
+        [long(words, at), long(words, at + 2)]
+    }
+
     /// The share of lanes at work in the statements of the `kernel`-th kernel, if it was profiled
     /// and ran.
     pub(crate) fn utilisation(self, words: &[u32], kernel: usize) -> Option<f64> {
@@ -263,6 +281,7 @@ mod tests {
             binned: false,
             kernels: 4,
             profiled: 2,
+            hits: 0,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
         assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
@@ -275,6 +294,11 @@ mod tests {
             ..counters
         };
         assert_eq!(binned.items(), counters.items() + 6);
+        let counted = Counters {
+            hits: 3,
+            ..counters
+        };
+        assert_eq!(counted.len(), counters.len() + 3 * PUSHED_STRIDE);
         words[counters.items() + 2] = 5;
         words[counters.items() + 3] = 1;
         assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);

@@ -2,6 +2,7 @@
 //! as JSON; the names of fields are a promise.
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
+use impasto_compiler::partition::Workload;
 use serde::Serialize;
 
 use crate::film::Film;
@@ -75,6 +76,9 @@ pub struct Report {
     pub iterations: u64,
     /// The kernels in the order of an iteration.
     pub kernels: Vec<KernelReport>,
+    /// What paths hit, on average over the iterations; absent if that was not counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workload: Option<Workload>,
     /// Samples dropped because a value was no finite number, or below zero: those that
     /// kernels dropped at a material, and those found when a path ended.
     pub nonfinite_samples: u64,
@@ -172,6 +176,7 @@ pub(crate) struct Inputs<'a> {
     pub geometry: GeometryCounts,
     pub pool: u32,
     pub materials: &'a [MaterialReport],
+    pub workload: Option<Workload>,
     pub compile_seconds: f64,
     pub wall_seconds: f64,
 }
@@ -222,6 +227,7 @@ impl Inputs<'_> {
             pool_size: self.pool,
             iterations: status.iterations,
             kernels,
+            workload: self.workload,
             nonfinite_samples: self.resumed.nonfinite
                 + self.layout.counters.all_nonfinite(&status.counters),
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use impasto_compiler::partition::Form;
+use impasto_compiler::partition::workload::BLOCK;
 
 use crate::bvh;
 use crate::modules::Composer;
@@ -38,6 +39,8 @@ pub(crate) struct Shell {
     pub casts_shadows: bool,
     /// Whether it traces rays.
     pub traverses: bool,
+    /// Whether it counts hits of each material.
+    pub counts_hits: bool,
 }
 
 /// A queue that a kernel reads.
@@ -79,6 +82,8 @@ pub(crate) struct EntryPoint {
     pub pushes: bool,
     /// Whether paths keep the places of their rays.
     pub keeps: bool,
+    /// Whether it counts hits of each material.
+    pub counts_hits: bool,
     /// Whether threads must know their place in the subgroup.
     pub subgroups: bool,
     /// Whether traversal must know the thread's place in the workgroup.
@@ -102,6 +107,7 @@ impl EntryPoint {
             ("slots", self.slots),
             ("pushes", self.pushes),
             ("keeps", self.keeps),
+            ("counts_hits", self.counts_hits),
             ("subgroups", self.subgroups),
             ("walk_lane", self.walk_lane),
         ];
@@ -155,6 +161,7 @@ impl Composer<'_> {
             slots: !(shell.traverses && requests),
             pushes,
             keeps: shell.casts && requests,
+            counts_hits: shell.counts_hits,
             subgroups: pushes && self.technique.append == Append::Subgroup,
             walk_lane: shell.traverses && bvh::asks_for_lane(&self.world.parts.bvh),
         };
@@ -171,8 +178,21 @@ impl Composer<'_> {
         if shell.sorts {
             out += &self.material_queue();
         }
+        if shell.counts_hits {
+            out += &self.hits();
+        }
         out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
         out + &entry.wgsl()
+    }
+
+    /// What counts hits of each material.
+    fn hits(&self) -> String {
+        let materials = self.layout.counters.hits as u32;
+        wgsl::constants_u32(&[
+            ("MATERIALS", materials),
+            ("BLOCK", BLOCK),
+            ("BLOCK_WORDS", materials.div_ceil(32)),
+        ]) + include_str!("kernels/hits.wgsl")
     }
 
     /// The functions by which a stage asks for work, and how they append to queues.

@@ -55,6 +55,7 @@ impl Composer<'_> {
             sorts: true,
             casts: !members.is_empty(),
             casts_shadows: self.needs_of(&members).shadow_rays,
+            counts_hits: self.layout.counters.hits > 0,
             ..Shell::default()
         });
         Recipe {

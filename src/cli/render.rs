@@ -126,6 +126,7 @@ impl RenderArgs {
             seed: self.seed,
             pool: self.pool,
             technique: self.technique.technique(),
+            count_hits: false,
         }
     }
 }

@@ -44,6 +44,9 @@ fn main(
     if in_range {
         run_stage(slot, item);
     }
+#if counts_hits
+    count_hits(lane);
+#endif
 #if pushes
     push_requests(lane, slot);
 #endif

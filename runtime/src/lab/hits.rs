@@ -1,33 +1,10 @@
 //! What the iteration hits that is measured: counted on the host, from the queues themselves.
 
-use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::workload::BLOCK;
-use impasto_compiler::partition::{Form, Hits, Plan, Workload};
+use impasto_compiler::partition::{Form, Plan};
 
 use super::{Candidate, Lab};
 use crate::error::RuntimeError;
-use crate::layout::Layout;
-use crate::stages::StageId;
-use crate::state;
-
-/// A workload of which only the plan-independent part is known.
-pub(super) fn empty(materials: &[MaterialInfo], layout: &Layout, pool: u32) -> Workload {
-    let hits = |material: &MaterialInfo| Hits {
-        material: material.name.clone(),
-        on_surface: true,
-        share: 0.0,
-        present: 0.0,
-    };
-    let [loads, stores] = state::traffic(layout.needs, StageId::Material).map(|b| b as f64);
-    Workload {
-        pool,
-        materials: materials.iter().map(hits).collect(),
-        loads,
-        stores,
-        logic_seconds: 0.0,
-        other_seconds: 0.0,
-    }
-}
 
 impl Lab<'_> {
     /// Counts the hits of each material, and the blocks of neighbouring slots with any.

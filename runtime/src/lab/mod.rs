@@ -21,6 +21,7 @@ use crate::resources::Resources;
 use crate::settings;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Technique;
+use crate::workload;
 use crate::world::{MaterialSource, World};
 
 mod bench;
@@ -172,7 +173,7 @@ impl<'a> Lab<'a> {
             snapshot: Snapshot::new(gpu, &resources)?,
             resources,
             cache: Cache::default(),
-            workload: hits::empty(&materials, &layout, parts.sizes.pool),
+            workload: workload::before_rendering(world, &materials, &layout, parts.sizes.pool),
             materials,
             instances,
         };

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use impasto_compiler::Program;
 use impasto_compiler::partition::Plan;
+use impasto_compiler::partition::workload::BLOCK;
 
 use super::{Facts, RenderOptions, Renderer};
 use crate::error::RuntimeError;
@@ -19,6 +20,7 @@ use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
 use crate::settings;
 use crate::shader_part::BufferData;
+use crate::workload;
 use crate::world::{MaterialSource, World};
 
 impl<'g> Renderer<'g> {
@@ -78,6 +80,9 @@ impl<'g> Renderer<'g> {
         if technique.profile {
             composer.layout.counters.profiled = composer.recipes().len();
         }
+        if options.count_hits {
+            composer.layout.counters.hits = counted_materials(gpu, &composer);
+        }
         let kernels = composer.kernels();
         let resources = Resources::new(gpu, &composer, &options)?;
         let steps = build_steps(gpu, &kernels, &resources, sizes)?;
@@ -123,8 +128,30 @@ impl Facts {
                 scene: composer.fingerprint(),
             },
             materials: MaterialReport::of(composer.materials, composer.instances),
+            workload: workload::before_rendering(
+                world,
+                composer.materials,
+                &composer.layout,
+                composer.sizes.pool,
+            ),
             compile_seconds: 0.0,
         }
+    }
+}
+
+/// How many materials hits are counted of: all, or none where there is no logic kernel, blocks of slots
+/// do not fill workgroups, or a workgroup's memory is too small.
+fn counted_materials(gpu: &Gpu, composer: &Composer<'_>) -> usize {
+    let (materials, workgroup) = (composer.materials.len() as u64, composer.sizes.workgroup);
+    let blocks = u64::from(workgroup / BLOCK);
+    let appending = 2 * composer.layout.queues.count() as u64;
+    let words = materials + blocks * materials.div_ceil(32) + appending;
+    let room = gpu.device.limits().max_compute_workgroup_storage_size;
+    let possible =
+        composer.layout.wavefront && workgroup % BLOCK == 0 && 4 * words <= u64::from(room);
+    match possible {
+        true => composer.materials.len(),
+        false => 0,
     }
 }
 

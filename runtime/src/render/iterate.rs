@@ -95,7 +95,7 @@ impl Renderer<'_> {
         })
     }
 
-    fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
+    pub(super) fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
         let dispatches = max_iterations * self.schedule.steps.len() as u32;
         Flight::new(
             self.gpu,
@@ -104,7 +104,7 @@ impl Renderer<'_> {
         )
     }
 
-    fn submit(&self, mut flight: Flight, iterations: u32) -> Flight {
+    pub(super) fn submit(&self, mut flight: Flight, iterations: u32) -> Flight {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.schedule
             .record(&mut encoder, iterations, flight.queries());

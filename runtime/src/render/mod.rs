@@ -4,11 +4,15 @@
 
 mod build;
 mod iterate;
+mod observe;
 
 pub(crate) use build::build_step;
+pub use observe::profile_workload;
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
+
+use impasto_compiler::partition::Workload;
 
 use crate::error::RuntimeError;
 use crate::film::{Film, Sums};
@@ -24,6 +28,7 @@ use crate::scene::GeometryCounts;
 use crate::schedule::Schedule;
 use crate::status::Status;
 use crate::technique::Technique;
+use crate::workload::Mark;
 
 /// What to render of a world.
 #[derive(Clone, Debug)]
@@ -39,6 +44,8 @@ pub struct RenderOptions {
     pub pool: Option<u32>,
     /// How the work is done.
     pub technique: Technique,
+    /// Whether a wavefront's logic kernel counts what paths hit, for the report's workload.
+    pub count_hits: bool,
 }
 
 impl Default for RenderOptions {
@@ -49,6 +56,7 @@ impl Default for RenderOptions {
             seed: 0,
             pool: None,
             technique: Technique::default(),
+            count_hits: false,
         }
     }
 }
@@ -98,6 +106,8 @@ struct Facts {
     pool: u32,
     identity: Identity,
     materials: Vec<MaterialReport>,
+    /// What is known of the workload before rendering.
+    workload: Workload,
     compile_seconds: f64,
 }
 
@@ -231,6 +241,12 @@ impl<'g> Renderer<'g> {
             geometry: self.facts.geometry,
             pool: self.facts.pool,
             materials: &self.facts.materials,
+            workload: Mark::default().workload(
+                status,
+                &self.layout,
+                &self.kernels,
+                &self.facts.workload,
+            ),
             compile_seconds: self.facts.compile_seconds,
             wall_seconds,
         }

@@ -25,3 +25,4 @@ mod stub;
 #[path = "../support/mod.rs"]
 mod support;
 mod techniques;
+mod workload;

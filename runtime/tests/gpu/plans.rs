@@ -31,7 +31,7 @@ pub fn surfaces() -> Materials {
     ])
 }
 
-fn custom(kernels: &[(Form, &[usize])]) -> Plan {
+pub fn custom(kernels: &[(Form, &[usize])]) -> Plan {
     let kernel = |(index, (form, members)): (usize, &(Form, &[usize]))| PlanKernel {
         name: format!("material_{index}"),
         form: *form,

@@ -1,0 +1,74 @@
+//! Looking at what a scene asks of material kernels without making a picture: the profiling pass of
+//! `impasto plan`.
+
+use impasto_compiler::partition::{Strategy, Workload};
+
+use super::{RenderOptions, Renderer};
+use crate::error::RuntimeError;
+use crate::gpu::Gpu;
+use crate::status::{Flight, Status};
+use crate::technique::Technique;
+use crate::workload::Mark;
+use crate::world::{MaterialSource, World};
+
+/// Samples a pixel, which the iterations of a profiling pass never use up.
+const ENDLESS: u32 = 1 << 24;
+/// Iterations until the mixture of paths is steady, at most: paths of a pool begin together, and
+/// end at different lengths.
+const WARM: u32 = 32;
+
+/// Renders a few iterations with a kernel a material, and counts what paths hit in them once the
+/// mixture of paths is steady. `pool` paths are in flight; if `None`, as many as in a render.
+///
+/// # Errors
+/// If the world cannot be rendered on this GPU with a pool of that size.
+pub fn profile_workload(
+    gpu: &Gpu,
+    world: &World,
+    source: &dyn MaterialSource,
+    pool: Option<u32>,
+    technique: Technique,
+    iterations: u32,
+) -> Result<Workload, RuntimeError> {
+    let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
+    let plan = Strategy::Own.plan(&names).leaving_out(&world.parts.unbound);
+    let options = RenderOptions {
+        samples: ENDLESS,
+        pool,
+        technique,
+        count_hits: true,
+        ..RenderOptions::default()
+    };
+    let renderer = Renderer::from_world(gpu, world, source, &plan, &options)?;
+    renderer.observe(WARM.min(world.max_depth + 2), iterations.max(1))
+}
+
+impl Renderer<'_> {
+    /// The workload of `iterations` iterations after `warm` others, from empty slots on. The film is
+    /// left with what they added.
+    fn observe(&self, warm: u32, iterations: u32) -> Result<Workload, RuntimeError> {
+        self.resources.clear(self.gpu);
+        self.resources
+            .begin_pass(self.gpu, &self.options, &self.layout);
+        let mut status = Status::new(self.schedule.steps.len());
+        self.advance(warm, &mut status)?;
+        let mark = Mark::of(&status);
+        self.advance(iterations, &mut status)?;
+        let workload = mark.workload(&status, &self.layout, &self.kernels, &self.facts.workload);
+        workload.ok_or_else(|| RuntimeError::Setting {
+            setting: "workgroup",
+            value: "what was chosen".into(),
+            expected: "a multiple of 32 threads, so that hits can be counted".into(),
+        })
+    }
+
+    /// Runs iterations one by one, so that no submission takes long.
+    fn advance(&self, iterations: u32, status: &mut Status) -> Result<(), RuntimeError> {
+        let mut flight: Flight = self.new_flight(1)?;
+        for _ in 0..iterations {
+            flight = self.submit(flight, 1);
+            flight.land(self.gpu, &self.schedule, status)?;
+        }
+        Ok(())
+    }
+}
