@@ -29,8 +29,7 @@ pub(super) fn predictions(scenes: &[Measured]) -> String {
     let mut forms = String::new();
     for form in Form::ALL {
         let pairs: Vec<_> = scenes.iter().flat_map(|s| s.kernels(Some(form))).collect();
-        let positive = pairs.iter().filter(|p| p.measured > 0.0);
-        let bias = median(positive.map(|p| p.predicted / p.measured));
+        let bias = median(pairs.iter().map(|p| p.predicted / p.measured));
         let (count, rank) = (pairs.len(), correlation(&pairs));
         if let Some((error, bias)) = median_error(pairs).zip(bias) {
             let name = form.name();
@@ -42,14 +41,11 @@ pub(super) fn predictions(scenes: &[Measured]) -> String {
             );
         }
     }
-    let inline = scenes.iter().flat_map(|s| s.kernels(Some(Form::Inline)));
-    let unseen = inline.filter(|p| p.measured <= 0.0).count();
     format!(
         "## Predictions\n\n\
          ![Predicted against measured times of kernels](images/partition-kernels.svg)\n\n\
          Errors are medians of |predicted / measured - 1|. In the median, predictions are *bias* times what was measured. \
-         {unseen} of the\ninline sets made the logic kernel no slower; their predictions count as wrong, and they are not \
-         drawn.\n\n\
+         Inline\nmaterials have no kernel of their own: there the times are those of the logic kernel with them in it.\n\n\
          | form | kernels | error | bias | rank correlation |\n|---|---|---|---|---|\n{forms}\n\
          ![Predicted against measured times of plans](images/partition-plans.svg)\n\n\
          Of a plan, the material kernels are predicted; the rest of an iteration is what the profiling pass of the scene \
@@ -58,21 +54,40 @@ pub(super) fn predictions(scenes: &[Measured]) -> String {
     )
 }
 
-/// What the device profile says of materials it was not fitted to.
+/// How predictions do for materials that the constants were not fitted to.
 pub(super) fn held_out(results: &Results) -> String {
-    let Some(fit) = results.fit.filter(|fit| fit.points > 0) else {
-        return String::new();
-    };
-    format!(
-        "## Held out\n\n\
-         The profile `{}` was fitted to {} kernels with a median error of {} and a rank correlation of {:.3}. Fitted to half \
-         of\nthe materials, its median error is {} on kernels of the other half.\n",
-        results.profile,
-        fit.points,
-        percent(fit.median_error),
-        fit.rank_correlation,
-        percent(fit.held_out_error)
-    )
+    let mut out = String::new();
+    if let Some(fit) = results.fit.filter(|fit| fit.points > 0) {
+        let _ = write!(
+            out,
+            "The constants of the profile `{}` were fitted to {} kernels, with a median error of {} and a rank correlation \
+             of {:.3};\nfitted to half of the materials, the median error on the other half is {}.\n",
+            results.profile,
+            fit.points,
+            percent(fit.median_error),
+            fit.rank_correlation,
+            percent(fit.held_out_error)
+        );
+    }
+    if let Some(held) = &results.held_out {
+        let _ = write!(
+            out,
+            "{}Of the materials on this page, every second by name was taken, and the constants fitted to the kernels over \
+             these alone\n(`cargo xtask partition --held-out`). On the {} kernels over the others the median error is {}, one in \
+             ten is off by more\nthan {}, predictions are {:.2} times what was measured in the median, and the rank \
+             correlation is {:.3}.\n",
+            if out.is_empty() { "" } else { "\n" },
+            held.kernels,
+            percent(held.median),
+            percent(held.tenth),
+            held.bias,
+            held.rank_correlation
+        );
+    }
+    match out.is_empty() {
+        true => out,
+        false => format!("## Held out\n\n{out}"),
+    }
 }
 
 /// What plans drawn by lot are called among strategies.

@@ -74,9 +74,9 @@ pub(super) fn answer_json() -> serde_json::Value {
     })
 }
 
-/// A scene of the fixture.
-pub(super) fn scene() -> Scene {
-    let case = Case {
+/// What is measured.
+pub(super) fn case() -> Case {
+    Case {
         name: "tiny".into(),
         about: "three of a kind".into(),
         hits: "random".into(),
@@ -84,9 +84,13 @@ pub(super) fn scene() -> Scene {
         scene: "examples/mixes/generated/tiny.toml".into(),
         samples: 1,
         paper: false,
-    };
+    }
+}
+
+/// A scene of the fixture.
+pub(super) fn scene() -> Scene {
     let answer = answer::read(&answer_json()).expect("an answer");
-    let mut scene = Scene::new(&case, "abc", "impasto plan", &answer).expect("a scene");
+    let mut scene = Scene::new(&case(), "abc", "impasto plan", &answer).expect("a scene");
     let render = |label: &str, rates: [f64; 2]| Render {
         label: label.into(),
         options: vec![format!("--strategy={label}")],

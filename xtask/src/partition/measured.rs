@@ -41,13 +41,9 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// How far the prediction is off, as a share. What an inline material adds to a kernel can be
-    /// measured as nothing or less; no prediction is right then.
+    /// How far the prediction is off, as a share.
     pub(super) fn error(self) -> f64 {
-        match self.measured > 0.0 {
-            true => error(self.predicted, self.measured),
-            false => f64::INFINITY,
-        }
+        error(self.predicted, self.measured)
     }
 }
 
@@ -204,18 +200,21 @@ impl<'a> Measured<'a> {
         Some(self.rate("auto's plan")? / self.rate(label)?)
     }
 
-    /// Every kernel of a form, or of all.
+    /// Every kernel of a form, or of all. Inline materials have no kernel of their own: there it is the logic
+    /// kernel with them in it.
     pub(super) fn kernels(&self, form: Option<Form>) -> Vec<Pair> {
-        let chosen = self
-            .scene
-            .kernels
-            .iter()
-            .filter(|k| form.is_none_or(|f| f.name() == k.0));
-        let pair = |k: &super::results::Kernel| Pair {
-            predicted: k.2,
-            measured: k.3,
+        let wanted = |k: &&super::results::Kernel| form.is_none_or(|f| f.name() == k.0);
+        let pair = |k: &super::results::Kernel| {
+            let logic = match k.0 == Form::Inline.name() {
+                true => self.scene.logic,
+                false => 0.0,
+            };
+            Pair {
+                predicted: logic + k.2,
+                measured: logic + k.3,
+            }
         };
-        chosen.map(pair).collect()
+        self.scene.kernels.iter().filter(wanted).map(pair).collect()
     }
 
     /// Every plan up to [`EXHAUSTIVE`] materials and the listed ones beyond: the material kernels' times.
@@ -400,17 +399,16 @@ mod tests {
     }
 
     #[test]
-    fn what_took_no_time_was_not_predicted() {
-        let pair = |measured| Pair {
-            predicted: 1e-6,
-            measured,
-        };
-        assert_eq!(pair(-1e-7).error(), f64::INFINITY);
-        assert!(close(pair(2e-6).error(), 0.5));
-        assert_eq!(
-            median_error(vec![pair(1e-6), pair(1e-6), pair(0.0)]),
-            Some(0.0)
+    fn of_inline_materials_the_logic_kernel_counts() {
+        let scene = fixture::scene();
+        let measured = Measured::new(&scene).expect("fits");
+        let inline = measured.kernels(Some(Form::Inline))[0];
+        assert!(
+            close(inline.predicted, 65e-6) && close(inline.measured, 67e-6),
+            "{inline:?}"
         );
+        assert!(close(measured.kernels(Some(Form::Own))[0].measured, 20e-6));
+        assert_eq!(measured.kernels(None).len(), 18);
     }
 
     #[test]

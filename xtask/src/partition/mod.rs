@@ -30,7 +30,7 @@ use crate::shell::{self, Result};
 use cases::{Case, Renders};
 use measured::Measured;
 use record::{Bench, Record};
-use results::{Fit, Results};
+use results::{Fit, HeldOut, Results};
 
 #[derive(Args)]
 pub(crate) struct PartitionArgs {
@@ -67,6 +67,10 @@ pub(crate) struct PartitionArgs {
     /// What measured, as the page should call it, such as a commit
     #[arg(long, value_name = "TEXT")]
     version: Option<String>,
+    /// Fit the time model to the records of half of the materials (`impasto calibrate --from`), and report its
+    /// errors on the other half; needs no GPU
+    #[arg(long)]
+    held_out: bool,
     /// Write page and plots from the JSON that is there, without measuring
     #[arg(long)]
     page: bool,
@@ -77,6 +81,11 @@ pub(crate) fn run(args: &PartitionArgs) -> Result {
     let mut results = Results::load(&json)?;
     if !args.page {
         measure(args, &mut results)?;
+    }
+    if args.held_out {
+        results.held_out = Some(held_out(args)?);
+    }
+    if args.held_out || !args.page {
         write_whole(&json, &results.text()?)?;
     }
     let scenes: Result<Vec<Measured>> = results.scenes.iter().map(Measured::new).collect();
@@ -198,6 +207,42 @@ fn put(results: &mut Results, case: &Case, record: &Record) -> Result {
     Ok(())
 }
 
+/// What the command says of a fit to half of the materials.
+fn held_out(args: &PartitionArgs) -> Result<HeldOut> {
+    let impasto = paper::command(args.impasto.as_deref())?;
+    let folder = std::fs::read_dir(&args.records);
+    let folder = folder.map_err(|e| format!("cannot read {}: {e}", args.records.display()))?;
+    let paths = folder.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut records: Vec<PathBuf> = paths
+        .filter(|p| p.extension().is_some_and(|e| e == "json"))
+        .collect();
+    records.sort();
+    let mut command = std::process::Command::new(impasto);
+    command
+        .arg("calibrate")
+        .args(["--format", "json", "--from"])
+        .args(&records);
+    read_held_out(&shell::capture(&mut command)?)
+}
+
+fn read_held_out(json: &str) -> Result<HeldOut> {
+    #[derive(serde::Deserialize)]
+    struct Fitted {
+        held_out: HeldOut,
+    }
+    let fitted: std::result::Result<Fitted, _> = serde_json::from_str(json);
+    let held = fitted
+        .map_err(|e| format!("the answer of `impasto calibrate` is not as expected: {e}"))?
+        .held_out;
+    Ok(HeldOut {
+        kernels: held.kernels,
+        median: results::rounded(held.median),
+        tenth: results::rounded(held.tenth),
+        bias: results::rounded(held.bias),
+        rank_correlation: results::rounded(held.rank_correlation),
+    })
+}
+
 /// What a profile of the repository, or a file, says of its fit; nothing if there is no such file.
 fn fit(profile: &str) -> Result<Option<Fit>> {
     #[derive(serde::Deserialize)]
@@ -212,4 +257,49 @@ fn fit(profile: &str) -> Result<Option<Fit>> {
     let read: std::result::Result<Profile, _> = serde_json::from_str(&text);
     let read = read.map_err(|e| format!("cannot read the profile {profile}: {e}"))?;
     Ok(Some(read.fit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_held_out_kernels_are_read_and_told() {
+        let json = r#"{ "profile": {}, "held_out": { "of": "held out", "kernels": 40, "median": 0.1234567, "tenth": 0.5,
+            "bias": 1.02, "rank_correlation": 0.9 }, "forms": [] }"#;
+        let held = read_held_out(json).expect("errors");
+        assert_eq!(held.median, 0.12346);
+        let results = Results {
+            held_out: Some(held),
+            ..Results::default()
+        };
+        let text = checks::held_out(&results);
+        assert!(
+            text.contains("On the 40 kernels over the others the median error is 12.3 %"),
+            "{text}"
+        );
+        assert_eq!(checks::held_out(&Results::default()), "");
+        assert!(read_held_out("{}").is_err_and(|why| why.contains("held_out")));
+    }
+
+    #[test]
+    fn scenes_are_chosen_by_name() {
+        let cases = || {
+            vec![
+                Case {
+                    name: "a".into(),
+                    ..fixture::case()
+                },
+                fixture::case(),
+            ]
+        };
+        let names = |only: &[String]| {
+            chosen(only, cases()).map(|cs| cs.iter().map(|c| c.name.clone()).collect::<Vec<_>>())
+        };
+        assert_eq!(names(&[]), Ok(vec!["a".into(), "tiny".into()]));
+        assert_eq!(names(&["tiny".into()]), Ok(vec!["tiny".into()]));
+        assert!(
+            names(&["b".into()]).is_err_and(|why| why.contains("`b`") && why.contains("a, tiny"))
+        );
+    }
 }

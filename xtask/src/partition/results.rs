@@ -23,6 +23,9 @@ pub(super) struct Results {
     pub profile: String,
     /// What the profile says of its own fit.
     pub fit: Option<Fit>,
+    /// How constants fitted to half of the materials do for the other half.
+    #[serde(default)]
+    pub held_out: Option<HeldOut>,
     /// By pool, then in the order of the cases.
     pub scenes: Vec<Scene>,
 }
@@ -33,6 +36,17 @@ pub(super) struct Fit {
     pub points: u32,
     pub median_error: f64,
     pub held_out_error: f64,
+    pub rank_correlation: f64,
+}
+
+/// Errors of kernels over materials that the constants were not fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct HeldOut {
+    pub kernels: u32,
+    /// Median error, the one that a kernel in ten exceeds, and the median ratio of prediction and measurement.
+    pub median: f64,
+    pub tenth: f64,
+    pub bias: f64,
     pub rank_correlation: f64,
 }
 
