@@ -41,9 +41,11 @@ pub use runtime::gpu::{Gpu, GpuOptions};
 pub use runtime::render::{RenderOptions, Renderer, Rendering};
 pub use runtime::scene::{Scene, SceneError};
 
+pub mod calibrate;
 pub mod cost;
 pub mod files;
 mod ir_text;
+pub mod measure;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +56,9 @@ pub enum Error {
     /// A material has errors; the text shows each with its place, expectation and hint.
     #[error("the scene's materials have errors\n{0}")]
     Materials(String),
+    /// What materials cost cannot be told in reasonable time.
+    #[error("the materials take too long to evaluate, so that nothing is known of what they cost")]
+    Costs,
     /// The GPU, or something that it was asked for.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),

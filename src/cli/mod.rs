@@ -10,6 +10,7 @@ use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
 use impasto::compiler::diag::{self, Diagnostic};
 use impasto::compiler::source::SourceMap;
 
+mod calibrate;
 mod check;
 mod checkpoint;
 mod completions;
@@ -70,6 +71,8 @@ enum Command {
     Emit(emit::EmitArgs),
     /// Count the operations that one evaluation of materials takes
     Cost(cost::CostArgs),
+    /// Fit the time model to this GPU, by kernels that are timed
+    Calibrate(Box<calibrate::CalibrateArgs>),
     /// Evaluate a material, closure or function at one point
     Eval(eval::EvalArgs),
     /// Render a scene
@@ -111,6 +114,7 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
+        Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),

@@ -279,7 +279,7 @@ fn material_list(report: &Report) -> String {
 const LISTED: usize = 12;
 
 /// A progress bar on standard error; invisible where that is no terminal.
-fn progress_bar(global: &Global) -> ProgressBar {
+pub(super) fn progress_bar(global: &Global) -> ProgressBar {
     let bar = match global.quiet {
         true => ProgressBar::hidden(),
         false => ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()),

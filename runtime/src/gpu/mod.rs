@@ -106,7 +106,7 @@ impl Gpu {
     }
 
     /// Lanes of its largest subgroups.
-    pub(crate) fn subgroup_size(&self) -> u32 {
+    pub fn subgroup_size(&self) -> u32 {
         self.adapter.get_info().subgroup_max_size
     }
 

@@ -41,7 +41,7 @@ impl Lab<'_> {
 
     /// The logic kernel alone, of a kernel a material.
     pub(super) fn bare_logic(&mut self) -> Result<Run, RuntimeError> {
-        let plan = own_plan(&self.materials);
+        let plan = own_plan(&self.materials, self.world);
         let composer = self.composer(&plan, false)?;
         let logic = composer.recipes().swap_remove(0);
         let composed = self.composed(&composer, vec![logic], Vec::new());
@@ -103,7 +103,7 @@ impl Lab<'_> {
                 "there is no kernel of form {form:?} over {members:?}"
             ));
         }
-        let own = own_plan(&self.materials);
+        let own = own_plan(&self.materials, self.world);
         if form == Form::Own {
             return Ok(own);
         }

@@ -5,6 +5,7 @@ use impasto_compiler::partition::{Form, Plan};
 
 use super::{Candidate, Lab};
 use crate::error::RuntimeError;
+use crate::queues::Queues;
 
 impl Lab<'_> {
     /// Counts the hits of each material, and the blocks of neighbouring slots with any.
@@ -12,16 +13,19 @@ impl Lab<'_> {
         let pool = f64::from(self.sizes.pool);
         let blocks = self.sizes.pool.div_ceil(BLOCK) as usize;
         // Any kernel will do: all queues are filled before it.
+        let Some(any) = own.kernels.first() else {
+            return Ok(());
+        };
         let any = Candidate {
             form: Form::Own,
-            members: vec![0],
+            members: any.materials.clone(),
         };
         let run = self.runs(&[any])?.swap_remove(0);
         let run = run.map_err(RuntimeError::Validation)?;
         let sample = self.time(std::slice::from_ref(&run))?.swap_remove(0);
         let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
-        for material in 0..own.kernels.len() {
-            let queue = 1 + material;
+        for (kernel, queues) in own.kernels.iter().zip(Queues::of_kernels(own)) {
+            let (material, queue) = (kernel.materials[0], queues.start);
             let taken = run.counters.taken_of(counters, queue);
             let mut met = vec![false; blocks];
             for slot in self.read_queue(queue, taken)? {

@@ -139,7 +139,7 @@ impl<'a> Lab<'a> {
         };
         settings::check(world, &render)?;
         let (materials, instances) = (source.infos(), source.instances());
-        let own = own_plan(&materials);
+        let own = own_plan(&materials, world);
         // No plan has more queues or counters: buffers of this layout do for all.
         let mut layout = Layout::new(world, &materials, &own, &render.technique)?;
         layout.counters.binned = true;
@@ -363,9 +363,10 @@ impl<'b> Parts<'b> {
     }
 }
 
-/// A kernel a material.
-fn own_plan(materials: &[MaterialInfo]) -> Plan {
-    Strategy::Own.plan(&names(materials))
+/// A kernel a material that is on some surface.
+fn own_plan(materials: &[MaterialInfo], world: &World) -> Plan {
+    let plan = Strategy::Own.plan(&names(materials));
+    plan.leaving_out(&world.parts.unbound)
 }
 
 fn names(materials: &[MaterialInfo]) -> Vec<String> {

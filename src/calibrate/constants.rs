@@ -1,0 +1,141 @@
+//! The constants of the time model as coordinates in which they can be fitted.
+//!
+//! Their names come from the profile's own fields, so that a constant that the model gains is fitted
+//! without more ado. Each is searched by its logarithm within bounds.
+
+use impasto_compiler::partition::profile::Weights;
+
+/// What is known of a constant beside its name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct About {
+    /// Its name in profiles.
+    pub name: &'static str,
+    /// The least and the most that it can be.
+    pub bounds: [f64; 2],
+    /// What it means, with its unit.
+    pub meaning: &'static str,
+}
+
+const TIMES: [f64; 2] = [1e-15, 1e-2];
+
+const fn time(name: &'static str, meaning: &'static str) -> About {
+    About {
+        name,
+        bounds: TIMES,
+        meaning,
+    }
+}
+
+/// Every constant of the model.
+pub const ABOUT: [About; 14] = [
+    time("launch", "s, a dispatch that finds nothing to do"),
+    time("latency", "s, an operation of the last subgroup"),
+    time("alu", "s, float arithmetic of a subgroup"),
+    time(
+        "special",
+        "s, a division, root or transcendental of a subgroup",
+    ),
+    time("integer", "s, an integer operation of a subgroup"),
+    time("texture", "s, a texture lookup of a subgroup"),
+    time("turns", "s, a turn of a loop of a subgroup"),
+    time("memory", "s, a byte that a lane reads or writes"),
+    time("queue", "s, an item that goes through a queue"),
+    About {
+        name: "free_registers",
+        bounds: [16.0, 512.0],
+        meaning: "live numbers that cost nothing",
+    },
+    About {
+        name: "pressure",
+        bounds: [1e-3, 20.0],
+        meaning: "slowdown by a hundred more, as a share",
+    },
+    About {
+        name: "code",
+        bounds: [100.0, 1e7],
+        meaning: "operations of code that caches hold",
+    },
+    About {
+        name: "miss",
+        bounds: [1.0, 50.0],
+        meaning: "times as long outside of caches",
+    },
+    About {
+        name: "overlap",
+        bounds: [1.0, 16.0],
+        meaning: "exponent by which arithmetic and memory overlap",
+    },
+];
+
+/// What is known of the constant called `name`; little of one that is not in the table.
+pub fn about(name: &str) -> About {
+    let found = ABOUT.iter().find(|about| about.name == name);
+    found.copied().unwrap_or(About {
+        name: "",
+        bounds: [1e-15, 1e9],
+        meaning: "",
+    })
+}
+
+/// Every constant by its name.
+pub fn named(weights: &Weights) -> Vec<(String, f64)> {
+    let json = serde_json::to_value(weights).unwrap_or_default();
+    let fields = json.as_object().into_iter().flatten();
+    fields
+        .filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
+        .collect()
+}
+
+/// The coordinates of constants: logarithms, in the order of [`named`].
+pub fn coordinates(weights: &Weights) -> Vec<f64> {
+    let all = named(weights).into_iter();
+    all.map(|(name, value)| {
+        let [least, most] = about(&name).bounds;
+        value.clamp(least, most).ln()
+    })
+    .collect()
+}
+
+/// The constants at coordinates, each within its bounds; `like` gives their names.
+pub fn at(coordinates: &[f64], like: &Weights) -> Weights {
+    let names = named(like).into_iter().zip(coordinates);
+    let fields = names.map(|((name, _), coordinate)| {
+        let [least, most] = about(&name).bounds;
+        (name, serde_json::json!(coordinate.exp().clamp(least, most)))
+    });
+    let fields = fields.collect::<serde_json::Map<_, _>>();
+    serde_json::from_value(fields.into()).unwrap_or(*like)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use impasto_compiler::partition::DeviceProfile;
+
+    #[test]
+    fn every_constant_is_known_and_survives_the_way_there_and_back() {
+        for name in DeviceProfile::shipped_names() {
+            let profile = DeviceProfile::named(name).expect("it is shipped");
+            let weights = profile.weights;
+            let back = at(&coordinates(&weights), &weights);
+            for ((name, before), (_, after)) in named(&weights).into_iter().zip(named(&back)) {
+                let About {
+                    bounds, meaning, ..
+                } = about(&name);
+                assert!(!meaning.is_empty(), "`{name}` needs a row in the table");
+                let expected = before.clamp(bounds[0], bounds[1]);
+                assert!((after / expected - 1.0).abs() < 1e-12, "{name}");
+            }
+            assert_eq!(named(&weights).len(), ABOUT.len(), "a row too many");
+        }
+    }
+
+    #[test]
+    fn constants_stay_within_their_bounds() {
+        let weights = DeviceProfile::named("h200").expect("it is shipped").weights;
+        let far = vec![1e3; coordinates(&weights).len()];
+        for (name, value) in named(&at(&far, &weights)) {
+            assert_eq!(value, about(&name).bounds[1], "{name}");
+        }
+    }
+}

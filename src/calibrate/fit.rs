@@ -1,0 +1,308 @@
+//! Fitting: the constants for which the time model comes nearest to what was measured.
+//!
+//! What counts is the ratio of predicted and measured time of each kernel, by its logarithm, and less
+//! than by its square where they are far apart (Huber 1964), so that a kernel that the model cannot
+//! know does not bend the rest. Inline materials have no time of their own: there it is the ratio
+//! of the logic kernel's times with them. Groups of kernels of one scene and form weigh by the
+//! root of their number.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use impasto_compiler::cost::Cost;
+use impasto_compiler::partition::profile::{Fit, Weights};
+use impasto_compiler::partition::{Calibrated, DeviceProfile, Form};
+use serde::Serialize;
+
+use super::constants;
+use super::minimise::least_squares;
+use crate::measure::{Kernel, Measurement};
+
+/// The logarithm of a ratio beyond which it counts linearly.
+const FAR: f64 = 0.3;
+/// How strongly a constant that no measurement tells of is held where it was.
+const HOLD: f64 = 1e-3;
+
+/// A kernel, measured and predicted.
+#[derive(Clone, Debug, Serialize)]
+pub struct Residual {
+    /// The scene.
+    pub scene: String,
+    /// Paths in flight.
+    pub pool: u32,
+    /// Its form.
+    pub form: Form,
+    /// Its materials.
+    pub members: Vec<String>,
+    /// Seconds.
+    pub measured: f64,
+    /// Seconds.
+    pub predicted: f64,
+    /// Predicted over measured; of inline materials that of the logic kernel with them.
+    pub ratio: f64,
+}
+
+/// The outcome of a fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Fitted {
+    /// The profile.
+    pub profile: DeviceProfile,
+    /// Of all kernels.
+    pub residuals: Vec<Residual>,
+    /// Errors by form, of the fit to everything.
+    pub forms: Vec<Errors>,
+    /// Errors by scene and pool.
+    pub scenes: Vec<Errors>,
+    /// Errors of kernels of the one half of the materials, by constants fitted to the other.
+    pub held_out: Errors,
+    /// What the model says without a fit.
+    pub before: Errors,
+}
+
+/// How far predictions of a group of kernels are off.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Errors {
+    /// The group.
+    pub of: String,
+    /// Kernels in it.
+    pub kernels: usize,
+    /// The median of |ratio - 1|.
+    pub median: f64,
+    /// The same that one in ten exceeds.
+    pub tenth: f64,
+    /// The median ratio.
+    pub bias: f64,
+    /// Spearman's rank correlation of predicted and measured times.
+    pub rank_correlation: f64,
+}
+
+/// A kernel as the model sees it.
+struct Point<'a> {
+    set: usize,
+    kernel: &'a Kernel,
+    members: Vec<usize>,
+    weight: f64,
+}
+
+/// All measurements, and what they are predicted by.
+struct Problem<'a> {
+    sets: &'a [Measurement],
+    costs: Vec<Vec<Option<Cost>>>,
+    start: &'a DeviceProfile,
+}
+
+/// Fits the constants of `start` to what was measured; all of one GPU.
+pub fn fit(sets: &[Measurement], start: &DeviceProfile) -> Fitted {
+    let costs = |set: &Measurement| set.materials.iter().map(|m| m.cost.clone()).collect();
+    let problem = Problem {
+        sets,
+        costs: sets.iter().map(costs).collect(),
+        start,
+    };
+    let points = problem.points();
+    let before = problem.residuals(&points, &start.weights);
+    let weights = problem.fitted(&points);
+    let residuals = problem.residuals(&points, &weights);
+    let held_out = problem.held_out(&points);
+    let all = errors("all", &residuals);
+    let profile = DeviceProfile {
+        weights,
+        fit: Fit {
+            points: residuals.len() as u32,
+            median_error: all.median,
+            held_out_error: held_out.median,
+            rank_correlation: all.rank_correlation,
+        },
+        ..start.clone()
+    };
+    let by_form = |r: &Residual| r.form.name().to_string();
+    let by_scene = |r: &Residual| format!("{} ({} paths)", r.scene, r.pool);
+    let mut forms = grouped(&residuals, by_form);
+    forms.push(all);
+    Fitted {
+        profile,
+        forms,
+        scenes: grouped(&residuals, by_scene),
+        held_out,
+        before: errors("before", &before),
+        residuals,
+    }
+}
+
+impl<'a> Problem<'a> {
+    fn points(&self) -> Vec<Point<'a>> {
+        let mut points = Vec::new();
+        let mut counts: BTreeMap<(usize, &str), f64> = BTreeMap::new();
+        for (set, measurement) in self.sets.iter().enumerate() {
+            for kernel in &measurement.kernels {
+                let members = measurement.members(kernel);
+                // Of what nothing is known, nothing can be predicted.
+                if members.iter().any(|m| self.costs[set][*m].is_none()) {
+                    continue;
+                }
+                *counts.entry((set, kernel.form.name())).or_default() += 1.0;
+                points.push(Point {
+                    set,
+                    kernel,
+                    members,
+                    weight: 1.0,
+                });
+            }
+        }
+        for point in &mut points {
+            let count = counts.get(&(point.set, point.kernel.form.name()));
+            point.weight = count.map_or(1.0, |n| n.powf(-0.25));
+        }
+        points
+    }
+
+    fn predicted(&self, point: &Point<'_>, profile: &DeviceProfile) -> f64 {
+        let model = Calibrated {
+            costs: &self.costs[point.set],
+            workload: &self.sets[point.set].workload,
+            profile,
+        };
+        model.predict(point.kernel.form, &point.members).total
+    }
+
+    /// Predicted over measured.
+    fn ratio(&self, point: &Point<'_>, predicted: f64) -> f64 {
+        let logic = match point.kernel.form {
+            Form::Inline => self.sets[point.set].logic_seconds,
+            _ => 0.0,
+        };
+        let positive = |seconds: f64| (logic + seconds).max(1e-9);
+        positive(predicted) / positive(point.kernel.measured)
+    }
+
+    fn profile(&self, weights: Weights) -> DeviceProfile {
+        DeviceProfile {
+            weights,
+            ..self.start.clone()
+        }
+    }
+
+    fn fitted(&self, points: &[Point<'_>]) -> Weights {
+        let like = self.start.weights;
+        let start = constants::coordinates(&like);
+        let residuals = |x: &[f64]| -> Vec<f64> {
+            let profile = self.profile(constants::at(x, &like));
+            let of_point = |point: &Point<'_>| {
+                point.weight * huber(self.ratio(point, self.predicted(point, &profile)).ln())
+            };
+            let held = x.iter().zip(&start).map(|(x, s)| HOLD * (x - s));
+            points.iter().map(of_point).chain(held).collect()
+        };
+        constants::at(&least_squares(&start, &residuals), &like)
+    }
+
+    /// Fits to kernels over the one half of the materials, and looks at those over the other.
+    fn held_out(&self, points: &[Point<'a>]) -> Errors {
+        let names = self.sets.iter().flat_map(|set| &set.materials);
+        let names: BTreeSet<&str> = names.map(|m| m.name.as_str()).collect();
+        let first: BTreeSet<&str> = names.into_iter().step_by(2).collect();
+        let within = |half: bool| {
+            let of = |p: &&Point<'a>| {
+                let mut members = p.kernel.members.iter();
+                members.all(|name| first.contains(name.as_str()) == half)
+            };
+            let copy = |p: &Point<'a>| Point {
+                members: p.members.clone(),
+                ..*p
+            };
+            points.iter().filter(of).map(copy).collect::<Vec<_>>()
+        };
+        let weights = self.fitted(&within(true));
+        errors("held out", &self.residuals(&within(false), &weights))
+    }
+
+    fn residuals(&self, points: &[Point<'_>], weights: &Weights) -> Vec<Residual> {
+        let profile = self.profile(*weights);
+        let residual = |point: &Point<'_>| {
+            let (set, predicted) = (&self.sets[point.set], self.predicted(point, &profile));
+            Residual {
+                scene: set.scene.clone(),
+                pool: set.pool,
+                form: point.kernel.form,
+                members: point.kernel.members.clone(),
+                measured: point.kernel.measured,
+                predicted,
+                ratio: self.ratio(point, predicted),
+            }
+        };
+        points.iter().map(residual).collect()
+    }
+}
+
+/// What is squared in the place of a logarithm of a ratio.
+fn huber(r: f64) -> f64 {
+    if r.abs() <= FAR {
+        return r;
+    }
+    let bounded = if r.is_finite() { r.abs() } else { 1e3 };
+    (2.0 * FAR * bounded - FAR * FAR).sqrt().copysign(r)
+}
+
+fn grouped(residuals: &[Residual], of: impl Fn(&Residual) -> String) -> Vec<Errors> {
+    let mut groups: BTreeMap<String, Vec<Residual>> = BTreeMap::new();
+    for residual in residuals {
+        groups
+            .entry(of(residual))
+            .or_default()
+            .push(residual.clone());
+    }
+    groups.iter().map(|(of, group)| errors(of, group)).collect()
+}
+
+fn errors(of: &str, residuals: &[Residual]) -> Errors {
+    let sorted = |value: fn(&Residual) -> f64| {
+        let mut values: Vec<f64> = residuals.iter().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let at = |sorted: &[f64], share: f64| {
+        let index = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
+        sorted.get(index).copied().unwrap_or(0.0)
+    };
+    let (off, ratios) = (sorted(|r| (r.ratio - 1.0).abs()), sorted(|r| r.ratio));
+    Errors {
+        of: of.into(),
+        kernels: residuals.len(),
+        median: at(&off, 0.5),
+        tenth: at(&off, 0.9),
+        bias: at(&ratios, 0.5),
+        rank_correlation: rank_correlation(
+            &residuals.iter().map(|r| r.predicted).collect::<Vec<_>>(),
+            &residuals.iter().map(|r| r.measured).collect::<Vec<_>>(),
+        ),
+    }
+}
+
+/// Spearman's rank correlation; 0 of fewer than two pairs, or if all of a side are equal.
+pub fn rank_correlation(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (ranks(a), ranks(b));
+    let n = a.len() as f64;
+    let mean = (n - 1.0) / 2.0;
+    let covariance = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - mean) * (b - mean)).sum()
+    };
+    let spread = (covariance(&a, &a) * covariance(&b, &b)).sqrt();
+    if spread > 0.0 {
+        covariance(&a, &b) / spread
+    } else {
+        0.0
+    }
+}
+
+/// The rank of each number, from 0 on; equal ones share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut begin = 0;
+    for group in order.chunk_by(|a, b| values[*a] == values[*b]) {
+        let rank = begin as f64 + (group.len() - 1) as f64 / 2.0;
+        group.iter().for_each(|i| ranks[*i] = rank);
+        begin += group.len();
+    }
+    ranks
+}

@@ -1,0 +1,129 @@
+//! Measuring the calibration's own scenes.
+
+use std::time::Instant;
+
+use impasto_compiler::{MemoryLoader, Program};
+use impasto_runtime::gpu::Gpu;
+use impasto_runtime::lab::LabOptions;
+
+use super::room::{self, Coherence};
+use super::sources::{Palette, palettes};
+use crate::measure::{Measurement, Progress, Subject, sample_for_fit};
+use crate::{Error, Scene};
+
+/// How thoroughly to measure.
+#[derive(Clone, Debug)]
+pub struct Effort {
+    /// Numbers of paths in flight, each measured by itself.
+    pub pools: Vec<u32>,
+    /// How often each kernel is timed.
+    pub repetitions: u32,
+    /// Whether pairs of materials and every second palette are left out.
+    pub quick: bool,
+    /// Pixels along a side of the pictures that are rendered meanwhile.
+    pub side: u32,
+}
+
+impl Effort {
+    /// What suits a GPU: one in software has little to gain from many paths.
+    pub fn of(gpu: &Gpu, quick: bool) -> Self {
+        let software = gpu.info().kind == "software";
+        Self {
+            pools: match (software, quick) {
+                (true, _) => vec![1 << 13],
+                (false, true) => vec![1 << 20],
+                (false, false) => vec![1 << 20, 1 << 22],
+            },
+            repetitions: if software { 5 } else { 9 },
+            quick: quick || software,
+            side: if software { 128 } else { 1024 },
+        }
+    }
+}
+
+/// How far calibration is.
+#[derive(Clone, Debug)]
+pub struct Step<'a> {
+    /// The scene that is measured.
+    pub scene: &'a str,
+    /// Which of how many scenes, counted from 0.
+    pub at: (usize, usize),
+    /// Kernels of this scene.
+    pub kernels: Progress,
+}
+
+/// Measures all scenes; `warn` is told of kernels that cannot be measured.
+///
+/// # Errors
+/// If the GPU fails, or has no timestamps.
+pub fn measure(
+    gpu: &Gpu,
+    effort: &Effort,
+    progress: &mut dyn FnMut(&Step<'_>),
+    warn: &mut dyn FnMut(&str),
+) -> Result<Vec<Measurement>, Error> {
+    let palettes = palettes();
+    let mut cases: Vec<(&Palette, Coherence, u32)> = Vec::new();
+    for pool in &effort.pools {
+        for palette in palettes.iter().step_by(if effort.quick { 2 } else { 1 }) {
+            cases.extend([Coherence::Random, Coherence::Runs].map(|c| (palette, c, *pool)));
+        }
+    }
+    let all = cases.len();
+    let mut sets = Vec::new();
+    for (at, (palette, coherence, pool)) in cases.into_iter().enumerate() {
+        let scene = room::scene(palette, coherence, effort.side);
+        let mut kernels = |kernels| {
+            progress(&Step {
+                scene: &scene.name,
+                at: (at, all),
+                kernels,
+            });
+        };
+        sets.push(one(gpu, &scene, palette, pool, effort, &mut kernels, warn)?);
+    }
+    Ok(sets)
+}
+
+fn one(
+    gpu: &Gpu,
+    scene: &Scene,
+    palette: &Palette,
+    pool: u32,
+    effort: &Effort,
+    progress: &mut dyn FnMut(Progress),
+    warn: &mut dyn FnMut(&str),
+) -> Result<Measurement, Error> {
+    let program = compile(scene, palette)?;
+    let options = LabOptions {
+        pool: Some(pool),
+        repetitions: effort.repetitions,
+        ..LabOptions::default()
+    };
+    let subject = Subject::new(scene, &program, &options)?;
+    let mut lab = subject.lab(gpu, &options)?;
+    let materials = subject.materials(&lab);
+    let candidates = sample_for_fit(&materials, !effort.quick);
+    let timed = subject.time(&mut lab, &candidates, None::<Instant>, progress)?;
+    for (candidate, why) in &timed.failed {
+        warn(&format!(
+            "the {} kernel of materials {:?} of `{}` was not measured: {why}",
+            candidate.form.name(),
+            candidate.members,
+            scene.name
+        ));
+    }
+    Ok(subject.measurement(gpu, &lab, &options, timed.kernels))
+}
+
+fn compile(scene: &Scene, palette: &Palette) -> Result<Program, Error> {
+    let mut files = MemoryLoader::default();
+    files.add(room::FILE, palette.source.clone());
+    let compiled = impasto_compiler::compile(&crate::requests(scene), &mut files);
+    let text =
+        || impasto_compiler::diag::render::text(&compiled.sources, &compiled.diagnostics, false);
+    match compiled.program {
+        Some(program) => Ok(program),
+        None => Err(Error::Materials(text())),
+    }
+}

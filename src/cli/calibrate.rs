@@ -1,0 +1,97 @@
+//! `impasto calibrate`: the constants of the time model for a GPU, fitted to what kernels take.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use impasto::calibrate::{self, Effort, Fitted, Step};
+use impasto::files;
+use impasto::measure::{Data, Measurement};
+
+use super::info::GpuArgs;
+use super::{Failure, Global, Outcome, print};
+
+#[derive(Args)]
+pub(super) struct CalibrateArgs {
+    /// Where to write the device profile, as JSON
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Fit to measurements that were kept: files of `--data`, or of `impasto plan SCENE --strategy
+    /// exhaustive --format json`
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["data", "quick", "pool", "repetitions", "gpu", "checked", "validate_indirect"])]
+    from: Vec<PathBuf>,
+    /// Where to keep the measurements, as JSON
+    #[arg(long, value_name = "FILE")]
+    data: Option<PathBuf>,
+    /// Measure less, for a first impression
+    #[arg(long)]
+    quick: bool,
+    /// Paths in flight; give it several times to measure with each. Chosen by the kind of GPU otherwise
+    #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(64..))]
+    pool: Vec<u32>,
+    /// How often each kernel is timed; the median counts
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    repetitions: Option<u32>,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+pub(super) fn run(args: &CalibrateArgs, global: &Global) -> Outcome {
+    for out in args.out.iter().chain(&args.data) {
+        files::check_writable(out)?;
+    }
+    let mut sets = Vec::new();
+    for path in &args.from {
+        sets.extend(read(path)?);
+    }
+    if args.from.is_empty() {
+        sets = measure(args, global)?;
+    }
+    let start = calibrate::start(&sets)?;
+    let fitted = calibrate::fit(&sets, &start);
+    write(args, &fitted)?;
+    match global.json() {
+        true => print(&format!("{:#}\n", serde_json::json!(fitted))),
+        false => print(&calibrate::text(&fitted, global.verbose > 0)),
+    }
+}
+
+/// Measures on the GPU, and keeps what was measured if a place is given.
+fn measure(args: &CalibrateArgs, global: &Global) -> Result<Vec<Measurement>, Failure> {
+    let gpu = args.gpu.open()?;
+    let mut effort = Effort::of(&gpu, args.quick);
+    if !args.pool.is_empty() {
+        effort.pools.clone_from(&args.pool);
+    }
+    effort.repetitions = args.repetitions.unwrap_or(effort.repetitions);
+    let bar = super::render::progress_bar(global);
+    let mut progress = |step: &Step<'_>| {
+        let (scene, scenes) = step.at;
+        bar.set_length((scenes * step.kernels.all) as u64);
+        bar.set_position((scene * step.kernels.all + step.kernels.done) as u64);
+        global.detail(&format!("{}: {} kernels", step.scene, step.kernels.all));
+    };
+    let mut warn = |why: &str| global.note(&format!("warning: {why}"));
+    let sets = calibrate::measure(&gpu, &effort, &mut progress, &mut warn);
+    bar.finish_and_clear();
+    let sets = sets.map_err(|error| error.to_string())?;
+    if let Some(path) = &args.data {
+        files::write_whole(path, Data::new(sets.clone()).text().as_bytes())?;
+    }
+    Ok(sets)
+}
+
+fn read(path: &std::path::Path) -> Result<Vec<Measurement>, Failure> {
+    let cannot = |why: String| format!("cannot use `{}`: {why}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| cannot(files::reason(&error)))?;
+    Ok(Data::parse(&text).map_err(cannot)?.sets)
+}
+
+/// Writes the profile, if a place is given.
+fn write(args: &CalibrateArgs, fitted: &Fitted) -> Result<(), Failure> {
+    let Some(path) = &args.out else {
+        return Ok(());
+    };
+    let json = serde_json::to_string_pretty(&fitted.profile)
+        .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+    Ok(files::write_whole(path, format!("{json}\n").as_bytes())?)
+}

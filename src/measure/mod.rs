@@ -1,0 +1,9 @@
+//! Measuring material kernels: the data, and where they come from.
+
+mod candidates;
+mod data;
+mod scene;
+
+pub use candidates::{ALL, candidate, candidates, sample_for_fit};
+pub use data::{Adapter, Data, Kernel, Material, Measurement};
+pub use scene::{Kernels, Progress, Subject};

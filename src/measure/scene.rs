@@ -1,0 +1,182 @@
+//! Measuring the kernels of a scene in the runtime's laboratory.
+
+use std::time::Instant;
+
+use impasto_compiler::Program;
+use impasto_compiler::cost::Cost;
+use impasto_compiler::partition::Form;
+use impasto_runtime::gpu::Gpu;
+use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
+use impasto_runtime::world::{MaterialSource, World};
+
+use super::{Adapter, Kernel, Material, Measurement};
+use crate::{Error, Scene};
+
+/// Points at which each material is evaluated to learn what it costs.
+pub const COST_SAMPLES: usize = 1024;
+/// Kernels that are built and timed together.
+const BATCH: usize = 48;
+
+/// A scene with what is known of it before anything is measured.
+pub struct Subject<'p> {
+    name: String,
+    program: &'p Program,
+    world: World,
+    /// What each material costs; none if it is on no surface.
+    pub costs: Vec<Option<Cost>>,
+    /// The materials' names.
+    pub names: Vec<String>,
+}
+
+/// How far measuring is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Kernels measured.
+    pub done: usize,
+    /// Kernels to be measured.
+    pub all: usize,
+}
+
+/// Kernels with their times.
+#[derive(Clone, Debug, Default)]
+pub struct Kernels {
+    /// Those that could be measured.
+    pub kernels: Vec<Kernel>,
+    /// The others, each with the reason.
+    pub failed: Vec<(Candidate, String)>,
+    /// How many were left out because time was used up.
+    pub left_out: usize,
+}
+
+impl<'p> Subject<'p> {
+    /// A scene whose materials compiled to `program`.
+    ///
+    /// # Errors
+    /// If it cannot be rendered, or its materials take too long to evaluate.
+    pub fn new(scene: &Scene, program: &'p Program, options: &LabOptions) -> Result<Self, Error> {
+        let costs = crate::cost::of_scene(scene, program, COST_SAMPLES);
+        let costs = costs.map_err(|_| Error::Costs)?;
+        let world = World::new(
+            scene,
+            &program.infos(),
+            &MaterialSource::instances(program),
+            &program.textures(),
+            &options.technique,
+        );
+        Ok(Self {
+            name: scene.name.clone(),
+            program,
+            world: world.map_err(impasto_runtime::error::RuntimeError::from)?,
+            names: costs.iter().map(|material| material.name.clone()).collect(),
+            costs: costs.into_iter().map(|material| material.cost).collect(),
+        })
+    }
+
+    /// Opens the laboratory.
+    ///
+    /// # Errors
+    /// If the scene cannot be rendered on the GPU, or that has no timestamps.
+    pub fn lab<'a>(&'a self, gpu: &'a Gpu, options: &LabOptions) -> Result<Lab<'a>, Error> {
+        Ok(Lab::new(gpu, &self.world, self.program, options)?)
+    }
+
+    /// The materials that are on some surface.
+    pub fn materials(&self, lab: &Lab<'_>) -> Vec<usize> {
+        let hits = lab.workload().materials.iter().enumerate();
+        hits.filter(|(_, h)| h.on_surface).map(|(m, _)| m).collect()
+    }
+
+    /// Times kernels, until `deadline` if there is one.
+    ///
+    /// # Errors
+    /// If the GPU fails.
+    pub fn time(
+        &self,
+        lab: &mut Lab<'_>,
+        candidates: &[Candidate],
+        deadline: Option<Instant>,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Kernels, Error> {
+        let mut all = Kernels::default();
+        let mut done = 0;
+        for batch in candidates.chunks(BATCH) {
+            progress(Progress {
+                done,
+                all: candidates.len(),
+            });
+            if deadline.is_some_and(|end| Instant::now() >= end) {
+                all.left_out = candidates.len() - done;
+                break;
+            }
+            for (candidate, result) in batch.iter().zip(lab.kernels(batch)?) {
+                match result {
+                    Ok(measured) => all.kernels.push(self.kernel(candidate, &measured)),
+                    Err(why) => all.failed.push((candidate.clone(), why)),
+                }
+            }
+            done += batch.len();
+        }
+        Ok(all)
+    }
+
+    fn kernel(&self, candidate: &Candidate, measured: &Measured) -> Kernel {
+        let of = match candidate.form {
+            Form::Inline => measured.logic_seconds,
+            _ => measured.seconds,
+        };
+        Kernel {
+            form: candidate.form,
+            members: candidate
+                .members
+                .iter()
+                .map(|m| self.names[*m].clone())
+                .collect(),
+            measured: measured.seconds,
+            spread: measured.spread / of.max(f64::MIN_POSITIVE),
+            items: measured.items,
+            logic_seconds: measured.logic_seconds,
+            registers: None,
+        }
+    }
+
+    /// Kernels as data.
+    pub fn measurement(
+        &self,
+        gpu: &Gpu,
+        lab: &Lab<'_>,
+        options: &LabOptions,
+        kernels: Vec<Kernel>,
+    ) -> Measurement {
+        let workload = lab.workload().clone();
+        let materials = self.names.iter().zip(&self.costs);
+        let material = |(name, cost): (&String, &Option<Cost>)| Material {
+            name: name.clone(),
+            cost: cost.clone(),
+        };
+        Measurement {
+            scene: self.name.clone(),
+            adapter: Adapter::of(gpu),
+            pool: lab.pool(),
+            repetitions: options.repetitions,
+            materials: materials.map(material).collect(),
+            kernels,
+            logic_seconds: workload.logic_seconds,
+            other_seconds: workload.other_seconds,
+            workload,
+        }
+    }
+}
+
+impl Adapter {
+    /// That of an open GPU.
+    pub fn of(gpu: &Gpu) -> Self {
+        let info = gpu.info();
+        Self {
+            name: info.name,
+            backend: info.backend,
+            driver: info.driver,
+            kind: info.kind.into(),
+            subgroup: gpu.subgroup_size(),
+        }
+    }
+}
