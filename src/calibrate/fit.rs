@@ -306,3 +306,172 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     }
     ranks
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::{Adapter, Data, Material};
+    use impasto_compiler::cost::{Classes, Inputs, LANES, Operations};
+    use impasto_compiler::partition::{Hits, Workload};
+
+    fn cost(numbers: &mut Inputs) -> Cost {
+        let mut some = |most: f64| (most * numbers.unit()).ceil();
+        let classes = Classes {
+            alu: some(900.0),
+            special: some(60.0),
+            integer: some(300.0),
+            texture: some(3.0),
+            turns: some(80.0),
+        };
+        let live = some(120.0) as u32;
+        let issued = |i: usize| {
+            let times = 1.0 + 0.2 * i as f64;
+            Classes {
+                turns: classes.turns * times,
+                ..classes
+            }
+        };
+        Cost {
+            operations: Operations {
+                evaluations: 1,
+                mean: classes.sum(),
+                min: 0,
+                max: 0,
+                classes,
+            },
+            issued: std::array::from_fn::<_, { LANES.len() }, _>(issued),
+            live,
+            code: some(4000.0) as u32,
+            loops: 1,
+            bytes: some(64.0),
+        }
+    }
+
+    /// Scenes whose kernels take exactly what the model says by `truth`.
+    fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
+        let mut numbers = Inputs::new(7);
+        let scene = |(index, pool): (usize, u32)| {
+            let name = |m: usize| format!("m{index}{m}");
+            let hits = |m: usize| Hits {
+                material: name(m),
+                on_surface: true,
+                share: 0.1 + 0.03 * m as f64,
+                present: if index % 2 == 0 {
+                    0.97
+                } else {
+                    0.2 + 0.03 * m as f64
+                },
+            };
+            let mut set = Measurement {
+                scene: format!("scene {index}"),
+                adapter: Adapter {
+                    name: "test".into(),
+                    ..Adapter::default()
+                },
+                pool,
+                repetitions: 1,
+                workload: Workload {
+                    pool,
+                    materials: (0..5).map(hits).collect(),
+                    loads: 112.0,
+                    stores: 96.0,
+                    logic_seconds: 1e-4,
+                    other_seconds: 1e-3,
+                },
+                materials: (0..5)
+                    .map(|m| Material {
+                        name: name(m),
+                        cost: Some(cost(&mut numbers)),
+                    })
+                    .collect(),
+                kernels: Vec::new(),
+                logic_seconds: 1e-4,
+                other_seconds: 1e-3,
+            };
+            let costs: Vec<_> = set.materials.iter().map(|m| m.cost.clone()).collect();
+            let model = Calibrated {
+                costs: &costs,
+                workload: &set.workload,
+                profile: truth,
+            };
+            let all: Vec<usize> = (0..5).collect();
+            let kernel = |c: impasto_runtime::lab::Candidate| Kernel {
+                form: c.form,
+                members: c.members.iter().map(|m| name(*m)).collect(),
+                measured: model.predict(c.form, &c.members).total,
+                spread: 0.0,
+                items: 0,
+                logic_seconds: 1e-4,
+                registers: None,
+            };
+            let kernels = crate::measure::sample_for_fit(&all, true);
+            set.kernels = kernels.into_iter().map(kernel).collect();
+            set
+        };
+        let pools = [1 << 18, 1 << 18, 1 << 22, 1 << 22];
+        pools.into_iter().enumerate().map(scene).collect()
+    }
+
+    fn shipped() -> DeviceProfile {
+        DeviceProfile::named("h200").expect("it is shipped")
+    }
+
+    #[test]
+    fn times_made_by_the_model_are_fitted_by_it() {
+        let mut truth = shipped();
+        truth.weights.alu *= 2.0;
+        truth.weights.integer *= 0.6;
+        truth.weights.memory *= 1.7;
+        truth.weights.launch *= 3.0;
+        let sets = measured_by(&truth);
+        let fitted = fit(&sets, &shipped());
+        assert!(fitted.before.median > 0.2, "{:?}", fitted.before);
+        let all = fitted.profile.fit;
+        assert!(
+            all.median_error < 0.01 && all.held_out_error < 0.05,
+            "{all:?}"
+        );
+        assert!(all.rank_correlation > 0.999, "{all:?}");
+        assert_eq!(all.points as usize, fitted.residuals.len());
+        let error = fitted.profile.weights.launch / truth.weights.launch;
+        assert!((0.9..1.1).contains(&error), "{error}");
+        // The same again, also by way of a file.
+        let data = Data::parse(&Data::new(sets.clone()).text()).expect("it reads back");
+        assert_eq!(data.sets.len(), 4);
+        let again = fit(&sets, &shipped());
+        assert_eq!(again.profile, fitted.profile);
+    }
+
+    #[test]
+    fn a_kernel_that_the_model_cannot_know_does_not_bend_the_rest() {
+        let truth = shipped();
+        let mut sets = measured_by(&truth);
+        sets[0].kernels[0].measured *= 50.0;
+        let fitted = fit(&sets, &truth);
+        let off = |r: &&Residual| (r.ratio - 1.0).abs() > 0.1;
+        assert!(fitted.residuals.iter().filter(off).count() < fitted.residuals.len() / 20);
+        assert!(fitted.residuals[0].ratio < 0.1);
+    }
+
+    #[test]
+    fn materials_of_unknown_cost_are_left_out() {
+        let mut sets = measured_by(&shipped());
+        let all = fit(&sets, &shipped()).residuals.len();
+        sets[0].materials[4].cost = None;
+        let rest = fit(&sets, &shipped()).residuals;
+        assert!(rest.len() < all);
+        let name = "m04".to_string();
+        assert!(rest.iter().all(|r| !r.members.contains(&name)));
+    }
+
+    #[test]
+    fn ranks_of_equal_numbers_are_shared() {
+        let r = rank_correlation(&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 400.0]);
+        assert!((r - 1.0).abs() < 1e-12);
+        let r = rank_correlation(&[1.0, 2.0, 3.0], &[3.0, 2.0, 1.0]);
+        assert!((r + 1.0).abs() < 1e-12);
+        assert_eq!(ranks(&[5.0, 1.0, 5.0]), [1.5, 0.0, 1.5]);
+        assert_eq!(rank_correlation(&[1.0, 1.0], &[1.0, 2.0]), 0.0);
+        assert_eq!(rank_correlation(&[], &[]), 0.0);
+    }
+}

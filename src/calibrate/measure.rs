@@ -36,7 +36,7 @@ impl Effort {
             },
             repetitions: if software { 5 } else { 9 },
             quick: quick || software,
-            side: if software { 128 } else { 1024 },
+            side: if software { 64 } else { 1024 },
         }
     }
 }

@@ -185,3 +185,86 @@ impl Measurement {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use impasto_compiler::partition::Hits;
+
+    fn measurement() -> Measurement {
+        Measurement {
+            scene: "room".into(),
+            adapter: Adapter::default(),
+            pool: 64,
+            repetitions: 3,
+            workload: Workload {
+                pool: 64,
+                materials: vec![Hits {
+                    material: "paint".into(),
+                    on_surface: true,
+                    share: 0.5,
+                    present: 0.9,
+                }],
+                loads: 1.0,
+                stores: 2.0,
+                logic_seconds: 0.1,
+                other_seconds: 0.2,
+            },
+            materials: vec![Material {
+                name: "paint".into(),
+                cost: None,
+            }],
+            kernels: vec![Kernel {
+                form: Form::Own,
+                members: vec!["paint".into()],
+                measured: 1e-5,
+                spread: 0.01,
+                items: 32,
+                logic_seconds: 1e-5,
+                registers: None,
+            }],
+            logic_seconds: 0.1,
+            other_seconds: 0.2,
+        }
+    }
+
+    #[test]
+    fn files_of_all_kinds_are_read() {
+        let data = Data::new(vec![measurement(), measurement()]);
+        assert_eq!(Data::parse(&data.text()), Ok(data));
+        // What `impasto plan` answers has more in it.
+        let mut answer = serde_json::to_value(measurement()).expect("JSON");
+        answer["plans"] = serde_json::json!([{ "strategy": "own" }]);
+        answer["kernels"][0]["predicted"] = serde_json::json!({ "total": 1.0 });
+        let one = Data::new(vec![measurement()]);
+        assert_eq!(Data::parse(&answer.to_string()), Ok(one.clone()));
+        let record = serde_json::json!({ "version": "x", "command": "y", "answer": answer });
+        assert_eq!(Data::parse(&record.to_string()), Ok(one));
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_said_with_what_to_do() {
+        let refused = |text: &str, part: &str| {
+            let why = Data::parse(text).expect_err(text);
+            assert!(
+                why.contains(part) && why.contains("hint: measure again"),
+                "{why}"
+            );
+        };
+        refused("", "cannot be read");
+        refused("{\"sets\": [", "cannot be read");
+        refused("{}", "no measurements");
+        refused("{\"version\": 7, \"sets\": []}", "version 7");
+        refused("{\"sets\": []}", "version null");
+        refused("{\"version\": 1, \"sets\": [{}]}", "missing field");
+        let with = |change: &dyn Fn(&mut Measurement)| {
+            let mut set = measurement();
+            change(&mut set);
+            Data::new(vec![set]).text()
+        };
+        refused(&with(&|s| s.kernels[0].members.clear()), "does not list");
+        refused(&with(&|s| s.kernels[0].members[0] = "wax".into()), "wax");
+        refused(&with(&|s| s.kernels[0].measured = -1.0), "no time");
+        refused(&with(&|s| s.materials.clear()), "other materials");
+    }
+}
