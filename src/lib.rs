@@ -46,6 +46,7 @@ pub mod cost;
 pub mod files;
 mod ir_text;
 pub mod measure;
+pub mod plan;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]

@@ -22,8 +22,10 @@ mod info;
 mod interrupt;
 mod merge;
 mod outputs;
+mod plan;
 mod rays;
 mod render;
+mod strategy;
 mod technique;
 
 /// A material language, and the wavefront path tracer its compiler feeds.
@@ -73,6 +75,8 @@ enum Command {
     Cost(cost::CostArgs),
     /// Fit the time model to this GPU, by kernels that are timed
     Calibrate(Box<calibrate::CalibrateArgs>),
+    /// Explain which materials share a kernel in a scene, and why
+    Plan(Box<plan::PlanCommandArgs>),
     /// Evaluate a material, closure or function at one point
     Eval(eval::EvalArgs),
     /// Render a scene
@@ -116,6 +120,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Emit(args) => emit::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),
+        Command::Plan(args) => plan::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
         Command::Rays(args) => rays::run(&args, &global),
@@ -208,6 +213,15 @@ fn print(text: &str) -> Outcome {
         ))),
         _ => Ok(()),
     }
+}
+
+/// The text of a file that an option names.
+fn read_text(path: &std::path::Path) -> Result<String, Failure> {
+    let text = std::fs::read_to_string(path);
+    text.map_err(|error| {
+        let why = impasto::files::reason(&error);
+        Failure::Error(format!("cannot read `{}`: {why}", path.display()))
+    })
 }
 
 /// An error of the renderer.

@@ -38,6 +38,25 @@ impl Plan {
         }
     }
 
+    /// Holds the plan to leaving out only materials of `unbound`, which no surface of the scene binds.
+    ///
+    /// # Errors
+    /// The first material that a surface binds and that has no kernel.
+    pub fn check_unused(&self, unbound: &[usize], names: &[String]) -> Result<(), PlanError> {
+        let missed = self.unused.iter().find(|m| !unbound.contains(m));
+        let name = |m: &usize| names.get(*m).map_or("?", String::as_str);
+        match missed {
+            None => Ok(()),
+            Some(m) => {
+                let name = name(m);
+                let message =
+                    format!("it has no kernel for `{name}`, which is on a surface of the scene");
+                Err(PlanError::new(message)
+                    .hint("make a new one with `impasto plan SCENE --save P.json`"))
+            }
+        }
+    }
+
     /// Each material has exactly one place.
     fn check_places(&self, names: &[String]) -> Result<(), PlanError> {
         let mut places: Vec<Vec<&str>> = vec![Vec::new(); names.len()];
@@ -114,6 +133,9 @@ mod tests {
                     let fewer = plan.leaving_out(&[1]);
                     assert_eq!(fewer.check_named(names), Ok(()), "{strategy:?}");
                     assert_eq!(fewer.unused, [1]);
+                    assert_eq!(fewer.check_unused(&[0, 1], names), Ok(()));
+                    let missed = fewer.check_unused(&[0], names).expect_err("1 is bound");
+                    assert!(missed.message().contains("no kernel for `glass`"));
                     assert!(fewer.kernels.iter().all(|k| !k.materials.contains(&1)));
                 }
             }

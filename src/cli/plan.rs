@@ -1,0 +1,197 @@
+//! `impasto plan`: which materials share a kernel in a scene, and why.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use impasto::compiler::partition::explain::{Explanation, Subject, explain};
+use impasto::compiler::partition::{Calibrated, DeviceProfile, Plan, Wanted, Workload, file};
+use impasto::compiler::{self};
+use impasto::plan::Facts;
+use impasto::{FileLoader, Gpu, Program, Scene, files};
+use serde::Serialize;
+
+use super::info::GpuArgs;
+use super::strategy::{PlanArgs, Source};
+use super::{Failure, Global, Outcome, print, read_text};
+
+#[derive(Args)]
+pub(super) struct PlanCommandArgs {
+    /// The scene, a TOML file
+    scene: PathBuf,
+    #[command(flatten)]
+    wanted: PlanArgs,
+    /// How paths hit materials, from a file that `--save-workload` wrote; otherwise a few iterations are
+    /// rendered
+    #[arg(long, value_name = "FILE")]
+    workload: Option<PathBuf>,
+    /// What the GPU's operations take: a profile that is part of the program (h200, llvmpipe), or a file
+    /// that `impasto calibrate` wrote; otherwise the one that fits the GPU best
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
+    /// Paths in flight; as in a render, or as in the workload, otherwise
+    #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
+    pool: Option<u32>,
+    /// At how many points each material is evaluated
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    samples: u32,
+    /// Where to write the plan, for `impasto render --plan`
+    #[arg(long, value_name = "P.json")]
+    save: Option<PathBuf>,
+    /// Where to write how paths hit materials
+    #[arg(long, value_name = "FILE")]
+    save_workload: Option<PathBuf>,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+/// A profile, and whether it is the GPU's own.
+struct Profile {
+    profile: DeviceProfile,
+    exact: bool,
+}
+
+/// What is printed as JSON.
+#[derive(Serialize)]
+struct Output<'a> {
+    scene: String,
+    #[serde(flatten)]
+    explanation: &'a Explanation,
+    workload: &'a Workload,
+}
+
+pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
+    for path in args.save.iter().chain(&args.save_workload) {
+        files::check_writable(path)?;
+    }
+    let (scene, program) = compile(&args.scene, global)?;
+    let facts = Facts::of_scene(&scene, &program, args.samples as usize)
+        .map_err(|_| "the materials take too long to evaluate; try fewer `--samples`".to_owned())?;
+    // What is wrong with the plan is said before anything is rendered.
+    let source = args
+        .wanted
+        .source(&facts.names, &facts.unused, Wanted::Auto)?;
+    let mut gpu = None;
+    let workload = args.workload(&facts, &mut gpu, &scene, &program)?;
+    let profile = args.profile(&mut gpu)?;
+    let plan = match source {
+        Source::Given(plan) => plan,
+        Source::Strategy(wanted) => {
+            let known = facts.known(&workload, &profile.profile);
+            wanted.plan(&known).map_err(|e| e.to_string())?
+        }
+    };
+    let subject = Subject {
+        plan: &plan,
+        names: &facts.names,
+        model: Calibrated {
+            costs: &facts.costs,
+            workload: &workload,
+            profile: &profile.profile,
+        },
+        exact: profile.exact,
+    };
+    let explanation = explain(&subject).map_err(|e| e.to_string())?;
+    args.save(&plan, &facts.names, &workload)?;
+    match global.json() {
+        true => args.print_json(&explanation, &workload),
+        false => print(&explanation.to_string()),
+    }
+}
+
+impl PlanCommandArgs {
+    fn workload(
+        &self,
+        facts: &Facts,
+        gpu: &mut Option<Gpu>,
+        scene: &Scene,
+        program: &Program,
+    ) -> Result<Workload, Failure> {
+        let Some(path) = &self.workload else {
+            let gpu = self.opened(gpu)?;
+            return impasto::plan::workload(gpu, scene, program, self.pool).map_err(super::runtime);
+        };
+        let workload = Workload::parse(&read_text(path)?, &facts.names);
+        let mut workload = workload.map_err(|e| format!("`{}`: {e}", path.display()))?;
+        workload.pool = self.pool.unwrap_or(workload.pool);
+        Ok(workload)
+    }
+
+    fn profile(&self, gpu: &mut Option<Gpu>) -> Result<Profile, Failure> {
+        if let Some(profile) = self.profile.as_deref().and_then(DeviceProfile::named) {
+            return Ok(Profile {
+                profile,
+                exact: true,
+            });
+        }
+        if let Some(path) = &self.profile {
+            let text = read_text(Path::new(path)).map_err(|error| self.no_profile(path, error))?;
+            let parsed = DeviceProfile::parse(&text).map_err(|e| format!("`{path}`: {e}"));
+            return Ok(Profile {
+                profile: parsed?,
+                exact: true,
+            });
+        }
+        let info = self.opened(gpu)?.info();
+        let choice = DeviceProfile::shipped(&info.name, info.kind).map_err(|e| e.to_string())?;
+        Ok(Profile {
+            profile: choice.profile,
+            exact: choice.exact,
+        })
+    }
+
+    /// A name that is neither a shipped profile's nor a file's.
+    fn no_profile(&self, path: &str, error: Failure) -> Failure {
+        match error {
+            Failure::Error(message) => {
+                let names: Vec<&str> = DeviceProfile::shipped_names().collect();
+                let hint = format!("give a file, or one of {}", names.join(", "));
+                match Path::new(path).exists() {
+                    true => Failure::Error(message),
+                    false => Failure::Error(format!("{message}\nhint: {hint}")),
+                }
+            }
+            other => other,
+        }
+    }
+
+    /// The GPU, which is opened when it is first asked for.
+    fn opened<'g>(&self, gpu: &'g mut Option<Gpu>) -> Result<&'g Gpu, Failure> {
+        match gpu {
+            Some(gpu) => Ok(gpu),
+            none => Ok(none.insert(self.gpu.open()?)),
+        }
+    }
+
+    fn save(&self, plan: &Plan, names: &[String], workload: &Workload) -> Outcome {
+        if let Some(path) = &self.save {
+            files::write_whole(path, file::write(plan, names).as_bytes())?;
+        }
+        if let Some(path) = &self.save_workload {
+            let text = serde_json::to_string_pretty(workload)
+                .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+            files::write_whole(path, format!("{text}\n").as_bytes())?;
+        }
+        Ok(())
+    }
+
+    fn print_json(&self, explanation: &Explanation, workload: &Workload) -> Outcome {
+        let output = Output {
+            scene: self.scene.display().to_string(),
+            explanation,
+            workload,
+        };
+        let text = serde_json::to_string_pretty(&output);
+        let text = text.map_err(|error| format!("cannot write the explanation: {error}"))?;
+        print(&format!("{text}\n"))
+    }
+}
+
+/// The scene and what its materials compile to.
+fn compile(path: &Path, global: &Global) -> Result<(Scene, Program), Failure> {
+    let scene = impasto::load(path).map_err(|e| Failure::Error(e.to_string()))?;
+    let mut loader = FileLoader::new(&scene.base);
+    let compiled = compiler::compile(&impasto::requests(&scene), &mut loader);
+    global.report(&compiled.sources, &compiled.diagnostics);
+    let program = compiled.program.ok_or(Failure::Diagnostics)?;
+    Ok((scene, program))
+}

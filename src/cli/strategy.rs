@@ -1,0 +1,69 @@
+//! The options that say how materials share kernels, the same for every command that plans.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use impasto::Plan;
+use impasto::compiler::partition::{PlanError, STRATEGIES, Wanted, file, text};
+
+use super::Failure;
+
+/// How materials share kernels.
+#[derive(Args)]
+pub(super) struct PlanArgs {
+    /// How materials share kernels
+    #[arg(long, value_name = "NAME", value_parser = parse, long_help = help())]
+    strategy: Option<Wanted>,
+    /// Use the plan of this file, which `impasto plan --save` wrote
+    #[arg(long, value_name = "P.json", conflicts_with_all = ["strategy", "partition"])]
+    plan: Option<PathBuf>,
+    /// Use this partition: groups of materials with their forms, as in
+    /// `own:paint|binned:wood,marble|inline:*`
+    #[arg(long, value_name = "GROUPS", conflicts_with = "strategy")]
+    partition: Option<String>,
+}
+
+/// Where a plan comes from.
+pub(super) enum Source {
+    /// A strategy is still to make it.
+    Strategy(Wanted),
+    /// It was given.
+    Given(Plan),
+}
+
+impl PlanArgs {
+    /// What was asked for, of materials called `names` of which no surface binds `unused`; `default` if
+    /// nothing was.
+    pub(super) fn source(
+        &self,
+        names: &[String],
+        unused: &[usize],
+        default: Wanted,
+    ) -> Result<Source, Failure> {
+        let error = |e: PlanError| Failure::Error(e.to_string());
+        if let Some(path) = &self.plan {
+            let of_file = |e| Failure::Error(format!("`{}`: {e}", path.display()));
+            let plan = file::read(&super::read_text(path)?, names).map_err(of_file)?;
+            plan.check_unused(unused, names).map_err(of_file)?;
+            return Ok(Source::Given(plan));
+        }
+        if let Some(groups) = &self.partition {
+            let plan = text::parse(groups, names, unused).map_err(error)?;
+            return Ok(Source::Given(plan));
+        }
+        Ok(Source::Strategy(self.strategy.unwrap_or(default)))
+    }
+}
+
+fn parse(name: &str) -> Result<Wanted, String> {
+    Wanted::parse(name).map_err(|error| error.to_string())
+}
+
+/// The table of strategies.
+fn help() -> String {
+    let mut help = "How materials share kernels\n".to_owned();
+    for row in STRATEGIES {
+        help += &format!("\n{:<12} {}", row.name, row.help);
+    }
+    help
+}
