@@ -21,11 +21,14 @@ use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
 use impasto_compiler::ir::interp::OutOfFuel;
 use impasto_compiler::partition::{DeviceProfile, Known, Workload};
-use impasto_runtime::lab::{Lab, LabOptions};
+use impasto_runtime::render::profile_workload;
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
 
 use crate::{Gpu, RuntimeError, Scene};
+
+/// Iterations whose mean a workload is.
+const ITERATIONS: u32 = 16;
 
 /// What is known of a scene's materials without rendering it.
 #[derive(Clone, Debug)]
@@ -92,11 +95,5 @@ pub fn workload(
         &program.textures(),
         &technique,
     )?;
-    let options = LabOptions {
-        pool,
-        technique,
-        ..LabOptions::default()
-    };
-    let lab = Lab::new(gpu, &world, program, &options)?;
-    Ok(lab.workload().clone())
+    profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
 }

@@ -103,8 +103,8 @@ pub struct Rival {
     pub partition: String,
     /// What its material kernels take.
     pub seconds: f64,
-    /// That over what those of the plan explained take.
-    pub times: f64,
+    /// That over what those of the plan explained take; none where those take nothing.
+    pub times: Option<f64>,
 }
 
 /// Explains a plan.
@@ -241,7 +241,7 @@ impl Subject<'_> {
                 strategy: wanted.to_string(),
                 partition: super::text::print(&plan, self.names),
                 seconds: takes,
-                times: if seconds > 0.0 { takes / seconds } else { 1.0 },
+                times: (seconds > 0.0).then(|| takes / seconds),
             })
         };
         all.filter_map(rival).collect()

@@ -34,20 +34,16 @@ impl fmt::Display for Explanation {
 
 impl Explanation {
     fn head(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kernels = match self
-            .kernels
-            .iter()
-            .filter(|k| k.form != Form::Inline)
-            .count()
-        {
-            1 => "1 material kernel".to_owned(),
-            n => format!("{n} material kernels"),
+        let inline = self.kernels.iter().any(|k| k.form == Form::Inline);
+        let kernels = match (self.kernels.len() - usize::from(inline), inline) {
+            (0, true) => "no material kernel, all is inline".to_owned(),
+            (n, inline) => format!(
+                "{n} material {}{}",
+                if n == 1 { "kernel" } else { "kernels" },
+                if inline { " and inline materials" } else { "" }
+            ),
         };
-        let inline = match self.kernels.iter().any(|k| k.form == Form::Inline) {
-            true => " and inline materials",
-            false => "",
-        };
-        writeln!(f, "plan `{}`: {kernels}{inline}", self.strategy)?;
+        writeln!(f, "plan `{}`: {kernels}", self.strategy)?;
         writeln!(f, "partition: {}", self.partition)?;
         let profile = match self.exact {
             true => "",
@@ -61,7 +57,11 @@ impl Explanation {
             time(self.seconds)
         )?;
         match self.other_seconds > 0.0 {
-            true => writeln!(f, ", beside {} for all else", time(self.other_seconds)),
+            true => writeln!(
+                f,
+                ", beside {} for all else where hits were counted",
+                time(self.other_seconds)
+            ),
             false => writeln!(f),
         }
     }
@@ -89,11 +89,11 @@ impl Explanation {
             true => ", the same",
             false => "",
         };
-        writeln!(
-            f,
-            "  {strategy:<10} {:>10}  {times:.2} times{same}",
-            time(*seconds)
-        )
+        write!(f, "  {strategy:<10} {:>10}", time(*seconds))?;
+        match times {
+            Some(times) => writeln!(f, "  {times:.2} times{same}"),
+            None => writeln!(f, "{same}"),
+        }
     }
 }
 
@@ -163,7 +163,7 @@ fn write_member(f: &mut fmt::Formatter<'_>, member: &Member, width: usize) -> fm
         (Some(operations), Some(efficiency)) => writeln!(
             f,
             ", {} operations, {:.0} % of lanes at work",
-            grouped(operations.round() as u64),
+            grouped(three_digits(*operations)),
             100.0 * efficiency
         ),
         _ => writeln!(f, ", cost not known"),
@@ -207,6 +207,12 @@ fn time(seconds: f64) -> String {
         v if v >= 0.0005 => format!("{v:.2} {unit}"),
         _ => format!("0 {unit}"),
     }
+}
+
+/// A count, rounded to three digits.
+fn three_digits(count: f64) -> u64 {
+    let unit = 10f64.powi((count.max(1.0).log10().floor() as i32 - 2).max(0));
+    ((count / unit).round() * unit) as u64
 }
 
 /// `1,048,576`.
