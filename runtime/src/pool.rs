@@ -147,6 +147,12 @@ impl Pace {
         }
     }
 
+    /// Asks for at most `max` iterations from now on.
+    pub(crate) fn limit(&mut self, max: u32) {
+        self.max = max.clamp(1, MAX_ITERATIONS);
+        self.iterations = self.iterations.min(self.max);
+    }
+
     /// Called whenever a submission is done.
     pub(crate) fn adapt(&mut self) {
         let took = self.last.elapsed();

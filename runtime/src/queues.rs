@@ -225,11 +225,15 @@ impl Counters {
         words.get(self.index(scalar)).copied().unwrap_or(0)
     }
 
-    /// Samples dropped because a value was no number, by kernels and at the end of paths.
-    pub(crate) fn all_nonfinite(self, words: &[u32]) -> u64 {
+    /// Samples dropped because a value was no number, by kernels.
+    pub(crate) fn kernels_nonfinite(self, words: &[u32]) -> u64 {
         let of_kernels = (0..self.kernels).filter_map(|kernel| words.get(self.nonfinite(kernel)));
-        let dropped: u64 = of_kernels.map(|n| u64::from(*n)).sum();
-        dropped + u64::from(self.scalar(words, Scalar::FilmNonfinite))
+        of_kernels.map(|n| u64::from(*n)).sum()
+    }
+
+    /// The same with those found at the end of paths.
+    pub(crate) fn all_nonfinite(self, words: &[u32]) -> u64 {
+        self.kernels_nonfinite(words) + u64::from(self.scalar(words, Scalar::FilmNonfinite))
     }
 
     /// The length of `queue` when it was consumed last, in the words read back.

@@ -2,7 +2,7 @@
 //! as JSON; the names of fields are a promise.
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
-use impasto_compiler::partition::Workload;
+use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::Serialize;
 
 use crate::film::Film;
@@ -22,6 +22,12 @@ pub struct Report {
     pub adapter: AdapterReport,
     /// The plan's strategy.
     pub strategy: String,
+    /// The plan: groups of materials with their forms, as `impasto render --partition` takes it;
+    /// `mega` for a megakernel.
+    pub plan: String,
+    /// How the plan was renewed while rendering; absent if it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replanned: Option<ReplanReport>,
     /// How the work was done.
     pub technique: Technique,
     /// Columns of the picture.
@@ -74,7 +80,7 @@ pub struct Report {
     pub pool_size: u32,
     /// Times every kernel was dispatched.
     pub iterations: u64,
-    /// The kernels in the order of an iteration.
+    /// The kernels in the order of an iteration; of a renewed plan what they did since then.
     pub kernels: Vec<KernelReport>,
     /// What paths hit, on average over the iterations; absent if that was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -153,6 +159,35 @@ pub struct KernelReport {
     pub nonfinite_samples: u64,
 }
 
+/// How a plan was renewed while rendering.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReplanReport {
+    /// Iterations that the first plan ran.
+    pub at_iteration: u64,
+    /// Time from the first submission until then.
+    pub at_seconds: f64,
+    /// Time that planning took, while the GPU went on.
+    pub planning_seconds: f64,
+    /// Time that compiling the new kernels took, while the GPU went on.
+    pub compile_seconds: f64,
+    /// The first plan.
+    pub from: String,
+    /// The new plan; absent if none was made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+    /// Why the first plan went on, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<String>,
+    /// GPU time of the first plan.
+    pub gpu_seconds: f64,
+    /// GPU time that counting hits took: by how much the logic kernel got faster without. Absent if
+    /// the new plan's logic kernel evaluates materials, or there are no timestamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counting_seconds: Option<f64>,
+    /// What the first plan's kernels did; empty where they went on.
+    pub kernels: Vec<KernelReport>,
+}
+
 /// What a render took over from an earlier run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Resumed {
@@ -173,6 +208,8 @@ pub(crate) struct Inputs<'a> {
     pub kernels: &'a [Kernel],
     pub timed: bool,
     pub strategy: &'a str,
+    pub plan: &'a Plan,
+    pub replanned: Option<ReplanReport>,
     pub geometry: GeometryCounts,
     pub pool: u32,
     pub materials: &'a [MaterialReport],
@@ -191,16 +228,18 @@ impl Inputs<'_> {
         } else {
             self.wall_seconds
         };
-        let kernels = self.kernels.iter().zip(&status.step_seconds).enumerate();
-        let kernels: Vec<_> = kernels
-            .map(|(index, (kernel, seconds))| KernelReport {
-                utilisation: self.layout.counters.utilisation(&status.counters, index),
-                ..self.kernel(kernel, *seconds, status, paths)
-            })
-            .collect();
+        let kernels = Ran {
+            layout: self.layout,
+            kernels: self.kernels,
+            materials: self.materials,
+            pool: self.pool,
+        };
+        let kernels = kernels.report(status, paths);
         let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
         Report {
             strategy: self.strategy.to_string(),
+            plan: partition(self.plan, self.materials),
+            replanned: self.replanned,
             technique: self.options.technique,
             width: film.width,
             height: film.height,
@@ -229,6 +268,7 @@ impl Inputs<'_> {
             kernels,
             workload: self.workload,
             nonfinite_samples: self.resumed.nonfinite
+                + status.before.nonfinite
                 + self.layout.counters.all_nonfinite(&status.counters),
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
@@ -241,8 +281,38 @@ impl Inputs<'_> {
             },
         }
     }
+}
+
+/// A plan as a string, for materials of some reports.
+pub(crate) fn partition(plan: &Plan, materials: &[MaterialReport]) -> String {
+    let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+    match plan.organisation {
+        Organisation::Wavefront => text::print(plan, &names),
+        Organisation::Mega => "mega".to_string(),
+    }
+}
+
+/// The kernels of a plan that ran.
+pub(crate) struct Ran<'a> {
+    pub layout: &'a Layout,
+    pub kernels: &'a [Kernel],
+    pub materials: &'a [MaterialReport],
+    pub pool: u32,
+}
+
+impl Ran<'_> {
+    /// What each did since the plan began; a megakernel finished `paths`.
+    pub(crate) fn report(&self, status: &Status, paths: u64) -> Vec<KernelReport> {
+        let kernels = self.kernels.iter().zip(&status.step_seconds).enumerate();
+        let report = kernels.map(|(index, (kernel, seconds))| KernelReport {
+            utilisation: self.layout.counters.utilisation(&status.counters, index),
+            ..self.kernel(kernel, *seconds, status, paths)
+        });
+        report.collect()
+    }
 
     fn kernel(&self, kernel: &Kernel, seconds: f64, status: &Status, paths: u64) -> KernelReport {
+        let iterations = status.iterations - status.before.iterations;
         let (recipe, counters) = (&kernel.recipe, self.layout.counters);
         let name = |index: &usize| self.materials.get(*index).map(|m| m.name.clone());
         let nonfinite = counters.nonfinite(recipe.counter);
@@ -257,9 +327,9 @@ impl Inputs<'_> {
                 Feed::Queues { first, count } => (first..first + count)
                     .map(|queue| counters.items_of(&status.counters, queue))
                     .sum(),
-                Feed::Pool if self.layout.wavefront => status.iterations * u64::from(self.pool),
+                Feed::Pool if self.layout.wavefront => iterations * u64::from(self.pool),
                 Feed::Pool | Feed::Fetched => paths,
-                Feed::Once | Feed::Groups(_) => status.iterations,
+                Feed::Once | Feed::Groups(_) => iterations,
             },
             gpu_seconds: seconds,
             utilisation: None,

@@ -12,10 +12,13 @@ use crate::render::RenderOptions;
 use crate::{order, random};
 
 /// Every buffer, by the index that kernels bind it at.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Resources {
     buffers: Vec<wgpu::Buffer>,
 }
+
+/// The buffers whose size depends on a plan's kernels.
+const OF_PLAN: [&str; 3] = ["queues", "counters", "arguments"];
 
 /// The indices of the runtime's own buffers that the host touches.
 fn own(name: &str) -> usize {
@@ -35,25 +38,7 @@ impl Resources {
     ) -> Result<Self, RuntimeError> {
         let mut buffers = Vec::new();
         for (name, _, access) in OWN_BUFFERS {
-            let bytes = own_bytes(name, composer);
-            buffers.push(gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(name),
-                size: bytes.max(16).next_multiple_of(4),
-                usage: match access {
-                    Access::Uniform => wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                    _ => {
-                        wgpu::BufferUsages::STORAGE
-                            | wgpu::BufferUsages::COPY_SRC
-                            | wgpu::BufferUsages::COPY_DST
-                            | if name == "arguments" {
-                                wgpu::BufferUsages::INDIRECT
-                            } else {
-                                wgpu::BufferUsages::empty()
-                            }
-                    }
-                },
-                mapped_at_creation: false,
-            }));
+            buffers.push(own_buffer(gpu, composer, name, access));
         }
         for data in composer.scene_buffers() {
             // A binding cannot be empty; what is not there is never read.
@@ -74,6 +59,18 @@ impl Resources {
         let resources = Self { buffers };
         resources.set_run(gpu, options);
         Ok(resources)
+    }
+
+    /// The buffers of another plan for the same world: its own queues with what belongs to them, and
+    /// all else that these have.
+    pub(crate) fn for_plan(&self, gpu: &Gpu, composer: &Composer<'_>) -> Self {
+        let mut buffers = self.buffers.clone();
+        for (buffer, (name, _, access)) in buffers.iter_mut().zip(OWN_BUFFERS) {
+            if OF_PLAN.contains(&name) {
+                *buffer = own_buffer(gpu, composer, name, access);
+            }
+        }
+        Self { buffers }
     }
 
     /// Writes the settings that kernels read.
@@ -213,6 +210,21 @@ impl Resources {
             entries: &entries,
         })
     }
+}
+
+fn own_buffer(gpu: &Gpu, composer: &Composer<'_>, name: &str, access: Access) -> wgpu::Buffer {
+    let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+    let usage = match access {
+        Access::Uniform => wgpu::BufferUsages::UNIFORM,
+        _ if name == "arguments" => storage | wgpu::BufferUsages::INDIRECT,
+        _ => storage,
+    };
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size: own_bytes(name, composer).max(16).next_multiple_of(4),
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {

@@ -29,7 +29,7 @@ pub(crate) struct Step {
 }
 
 /// The dispatches of one iteration and the buffer their indirect sizes are in.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     pub steps: Vec<Step>,
     pub arguments: wgpu::Buffer,

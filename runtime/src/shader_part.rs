@@ -42,6 +42,20 @@ impl From<&Table> for BufferData {
     }
 }
 
+impl ShaderPart {
+    /// The same without the contents of buffers, for composing kernels that read what is uploaded.
+    pub(crate) fn text(&self) -> Self {
+        let empty = |buffer: &BufferData| BufferData {
+            bytes: Vec::new(),
+            ..*buffer
+        };
+        Self {
+            wgsl: self.wgsl.clone(),
+            buffers: self.buffers.iter().map(empty).collect(),
+        }
+    }
+}
+
 /// A piece of WGSL and what it reads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShaderPart {

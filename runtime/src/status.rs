@@ -2,6 +2,7 @@
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
+use crate::queues::Counters;
 use crate::schedule::Schedule;
 
 /// What is known so far.
@@ -17,6 +18,19 @@ pub(crate) struct Status {
     pub iterations: u64,
     /// After each submission: paths finished, and GPU seconds until then.
     pub history: Vec<(u64, f64)>,
+    /// What an earlier plan did.
+    pub before: Before,
+}
+
+/// What was done by a plan that another took over from, as far as it is not part of the totals.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Before {
+    /// Iterations run.
+    pub iterations: u64,
+    /// Requests for new paths.
+    pub asked: u64,
+    /// Samples that kernels dropped.
+    pub nonfinite: u64,
 }
 
 impl Status {
@@ -27,7 +41,17 @@ impl Status {
             gpu_seconds: 0.0,
             iterations: 0,
             history: Vec::new(),
+            before: Before::default(),
         }
+    }
+
+    /// Goes on with another plan of `steps` steps, whose buffer of counters has `words` words and
+    /// took over the first, the scalars.
+    pub(crate) fn go_on(&mut self, before: Before, steps: usize, words: usize) {
+        self.before = before;
+        self.step_seconds = vec![0.0; steps];
+        self.counters.truncate(Counters::SCALARS);
+        self.counters.resize(words, 0);
     }
 
     /// Paths finished in a GPU second while the mixture of paths was steady: from a quarter to nine

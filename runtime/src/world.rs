@@ -8,7 +8,9 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
 
 use crate::camera::CameraFrame;
 use crate::lights;
+use crate::media::Media;
 use crate::scene::{Scene, SceneError, SceneParts};
+use crate::shader_part::ShaderPart;
 use crate::technique::Technique;
 
 /// A scene as the kernels see it.
@@ -48,6 +50,30 @@ impl World {
             roulette_start: scene.integrator.roulette_start,
             parts: SceneParts::build(scene, materials, instances, textures, technique)?,
         })
+    }
+}
+
+impl World {
+    /// All that kernels are composed of, without the contents of buffers.
+    pub(crate) fn texts(&self) -> World {
+        let parts = &self.parts;
+        World {
+            parts: SceneParts {
+                geometry: parts.geometry.text(),
+                bvh: parts.bvh.text(),
+                surface: parts.surface.text(),
+                lights: parts.lights.text(),
+                media: Media {
+                    part: parts.media.part.as_ref().map(ShaderPart::text),
+                    of_instance: Vec::new(),
+                    ..parts.media
+                },
+                texture: parts.texture.as_ref().map(ShaderPart::text),
+                unbound: parts.unbound.clone(),
+                ..*parts
+            },
+            ..*self
+        }
     }
 }
 

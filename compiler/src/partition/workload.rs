@@ -76,11 +76,11 @@ impl Workload {
             other.map(|name| (*name).to_owned()).collect()
         };
         let (extra, missing) = (without(&given, &named), without(&named, &given));
-        if let false = extra.is_empty() {
+        if !extra.is_empty() {
             let extra = list(extra.iter().map(String::as_str));
             return refuse(format!("the workload has {extra}, which the scene lacks"));
         }
-        if let false = missing.is_empty() {
+        if !missing.is_empty() {
             let missing = list(missing.iter().map(String::as_str));
             return refuse(format!("the workload lacks {missing}, which the scene has"));
         }

@@ -79,6 +79,38 @@ impl Gpu {
         })
     }
 
+    /// The same GPU, for another thread.
+    pub(crate) fn share(&self) -> Self {
+        Self {
+            device: self.device.clone(),
+            queue: self.queue.clone(),
+            adapter: self.adapter.clone(),
+            checked: self.checked,
+            timing: self.timing,
+            failure: self.failure.clone(),
+        }
+    }
+
+    /// What wgpu has to say against what `work` does on this thread, which nobody else then hears of.
+    pub(crate) fn guarded<T>(
+        &self,
+        work: impl FnOnce() -> Result<T, RuntimeError>,
+    ) -> Result<T, RuntimeError> {
+        let filters = [
+            wgpu::ErrorFilter::Validation,
+            wgpu::ErrorFilter::OutOfMemory,
+            wgpu::ErrorFilter::Internal,
+        ];
+        let scopes = filters.map(|filter| self.device.push_error_scope(filter));
+        let mut result = work();
+        for scope in scopes.into_iter().rev() {
+            if let Some(error) = pollster::block_on(scope.pop()) {
+                result = Err(runtime_error(error));
+            }
+        }
+        result
+    }
+
     /// The names of all adapters, best first.
     pub fn adapter_names() -> Vec<String> {
         let adapters = adapters(false);
@@ -195,11 +227,7 @@ fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
     };
     let on_error = failure.clone();
     device.on_uncaptured_error(Arc::new(move |error| {
-        let error = match error {
-            wgpu::Error::OutOfMemory { source } => RuntimeError::OutOfMemory(source.to_string()),
-            other => RuntimeError::Validation(other.to_string()),
-        };
-        keep_first(&on_error, error);
+        keep_first(&on_error, runtime_error(error));
     }));
     let on_loss = failure.clone();
     device.set_device_lost_callback(move |reason, message| {
@@ -208,6 +236,13 @@ fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
         }
     });
     failure
+}
+
+fn runtime_error(error: wgpu::Error) -> RuntimeError {
+    match error {
+        wgpu::Error::OutOfMemory { source } => RuntimeError::OutOfMemory(source.to_string()),
+        other => RuntimeError::Validation(other.to_string()),
+    }
 }
 
 impl Gpu {

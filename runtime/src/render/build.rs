@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use impasto_compiler::Program;
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::Plan;
 use impasto_compiler::partition::workload::BLOCK;
 
@@ -20,8 +21,31 @@ use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
 use crate::settings;
 use crate::shader_part::BufferData;
+use crate::technique::Technique;
 use crate::workload;
 use crate::world::{MaterialSource, World};
+
+/// A plan that can run: its kernels, and the buffers they work in.
+#[derive(Clone, Debug)]
+pub(super) struct Ready {
+    pub plan: Plan,
+    pub layout: Layout,
+    pub sizes: Sizes,
+    pub kernels: Vec<Kernel>,
+    pub resources: Resources,
+    pub schedule: Schedule,
+}
+
+/// What the kernels of every plan for a world are made of.
+pub(super) struct Makings<'a> {
+    pub world: &'a World,
+    source: &'a dyn MaterialSource,
+    materials: Vec<MaterialInfo>,
+    instances: Vec<InstanceInfo>,
+    tables: Vec<BufferData>,
+    technique: Technique,
+    subgroup_size: u32,
+}
 
 impl<'g> Renderer<'g> {
     /// Prepares to render `scene`, whose materials compiled to `program`.
@@ -54,62 +78,101 @@ impl<'g> Renderer<'g> {
         let mut options = options.clone();
         options.technique = options.technique.within(gpu);
         settings::check(world, &options)?;
-        let (materials, instances) = (source.infos(), source.instances());
-        let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
-        let layout = Layout::new(world, &materials, plan, &options.technique)?;
+        let mut makings = Makings::new(gpu, world, source, options.technique);
+        let layout = makings.layout(plan)?;
         options.technique = layout.technique(options.technique);
-        let technique = options.technique;
+        makings.technique = options.technique;
         let sizes = pool::sizes(gpu, world, &layout, &options)?;
-        let mut composer = Composer {
-            world,
-            source,
-            materials: &materials,
-            instances: &instances,
-            tables: &tables,
-            plan,
-            layout,
-            sizes,
-            technique,
-            queue_table: false,
-            subgroup_size: gpu.subgroup_size(),
-            random: random::part(
-                technique.sampler,
-                Demand::of(world, &materials, layout.needs.shadow_rays),
-            ),
-        };
-        if technique.profile {
-            composer.layout.counters.profiled = composer.recipes().len();
-        }
+        let mut composer = makings.composer(plan, layout, sizes);
         if options.count_hits {
             composer.layout.counters.hits = counted_materials(gpu, &composer);
         }
-        let kernels = composer.kernels();
+        let facts = Facts::of(&composer, options.seed);
         let resources = Resources::new(gpu, &composer, &options)?;
-        let steps = build_steps(gpu, &kernels, &resources, sizes)?;
+        let build = |kernel: &Kernel| build_step(gpu, kernel, &resources, sizes);
+        let (kernels, steps) = build_all(&composer, build)?;
+        gpu.check()?;
         let schedule = Schedule {
             steps,
             arguments: resources.arguments().clone(),
             timing: gpu.timing,
         };
         warm_up(gpu, &resources, &schedule, &options)?;
-        let facts = Facts {
-            compile_seconds: begin.elapsed().as_secs_f64(),
-            ..Facts::of(&composer, options.seed)
-        };
         Ok(Self {
             gpu,
+            texts: options.count_hits.then(|| world.texts()),
             options,
-            layout: composer.layout,
-            kernels,
-            resources,
-            schedule,
-            facts,
+            ready: Ready {
+                plan: plan.clone(),
+                layout: composer.layout,
+                sizes,
+                kernels,
+                resources,
+                schedule,
+            },
+            facts: Facts {
+                compile_seconds: begin.elapsed().as_secs_f64(),
+                ..facts
+            },
+            replan: None,
+            replanned: None,
         })
     }
 }
 
+impl<'a> Makings<'a> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        world: &'a World,
+        source: &'a dyn MaterialSource,
+        technique: Technique,
+    ) -> Self {
+        Self {
+            world,
+            source,
+            materials: source.infos(),
+            instances: source.instances(),
+            tables: source.tables().iter().map(BufferData::from).collect(),
+            technique,
+            subgroup_size: gpu.subgroup_size(),
+        }
+    }
+
+    pub(super) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
+        Layout::new(self.world, &self.materials, plan, &self.technique)
+    }
+
+    /// What writes the kernels of a plan.
+    pub(super) fn composer<'b>(
+        &'b self,
+        plan: &'b Plan,
+        layout: Layout,
+        sizes: Sizes,
+    ) -> Composer<'b> {
+        let demand = Demand::of(self.world, &self.materials, layout.needs.shadow_rays);
+        let mut composer = Composer {
+            world: self.world,
+            source: self.source,
+            materials: &self.materials,
+            instances: &self.instances,
+            tables: &self.tables,
+            plan,
+            layout,
+            sizes,
+            technique: self.technique,
+            queue_table: false,
+            subgroup_size: self.subgroup_size,
+            random: random::part(self.technique.sampler, demand),
+        };
+        if self.technique.profile {
+            composer.layout.counters.profiled = composer.recipes().len();
+        }
+        composer
+    }
+}
+
 impl Facts {
-    /// What is known once kernels are composed; building them takes yet unknown time.
+    /// What is known before kernels are built, which takes yet unknown time.
     fn of(composer: &Composer<'_>, seed: u32) -> Self {
         let world = composer.world;
         let (width, height) = (world.width, world.height);
@@ -119,7 +182,6 @@ impl Facts {
             height,
             geometry: world.parts.counts,
             max_depth: world.max_depth,
-            pool: composer.sizes.pool,
             identity: Identity {
                 width,
                 height,
@@ -177,17 +239,15 @@ fn warm_up(
     Ok(())
 }
 
-/// Validates the kernels and builds their pipelines, several at a time.
-fn build_steps(
-    gpu: &Gpu,
-    kernels: &[Kernel],
-    resources: &Resources,
-    sizes: Sizes,
-) -> Result<Vec<Step>, RuntimeError> {
-    let build = |kernel: &Kernel| build_step(gpu, kernel, resources, sizes);
-    let steps = crate::parallel::map(kernels, build);
-    gpu.check()?;
-    steps.into_iter().collect()
+/// The kernels of a plan, and the dispatches that `build` makes of them, several at a time.
+pub(super) fn build_all(
+    composer: &Composer<'_>,
+    build: impl Fn(&Kernel) -> Result<Step, RuntimeError> + Sync,
+) -> Result<(Vec<Kernel>, Vec<Step>), RuntimeError> {
+    let kernels = composer.kernels();
+    let steps = crate::parallel::map(&kernels, build);
+    let steps: Result<Vec<Step>, RuntimeError> = steps.into_iter().collect();
+    Ok((kernels, steps?))
 }
 
 /// Validates a kernel and builds its pipeline. What wgpu has to say against it comes through

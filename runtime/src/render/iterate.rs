@@ -17,67 +17,83 @@ use crate::status::{Flight, Status};
 /// Submissions in flight.
 const FLIGHTS: usize = 2;
 
+/// A pass under way.
+struct Run<'r> {
+    pass: &'r mut Pass,
+    status: &'r mut Status,
+    /// Submissions in flight, and those that can be used again.
+    flights: VecDeque<Flight>,
+    spare: Vec<Flight>,
+    pace: Pace,
+    now: Progress,
+    /// The iteration that a path was last finished in.
+    finished_at: u64,
+    /// Whether there is more to submit.
+    going: bool,
+    /// Whether the pass was cut short.
+    cut: bool,
+}
+
 impl Renderer<'_> {
     /// Submits iterations until no path of the pass is left. If `progress` breaks, the pass ends
     /// with the sample that the last path to be begun is of.
     pub(super) fn run(
-        &self,
+        &mut self,
         pass: &mut Pass,
         status: &mut Status,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(), RuntimeError> {
-        self.resources
-            .begin_pass(self.gpu, &pass.options(&self.options), &self.layout);
-        let steps = self.schedule.steps.len();
-        let mut flights: VecDeque<Flight> = VecDeque::new();
-        let mut spare: Vec<Flight> = Vec::new();
-        let mut pace = Pace::new(self.schedule.timing.max_dispatches() / steps as u32);
-        let mut now = self.progress(None, pass);
-        let mut finished_at = status.iterations;
-        let mut going = true;
-        let mut cut = false;
+        let ready = &self.ready;
+        let options = pass.options(&self.options);
+        ready
+            .resources
+            .begin_pass(self.gpu, &options, &ready.layout);
+        let mut run = Run {
+            now: self.progress(None, pass),
+            finished_at: status.iterations,
+            pace: Pace::new(self.max_iterations()),
+            flights: VecDeque::new(),
+            spare: Vec::new(),
+            going: true,
+            cut: false,
+            pass,
+            status,
+        };
         loop {
-            while going && flights.len() < FLIGHTS {
-                let ahead = flights.iter().map(Flight::iterations).sum();
-                let iterations = pace.next(&now, status.iterations, ahead);
-                let flight = spare.pop().map_or_else(|| self.new_flight(pace.max), Ok)?;
-                flights.push_back(self.submit(flight, iterations));
+            // With a new plan at hand, what is under way is waited for.
+            let changes = run.going && self.is_replanned();
+            if !changes {
+                run.depart(self)?;
             }
-            let Some(mut flight) = flights.pop_front() else {
-                if !pass.stopped || cut {
-                    return Ok(());
+            if let Some(flight) = run.flights.pop_front() {
+                run.land(self, flight)?;
+                if progress(&self.progress_of_all(&run.now, run.pass)).is_break() {
+                    run.stop();
                 }
-                // What the counters say is of now.
-                cut = true;
-                self.cut(pass, status);
-                now = self.progress(Some(status), pass);
-                going = now.paths < now.total;
-                continue;
-            };
-            flight.land(self.gpu, &self.schedule, status)?;
-            pace.adapt();
-            spare.push(flight);
-            let before = now.paths;
-            now = self.progress(Some(status), pass);
-            status.history.push((now.paths, status.gpu_seconds));
-            if now.paths > before {
-                finished_at = status.iterations;
-            }
-            self.check_stall(status.iterations - finished_at)?;
-            going &= now.paths < now.total;
-            if progress(&self.progress_of_all(&now, pass)).is_break() && !pass.stopped {
-                pass.stopped = true;
-                going = false;
+            } else if changes {
+                self.change_plan(run.status, run.now.elapsed);
+                run.spare.clear();
+                run.pace.limit(self.max_iterations());
+            } else if !run.goes_on_after_cut(self) {
+                return Ok(());
             }
         }
     }
 
+    /// The most iterations whose timestamps a submission has room for.
+    fn max_iterations(&self) -> u32 {
+        let schedule = &self.ready.schedule;
+        schedule.timing.max_dispatches() / schedule.steps.len() as u32
+    }
+
     /// Ends a pass with the sample whose paths were begun last.
     fn cut(&self, pass: &mut Pass, status: &Status) {
-        let scalar = |s| self.layout.counters.scalar(&status.counters, s);
+        let ready = &self.ready;
+        let scalar = |s| ready.layout.counters.scalar(&status.counters, s);
         let begun = u32::from(scalar(Scalar::NextPixel) > 0);
         pass.samples = pass.samples.min(scalar(Scalar::NextSample) + begun);
-        self.resources
+        ready
+            .resources
             .set_run(self.gpu, &pass.options(&self.options));
     }
 
@@ -96,21 +112,22 @@ impl Renderer<'_> {
     }
 
     pub(super) fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
-        let dispatches = max_iterations * self.schedule.steps.len() as u32;
+        let (schedule, counters) = (&self.ready.schedule, self.ready.layout.counters);
+        let dispatches = max_iterations * schedule.steps.len() as u32;
         Flight::new(
             self.gpu,
-            self.layout.counters.len(),
-            self.schedule.timing.queries(dispatches),
+            counters.len(),
+            schedule.timing.queries(dispatches),
         )
     }
 
     pub(super) fn submit(&self, mut flight: Flight, iterations: u32) -> Flight {
+        let schedule = &self.ready.schedule;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        self.schedule
-            .record(&mut encoder, iterations, flight.queries());
-        let dispatches = iterations * self.schedule.steps.len() as u32;
-        let queries = self.schedule.timing.queries(dispatches);
-        flight.copy(&mut encoder, self.resources.counters(), queries);
+        schedule.record(&mut encoder, iterations, flight.queries());
+        let dispatches = iterations * schedule.steps.len() as u32;
+        let queries = schedule.timing.queries(dispatches);
+        flight.copy(&mut encoder, self.ready.resources.counters(), queries);
         flight.depart(self.gpu, encoder, iterations);
         flight
     }
@@ -119,15 +136,16 @@ impl Renderer<'_> {
     /// pass. A slot asks for a path when a pass begins and whenever one is finished; a megakernel
     /// finishes what it was handed. `None` if nothing is known of this pass yet.
     fn progress(&self, status: Option<&Status>, pass: &Pass) -> Progress {
-        let counters = self.layout.counters;
+        let layout = &self.ready.layout;
         let pixels = self.pixels();
         let before = pixels * u64::from(pass.done - pass.resumed);
         let paths = status.map_or(before, |status| {
             let words = &status.counters;
-            let scalar = |s| u64::from(counters.scalar(words, s));
-            if self.layout.wavefront {
-                let asked = counters.items_of(words, Queues::NEW_PATH);
-                asked.saturating_sub(u64::from(self.facts.pool) * pass.number)
+            let scalar = |s| u64::from(layout.counters.scalar(words, s));
+            if layout.wavefront {
+                let asked = layout.counters.items_of(words, Queues::NEW_PATH);
+                let begun = u64::from(self.ready.sizes.pool) * pass.number;
+                (status.before.asked + asked).saturating_sub(begun)
             } else {
                 before + scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)
             }
@@ -146,5 +164,73 @@ impl Renderer<'_> {
             total: self.pixels() * u64::from(self.options.samples),
             ..*now
         }
+    }
+
+    /// The time that all that is left will take, at the rate so far.
+    fn time_left(&self, now: &Progress, pass: &Pass) -> f64 {
+        if pass.stopped || now.paths == 0 {
+            return 0.0;
+        }
+        let all = self.pixels() * u64::from(self.options.samples - pass.resumed);
+        let left = all.saturating_sub(now.paths) as f64;
+        now.elapsed.as_secs_f64() * left / now.paths as f64
+    }
+}
+
+impl Run<'_> {
+    /// Submits as much as may be in flight.
+    fn depart(&mut self, renderer: &Renderer<'_>) -> Result<(), RuntimeError> {
+        while self.going && self.flights.len() < FLIGHTS {
+            let ahead = self.flights.iter().map(Flight::iterations).sum();
+            let iterations = self.pace.next(&self.now, self.status.iterations, ahead);
+            let spare = self.spare.pop();
+            let flight = spare.map_or_else(|| renderer.new_flight(self.pace.max), Ok)?;
+            self.flights.push_back(renderer.submit(flight, iterations));
+        }
+        Ok(())
+    }
+
+    /// Waits for a submission, and learns what it brings.
+    fn land(
+        &mut self,
+        renderer: &mut Renderer<'_>,
+        mut flight: Flight,
+    ) -> Result<(), RuntimeError> {
+        flight.land(renderer.gpu, &renderer.ready.schedule, self.status)?;
+        self.pace.adapt();
+        self.spare.push(flight);
+        let before = self.now.paths;
+        self.now = renderer.progress(Some(self.status), self.pass);
+        let (paths, seconds) = (self.now.paths, self.status.gpu_seconds);
+        self.status.history.push((paths, seconds));
+        if paths > before {
+            self.finished_at = self.status.iterations;
+        }
+        renderer.check_stall(self.status.iterations - self.finished_at)?;
+        self.going &= paths < self.now.total;
+        let left = renderer.time_left(&self.now, self.pass);
+        renderer.plan_ahead(self.status, self.now.elapsed, left);
+        Ok(())
+    }
+
+    /// Submits no more of this pass than what is begun.
+    fn stop(&mut self) {
+        if !self.pass.stopped {
+            self.pass.stopped = true;
+            self.going = false;
+        }
+    }
+
+    /// Whether there is more to do when nothing is in flight: once, if the render was stopped, whose
+    /// counters then say which sample it ends with.
+    fn goes_on_after_cut(&mut self, renderer: &Renderer<'_>) -> bool {
+        if !self.pass.stopped || self.cut {
+            return false;
+        }
+        self.cut = true;
+        renderer.cut(self.pass, self.status);
+        self.now = renderer.progress(Some(self.status), self.pass);
+        self.going = self.now.paths < self.now.total;
+        true
     }
 }

@@ -2,12 +2,15 @@
 //!
 //! How a renderer comes to be is in `build`, the loop that runs a pass in `iterate`.
 
+mod background;
 mod build;
 mod iterate;
 mod observe;
+mod replan;
 
 pub(crate) use build::build_step;
 pub use observe::profile_workload;
+pub use replan::{Planner, Replanning};
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -18,17 +21,16 @@ use crate::error::RuntimeError;
 use crate::film::{Film, Sums};
 use crate::film_file::{FilmFile, Identity, Range};
 use crate::gpu::{Gpu, Timing};
-use crate::layout::Layout;
-use crate::modules::Kernel;
 use crate::passes::{Keeping, Pass, Passes};
 use crate::queues::Scalar;
 use crate::report::{MaterialReport, Report, Resumed};
-use crate::resources::Resources;
 use crate::scene::GeometryCounts;
-use crate::schedule::Schedule;
 use crate::status::Status;
 use crate::technique::Technique;
 use crate::workload::Mark;
+use crate::world::World;
+use build::Ready;
+use replan::{Change, Replan};
 
 /// What to render of a world.
 #[derive(Clone, Debug)]
@@ -88,11 +90,12 @@ pub struct Rendering {
 pub struct Renderer<'g> {
     gpu: &'g Gpu,
     options: RenderOptions,
-    layout: Layout,
-    kernels: Vec<Kernel>,
-    resources: Resources,
-    schedule: Schedule,
+    ready: Ready,
     facts: Facts,
+    /// What kernels of another plan would be composed from, if hits are counted.
+    texts: Option<World>,
+    replan: Option<Replan>,
+    replanned: Option<Change>,
 }
 
 /// What the report says of the world and the plan.
@@ -103,7 +106,6 @@ struct Facts {
     height: u32,
     geometry: GeometryCounts,
     max_depth: u32,
-    pool: u32,
     identity: Identity,
     materials: Vec<MaterialReport>,
     /// What is known of the workload before rendering.
@@ -114,7 +116,8 @@ struct Facts {
 impl<'g> Renderer<'g> {
     /// The kernels' names and their WGSL, in the order of an iteration.
     pub fn kernels(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.kernels
+        self.ready
+            .kernels
             .iter()
             .map(|k| (k.recipe.name.as_str(), k.wgsl.as_str()))
     }
@@ -149,10 +152,11 @@ impl<'g> Renderer<'g> {
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Rendering, RuntimeError> {
         let begin = Instant::now();
+        self.replanned = None;
         let start = keeping.as_mut().and_then(|k| k.start.take());
         let resumed = self.take_up(start.as_ref())?;
         drop(start);
-        let mut status = Status::new(self.schedule.steps.len());
+        let mut status = Status::new(self.ready.schedule.steps.len());
         let mut pass = Pass::new(begin, resumed.samples);
         let every = keeping.as_ref().map(|k| k.every);
         let mut passes = Passes::new(self.options.samples - resumed.samples, every);
@@ -186,14 +190,16 @@ impl<'g> Renderer<'g> {
 
     /// Empties everything, then fills the film with the sums that are gone on from.
     fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
-        self.resources.clear(self.gpu);
+        self.ready.resources.clear(self.gpu);
         let Some(start) = start else {
             return Ok(Resumed::default());
         };
         let (identity, options) = (self.identity(), &self.options);
         let done = start.done_of(identity, options.first_sample, options.samples);
         let samples = done.map_err(RuntimeError::OtherRender)?;
-        self.resources.write_film(self.gpu, start.sums.words());
+        self.ready
+            .resources
+            .write_film(self.gpu, start.sums.words());
         Ok(Resumed {
             samples,
             nonfinite: start.nonfinite,
@@ -209,13 +215,13 @@ impl<'g> Renderer<'g> {
         done: u32,
     ) -> Result<FilmFile, RuntimeError> {
         let (width, height) = (self.facts.width, self.facts.height);
-        let words = self.resources.read_film(self.gpu)?;
+        let words = self.ready.resources.read_film(self.gpu)?;
         let sums = Sums::new(width, height, words);
         let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
-        let (counters, read) = (self.layout.counters, &status.counters);
+        let (counters, read) = (self.ready.layout.counters, &status.counters);
         Ok(FilmFile {
             identity: self.facts.identity,
-            nonfinite: resumed.nonfinite + counters.all_nonfinite(read),
+            nonfinite: resumed.nonfinite + status.before.nonfinite + counters.all_nonfinite(read),
             clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
             ranges: vec![Range {
                 first: self.options.first_sample.into(),
@@ -229,24 +235,30 @@ impl<'g> Renderer<'g> {
         u64::from(self.facts.width) * u64::from(self.facts.height)
     }
 
+    /// What a new plan was made from, or else what was counted so far.
+    fn workload(&self, status: &Status) -> Option<Workload> {
+        let planned = self.replan.as_ref().and_then(Replan::workload);
+        planned.or_else(|| {
+            let (ready, before) = (&self.ready, &self.facts.workload);
+            Mark::default().workload(status, &ready.layout, &ready.kernels, before)
+        })
+    }
+
     fn report(&self, status: &Status, film: &Film, resumed: Resumed, wall_seconds: f64) -> Report {
         crate::report::Inputs {
             resumed,
             gpu: self.gpu.info(),
             options: &self.options,
-            layout: &self.layout,
-            kernels: &self.kernels,
-            timed: self.schedule.timing != Timing::None,
+            layout: &self.ready.layout,
+            kernels: &self.ready.kernels,
+            timed: self.ready.schedule.timing != Timing::None,
             strategy: &self.facts.strategy,
+            plan: &self.ready.plan,
+            replanned: self.replan_report(status),
             geometry: self.facts.geometry,
-            pool: self.facts.pool,
+            pool: self.ready.sizes.pool,
             materials: &self.facts.materials,
-            workload: Mark::default().workload(
-                status,
-                &self.layout,
-                &self.kernels,
-                &self.facts.workload,
-            ),
+            workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,
             wall_seconds,
         }

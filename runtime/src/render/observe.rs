@@ -47,14 +47,20 @@ impl Renderer<'_> {
     /// The workload of `iterations` iterations after `warm` others, from empty slots on. The film is
     /// left with what they added.
     fn observe(&self, warm: u32, iterations: u32) -> Result<Workload, RuntimeError> {
-        self.resources.clear(self.gpu);
-        self.resources
-            .begin_pass(self.gpu, &self.options, &self.layout);
-        let mut status = Status::new(self.schedule.steps.len());
+        self.ready.resources.clear(self.gpu);
+        self.ready
+            .resources
+            .begin_pass(self.gpu, &self.options, &self.ready.layout);
+        let mut status = Status::new(self.ready.schedule.steps.len());
         self.advance(warm, &mut status)?;
         let mark = Mark::of(&status);
         self.advance(iterations, &mut status)?;
-        let workload = mark.workload(&status, &self.layout, &self.kernels, &self.facts.workload);
+        let workload = mark.workload(
+            &status,
+            &self.ready.layout,
+            &self.ready.kernels,
+            &self.facts.workload,
+        );
         workload.ok_or_else(|| RuntimeError::Setting {
             setting: "workgroup",
             value: "what was chosen".into(),
@@ -67,7 +73,7 @@ impl Renderer<'_> {
         let mut flight: Flight = self.new_flight(1)?;
         for _ in 0..iterations {
             flight = self.submit(flight, 1);
-            flight.land(self.gpu, &self.schedule, status)?;
+            flight.land(self.gpu, &self.ready.schedule, status)?;
         }
         Ok(())
     }

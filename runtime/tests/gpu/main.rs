@@ -20,6 +20,7 @@ mod placed;
 mod planes;
 mod plans;
 mod random;
+mod replan;
 mod scene;
 mod stub;
 #[path = "../support/mod.rs"]

@@ -1,0 +1,144 @@
+//! What happens beside a render whose plan is renewed: planning, composing, compiling. It shares with the
+//! render the GPU and the buffers that do not depend on the plan, and writes to none.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
+
+use impasto_compiler::partition::{Organisation, Plan, Workload};
+
+use super::Planner;
+use super::build::{Makings, Ready, build_all, build_step};
+use crate::error::RuntimeError;
+use crate::gpu::Gpu;
+use crate::modules::Kernel;
+use crate::schedule::{Schedule, Step};
+use crate::technique::Technique;
+use crate::world::{MaterialSource, World};
+
+/// Compiling materials recurses.
+const STACK_BYTES: usize = 32 << 20;
+
+/// A plan to be made, and kernels to be compiled.
+pub(super) struct Job {
+    pub gpu: Gpu,
+    /// Without the contents of buffers.
+    pub world: World,
+    pub source: Arc<dyn MaterialSource + Send + Sync>,
+    pub technique: Technique,
+    /// The plan that runs meanwhile.
+    pub present: Ready,
+    /// Set when nobody waits for it any more.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+/// What a job did.
+#[derive(Debug, Default)]
+pub(super) struct Made {
+    pub planning_seconds: f64,
+    pub compile_seconds: f64,
+    /// The plan, unless there is none.
+    pub plan: Option<Plan>,
+}
+
+impl Job {
+    /// Does it on a thread of its own: the plan ready to run, or why it cannot take over.
+    pub(super) fn spawn(
+        self,
+        planner: Planner,
+        workload: Workload,
+    ) -> std::io::Result<JoinHandle<(Made, Result<Ready, String>)>> {
+        let builder = Builder::new().name("plan".into());
+        let work = move || self.run(planner, &workload);
+        builder.stack_size(STACK_BYTES).spawn(work)
+    }
+
+    fn run(self, planner: Planner, workload: &Workload) -> (Made, Result<Ready, String>) {
+        let begin = Instant::now();
+        let planned = planner(workload);
+        let mut made = Made {
+            planning_seconds: begin.elapsed().as_secs_f64(),
+            ..Made::default()
+        };
+        let plan = match planned {
+            Ok(plan) => plan,
+            Err(why) => return (made, Err(why)),
+        };
+        let begin = Instant::now();
+        let ready = self.gpu.guarded(|| self.compile(&plan));
+        made.compile_seconds = begin.elapsed().as_secs_f64();
+        made.plan = Some(plan);
+        (made, ready.map_err(|error| error.to_string()))
+    }
+
+    fn compile(&self, plan: &Plan) -> Result<Ready, RuntimeError> {
+        let (gpu, present) = (&self.gpu, &self.present);
+        let sizes = present.sizes;
+        if plan.organisation != Organisation::Wavefront {
+            return Err(RuntimeError::Plan {
+                strategy: plan.strategy.clone(),
+                reason: "a megakernel cannot go on with paths that are under way".into(),
+            });
+        }
+        let makings = Makings::new(gpu, &self.world, &*self.source, self.technique);
+        let layout = makings.layout(plan)?;
+        let queues = 4 * u64::from(sizes.pool) * layout.queue_words();
+        gpu.check_binding_size("the queues of the new plan", queues)?;
+        let composer = makings.composer(plan, layout, sizes);
+        // Without other queues nothing differs but the logic kernel, which counted hits.
+        let same = does_the_same(plan, &present.plan);
+        let resources = match same {
+            true => present.resources.clone(),
+            false => present.resources.for_plan(gpu, &composer),
+        };
+        let build = |kernel: &Kernel| {
+            let built = self.built(kernel).filter(|_| same);
+            built.map_or_else(
+                || {
+                    self.check_cancelled()?;
+                    gpu.guarded(|| build_step(gpu, kernel, &resources, sizes))
+                },
+                Ok,
+            )
+        };
+        let (kernels, steps) = build_all(&composer, build)?;
+        Ok(Ready {
+            plan: plan.clone(),
+            layout: composer.layout,
+            sizes,
+            kernels,
+            schedule: Schedule {
+                steps,
+                arguments: resources.arguments().clone(),
+                timing: gpu.timing,
+            },
+            resources,
+        })
+    }
+
+    /// The dispatch of the present plan's kernel with the same text.
+    fn built(&self, kernel: &Kernel) -> Option<Step> {
+        let kernels = self.present.kernels.iter();
+        let mut built = kernels.zip(&self.present.schedule.steps);
+        let found = built.find(|(present, _)| present.wgsl == kernel.wgsl);
+        found.map(|(_, step)| step.clone())
+    }
+
+    fn check_cancelled(&self) -> Result<(), RuntimeError> {
+        match self.cancelled.load(Ordering::Relaxed) {
+            true => Err(RuntimeError::Validation("the render has ended".into())),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Whether two plans have the same kernels.
+fn does_the_same(a: &Plan, b: &Plan) -> bool {
+    let kernels = |plan: &Plan| {
+        let kernels = plan.kernels.iter();
+        let kernels: Vec<_> = kernels.map(|k| (k.form, k.materials.clone())).collect();
+        kernels
+    };
+    a.organisation == b.organisation && kernels(a) == kernels(b) && a.unused == b.unused
+}

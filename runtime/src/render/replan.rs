@@ -1,0 +1,343 @@
+//! Renewing the plan while rendering: count what paths hit, plan for that and compile in the background,
+//! then go on with the new kernels.
+//!
+//! Between two iterations the queues are empty, and state, film and scalar counters are the same under
+//! every plan. So another may go on where one ends, and the picture has the same bits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use impasto_compiler::partition::{Form, Plan, Workload};
+
+use super::Renderer;
+use super::background::{Job, Made};
+use super::build::Ready;
+use crate::queues::{Counters, Queues};
+use crate::report::{Ran, ReplanReport, partition};
+use crate::status::{Before, Status};
+use crate::workload::Mark;
+use crate::world::MaterialSource;
+
+/// Makes a plan for a workload, or says why there is none. It runs on a thread of its own.
+pub type Planner = Box<dyn FnOnce(&Workload) -> Result<Plan, String> + Send>;
+
+/// When and how to renew a plan.
+pub struct Replanning {
+    /// The materials that the renderer was made for.
+    pub source: Arc<dyn MaterialSource + Send + Sync>,
+    /// What plans.
+    pub planner: Planner,
+    /// Iterations before hits count: paths begin together, and the mixture of their lengths
+    /// becomes steady.
+    pub warm_iterations: u64,
+    /// Iterations over which hits are counted, at least.
+    pub counted_iterations: u64,
+    /// Hits without which shares say too little.
+    pub least_hits: f64,
+    /// A render that will be done sooner keeps its plan.
+    pub worthwhile: Duration,
+    /// Whether to wait for the new plan instead of rendering on: for experiments that must not depend on
+    /// how long it takes.
+    pub wait: bool,
+}
+
+impl Replanning {
+    /// With the defaults: after 16 iterations hits are counted over 16, at least 10,000 of them;
+    /// less than half a second of rendering is not worth a plan.
+    pub fn new(source: Arc<dyn MaterialSource + Send + Sync>, planner: Planner) -> Self {
+        Self {
+            source,
+            planner,
+            warm_iterations: 16,
+            counted_iterations: 16,
+            least_hits: 10_000.0,
+            worthwhile: Duration::from_millis(500),
+            wait: false,
+        }
+    }
+}
+
+/// A plan to be renewed.
+pub(super) struct Replan {
+    source: Arc<dyn MaterialSource + Send + Sync>,
+    planner: Option<Planner>,
+    settings: Settings,
+    stage: Stage,
+    workload: Option<Workload>,
+    cancelled: Arc<AtomicBool>,
+}
+
+/// The numbers of [`Replanning`].
+#[derive(Clone, Copy)]
+struct Settings {
+    warm: u64,
+    counted: u64,
+    least_hits: f64,
+    worthwhile: f64,
+    wait: bool,
+}
+
+enum Stage {
+    /// The mixture of paths becomes steady.
+    Warming,
+    /// Hits are counted.
+    Counting(Mark),
+    /// A plan is made and compiled.
+    Working(JoinHandle<(Made, Result<Ready, String>)>),
+    /// It is there.
+    Made(Made, Box<Ready>),
+    /// There is none, or it cannot take over.
+    Failed(Made, String),
+    /// Nothing is left to do.
+    Done,
+}
+
+impl std::fmt::Debug for Replan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Replan").finish_non_exhaustive()
+    }
+}
+
+/// A change of plans, or an attempt at one.
+#[derive(Debug)]
+pub(super) struct Change {
+    report: ReplanReport,
+    /// GPU seconds of the logic kernel in an iteration of the old plan.
+    logic_seconds: f64,
+    /// Those that count as the new plan's and are not.
+    logic_before: f64,
+    iterations: u64,
+}
+
+impl Renderer<'_> {
+    /// Renews the plan once, in the midst of the next render, if hits are counted
+    /// ([`RenderOptions::count_hits`](super::RenderOptions::count_hits)) and it lasts long enough.
+    pub fn replan(&mut self, replanning: Replanning) {
+        if self.ready.layout.counters.hits == 0 {
+            return;
+        }
+        self.replan = Some(Replan {
+            source: replanning.source,
+            planner: Some(replanning.planner),
+            settings: Settings {
+                warm: replanning.warm_iterations,
+                counted: replanning.counted_iterations.max(1),
+                least_hits: replanning.least_hits,
+                worthwhile: replanning.worthwhile.as_secs_f64(),
+                wait: replanning.wait,
+            },
+            stage: Stage::Warming,
+            workload: None,
+            cancelled: Arc::default(),
+        });
+    }
+
+    /// Goes on with planning, now that more is known, when rendering took `elapsed` and will take
+    /// `left` seconds more.
+    pub(super) fn plan_ahead(&mut self, status: &Status, elapsed: Duration, left: f64) {
+        let Some(mut replan) = self.replan.take() else {
+            return;
+        };
+        replan.advance(self, status, left);
+        if let Some((made, why)) = replan.failed() {
+            let mut change = self.change(&made, status, elapsed);
+            change.report.kept = Some(why);
+            self.replanned = Some(change);
+        }
+        self.replan = Some(replan);
+    }
+
+    /// Whether a new plan waits to take over.
+    pub(super) fn is_replanned(&self) -> bool {
+        let stage = self.replan.as_ref().map(|replan| &replan.stage);
+        matches!(stage, Some(Stage::Made(..)))
+    }
+
+    /// Goes on with the new plan. Nothing may be in flight.
+    pub(super) fn change_plan(&mut self, status: &mut Status, elapsed: Duration) {
+        let made = self.replan.as_mut().and_then(Replan::take);
+        let Some((made, ready)) = made else {
+            return;
+        };
+        let mut change = self.change(&made, status, elapsed);
+        let old = std::mem::replace(&mut self.ready, ready);
+        if self.ready.resources.counters() != old.resources.counters() {
+            change.report.kernels = self.ran(&old).report(status, 0);
+            change.logic_before = 0.0;
+            self.take_over(&old, status);
+        }
+        self.replanned = Some(change);
+    }
+
+    fn ran<'r>(&'r self, ready: &'r Ready) -> Ran<'r> {
+        Ran {
+            layout: &ready.layout,
+            kernels: &ready.kernels,
+            materials: &self.facts.materials,
+            pool: ready.sizes.pool,
+        }
+    }
+
+    /// What is to be said of a change from the present plan.
+    fn change(&self, made: &Made, status: &Status, elapsed: Duration) -> Change {
+        let string = |plan| partition(plan, &self.facts.materials);
+        let iterations = status.iterations - status.before.iterations;
+        let logic = status.step_seconds.first().copied().unwrap_or(0.0);
+        Change {
+            report: ReplanReport {
+                at_iteration: status.iterations,
+                at_seconds: elapsed.as_secs_f64(),
+                planning_seconds: made.planning_seconds,
+                compile_seconds: made.compile_seconds,
+                from: string(&self.ready.plan),
+                to: made.plan.as_ref().map(string),
+                kept: None,
+                gpu_seconds: status.gpu_seconds,
+                counting_seconds: None,
+                kernels: Vec::new(),
+            },
+            logic_seconds: logic / iterations.max(1) as f64,
+            logic_before: logic,
+            iterations: status.iterations,
+        }
+    }
+
+    /// Makes the present plan's counters go on from those of the `old` one.
+    fn take_over(&self, old: &Ready, status: &mut Status) {
+        let (counters, words) = (old.layout.counters, &status.counters);
+        let before = Before {
+            iterations: status.iterations,
+            asked: status.before.asked + counters.items_of(words, Queues::NEW_PATH),
+            nonfinite: status.before.nonfinite + counters.kernels_nonfinite(words),
+        };
+        let (from, to) = (old.resources.counters(), self.ready.resources.counters());
+        let bytes = 4 * Counters::SCALARS as u64;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
+        self.gpu.queue.submit([encoder.finish()]);
+        let steps = self.ready.schedule.steps.len();
+        status.go_on(before, steps, self.ready.layout.counters.len());
+    }
+
+    /// What the report says of a change of plans.
+    pub(super) fn replan_report(&self, status: &Status) -> Option<ReplanReport> {
+        let change = self.replanned.as_ref()?;
+        let mut report = change.report.clone();
+        let since = status.iterations - change.iterations;
+        let inline = self.ready.plan.kernels.iter();
+        let inline = inline.filter(|k| k.form == Form::Inline).count();
+        let logic = status.step_seconds.first().copied().unwrap_or(0.0);
+        if report.kept.is_none() && inline == 0 && since > 0 && logic > 0.0 {
+            let now = (logic - change.logic_before) / since as f64;
+            let saved = (change.logic_seconds - now).max(0.0);
+            report.counting_seconds = Some(saved * change.iterations as f64);
+        }
+        Some(report)
+    }
+}
+
+impl Replan {
+    /// What the plan was made for.
+    pub(super) fn workload(&self) -> Option<Workload> {
+        self.workload.clone()
+    }
+
+    /// Goes on to the next stage if it is time.
+    fn advance(&mut self, renderer: &Renderer<'_>, status: &Status, left: f64) {
+        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Warming if status.iterations >= self.settings.warm => {
+                Stage::Counting(Mark::of(status))
+            }
+            Stage::Counting(mark) => self.count(mark, renderer, status, left),
+            Stage::Working(thread) if thread.is_finished() => joined(thread),
+            same => same,
+        };
+    }
+
+    /// Lets a plan be made once enough is counted.
+    fn count(&mut self, mark: Mark, renderer: &Renderer<'_>, status: &Status, left: f64) -> Stage {
+        let iterations = status.iterations - mark.iterations;
+        if iterations < self.settings.counted {
+            return Stage::Counting(mark);
+        }
+        let (ready, before) = (&renderer.ready, &renderer.facts.workload);
+        let workload = mark.workload(status, &ready.layout, &ready.kernels, before);
+        let Some(workload) = workload else {
+            return Stage::Done;
+        };
+        let slots = iterations as f64 * f64::from(workload.pool);
+        let hits = workload.materials.iter().map(|m| m.share).sum::<f64>() * slots;
+        if hits < self.settings.least_hits {
+            return Stage::Counting(mark);
+        }
+        if left < self.settings.worthwhile {
+            return Stage::Done;
+        }
+        self.workload = Some(workload.clone());
+        self.begin(renderer, workload)
+    }
+
+    /// Begins to plan.
+    fn begin(&mut self, renderer: &Renderer<'_>, workload: Workload) -> Stage {
+        let (Some(planner), Some(texts)) = (self.planner.take(), &renderer.texts) else {
+            return Stage::Done;
+        };
+        let job = Job {
+            gpu: renderer.gpu.share(),
+            world: texts.clone(),
+            source: self.source.clone(),
+            technique: renderer.options.technique,
+            present: renderer.ready.clone(),
+            cancelled: self.cancelled.clone(),
+        };
+        match job.spawn(planner, workload) {
+            Ok(thread) if self.settings.wait => joined(thread),
+            Ok(thread) => Stage::Working(thread),
+            Err(error) => failed(format!("no thread for planning: {error}")),
+        }
+    }
+
+    /// A plan that did not come to be, and why not; once.
+    fn failed(&mut self) -> Option<(Made, String)> {
+        match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Failed(made, why) => Some((made, why)),
+            other => {
+                self.stage = other;
+                None
+            }
+        }
+    }
+
+    /// The new plan, if it is there.
+    fn take(&mut self) -> Option<(Made, Ready)> {
+        match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Made(made, ready) => Some((made, *ready)),
+            _ => None,
+        }
+    }
+}
+
+/// What a thread came to.
+fn joined(thread: JoinHandle<(Made, Result<Ready, String>)>) -> Stage {
+    match thread.join() {
+        Ok((made, Ok(ready))) => Stage::Made(made, Box::new(ready)),
+        Ok((made, Err(why))) => Stage::Failed(made, why),
+        Err(_) => failed("planning broke off".into()),
+    }
+}
+
+fn failed(why: String) -> Stage {
+    Stage::Failed(Made::default(), why)
+}
+
+impl Drop for Replan {
+    /// Lets the thread end: drivers do not take it well if a process ends while they compile.
+    fn drop(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+        if let Stage::Working(thread) = std::mem::replace(&mut self.stage, Stage::Done) {
+            drop(thread.join());
+        }
+    }
+}
