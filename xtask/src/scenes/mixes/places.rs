@@ -12,7 +12,8 @@ use super::super::obj::MtlEntry;
 use super::super::random::Random;
 use super::super::shapes::{Topology, grid};
 
-/// Names of the places, in the booths row by row.
+/// Names of the places, in the booths column by column: paths are begun along the rows of a picture, and those that are
+/// on their way at once should hit everything.
 pub(super) const PLACES: [&str; 64] = [
     "s00", "s01", "s02", "s03", "s04", "s05", "s06", "s07", "s08", "s09", "s10", "s11", "s12",
     "s13", "s14", "s15", "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23", "s24", "s25",
@@ -74,7 +75,7 @@ pub(crate) fn booths() -> Model {
     let mut mesh = Mesh::default();
     for (i, place) in PLACES.iter().enumerate() {
         let middle = |n: usize| (n as f64 - 0.5 * (SIDE - 1) as f64) * PITCH;
-        let (x, y) = (middle(i % SIDE), middle(i / SIDE));
+        let (x, y) = (middle(i / SIDE), middle(i % SIDE));
         let corner = dvec3(x - 0.5 * WIDTH, y - 0.5 * WIDTH, -DEPTH);
         let [w, h, d] = [DVec3::X * WIDTH, DVec3::Y * WIDTH, DVec3::Z * DEPTH];
         // The last wall would close it.
