@@ -199,6 +199,11 @@ impl Program {
         )
     }
 
+    /// The texts that the program was made of.
+    pub(crate) fn sources(&self) -> &SourceMap {
+        &self.sources
+    }
+
     /// `car_paint.impasto:12`: where a span is, without folders, which differ between machines.
     pub(crate) fn origin(&self, span: Span) -> String {
         let text = self.sources.file_line(span);

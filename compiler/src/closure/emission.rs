@@ -66,11 +66,11 @@ impl View<'_> {
         let Methods::Edf { emit } = self.module.closures[lobe.def.index()].methods else {
             return wo;
         };
-        self.span = lobe.span;
+        self.at_lobe(lobe);
         let mut args = lobe.args.clone();
         args.push(wo);
         let value = self.call(emit, &args);
-        self.span = self.m.span;
+        self.at_material();
         value
     }
 }

@@ -128,7 +128,7 @@ impl View<'_> {
 
     fn sample_lobe(&mut self, lobe: &Ready<'_>, total: ExprId, u: ExprId, results: &Results) {
         let [sample, eval, pdf, _] = lobe.methods;
-        self.span = lobe.path.lobe.span;
+        self.at_lobe(lobe.path.lobe);
         let mut args = lobe.path.lobe.args.clone();
         args.extend([lobe.wo, u]);
         let local = self.call(sample, &args);
@@ -156,7 +156,7 @@ impl View<'_> {
             let due = self.float(1.0);
             self.b.store(results.pdf, due);
         }
-        self.span = self.m.span;
+        self.at_material();
     }
 
     /// Do the lobe's frame and the geometry agree on reflection or transmission?
@@ -224,7 +224,7 @@ impl View<'_> {
         self.b.store(value, black);
         self.b.store(density, zero);
         for lobe in ready.iter().filter(|l| !l.delta) {
-            self.span = lobe.path.lobe.span;
+            self.at_lobe(lobe.path.lobe);
             let [_, eval, pdf, _] = lobe.methods;
             let local = self.call(self.core.to_local, &[lobe.frame, wi]);
             let valid = self.valid(lobe, local, wi);
@@ -243,7 +243,7 @@ impl View<'_> {
             let then = self.b.close();
             self.b.stmt(Stmt::If(valid, then, Vec::new()));
         }
-        self.span = self.m.span;
+        self.at_material();
         let (value, density) = (
             self.b.load(value, self.span),
             self.b.load(density, self.span),

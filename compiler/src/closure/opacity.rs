@@ -1,7 +1,7 @@
 //! Opacity: what a material does not cover, light passes as if there were no surface.
 
 use crate::ir::build::Builder;
-use crate::ir::{Closure, ClosureDefId, ClosureId, Const, ExprId, Lobe, Material};
+use crate::ir::{Closure, ClosureDefId, ClosureId, Const, Expr, ExprId, Lobe, Material};
 use crate::ops::Op;
 
 /// Puts a material's opacity into its closures: `mix(transparent(), surface, opacity)`, and emission
@@ -25,7 +25,7 @@ pub fn cut_out(m: &mut Material, transparent: ClosureDefId) {
 
 /// The lobe of light that passes untinted.
 fn through(m: &mut Material, transparent: ClosureDefId, opacity: ExprId) -> ClosureId {
-    let span = m.body.expr(opacity).span;
+    let Expr { span, via, .. } = *m.body.expr(opacity);
     let value = m.body.value;
     let mut b = Builder::resume(m.body.clone());
     let white = b.constant(Const::Float(vec![1.0; 3]), span);
@@ -38,6 +38,7 @@ fn through(m: &mut Material, transparent: ClosureDefId, opacity: ExprId) -> Clos
             normal: None,
             tangent: None,
             span,
+            via,
         }),
     )
 }

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use super::{Core, Path, children};
 use crate::ir::build::Builder;
 use crate::ir::{
-    Closure, ClosureId, Const, ExprId, Function, FunctionId, Local, Material, Methods, Module, Type,
+    Closure, ClosureId, Const, ExprId, Function, FunctionId, Lobe, Local, Material, Methods,
+    Module, Type,
 };
 use crate::ops::Op;
 use crate::source::Span;
@@ -85,7 +86,7 @@ impl<'m> View<'m> {
         paths: &'a [Path<'a>],
     ) -> (Vec<Ready<'a>>, ExprId) {
         let mut ready: Vec<Ready<'a>> = paths.iter().filter_map(|p| self.lobe(p)).collect();
-        self.span = self.m.span;
+        self.at_material();
         let white = self.color(1.0);
         let albedo = self.weights(root, white, &mut ready);
         for lobe in &mut ready {
@@ -113,7 +114,7 @@ impl<'m> View<'m> {
         else {
             return None;
         };
-        self.span = path.lobe.span;
+        self.at_lobe(path.lobe);
         let (frame, wo) = self.frame(path);
         let mut args = path.lobe.args.clone();
         args.push(wo);
@@ -217,6 +218,18 @@ impl<'m> View<'m> {
         );
         let (ea, eb) = (self.weights(a, wa, ready), self.weights(b, wb, ready));
         self.op(Op::Mix, &[ea, eb, t])
+    }
+
+    /// What is added from now on comes from a lobe.
+    pub fn at_lobe(&mut self, lobe: &Lobe) {
+        self.span = lobe.span;
+        self.b.set_via(lobe.via);
+    }
+
+    /// What is added from now on comes from the material as a whole.
+    pub fn at_material(&mut self) {
+        self.span = self.m.span;
+        self.b.set_via(None);
     }
 
     // ---- Shorthands --------------------------------------------------------------------

@@ -22,6 +22,14 @@ impl Inputs {
         }
     }
 
+    /// A sequence of its own for each name, so that a material is evaluated at the same points
+    /// whatever other materials there are.
+    pub fn named(name: &str) -> Self {
+        // FNV-1a.
+        let fold = |h: u64, b: u8| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
+        Self::new(name.bytes().fold(0xcbf2_9ce4_8422_2325, fold))
+    }
+
     /// A number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.numbers.next() >> 40) as f64 / (1u64 << 24) as f64

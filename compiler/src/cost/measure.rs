@@ -21,10 +21,10 @@ const LOOKUP: f64 = 8.0 + 4.0 * 8.0;
 
 /// A material that was evaluated at some inputs.
 pub struct Measured<'p> {
-    program: &'p Program,
+    pub(super) program: &'p Program,
     material: &'p CompiledMaterial,
-    run: Interpreter<'p, f32>,
-    subgroups: Subgroups,
+    pub(super) run: Interpreter<'p, f32>,
+    pub(super) subgroups: Subgroups,
     evaluations: u64,
     least: u64,
     most: u64,

@@ -18,6 +18,7 @@ use crate::ops::Counts;
 use crate::program::Program;
 
 mod inputs;
+mod lines;
 mod live;
 mod measure;
 mod size;
@@ -25,6 +26,7 @@ mod subgroups;
 mod vector;
 
 pub use inputs::Inputs;
+pub use lines::LineCost;
 pub use live::live;
 pub use measure::Measured;
 pub use vector::{Cost, LANES};
@@ -93,6 +95,20 @@ pub fn vector(
 ) -> Result<Option<Cost>, OutOfFuel> {
     let measured = Measured::new(program, material, inputs)?;
     Ok(measured.map(|m| m.cost()))
+}
+
+/// The lines of the source that evaluating material `material` of `program` over `inputs` costs,
+/// those first that cost most with what they call. None without inputs.
+///
+/// # Errors
+/// If the evaluations take too long together.
+pub fn lines(
+    program: &Program,
+    material: usize,
+    inputs: &[(usize, At)],
+) -> Result<Vec<LineCost>, OutOfFuel> {
+    let measured = Measured::new(program, material, inputs)?;
+    Ok(measured.map_or(Vec::new(), |m| m.lines()))
 }
 
 /// The operations of a function of the library, such as `std::noise::perlin`, with its defaults at

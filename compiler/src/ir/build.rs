@@ -5,8 +5,8 @@
 
 use super::value::Value;
 use super::{
-    Block, Const, Expr, ExprId, ExprKind, Function, FunctionId, Local, LocalId, Module, Stmt,
-    StructId, Type,
+    Block, CallSite, Const, Expr, ExprId, ExprKind, Function, FunctionId, Local, LocalId, Module,
+    SiteId, Stmt, StructId, Type,
 };
 use crate::ops::{self, Op};
 use crate::source::Span;
@@ -16,6 +16,8 @@ pub struct Builder {
     function: Function,
     /// Open blocks, innermost last.
     blocks: Vec<Block>,
+    /// The call that what is added stands in place of.
+    via: Option<SiteId>,
 }
 
 impl Builder {
@@ -30,11 +32,13 @@ impl Builder {
             body: Vec::new(),
             value: ExprId(0),
             turns: 1,
+            sites: Vec::new(),
             span,
         };
         Self {
             function,
             blocks: vec![Vec::new()],
+            via: None,
         }
     }
 
@@ -44,6 +48,7 @@ impl Builder {
         Self {
             function,
             blocks: vec![body],
+            via: None,
         }
     }
 
@@ -58,6 +63,27 @@ impl Builder {
     /// The function so far.
     pub fn function(&self) -> &Function {
         &self.function
+    }
+
+    /// The call that what is added stands in place of.
+    pub fn via(&self) -> Option<SiteId> {
+        self.via
+    }
+
+    /// What is added from now on stands in place of `via`, a call of this function. Gives what it
+    /// stood in place of before.
+    pub fn set_via(&mut self, via: Option<SiteId>) -> Option<SiteId> {
+        std::mem::replace(&mut self.via, via)
+    }
+
+    /// Begins the body of a function in place of a call. Gives what to set when it ends.
+    pub fn enter_call(&mut self, span: Span) -> Option<SiteId> {
+        let site = CallSite {
+            span,
+            via: self.via,
+        };
+        self.function.sites.push(site);
+        self.set_via(Some(SiteId(self.function.sites.len() as u32 - 1)))
     }
 
     /// Notes that nested loops can take `turns` turns together.
@@ -86,6 +112,7 @@ impl Builder {
             kind,
             ty,
             span,
+            via: self.via,
             name: None,
         });
         if evaluated {

@@ -87,7 +87,9 @@ ids! {
     /// A variable of a function.
     LocalId,
     /// A closure of a material.
-    ClosureId
+    ClosureId,
+    /// A call of a function whose body stands in its caller.
+    SiteId
 }
 
 /// Everything the materials of a compilation are made of.
@@ -142,8 +144,19 @@ pub struct Function {
     pub value: ExprId,
     /// Most turns that nested loops can take together, callees included.
     pub turns: u64,
+    /// Calls in whose place the callee's expressions stand.
+    pub sites: Vec<CallSite>,
     /// Where it is defined.
     pub span: Span,
+}
+
+/// A call in whose place the callee's expressions stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CallSite {
+    /// Where the call was written.
+    pub span: Span,
+    /// The call that put this one there, if it stands in a callee's body itself.
+    pub via: Option<SiteId>,
 }
 
 impl Function {
@@ -164,6 +177,15 @@ impl Function {
             _ => None,
         }
     }
+
+    /// The calls that put something here, from the innermost out.
+    pub fn calls_to(&self, mut via: Option<SiteId>) -> impl Iterator<Item = CallSite> {
+        std::iter::from_fn(move || {
+            let site = *self.sites.get(via?.index())?;
+            via = site.via;
+            Some(site)
+        })
+    }
 }
 
 /// An expression with its type and origin.
@@ -175,6 +197,8 @@ pub struct Expr {
     pub ty: Type,
     /// Where it was written.
     pub span: Span,
+    /// The call that put it here, if it was written in the body of another function.
+    pub via: Option<SiteId>,
     /// The `let` that names it.
     pub name: Option<String>,
 }
@@ -337,6 +361,8 @@ pub struct Lobe {
     pub tangent: Option<ExprId>,
     /// Where it was written.
     pub span: Span,
+    /// The call that put it here, if it was written in the body of a function.
+    pub via: Option<SiteId>,
 }
 
 /// A parameter of a material.

@@ -4,7 +4,7 @@
 //! order of evaluation, so that equal code has equal text however it came about.
 
 use super::rewrite::operands_mut;
-use crate::ir::{Block, Expr, ExprId, ExprKind, Function, Local, LocalId, Stmt};
+use crate::ir::{Block, CallSite, Expr, ExprId, ExprKind, Function, Local, LocalId, SiteId, Stmt};
 
 /// Removes dead code in place.
 pub fn remove(f: &mut Function) {
@@ -139,6 +139,7 @@ impl Renumber<'_> {
         let value = this.expr(this.old.value);
         let (exprs, locals) = (this.exprs, this.locals);
         (f.exprs, f.locals, f.value, f.body) = (exprs, locals, value, body);
+        number_sites(f);
     }
 
     /// The new number of an expression, which is taken over with what it reads.
@@ -211,15 +212,39 @@ impl Renumber<'_> {
     }
 }
 
+/// Numbers the calls that some expression stands in place of in the order of the expressions, and
+/// forgets the others.
+fn number_sites(f: &mut Function) {
+    let old = std::mem::take(&mut f.sites);
+    let mut known: Vec<Option<SiteId>> = vec![None; old.len()];
+    let mut pending = Vec::new();
+    for i in 0..f.exprs.len() {
+        let mut via = f.exprs[i].via;
+        while let Some(id) = via.filter(|id| known[id.index()].is_none()) {
+            pending.push(id);
+            via = old[id.index()].via;
+        }
+        // From the outermost in.
+        while let Some(id) = pending.pop() {
+            let CallSite { span, via } = old[id.index()];
+            let via = via.and_then(|outer| known[outer.index()]);
+            known[id.index()] = Some(SiteId(f.sites.len() as u32));
+            f.sites.push(CallSite { span, via });
+        }
+        f.exprs[i].via = f.exprs[i].via.and_then(|id| known[id.index()]);
+    }
+}
+
 /// Takes an expression out of an arena that is thrown away.
 fn take(expr: &mut Expr) -> Expr {
-    let (ty, span) = (expr.ty, expr.span);
+    let (ty, span, via) = (expr.ty, expr.span, expr.via);
     let kind = std::mem::replace(&mut expr.kind, ExprKind::Param(0));
     let name = expr.name.take();
     Expr {
         kind,
         ty,
         span,
+        via,
         name,
     }
 }

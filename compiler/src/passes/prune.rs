@@ -13,7 +13,9 @@ use std::collections::BTreeMap;
 
 use crate::closure::{MAX_LOBES, lobe_count};
 use crate::ir::build::Builder;
-use crate::ir::{Closure, ClosureId, Const, ExprId, Lobe, Local, Material, Methods, Module, Type};
+use crate::ir::{
+    Closure, ClosureId, Const, Expr, ExprId, Lobe, Local, Material, Methods, Module, Type,
+};
 use crate::ops::Op;
 
 /// Rewrites the closures of a material. An output of which nothing is left becomes `None`, and so
@@ -193,7 +195,8 @@ impl Pruner<'_> {
 
     /// An operation on floats and on `operand`, which stands where they are `None`.
     fn op(&mut self, op: Op, args: &[Option<f64>], operand: ExprId) -> ExprId {
-        let span = self.b.function().expr(operand).span;
+        let Expr { span, via, .. } = *self.b.function().expr(operand);
+        self.b.set_via(via);
         let value = |b: &mut Builder, x: &Option<f64>| match x {
             Some(x) => b.float(*x, span),
             None => operand,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::ast::{self, Arg, ItemKind, Name};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::Builder;
-use crate::ir::{self, ClosureId, Const, Interior};
+use crate::ir::{self, ClosureId, Const, Interior, SiteId};
 use crate::source::Span;
 
 use super::body::{Binding, Body, Entry, Operand, Place};
@@ -36,6 +36,7 @@ pub struct Expansion {
 
 /// What a called function's body does not see.
 struct Caller {
+    via: Option<SiteId>,
     module: ModuleId,
     scopes: Vec<Vec<Entry>>,
     fixed_scopes: usize,
@@ -152,17 +153,19 @@ impl Body<'_, '_> {
             return self.report(deep);
         }
         let known = self.cx.diagnostics.len();
-        let caller = self.enter(item.module);
+        let caller = self.enter(item.module, span);
         let value = self.closure_body(f, &operands, signature.result, span);
         self.leave(caller);
         self.found_in_call(known, span);
         value
     }
 
-    /// Starts on the body of a function of `module`, which sees nothing of its caller.
-    fn enter(&mut self, module: ModuleId) -> Caller {
+    /// Starts on the body of a function of `module`, called at `span`, which sees nothing of its
+    /// caller.
+    fn enter(&mut self, module: ModuleId, span: Span) -> Caller {
         self.expansion.depth += 1;
         Caller {
+            via: self.builder.enter_call(span),
             module: std::mem::replace(&mut self.module, module),
             scopes: std::mem::replace(&mut self.scopes, vec![Vec::new()]),
             fixed_scopes: std::mem::take(&mut self.fixed_scopes),
@@ -173,6 +176,7 @@ impl Body<'_, '_> {
 
     fn leave(&mut self, caller: Caller) {
         self.expansion.depth -= 1;
+        self.builder.set_via(caller.via);
         self.module = caller.module;
         self.scopes = caller.scopes;
         self.fixed_scopes = caller.fixed_scopes;

@@ -110,6 +110,7 @@ impl Body<'_, '_> {
                 normal,
                 tangent,
                 span,
+                via: self.builder.via(),
             }),
             ty,
         ))

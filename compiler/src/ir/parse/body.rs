@@ -38,6 +38,7 @@ impl<'p> Body<'p> {
                 body: Vec::new(),
                 value: ExprId(0),
                 turns: 1,
+                sites: Vec::new(),
                 span,
             },
             params: names,

@@ -13,6 +13,7 @@ impl Body<'_> {
             kind,
             ty,
             span,
+            via: None,
             name: None,
         });
         ExprId(self.function.exprs.len() as u32 - 1)

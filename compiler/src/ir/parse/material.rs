@@ -67,6 +67,7 @@ fn with_value(mut f: Function, name: String, span: Span) -> Function {
         kind: ExprKind::Const(Const::Float(vec![0.0])),
         ty: Type::Float,
         span,
+        via: None,
         name: None,
     });
     Function { name, span, ..f }
@@ -235,6 +236,7 @@ impl Body<'_> {
             normal,
             tangent,
             span: self.p.since(start),
+            via: None,
         })
     }
 }

@@ -29,6 +29,8 @@ impl Prelude {
                 body: Vec::new(),
                 value: ExprId(0),
                 turns: f.turns,
+                // Copies are in place of the same calls.
+                sites: f.sites.clone(),
                 span: f.span,
             },
             known: BTreeMap::new(),
@@ -43,6 +45,7 @@ impl Prelude {
             kind: ExprKind::Const(Const::Float(vec![0.0])),
             ty: Type::Float,
             span: self.function.span,
+            via: None,
             name: None,
         };
         self.function.value = self.add(zero);
@@ -161,6 +164,7 @@ fn part_of(f: &Function, whole: ExprId, kind: ExprKind, ty: Type) -> Expr {
         kind,
         ty,
         span: f.expr(whole).span,
+        via: f.expr(whole).via,
         name: None,
     }
 }

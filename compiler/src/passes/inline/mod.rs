@@ -150,11 +150,16 @@ impl Policy {
 }
 
 /// The value of a call that goes in line.
-pub(super) fn call(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) -> Option<ExprId> {
+pub(super) fn call(
+    w: &mut Rewriter<'_>,
+    call: ExprId,
+    callee: FunctionId,
+    args: &[ExprId],
+) -> Option<ExprId> {
     let mut policy = w.rules.inline.take()?;
     let wanted = goes_in_line(w, &mut policy, callee, args);
     w.rules.inline = Some(policy);
-    wanted.then(|| splice::splice(w, callee, args))
+    wanted.then(|| splice::splice(w, call, callee, args))
 }
 
 fn goes_in_line(

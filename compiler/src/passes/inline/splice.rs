@@ -1,17 +1,33 @@
 //! Copies the body of a function into its caller.
 
-use crate::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, LocalId, Stmt, Type};
+use crate::ir::{
+    Block, CallSite, Const, Expr, ExprId, ExprKind, Function, FunctionId, LocalId, SiteId, Stmt,
+    Type,
+};
 use crate::passes::rewrite::{Rewriter, operands_mut};
 use crate::source::Span;
 
-/// Copies a callee's body into the open block; gives its value.
-pub(super) fn splice(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) -> ExprId {
+/// Copies the body of a function, called by the expression `call`, into the open block; gives its
+/// value.
+pub(super) fn splice(
+    w: &mut Rewriter<'_>,
+    call: ExprId,
+    callee: FunctionId,
+    args: &[ExprId],
+) -> ExprId {
     let module = w.module;
     let callee = &module.functions[callee.index()];
     let shift = Shift {
         exprs: w.f.exprs.len() as u32,
         locals: w.f.locals.len() as u32,
+        site: w.f.sites.len() as u32,
     };
+    let Expr { span, via, .. } = *w.f.expr(call);
+    w.f.sites.push(CallSite { span, via });
+    w.f.sites.extend(callee.sites.iter().map(|site| CallSite {
+        via: shift.via(site.via),
+        ..*site
+    }));
     for local in &callee.locals {
         w.local(local.clone());
     }
@@ -22,8 +38,10 @@ pub(super) fn splice(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) 
         }
         let mut copy = expr.clone();
         shift.kind(&mut copy.kind);
+        copy.via = shift.via(copy.via);
         w.adopt(copy);
     }
+    w.via = shift.via(None);
     for local in unset(callee) {
         let zero = zero(w, callee.locals[local.index()].ty, callee.span);
         w.store(shift.local(local), None, zero);
@@ -38,6 +56,8 @@ pub(super) fn splice(w: &mut Rewriter<'_>, callee: FunctionId, args: &[ExprId]) 
 struct Shift {
     exprs: u32,
     locals: u32,
+    /// The call itself; those in the callee come after it.
+    site: u32,
 }
 
 impl Shift {
@@ -47,6 +67,10 @@ impl Shift {
 
     fn local(&self, id: LocalId) -> LocalId {
         LocalId(id.0 + self.locals)
+    }
+
+    fn via(&self, via: Option<SiteId>) -> Option<SiteId> {
+        Some(SiteId(via.map_or(self.site, |id| self.site + 1 + id.0)))
     }
 
     fn kind(&self, kind: &mut ExprKind) {

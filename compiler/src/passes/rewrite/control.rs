@@ -115,6 +115,7 @@ impl Rewriter<'_> {
             self.out.extend(then);
             return;
         }
+        self.via = self.f.expr(cond).via;
         if self.rules.simplify && simplify::pick(self, cond, &then, &otherwise, before) {
             return;
         }

@@ -11,7 +11,7 @@ mod control;
 pub(super) use control::stored_in;
 
 use super::{cse, fold, inline, simplify};
-use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, Stmt, Type};
+use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, SiteId, Stmt, Type};
 use crate::ops::Op;
 use crate::source::Span;
 
@@ -77,6 +77,8 @@ pub(super) struct Rewriter<'a> {
     /// Evaluated in a block that is open; `evaluated` lists them in order, to close blocks.
     available: Vec<bool>,
     evaluated: Vec<ExprId>,
+    /// The call that what is rewritten stands in place of, and so what is added for it.
+    pub via: Option<SiteId>,
 }
 
 /// Rewrites a function.
@@ -95,6 +97,7 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) {
         held: vec![None; locals],
         available: vec![false; exprs],
         evaluated: Vec::new(),
+        via: None,
     };
     walk.block(body);
     let value = walk.resolve(walk.f.value);
@@ -150,6 +153,7 @@ impl Rewriter<'_> {
             kind,
             ty,
             span,
+            via: self.via,
             name: None,
         })
     }
@@ -207,6 +211,7 @@ impl Rewriter<'_> {
     }
 
     fn eval(&mut self, id: ExprId) {
+        self.via = self.f.expr(id).via;
         let unset = ExprKind::Const(Const::Bool(false));
         let mut kind = std::mem::replace(&mut self.f.exprs[id.index()].kind, unset);
         for operand in operands_mut(&mut kind) {
@@ -250,7 +255,7 @@ impl Rewriter<'_> {
         if let ExprKind::Call(callee, args) = self.kind(id) {
             let (callee, args) = (*callee, args.clone());
             let value = match fold::call(self, id, callee, &args) {
-                None => inline::call(self, callee, &args),
+                None => inline::call(self, id, callee, &args),
                 value => value,
             };
             if let Some(value) = value {
@@ -291,10 +296,11 @@ impl Rewriter<'_> {
         }
         self.bind(id, value);
         if !self.kind(value).is_free() && self.f.expr(value).name.is_none() {
-            let (name, span) = (self.f.exprs[id.index()].name.take(), self.f.expr(id).span);
+            let named = &mut self.f.exprs[id.index()];
+            let (name, span, via) = (named.name.take(), named.span, named.via);
             if name.is_some() {
                 let expr = &mut self.f.exprs[value.index()];
-                (expr.name, expr.span) = (name, span);
+                (expr.name, expr.span, expr.via) = (name, span, via);
             }
         }
         value

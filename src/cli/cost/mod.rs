@@ -1,6 +1,9 @@
-//! `impasto cost`: how many operations one evaluation of a material takes.
+//! `impasto cost`: what evaluating a material takes, which lines of its source that comes from, and
+//! what an edit did to it.
 
-use std::fmt::Write;
+mod difference;
+mod table;
+
 use std::path::Path;
 
 use clap::Args;
@@ -21,14 +24,16 @@ pub(super) struct CostArgs {
     /// At how many points each material is evaluated
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
+    /// How many lines of each material's source are shown, those that cost most
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    lines: usize,
+    /// Show lines of the standard library, too
+    #[arg(long)]
+    library: bool,
+    /// Compare two files or scenes, OLD NEW: what an edit did to the cost of each material
+    #[arg(long)]
+    diff: bool,
 }
-
-/// What Laine, Karras and Aila 2013, section 3, count: instructions of a Kepler GPU.
-const PAPER: [(&str, &str); 3] = [
-    ("one noise evaluation", "477"),
-    ("car paint", "4200"),
-    ("casting a ray", "2000 to 3000"),
-];
 
 /// The noise of the library that is set beside the paper's.
 const NOISE: [&str; 3] = ["perlin", "perlin_gradient", "perlin_vector"];
@@ -41,9 +46,12 @@ struct NoiseCost {
 }
 
 pub(super) fn run(args: &CostArgs, global: &Global) -> Outcome {
+    if args.diff {
+        return difference::run(args, global);
+    }
     let samples = args.samples as usize;
     let materials = match args.files.as_slice() {
-        [scene] if is_scene(scene) => scene_materials(scene, samples, global)?,
+        [one] => one_source(one, samples, global)?,
         files => match files.iter().find(|f| is_scene(f)) {
             Some(scene) => {
                 let message = format!("`{scene}` is a scene: give it alone, without other files");
@@ -55,7 +63,15 @@ pub(super) fn run(args: &CostArgs, global: &Global) -> Outcome {
     let noise = noise(samples)?;
     match global.json() {
         true => print(&format!("{:#}\n", json(args, &materials, &noise))),
-        false => print(&text(samples, &materials, &noise)),
+        false => print(&table::text(args, &materials, &noise)),
+    }
+}
+
+/// The materials of a scene or of a file.
+fn one_source(path: &str, samples: usize, global: &Global) -> Result<Vec<MaterialCost>, Failure> {
+    match is_scene(path) {
+        true => scene_materials(path, samples, global),
+        false => file_materials(&[path.to_owned()], samples, global),
     }
 }
 
@@ -137,56 +153,14 @@ fn json(args: &CostArgs, materials: &[MaterialCost], noise: &[NoiseCost]) -> ser
             "operations": m.operations(),
             "cost": m.cost,
             "efficiency": m.cost.as_ref().map(Cost::efficiency),
+            "lines": m.lines,
         })
     };
-    let materials: Vec<_> = materials.iter().map(material).collect();
     json!({
         "files": args.files,
         "samples": args.samples,
-        "materials": materials,
+        "materials": materials.iter().map(material).collect::<Vec<_>>(),
         "noise": noise,
         "paper": { "noise": 477, "car_paint": 4200, "ray_cast": [2000, 3000] },
     })
-}
-
-// ---- Text --------------------------------------------------------------------------------
-
-/// A table: materials, noise beside them, and what the paper has.
-fn text(samples: usize, materials: &[MaterialCost], noise: &[NoiseCost]) -> String {
-    let names = materials.iter().map(|m| &m.name);
-    let names = names.chain(noise.iter().map(|n| &n.name));
-    let paper = PAPER.iter().map(|(what, _)| what.len());
-    let width = names.map(|n| n.chars().count()).chain(paper).max();
-    let width = width.unwrap_or(0);
-    let mut out = format!("operations of one evaluation, at {samples} points\n\n");
-    let _ = writeln!(
-        out,
-        "{:width$}  {:>7} {:>7} {:>7}  {:>7} {:>7} {:>7} {:>7} {:>7}",
-        "", "mean", "least", "most", "float", "special", "integer", "texture", "turns"
-    );
-    for m in materials {
-        row(&mut out, width, &m.name, m.operations());
-    }
-    out.push('\n');
-    for n in noise {
-        row(&mut out, width, &n.name, Some(&n.operations));
-    }
-    out.push_str("\ninstructions in Laine, Karras and Aila 2013, section 3\n\n");
-    for (what, count) in PAPER {
-        let _ = writeln!(out, "{what:width$}  {count:>7}");
-    }
-    out
-}
-
-fn row(out: &mut String, width: usize, name: &str, operations: Option<&Operations>) {
-    let Some(o) = operations else {
-        let _ = writeln!(out, "{name:width$}  on no surface");
-        return;
-    };
-    let c = &o.classes;
-    let _ = writeln!(
-        out,
-        "{name:width$}  {:>7.0} {:>7} {:>7}  {:>7.0} {:>7.0} {:>7.0} {:>7.0} {:>7.0}",
-        o.mean, o.min, o.max, c.alu, c.special, c.integer, c.texture, c.turns
-    );
 }

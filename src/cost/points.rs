@@ -1,96 +1,20 @@
-//! What the materials of a scene, or of a file, cost where they are used: operations of one
-//! evaluation at points of the scene's own surfaces.
+//! Points of the surfaces of a scene, by material.
 
 use glam::{DVec2, DVec3};
-use impasto_compiler::cost::{self, Cost, Inputs, Operations};
+use impasto_compiler::Program;
+use impasto_compiler::cost::Inputs;
 use impasto_compiler::inspect::At;
-use impasto_compiler::ir::interp::OutOfFuel;
-use impasto_compiler::{Program, abi::MaterialInfo};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
-use serde::Serialize;
-
-use crate::Scene;
-
-/// What a material of a program costs.
-#[derive(Clone, Debug, Serialize)]
-pub struct MaterialCost {
-    /// Its name in the program.
-    pub name: String,
-    /// How many instances share its code.
-    pub instances: usize,
-    /// Its lobes after layering.
-    pub lobes: usize,
-    /// What evaluating it costs; none if it is on no surface of the scene.
-    pub cost: Option<Cost>,
-}
-
-impl MaterialCost {
-    /// Operations of one evaluation.
-    pub fn operations(&self) -> Option<&Operations> {
-        self.cost.as_ref().map(|c| &c.operations)
-    }
-}
-
-/// The materials of `program`, which a scene's bindings compiled to, each evaluated at `samples`
-/// points: spread by area over the surfaces that bind it, seen from random directions.
-///
-/// # Errors
-/// If the evaluations of a material take too long together.
-pub fn of_scene(
-    scene: &Scene,
-    program: &Program,
-    samples: usize,
-) -> Result<Vec<MaterialCost>, OutOfFuel> {
-    let mesh = &*scene.sampled(SAMPLED_COPIES);
-    let surfaces = surfaces(mesh, program);
-    measure(program, |material, info| {
-        let mut inputs = Inputs::new(material as u64);
-        surfaces[material].points(mesh, samples, info.crosses, &mut inputs)
-    })
-}
-
-/// The materials of `program`, each evaluated at `samples` points anywhere within a few metres.
-///
-/// # Errors
-/// If the evaluations of a material take too long together.
-pub fn anywhere(program: &Program, samples: usize) -> Result<Vec<MaterialCost>, OutOfFuel> {
-    measure(program, |material, _| {
-        let of = |i: &usize| program.instances()[*i].info.material == material;
-        let instances: Vec<usize> = (0..program.instances().len()).filter(of).collect();
-        let mut inputs = Inputs::new(material as u64);
-        let point = |i: usize| (instances[i * instances.len() / samples], inputs.anywhere());
-        (0..samples).map(point).collect()
-    })
-}
-
-fn measure(
-    program: &Program,
-    mut points: impl FnMut(usize, &MaterialInfo) -> Vec<(usize, At)>,
-) -> Result<Vec<MaterialCost>, OutOfFuel> {
-    let cost = |(material, info): (usize, &MaterialInfo)| {
-        let instances = program.instances().iter();
-        Ok(MaterialCost {
-            name: info.name.clone(),
-            instances: instances.filter(|i| i.info.material == material).count(),
-            lobes: info.lobes,
-            cost: cost::vector(program, material, &points(material, info))?,
-        })
-    };
-    program.materials().enumerate().map(cost).collect()
-}
-
-/// About how many triangles of placed objects points are taken from.
-const SAMPLED_COPIES: usize = 4_000_000;
 
 /// The triangles of one material, by instance, each with the area up to its end.
 #[derive(Default)]
-struct Surfaces {
+pub(super) struct Surfaces {
     triangles: Vec<u32>,
     area: Vec<f64>,
 }
 
 /// The surfaces of each material.
-fn surfaces(mesh: &Mesh, program: &Program) -> Vec<Surfaces> {
+pub(super) fn surfaces(mesh: &Mesh, program: &Program) -> Vec<Surfaces> {
     let mut order: Vec<u32> = (0..mesh.len() as u32).collect();
     order.retain(|&t| mesh.materials[t as usize] != NO_MATERIAL);
     // Instances one after another: evaluating them by turns would be slow.
@@ -109,7 +33,7 @@ fn surfaces(mesh: &Mesh, program: &Program) -> Vec<Surfaces> {
 
 impl Surfaces {
     /// Points with their instances, in equal steps of area, each step with a point in it.
-    fn points(
+    pub fn points(
         &self,
         mesh: &Mesh,
         samples: usize,

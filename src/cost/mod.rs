@@ -1,0 +1,90 @@
+//! What the materials of a scene, or of a file, cost where they are used: operations of one
+//! evaluation at points of the scene's own surfaces.
+
+use impasto_compiler::cost::{Cost, Inputs, LineCost, Measured, Operations};
+use impasto_compiler::inspect::At;
+use impasto_compiler::ir::interp::OutOfFuel;
+use impasto_compiler::{Program, abi::MaterialInfo};
+use serde::Serialize;
+
+use crate::Scene;
+
+mod difference;
+mod points;
+
+pub use difference::{Change, Difference, LineChange, difference};
+
+/// About how many triangles of placed objects points are taken from.
+const SAMPLED_COPIES: usize = 4_000_000;
+
+/// What a material of a program costs.
+#[derive(Clone, Debug, Serialize)]
+pub struct MaterialCost {
+    /// Its name in the program.
+    pub name: String,
+    /// How many instances share its code.
+    pub instances: usize,
+    /// Its lobes after layering.
+    pub lobes: usize,
+    /// What evaluating it costs; none if it is on no surface of the scene.
+    pub cost: Option<Cost>,
+    /// What the lines of its source cost, those first that cost most with what they call.
+    pub lines: Vec<LineCost>,
+}
+
+impl MaterialCost {
+    /// Operations of one evaluation.
+    pub fn operations(&self) -> Option<&Operations> {
+        self.cost.as_ref().map(|c| &c.operations)
+    }
+}
+
+/// The materials of `program`, which a scene's bindings compiled to, each evaluated at `samples`
+/// points: spread by area over the surfaces that bind it, seen from random directions.
+///
+/// # Errors
+/// If the evaluations of a material take too long together.
+pub fn of_scene(
+    scene: &Scene,
+    program: &Program,
+    samples: usize,
+) -> Result<Vec<MaterialCost>, OutOfFuel> {
+    let mesh = &*scene.sampled(SAMPLED_COPIES);
+    let surfaces = points::surfaces(mesh, program);
+    measure(program, |material, info| {
+        let mut inputs = Inputs::named(&info.name);
+        surfaces[material].points(mesh, samples, info.crosses, &mut inputs)
+    })
+}
+
+/// The materials of `program`, each evaluated at `samples` points anywhere within a few metres.
+///
+/// # Errors
+/// If the evaluations of a material take too long together.
+pub fn anywhere(program: &Program, samples: usize) -> Result<Vec<MaterialCost>, OutOfFuel> {
+    measure(program, |material, info| {
+        let of = |i: &usize| program.instances()[*i].info.material == material;
+        let instances: Vec<usize> = (0..program.instances().len()).filter(of).collect();
+        let mut inputs = Inputs::named(&info.name);
+        let point = |i: usize| (instances[i * instances.len() / samples], inputs.anywhere());
+        (0..samples).map(point).collect()
+    })
+}
+
+fn measure(
+    program: &Program,
+    mut points: impl FnMut(usize, &MaterialInfo) -> Vec<(usize, At)>,
+) -> Result<Vec<MaterialCost>, OutOfFuel> {
+    let cost = |(material, info): (usize, &MaterialInfo)| {
+        let instances = program.instances().iter();
+        let measured = Measured::new(program, material, &points(material, info))?;
+        Ok(MaterialCost {
+            name: info.name.clone(),
+            instances: instances.filter(|i| i.info.material == material).count(),
+            lobes: info.lobes,
+            cost: measured.as_ref().map(Measured::cost),
+            lines: measured.as_ref().map_or(Vec::new(), Measured::lines),
+        })
+    };
+    program.materials().enumerate().map(cost).collect()
+}
