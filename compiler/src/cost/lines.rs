@@ -2,7 +2,8 @@
 //!
 //! An operation belongs to the line that it was written in, and to every line that calls the function
 //! it was written in. What several lines compute alike is computed once, and belongs to one of them;
-//! what a compiler's own rules add belongs to the line of what they replace.
+//! the operation whose result a `let` names belongs to the `let`, and what the compiler's own rules add
+//! to the line of what they replace.
 
 use std::collections::BTreeMap;
 
