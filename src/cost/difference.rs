@@ -23,7 +23,7 @@ pub struct Difference {
 pub struct Change {
     /// Its name.
     pub name: String,
-    /// Does it cost what it did, line by line?
+    /// Does it cost what it did, in every number?
     pub same: bool,
     /// What it cost; none if it was on no surface.
     pub old: Option<Cost>,
@@ -78,7 +78,7 @@ fn change(old: &MaterialCost, new: &MaterialCost) -> Change {
     let lines = line_changes(&old.lines, &new.lines);
     Change {
         name: new.name.clone(),
-        same: old.cost == new.cost && lines.is_empty(),
+        same: old.cost == new.cost,
         old: old.cost.clone(),
         new: new.cost.clone(),
         lines,

@@ -268,14 +268,14 @@ fn the_papers_scenes_carry_the_counts_of_their_materials() {
             .skip_while(|line| !line.starts_with("# operations of one evaluation"))
             .map(|line| line.trim_start_matches('#').trim())
             .collect();
-        let counted = impasto(&["cost", &scene]).exits(0).stdout;
+        let counted = impasto(&["cost", "--lines", "0", &scene]).exits(0).stdout;
         let lines: Vec<&str> = counted.lines().collect();
         let same =
             comment.len() == lines.len() && comment.iter().zip(&lines).all(|(a, b)| agree(a, b));
         assert!(
             same,
             "the comment at the end of examples/{name}/scene.toml should be what `impasto cost \
-             examples/{name}/scene.toml` prints:\n{counted}"
+             --lines 0 examples/{name}/scene.toml` prints:\n{counted}"
         );
     }
 }

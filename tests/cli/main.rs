@@ -3,6 +3,7 @@
 
 mod common;
 mod cost;
+mod cost_lines;
 mod emit_check;
 mod eval;
 mod film;
