@@ -402,6 +402,7 @@ mod tests {
                 spread: 0.0,
                 items: 0,
                 logic_seconds: 1e-4,
+                predicted: None,
                 registers: None,
             };
             let kernels = crate::measure::sample_for_fit(&all, true);

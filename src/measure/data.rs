@@ -2,7 +2,7 @@
 //! files of `impasto calibrate --data` and of `impasto plan --strategy exhaustive --format json`.
 
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::{Form, Workload};
+use impasto_compiler::partition::{Form, Prediction, Workload};
 use serde::{Deserialize, Serialize};
 
 /// The version of the format.
@@ -78,6 +78,9 @@ pub struct Kernel {
     /// Seconds of the logic kernel that filled its queues, or that it is part of.
     #[serde(default)]
     pub logic_seconds: f64,
+    /// What the time model said of it, by the profile at hand.
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    pub predicted: Option<Prediction>,
     /// Registers that the driver gives a thread of it, where it tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub registers: Option<u32>,
@@ -221,6 +224,7 @@ mod tests {
                 spread: 0.01,
                 items: 32,
                 logic_seconds: 1e-5,
+                predicted: None,
                 registers: None,
             }],
             logic_seconds: 0.1,

@@ -2,8 +2,11 @@
 
 mod candidates;
 mod data;
+mod exhaustive;
+mod plans;
 mod scene;
 
 pub use candidates::{ALL, candidate, candidates, sample_for_fit};
 pub use data::{Adapter, Data, Kernel, Material, Measurement};
+pub use exhaustive::{Answer, Options, PlanTime, exhaustive};
 pub use scene::{Kernels, Progress, Subject};

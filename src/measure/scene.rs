@@ -135,6 +135,7 @@ impl<'p> Subject<'p> {
             spread: measured.spread / of.max(f64::MIN_POSITIVE),
             items: measured.items,
             logic_seconds: measured.logic_seconds,
+            predicted: None,
             registers: None,
         }
     }

@@ -1,0 +1,294 @@
+//! The best plan by measurement: every kernel that a plan of the scene may have is timed, and plans are
+//! what their kernels take together. Whole iterations of some plans tell whether times add up.
+
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+use impasto_compiler::Program;
+use impasto_compiler::cost::Inputs;
+use impasto_compiler::partition::search::{Automatic, Groups, Search};
+use impasto_compiler::partition::{
+    Calibrated, DeviceProfile, Form, Known, Plan, Strategy, TimeModel, Wanted, text,
+};
+use impasto_runtime::gpu::Gpu;
+use impasto_runtime::lab::{Candidate, Lab, LabOptions};
+use serde::Serialize;
+
+use super::plans::Times;
+use super::{Measurement, Progress, Subject, candidate, candidates};
+use crate::{Error, Scene};
+
+/// How many plans are drawn by chance to be timed as a whole.
+const DRAWN: usize = 6;
+/// By what they are drawn.
+const SEED: u64 = 0x9a11;
+
+/// How to measure.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How the laboratory works.
+    pub lab: LabOptions,
+    /// After how long no further kernel is measured.
+    pub limit: Option<Duration>,
+}
+
+/// What was measured, and what follows from it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Answer {
+    /// The kernels, and what the scene asks of them.
+    #[serde(flatten)]
+    pub measurement: Measurement,
+    /// The device profile by which times were predicted.
+    pub profile: String,
+    /// Strategies' plans, the best and the worst, and some drawn by chance.
+    pub plans: Vec<PlanTime>,
+    /// The partition that the time model chooses.
+    pub auto: String,
+    /// The best by measured kernels.
+    pub best: String,
+    /// Time of material kernels of the one over that of the other; none if a kernel of the model's choice
+    /// could not be measured.
+    pub regret: Option<f64>,
+    /// Seconds that the model's search took.
+    pub planning_seconds: f64,
+    /// Kernels left out because time was used up.
+    pub left_out: usize,
+    /// Kernels that could not be measured, with the reason.
+    pub failed: Vec<String>,
+}
+
+/// A plan with its times.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlanTime {
+    /// The strategy that made it; `best` and `worst` by measured kernels, `sample` by chance.
+    pub strategy: String,
+    /// Its kernels.
+    pub partition: String,
+    /// Seconds of its material kernels by the time model.
+    pub predicted: f64,
+    /// Their measured seconds, added up; none if one was not measured.
+    pub added: Option<f64>,
+    /// Seconds of a whole iteration, as it was timed.
+    pub measured: Option<f64>,
+    /// Those of its parts added up: logic, material kernels and everything else.
+    pub expected: Option<f64>,
+}
+
+/// Measures the kernels of `scene`, whose materials compiled to `program`, and looks for the best plan;
+/// predictions are those of `profile`, which is called `profile_name`.
+///
+/// # Errors
+/// If the scene cannot be rendered on the GPU, or that has no timestamps.
+pub fn exhaustive(
+    gpu: &Gpu,
+    scene: &Scene,
+    program: &Program,
+    profile: (&str, &DeviceProfile),
+    options: &Options,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Answer, Error> {
+    let deadline = options.limit.map(|limit| Instant::now() + limit);
+    let subject = Subject::new(scene, program, &options.lab)?;
+    let mut lab = subject.lab(gpu, &options.lab)?;
+    let materials = subject.materials(&lab);
+    let unused: Vec<usize> = (0..subject.names.len())
+        .filter(|m| !materials.contains(m))
+        .collect();
+    let workload = lab.workload().clone();
+    let known = Known {
+        names: &subject.names,
+        unused: &unused,
+        costs: Some(&subject.costs),
+        workload: Some(&workload),
+        profile: Some(profile.1),
+    };
+    let model = Calibrated {
+        costs: &subject.costs,
+        workload: &workload,
+        profile: profile.1,
+    };
+    let (mut plans, planning_seconds) = strategies(&known);
+    let wanted = wanted(&plans, &materials);
+    let timed = subject.time(&mut lab, &wanted, deadline, progress)?;
+    let mut measurement = subject.measurement(gpu, &lab, &options.lab, timed.kernels);
+    let mut times = Times::default();
+    for at in 0..measurement.kernels.len() {
+        let members = measurement.members(&measurement.kernels[at]);
+        let kernel = &mut measurement.kernels[at];
+        kernel.predicted = Some(model.predict(kernel.form, &members));
+        times.insert(kernel.form, members, kernel.measured);
+    }
+    let best = Automatic.search(&known.problem(), &times);
+    plans.push(known.plan("best", best));
+    plans.extend(
+        times
+            .worst(&materials)
+            .map(|worst| known.plan("worst", worst)),
+    );
+    let mut numbers = Inputs::new(SEED);
+    for _ in 0..DRAWN {
+        let drawn = times.drawn(&materials, &mut numbers);
+        plans.extend(drawn.map(|groups| known.plan("sample", groups)));
+    }
+    let late = deadline.is_some_and(|end| Instant::now() >= end);
+    let whole = match late {
+        true => vec![None; plans.len()],
+        false => iterations(&mut lab, &plans)?,
+    };
+    let beside = workload.logic_seconds + workload.other_seconds;
+    let describe = |(plan, measured): (&Plan, Option<f64>)| {
+        let groups = groups(plan);
+        let added = times.added(&groups);
+        PlanTime {
+            strategy: plan.strategy.clone(),
+            partition: text::print(plan, &subject.names),
+            predicted: groups
+                .iter()
+                .map(|(form, members)| model.seconds(*form, members))
+                .sum(),
+            added,
+            measured,
+            expected: added.map(|added| added + beside),
+        }
+    };
+    let plans: Vec<PlanTime> = plans.iter().zip(whole).map(describe).collect();
+    let of = |strategy: &str| plans.iter().find(|plan| plan.strategy == strategy);
+    let partition = |strategy| of(strategy).map_or_else(String::new, |plan| plan.partition.clone());
+    let added = |strategy| of(strategy).and_then(|plan| plan.added);
+    Ok(Answer {
+        profile: profile.0.to_string(),
+        auto: partition("auto"),
+        best: partition("best"),
+        regret: added("auto")
+            .zip(added("best"))
+            .map(|(auto, best)| auto / best),
+        planning_seconds,
+        left_out: timed.left_out,
+        failed: timed
+            .failed
+            .iter()
+            .map(|(c, why)| failure(c, &subject.names, why))
+            .collect(),
+        plans,
+        measurement,
+    })
+}
+
+fn failure(candidate: &Candidate, names: &[String], why: &str) -> String {
+    let members: Vec<&str> = candidate
+        .members
+        .iter()
+        .map(|m| names[*m].as_str())
+        .collect();
+    format!("{}:{}: {why}", candidate.form.name(), members.join(","))
+}
+
+/// The plans of strategies that have iterations, and how long the model's took to find. A strategy that
+/// cannot plan this scene is left out.
+fn strategies(known: &Known<'_>) -> (Vec<Plan>, f64) {
+    let begin = Instant::now();
+    let auto = Wanted::Auto.plan(known);
+    let planning_seconds = begin.elapsed().as_secs_f64();
+    let fixed = [
+        Strategy::Own,
+        Strategy::Mixed,
+        Strategy::Binned,
+        Strategy::Inline,
+    ];
+    let fixed = fixed.map(Wanted::Fixed);
+    let others = fixed.iter().chain(&[Wanted::Paper]);
+    let others = others.map(|wanted| wanted.plan(known));
+    let plans = std::iter::once(auto).chain(others);
+    (plans.filter_map(Result::ok).collect(), planning_seconds)
+}
+
+/// The kernels of those plans first, in case that time is short, then all others.
+fn wanted(plans: &[Plan], materials: &[usize]) -> Vec<Candidate> {
+    let of_plans = plans.iter().flat_map(groups).map(|(form, members)| {
+        let form = match (form, members.len()) {
+            (Form::Mixed | Form::Binned, 1) => Form::Own,
+            (form, _) => form,
+        };
+        candidate(form, members)
+    });
+    let mut all: Vec<Candidate> = Vec::new();
+    for candidate in of_plans.chain(candidates(materials)) {
+        if !all.contains(&candidate) {
+            all.push(candidate);
+        }
+    }
+    all
+}
+
+fn groups(plan: &Plan) -> Groups {
+    let kernels = plan.kernels.iter();
+    kernels
+        .map(|kernel| (kernel.form, kernel.materials.clone()))
+        .collect()
+}
+
+/// Whole iterations of the plans.
+fn iterations(lab: &mut Lab<'_>, plans: &[Plan]) -> Result<Vec<Option<f64>>, Error> {
+    let timed = lab.iterations(plans)?.into_iter();
+    Ok(timed
+        .map(|one| one.ok().map(|iteration| iteration.seconds))
+        .collect())
+}
+
+impl std::fmt::Display for Answer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let set = &self.measurement;
+        writeln!(
+            f,
+            "{} on {}: {} kernels, {} paths, medians of {}",
+            set.scene,
+            set.adapter.name,
+            set.kernels.len(),
+            set.pool,
+            set.repetitions
+        )?;
+        writeln!(
+            f,
+            "an iteration takes {} for logic and {} for all but materials\n",
+            microseconds(Some(set.logic_seconds)),
+            microseconds(Some(set.other_seconds))
+        )?;
+        writeln!(
+            f,
+            "{:<8} {:>13} {:>13} {:>7} {:>13} {:>13}  partition",
+            "plan", "predicted", "materials", "/ best", "iteration", "as the sum"
+        )?;
+        let best = self.plans.iter().find(|plan| plan.strategy == "best");
+        let best = best.and_then(|plan| plan.added);
+        for plan in &self.plans {
+            let regret = plan.added.zip(best).map(|(a, b)| format!("{:.3}", a / b));
+            writeln!(
+                f,
+                "{:<8} {:>13} {:>13} {:>7} {:>13} {:>13}  {}",
+                plan.strategy,
+                microseconds(Some(plan.predicted)),
+                microseconds(plan.added),
+                regret.unwrap_or_else(|| "?".into()),
+                microseconds(plan.measured),
+                microseconds(plan.expected),
+                plan.partition
+            )?;
+        }
+        let mut notes = String::new();
+        if self.left_out > 0 {
+            let _ = writeln!(
+                notes,
+                "\n{} kernels were left out: time was used up",
+                self.left_out
+            );
+        }
+        for why in &self.failed {
+            let _ = writeln!(notes, "\nnot measured: {why}");
+        }
+        f.write_str(&notes)
+    }
+}
+
+fn microseconds(seconds: Option<f64>) -> String {
+    seconds.map_or_else(|| "?".into(), |s| format!("{:.2} us", 1e6 * s))
+}
