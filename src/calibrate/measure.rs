@@ -9,7 +9,11 @@ use impasto_runtime::lab::LabOptions;
 use super::room::{self, Coherence};
 use super::sources::{Palette, palettes};
 use crate::measure::{Measurement, Progress, Subject, sample_for_fit};
+use crate::plan::Facts;
 use crate::{Error, Scene};
+
+/// Points at which each material is evaluated to learn what it costs.
+const COST_SAMPLES: usize = 1024;
 
 /// How thoroughly to measure.
 #[derive(Clone, Debug)]
@@ -100,10 +104,10 @@ fn one(
         repetitions: effort.repetitions,
         ..LabOptions::default()
     };
-    let subject = Subject::new(scene, &program, &options)?;
+    let facts = Facts::of_scene(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;
+    let subject = Subject::new(scene, &program, facts, &options)?;
     let mut lab = subject.lab(gpu, &options)?;
-    let materials = subject.materials(&lab);
-    let candidates = sample_for_fit(&materials, !effort.quick);
+    let candidates = sample_for_fit(&subject.materials(), !effort.quick);
     let timed = subject.time(&mut lab, &candidates, None::<Instant>, progress)?;
     for (candidate, why) in &timed.failed {
         warn(&format!(

@@ -17,6 +17,7 @@ mod completions;
 mod cost;
 mod emit;
 mod eval;
+mod exhaustive;
 mod explain;
 mod info;
 mod interrupt;

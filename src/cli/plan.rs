@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, DeviceProfile, Plan, Wanted, Workload, file};
+use impasto::compiler::partition::{Calibrated, DeviceProfile, Plan, Wanted, Workload, file, text};
 use impasto::compiler::{self};
 use impasto::plan::Facts;
 use impasto::{FileLoader, Gpu, Program, Scene, files};
 use serde::Serialize;
 
+use super::exhaustive::ExhaustiveArgs;
 use super::info::GpuArgs;
 use super::strategy::{PlanArgs, Source};
 use super::{Failure, Global, Outcome, print, read_text};
@@ -41,11 +42,15 @@ pub(super) struct PlanCommandArgs {
     #[arg(long, value_name = "FILE")]
     save_workload: Option<PathBuf>,
     #[command(flatten)]
+    exhaustive: ExhaustiveArgs,
+    #[command(flatten)]
     gpu: GpuArgs,
 }
 
 /// A profile, and whether it is the GPU's own.
 struct Profile {
+    /// The name of the shipped profile that it is or is scaled from, or its file.
+    name: String,
     profile: DeviceProfile,
     exact: bool,
 }
@@ -70,6 +75,9 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     let source = args
         .wanted
         .source(&facts.names, &facts.unused, Wanted::Auto)?;
+    if let Source::Strategy(Wanted::Exhaustive) = source {
+        return args.measure(&scene, &program, facts, global);
+    }
     let mut gpu = None;
     let workload = args.workload(&facts, &mut gpu, &scene, &program)?;
     let profile = args.profile(&mut gpu)?;
@@ -99,6 +107,35 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
 }
 
 impl PlanCommandArgs {
+    /// Measures every kernel in the place of predicting it.
+    fn measure(&self, scene: &Scene, program: &Program, facts: Facts, global: &Global) -> Outcome {
+        if self.workload.is_some() {
+            return Err(Failure::Error(
+                "`--strategy exhaustive` renders the scene to measure its kernels, and takes no `--workload`"
+                    .into(),
+            ));
+        }
+        let mut gpu = Some(self.gpu.open()?);
+        let profile = self.profile(&mut gpu)?;
+        let gpu = self.opened(&mut gpu)?;
+        let answer = self.exhaustive.measure(
+            gpu,
+            scene,
+            program,
+            facts.clone(),
+            (&profile.name, &profile.profile),
+            self.pool,
+            global,
+        )?;
+        let best = text::parse(&answer.best, &facts.names, &facts.unused);
+        let best = best.map_err(|e| e.to_string())?;
+        self.save(&best, &facts.names, &answer.measurement.workload)?;
+        match global.json() {
+            true => print(&format!("{:#}\n", serde_json::json!(answer))),
+            false => print(&answer.to_string()),
+        }
+    }
+
     fn workload(
         &self,
         facts: &Facts,
@@ -119,6 +156,7 @@ impl PlanCommandArgs {
     fn profile(&self, gpu: &mut Option<Gpu>) -> Result<Profile, Failure> {
         if let Some(profile) = self.profile.as_deref().and_then(DeviceProfile::named) {
             return Ok(Profile {
+                name: self.profile.clone().unwrap_or_default(),
                 profile,
                 exact: true,
             });
@@ -127,6 +165,7 @@ impl PlanCommandArgs {
             let text = read_text(Path::new(path)).map_err(|error| self.no_profile(path, error))?;
             let parsed = DeviceProfile::parse(&text).map_err(|e| format!("`{path}`: {e}"));
             return Ok(Profile {
+                name: path.clone(),
                 profile: parsed?,
                 exact: true,
             });
@@ -134,6 +173,7 @@ impl PlanCommandArgs {
         let info = self.opened(gpu)?.info();
         let choice = DeviceProfile::shipped(&info.name, info.kind).map_err(|e| e.to_string())?;
         Ok(Profile {
+            name: choice.name.to_string(),
             profile: choice.profile,
             exact: choice.exact,
         })

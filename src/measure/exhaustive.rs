@@ -4,19 +4,18 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use impasto_compiler::Program;
 use impasto_compiler::cost::Inputs;
 use impasto_compiler::partition::search::{Automatic, Groups, Search};
 use impasto_compiler::partition::{
     Calibrated, DeviceProfile, Form, Known, Plan, Strategy, TimeModel, Wanted, text,
 };
 use impasto_runtime::gpu::Gpu;
-use impasto_runtime::lab::{Candidate, Lab, LabOptions};
+use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
 use serde::Serialize;
 
 use super::plans::Times;
 use super::{Measurement, Progress, Subject, candidate, candidates};
-use crate::{Error, Scene};
+use crate::Error;
 
 /// How many plans are drawn by chance to be timed as a whole.
 const DRAWN: usize = 6;
@@ -47,8 +46,10 @@ pub struct Answer {
     /// The best by measured kernels.
     pub best: String,
     /// Time of material kernels of the one over that of the other; none if a kernel of the model's choice
-    /// could not be measured.
+    /// could not be measured, or the best takes no time (inline materials may save more than they take).
     pub regret: Option<f64>,
+    /// The same of whole iterations, as sums of their parts.
+    pub regret_of_iterations: Option<f64>,
     /// Seconds that the model's search took.
     pub planning_seconds: f64,
     /// Kernels left out because time was used up.
@@ -72,38 +73,29 @@ pub struct PlanTime {
     pub measured: Option<f64>,
     /// Those of its parts added up: logic, material kernels and everything else.
     pub expected: Option<f64>,
+    /// Seconds of each kernel of the iteration that was timed.
+    pub kernels: Vec<(String, f64)>,
 }
 
-/// Measures the kernels of `scene`, whose materials compiled to `program`, and looks for the best plan;
-/// predictions are those of `profile`, which is called `profile_name`.
+/// Measures the kernels of a scene and looks for its best plan; times are predicted by the `profile` of
+/// that name.
 ///
 /// # Errors
 /// If the scene cannot be rendered on the GPU, or that has no timestamps.
 pub fn exhaustive(
     gpu: &Gpu,
-    scene: &Scene,
-    program: &Program,
+    subject: &Subject<'_>,
     profile: (&str, &DeviceProfile),
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Answer, Error> {
     let deadline = options.limit.map(|limit| Instant::now() + limit);
-    let subject = Subject::new(scene, program, &options.lab)?;
     let mut lab = subject.lab(gpu, &options.lab)?;
-    let materials = subject.materials(&lab);
-    let unused: Vec<usize> = (0..subject.names.len())
-        .filter(|m| !materials.contains(m))
-        .collect();
+    let (facts, materials) = (&subject.facts, subject.materials());
     let workload = lab.workload().clone();
-    let known = Known {
-        names: &subject.names,
-        unused: &unused,
-        costs: Some(&subject.costs),
-        workload: Some(&workload),
-        profile: Some(profile.1),
-    };
+    let known = facts.known(&workload, profile.1);
     let model = Calibrated {
-        costs: &subject.costs,
+        costs: &facts.costs,
         workload: &workload,
         profile: profile.1,
     };
@@ -136,38 +128,41 @@ pub fn exhaustive(
         false => iterations(&mut lab, &plans)?,
     };
     let beside = workload.logic_seconds + workload.other_seconds;
-    let describe = |(plan, measured): (&Plan, Option<f64>)| {
+    let describe = |(plan, whole): (&Plan, Option<Iteration>)| {
         let groups = groups(plan);
         let added = times.added(&groups);
         PlanTime {
             strategy: plan.strategy.clone(),
-            partition: text::print(plan, &subject.names),
+            partition: text::print(plan, &facts.names),
             predicted: groups
                 .iter()
                 .map(|(form, members)| model.seconds(*form, members))
                 .sum(),
             added,
-            measured,
+            measured: whole.as_ref().map(|whole| whole.seconds),
+            kernels: whole.map_or_else(Vec::new, |whole| whole.kernels),
             expected: added.map(|added| added + beside),
         }
     };
     let plans: Vec<PlanTime> = plans.iter().zip(whole).map(describe).collect();
     let of = |strategy: &str| plans.iter().find(|plan| plan.strategy == strategy);
     let partition = |strategy| of(strategy).map_or_else(String::new, |plan| plan.partition.clone());
-    let added = |strategy| of(strategy).and_then(|plan| plan.added);
+    let ratio = |time: fn(&PlanTime) -> Option<f64>| {
+        let best = of("best").and_then(time).filter(|best| *best > 0.0)?;
+        Some(of("auto").and_then(time)? / best)
+    };
     Ok(Answer {
         profile: profile.0.to_string(),
         auto: partition("auto"),
         best: partition("best"),
-        regret: added("auto")
-            .zip(added("best"))
-            .map(|(auto, best)| auto / best),
+        regret: ratio(|plan| plan.added),
+        regret_of_iterations: ratio(|plan| plan.expected),
         planning_seconds,
         left_out: timed.left_out,
         failed: timed
             .failed
             .iter()
-            .map(|(c, why)| failure(c, &subject.names, why))
+            .map(|(c, why)| failure(c, &facts.names, why))
             .collect(),
         plans,
         measurement,
@@ -228,11 +223,8 @@ fn groups(plan: &Plan) -> Groups {
 }
 
 /// Whole iterations of the plans.
-fn iterations(lab: &mut Lab<'_>, plans: &[Plan]) -> Result<Vec<Option<f64>>, Error> {
-    let timed = lab.iterations(plans)?.into_iter();
-    Ok(timed
-        .map(|one| one.ok().map(|iteration| iteration.seconds))
-        .collect())
+fn iterations(lab: &mut Lab<'_>, plans: &[Plan]) -> Result<Vec<Option<Iteration>>, Error> {
+    Ok(lab.iterations(plans)?.into_iter().map(Result::ok).collect())
 }
 
 impl std::fmt::Display for Answer {
@@ -259,7 +251,7 @@ impl std::fmt::Display for Answer {
             "plan", "predicted", "materials", "/ best", "iteration", "as the sum"
         )?;
         let best = self.plans.iter().find(|plan| plan.strategy == "best");
-        let best = best.and_then(|plan| plan.added);
+        let best = best.and_then(|plan| plan.added).filter(|best| *best > 0.0);
         for plan in &self.plans {
             let regret = plan.added.zip(best).map(|(a, b)| format!("{:.3}", a / b));
             writeln!(

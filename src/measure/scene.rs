@@ -10,10 +10,9 @@ use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
 use impasto_runtime::world::{MaterialSource, World};
 
 use super::{Adapter, Kernel, Material, Measurement};
-use crate::{Error, Scene};
+use crate::plan::Facts;
+use crate::{Error, RuntimeError, Scene};
 
-/// Points at which each material is evaluated to learn what it costs.
-pub const COST_SAMPLES: usize = 1024;
 /// Kernels that are built and timed together.
 const BATCH: usize = 48;
 
@@ -22,10 +21,8 @@ pub struct Subject<'p> {
     name: String,
     program: &'p Program,
     world: World,
-    /// What each material costs; none if it is on no surface.
-    pub costs: Vec<Option<Cost>>,
-    /// The materials' names.
-    pub names: Vec<String>,
+    /// What is known of its materials.
+    pub facts: Facts,
 }
 
 /// How far measuring is.
@@ -49,13 +46,16 @@ pub struct Kernels {
 }
 
 impl<'p> Subject<'p> {
-    /// A scene whose materials compiled to `program`.
+    /// A scene whose materials compiled to `program`, of which `facts` are known.
     ///
     /// # Errors
-    /// If it cannot be rendered, or its materials take too long to evaluate.
-    pub fn new(scene: &Scene, program: &'p Program, options: &LabOptions) -> Result<Self, Error> {
-        let costs = crate::cost::of_scene(scene, program, COST_SAMPLES);
-        let costs = costs.map_err(|_| Error::Costs)?;
+    /// If it cannot be rendered.
+    pub fn new(
+        scene: &Scene,
+        program: &'p Program,
+        facts: Facts,
+        options: &LabOptions,
+    ) -> Result<Self, Error> {
         let world = World::new(
             scene,
             &program.infos(),
@@ -66,9 +66,8 @@ impl<'p> Subject<'p> {
         Ok(Self {
             name: scene.name.clone(),
             program,
-            world: world.map_err(impasto_runtime::error::RuntimeError::from)?,
-            names: costs.iter().map(|material| material.name.clone()).collect(),
-            costs: costs.into_iter().map(|material| material.cost).collect(),
+            world: world.map_err(RuntimeError::from)?,
+            facts,
         })
     }
 
@@ -81,9 +80,9 @@ impl<'p> Subject<'p> {
     }
 
     /// The materials that are on some surface.
-    pub fn materials(&self, lab: &Lab<'_>) -> Vec<usize> {
-        let hits = lab.workload().materials.iter().enumerate();
-        hits.filter(|(_, h)| h.on_surface).map(|(m, _)| m).collect()
+    pub fn materials(&self) -> Vec<usize> {
+        let all = 0..self.facts.names.len();
+        all.filter(|m| !self.facts.unused.contains(m)).collect()
     }
 
     /// Times kernels, until `deadline` if there is one.
@@ -129,7 +128,7 @@ impl<'p> Subject<'p> {
             members: candidate
                 .members
                 .iter()
-                .map(|m| self.names[*m].clone())
+                .map(|m| self.facts.names[*m].clone())
                 .collect(),
             measured: measured.seconds,
             spread: measured.spread / of.max(f64::MIN_POSITIVE),
@@ -149,7 +148,7 @@ impl<'p> Subject<'p> {
         kernels: Vec<Kernel>,
     ) -> Measurement {
         let workload = lab.workload().clone();
-        let materials = self.names.iter().zip(&self.costs);
+        let materials = self.facts.names.iter().zip(&self.facts.costs);
         let material = |(name, cost): (&String, &Option<Cost>)| Material {
             name: name.clone(),
             cost: cost.clone(),

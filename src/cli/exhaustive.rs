@@ -1,0 +1,56 @@
+//! The options of `impasto plan --strategy exhaustive`, which measures kernels.
+
+use std::time::Duration;
+
+use clap::Args;
+use impasto::compiler::partition::DeviceProfile;
+use impasto::measure::{Answer, Options, Progress, Subject, exhaustive};
+use impasto::plan::Facts;
+use impasto::runtime::lab::LabOptions;
+use impasto::{Gpu, Program, Scene};
+
+use super::{Failure, Global};
+
+#[derive(Args)]
+#[command(next_help_heading = "With --strategy exhaustive")]
+pub(super) struct ExhaustiveArgs {
+    /// How often each kernel is timed; the median counts
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    repetitions: u32,
+    /// Measure no further kernel after so many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
+    limit: Option<u64>,
+}
+
+impl ExhaustiveArgs {
+    /// Measures the kernels of a scene.
+    #[allow(clippy::too_many_arguments)] // what the command has gathered
+    pub(super) fn measure(
+        &self,
+        gpu: &Gpu,
+        scene: &Scene,
+        program: &Program,
+        facts: Facts,
+        profile: (&str, &DeviceProfile),
+        pool: Option<u32>,
+        global: &Global,
+    ) -> Result<Answer, Failure> {
+        let options = Options {
+            lab: LabOptions {
+                pool,
+                repetitions: self.repetitions,
+                ..LabOptions::default()
+            },
+            limit: self.limit.map(Duration::from_secs),
+        };
+        let bar = super::render::progress_bar(global);
+        let mut progress = |progress: Progress| {
+            bar.set_length(progress.all as u64);
+            bar.set_position(progress.done as u64);
+        };
+        let subject = Subject::new(scene, program, facts, &options.lab);
+        let answer = subject.and_then(|s| exhaustive(gpu, &s, profile, &options, &mut progress));
+        bar.finish_and_clear();
+        Ok(answer.map_err(|error| error.to_string())?)
+    }
+}
