@@ -33,6 +33,12 @@ pub(super) struct Answer {
     /// Seconds that the search took.
     #[serde(default)]
     pub planning_seconds: f64,
+    /// Kernels left out because time was used up.
+    #[serde(default)]
+    pub left_out: usize,
+    /// Kernels that could not be measured, with the reason.
+    #[serde(default)]
+    pub failed: Vec<String>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, Deserialize)]

@@ -90,6 +90,39 @@ pub(super) fn held_out(results: &Results) -> String {
     }
 }
 
+/// What was not measured, if anything was not.
+pub(super) fn gaps(scenes: &[Measured]) -> String {
+    let mut rows = String::new();
+    for scene in scenes.iter().map(|s| s.scene) {
+        if scene.left_out == 0 && scene.failed.is_empty() {
+            continue;
+        }
+        let mut why: Vec<String> = scene
+            .failed
+            .iter()
+            .take(3)
+            .map(|f| f.replace(['|', '\n'], " "))
+            .collect();
+        if scene.left_out > 0 {
+            why.insert(0, "no time was left".into());
+        }
+        let count = scene.left_out + scene.failed.len();
+        let _ = writeln!(
+            rows,
+            "| {} | {} | {count} | {} |",
+            scene.name,
+            paths(scene.pool),
+            why.join("; ")
+        );
+    }
+    match rows.is_empty() {
+        true => rows,
+        false => format!(
+            "## What was not measured\n\n| scene | pool | kernels | why |\n|---|---|---|---|\n{rows}"
+        ),
+    }
+}
+
 /// What plans drawn by lot are called among strategies.
 const BY_LOT: &str = "sample";
 /// Further from the sum than this is told apart.

@@ -142,12 +142,15 @@ fn bench<'a>(args: &'a PartitionArgs, impasto: &'a Path, version: &'a str) -> Be
         true => options.iter().map(|o| o.to_string()).collect(),
         false => Vec::new(),
     };
+    let mut plan_options = quick(&["--repetitions=1"]);
+    // Kernels may use most of a scene's time; what is left is for building, iterations and renders.
+    plan_options.push(format!("--limit={}", (args.limit / 2).max(1)));
     Bench {
         impasto,
         version,
         records: &args.records,
         rounds: args.rounds as usize,
-        plan_options: quick(&["--repetitions=1"]),
+        plan_options,
         render_options: quick(&["--size=32x32"]),
         samples: args.quick.then_some(1),
         limit: Duration::from_secs(args.limit),

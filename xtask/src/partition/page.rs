@@ -32,6 +32,7 @@ pub(super) fn page(results: &Results, scenes: &[Measured]) -> String {
         checks::held_out(results),
         checks::additivity(scenes),
         tables::renders(scenes),
+        checks::gaps(scenes),
     ];
     let sections: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
     out += &sections.join("\n");
@@ -95,6 +96,16 @@ mod tests {
             let page = page.replace(" ()", "");
             assert!(page.contains(&line), "{line}\nis not in\n{page}");
         }
+    }
+
+    #[test]
+    fn what_was_not_measured_is_said() {
+        let mut results = fixture::results();
+        assert!(!page_of(&results).contains("not measured\n"));
+        results.scenes[0].left_out = 2;
+        results.scenes[0].failed = vec!["mixed:a|b: too large".into()];
+        let row = "| tiny | 1 M paths | 3 | no time was left; mixed:a b: too large |";
+        assert!(page_of(&results).contains(row), "{}", page_of(&results));
     }
 
     /// Whoever changes the page or the numbers writes the page anew: `cargo xtask partition --page`.

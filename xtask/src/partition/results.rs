@@ -73,6 +73,12 @@ pub(super) struct Scene {
     pub plans: Vec<Plan>,
     /// The partition that was chosen.
     pub auto: String,
+    /// Kernels for which there was no time.
+    #[serde(default)]
+    pub left_out: usize,
+    /// Kernels that could not be measured, with the reason.
+    #[serde(default)]
+    pub failed: Vec<String>,
     pub renders: Vec<Render>,
 }
 
@@ -177,6 +183,8 @@ impl Scene {
             plans: plans.collect(),
             materials,
             auto: answer.auto.clone(),
+            left_out: answer.left_out,
+            failed: answer.failed.clone(),
             renders: Vec::new(),
         })
     }
