@@ -17,11 +17,13 @@
 //! # }
 //! ```
 
+use std::sync::Arc;
+
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
 use impasto_compiler::ir::interp::OutOfFuel;
-use impasto_compiler::partition::{DeviceProfile, Known, Workload};
-use impasto_runtime::render::profile_workload;
+use impasto_compiler::partition::{DeviceProfile, Known, Wanted, Workload};
+use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
 
@@ -66,6 +68,22 @@ impl Facts {
             profile: Some(profile),
         }
     }
+}
+
+/// Plans while a scene is rendered: the automatic plan for what paths turn out to hit, by what materials cost
+/// at `samples` points of the scene's surfaces and by what the GPU takes.
+pub fn planner(
+    scene: Arc<Scene>,
+    program: Arc<Program>,
+    profile: DeviceProfile,
+    samples: usize,
+) -> Planner {
+    Box::new(move |workload| {
+        let facts = Facts::of_scene(&scene, &program, samples);
+        let facts = facts.map_err(|_| "its materials take too long to evaluate".to_owned())?;
+        let plan = Wanted::Auto.plan(&facts.known(workload, &profile));
+        plan.map_err(|error| error.to_string())
+    })
 }
 
 /// The materials of `program` that no triangle of `scene` binds, ascending: they need no kernel.

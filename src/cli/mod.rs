@@ -24,6 +24,7 @@ mod interrupt;
 mod merge;
 mod outputs;
 mod plan;
+mod profile;
 mod rays;
 mod render;
 mod strategy;

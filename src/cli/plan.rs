@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, DeviceProfile, Plan, Wanted, Workload, file, text};
+use impasto::compiler::partition::{Calibrated, Plan, Wanted, Workload, file, text};
 use impasto::compiler::{self};
 use impasto::plan::Facts;
 use impasto::{FileLoader, Gpu, Program, Scene, files};
@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::exhaustive::ExhaustiveArgs;
 use super::info::GpuArgs;
+use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
 use super::{Failure, Global, Outcome, print, read_text};
 
@@ -45,14 +46,6 @@ pub(super) struct PlanCommandArgs {
     exhaustive: ExhaustiveArgs,
     #[command(flatten)]
     gpu: GpuArgs,
-}
-
-/// A profile, and whether it is the GPU's own.
-struct Profile {
-    /// The name of the shipped profile that it is or is scaled from, or its file.
-    name: String,
-    profile: DeviceProfile,
-    exact: bool,
 }
 
 /// What is printed as JSON.
@@ -154,43 +147,9 @@ impl PlanCommandArgs {
     }
 
     fn profile(&self, gpu: &mut Option<Gpu>) -> Result<Profile, Failure> {
-        if let Some(profile) = self.profile.as_deref().and_then(DeviceProfile::named) {
-            return Ok(Profile {
-                name: self.profile.clone().unwrap_or_default(),
-                profile,
-                exact: true,
-            });
-        }
-        if let Some(path) = &self.profile {
-            let text = read_text(Path::new(path)).map_err(|error| self.no_profile(path, error))?;
-            let parsed = DeviceProfile::parse(&text).map_err(|e| format!("`{path}`: {e}"));
-            return Ok(Profile {
-                name: path.clone(),
-                profile: parsed?,
-                exact: true,
-            });
-        }
-        let info = self.opened(gpu)?.info();
-        let choice = DeviceProfile::shipped(&info.name, info.kind).map_err(|e| e.to_string())?;
-        Ok(Profile {
-            name: choice.name.to_string(),
-            profile: choice.profile,
-            exact: choice.exact,
-        })
-    }
-
-    /// A name that is neither a shipped profile's nor a file's.
-    fn no_profile(&self, path: &str, error: Failure) -> Failure {
-        match error {
-            Failure::Error(message) => {
-                let names: Vec<&str> = DeviceProfile::shipped_names().collect();
-                let hint = format!("give a file, or one of {}", names.join(", "));
-                match Path::new(path).exists() {
-                    true => Failure::Error(message),
-                    false => Failure::Error(format!("{message}\nhint: {hint}")),
-                }
-            }
-            other => other,
+        match &self.profile {
+            Some(given) => Profile::given(given),
+            None => Profile::of(&self.opened(gpu)?.info()),
         }
     }
 

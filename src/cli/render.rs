@@ -5,21 +5,27 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
+use impasto::compiler::partition::{Known, Needs, Wanted};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film_file::FilmFile;
 use impasto::runtime::media::MAX_NESTED;
-use impasto::runtime::render::Progress;
-use impasto::runtime::report::{MaterialReport, Report};
+use impasto::runtime::render::{Progress, Replanning};
+use impasto::runtime::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::scene::FilmSettings;
-use impasto::{FileLoader, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files};
+use impasto::{
+    FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files, plan,
+};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::checkpoint::CheckpointArgs;
 use super::info::GpuArgs;
 use super::outputs::{Outputs, parse_exposure};
+use super::profile::Profile;
+use super::strategy::{PlanArgs, Source};
 use super::technique::TechniqueArgs;
 use super::{Failure, Global, Outcome, interrupt, print, runtime};
 
@@ -45,9 +51,12 @@ pub(super) struct RenderArgs {
     /// Seed of all random numbers: equal seeds give equal pictures
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// How materials share kernels
-    #[arg(long, default_value = "wavefront", value_parser = parse_strategy)]
-    strategy: Strategy,
+    #[command(flatten)]
+    plan: PlanArgs,
+    /// What the GPU's operations take, for the automatic plan: a profile that is part of the program
+    /// (h200, llvmpipe), or a file that `impasto calibrate` wrote; otherwise the one that fits best
+    #[arg(long, value_name = "NAME|FILE")]
+    device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -81,13 +90,6 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// Longest side of a picture in pixels.
 const MAX_SIDE: u32 = 65_536;
 
-fn parse_strategy(name: &str) -> Result<Strategy, String> {
-    Strategy::from_name(name).ok_or_else(|| {
-        let names: Vec<&str> = Strategy::ALL.iter().map(|(_, name)| *name).collect();
-        format!("expected one of {}", names.join(", "))
-    })
-}
-
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let outputs = Outputs::of(&args.out)?;
     if let Some(report) = &args.report {
@@ -95,14 +97,25 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     }
     let start = args.checkpoint.read()?;
     interrupt::install()?;
-    let scene = load(args, global)?;
+    let scene = Arc::new(load(args, global)?);
     let started = Instant::now();
-    let program = compile(&scene, global)?;
+    let program = Arc::new(compile(&scene, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
-    let plan = impasto::plan(&program, args.strategy);
+    let planned = args.planned(&scene, &program)?;
+    let given = args.device_profile.as_deref().map(Profile::given);
+    let given = given.transpose()?;
     let gpu = args.gpu.open()?;
+    let options = args.options(planned.renewed);
     let mut renderer =
-        Renderer::new(&gpu, &scene, &program, &plan, &args.options()).map_err(runtime)?;
+        Renderer::new(&gpu, &scene, &program, &planned.plan, &options).map_err(runtime)?;
+    if planned.renewed {
+        let profile = given.map_or_else(|| Profile::of(&gpu.info()), Ok)?;
+        if !profile.exact {
+            global.detail("no profile is of this GPU; `impasto calibrate` makes one");
+        }
+        let planner = plan::planner(scene.clone(), program.clone(), profile.profile, POINTS);
+        renderer.replan(Replanning::new(program.clone(), planner));
+    }
     let mut rendering = sample(&mut renderer, args, start, global)?;
     rendering.report.compile_seconds += material_seconds;
     if rendering.report.paths == 0 {
@@ -118,15 +131,65 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     }
 }
 
+/// At how many points of surfaces materials are evaluated to see what they cost.
+const POINTS: usize = 1024;
+
+/// The plan that a render begins with.
+struct Planned {
+    plan: Plan,
+    /// Whether it is renewed for what paths turn out to hit.
+    renewed: bool,
+}
+
 impl RenderArgs {
-    fn options(&self) -> RenderOptions {
+    /// The plan that was asked for. The automatic one begins with a kernel a material.
+    fn planned(&self, scene: &Scene, program: &Program) -> Result<Planned, Failure> {
+        let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
+        let unused = plan::unused(scene, program);
+        let fixed = |plan| Planned {
+            plan,
+            renewed: false,
+        };
+        let wanted = match self.plan.source(&names, &unused, Wanted::Auto)? {
+            Source::Given(plan) => return Ok(fixed(plan)),
+            Source::Strategy(wanted) => wanted,
+        };
+        let mut known = Known {
+            names: &names,
+            unused: &unused,
+            costs: None,
+            workload: None,
+            profile: None,
+        };
+        let planned = |known: &Known<'_>| wanted.plan(known).map_err(|e| e.to_string());
+        if wanted == Wanted::Auto {
+            let own = Wanted::Fixed(Strategy::Own).plan(&known);
+            return Ok(Planned {
+                plan: Plan {
+                    strategy: wanted.to_string(),
+                    ..own.map_err(|e| e.to_string())?
+                },
+                renewed: true,
+            });
+        }
+        if wanted.row().needs != Needs::Costs {
+            return Ok(fixed(planned(&known)?));
+        }
+        let facts = plan::Facts::of_scene(scene, program, POINTS).map_err(|_| {
+            "the materials take too long to evaluate; choose another strategy".to_owned()
+        })?;
+        known.costs = Some(&facts.costs);
+        Ok(fixed(planned(&known)?))
+    }
+
+    fn options(&self, count_hits: bool) -> RenderOptions {
         RenderOptions {
             samples: self.spp,
             first_sample: self.samples_from,
             seed: self.seed,
             pool: self.pool,
             technique: self.technique.technique(),
-            count_hits: false,
+            count_hits,
         }
     }
 }
@@ -225,6 +288,9 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
         super::count(report.instance_count, "instance"),
         material_list(report),
     ));
+    if let Some(change) = &report.replanned {
+        global.note(&plan_note(change));
+    }
     if report.placements > 0 {
         let [objects, placements] = [report.objects, report.placements].map(|n| n as usize);
         global.note(&format!(
@@ -259,6 +325,18 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
         global.note(&format!(
             "warning: {lost} paths crossed too many hidden boundaries in a row and were ended"
         ));
+    }
+}
+
+/// What became of the automatic plan.
+fn plan_note(change: &ReplanReport) -> String {
+    let (iteration, seconds) = (change.at_iteration, change.at_seconds);
+    match (&change.kept, &change.to) {
+        (Some(why), _) => format!("warning: the first plan went on: {why}"),
+        (None, Some(plan)) if *plan != change.from => {
+            format!("planned after {iteration} iterations ({seconds:.1} s): {plan}")
+        }
+        _ => format!("a kernel a material is the best plan, found after {seconds:.1} s"),
     }
 }
 

@@ -8,5 +8,6 @@ mod emit_check;
 mod eval;
 mod film;
 mod limits;
+mod plans;
 mod rays;
 mod render;

@@ -52,9 +52,10 @@ fn a_picture_a_look_at_it_and_a_report() {
 }
 
 /// What every report has; docs/report.md says what they mean.
-const REPORT_FIELDS: [&str; 16] = [
+const REPORT_FIELDS: [&str; 17] = [
     "adapter",
     "strategy",
+    "plan",
     "samples_per_pixel",
     "paths",
     "gpu_seconds",
