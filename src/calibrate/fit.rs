@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::constants;
 use super::minimise::least_squares;
+use super::registers::{Registers, registers};
 use crate::measure::{Kernel, Measurement};
 
 /// The logarithm of a ratio beyond which it counts linearly.
@@ -56,6 +57,8 @@ pub struct Fitted {
     pub held_out: Errors,
     /// What the model says without a fit.
     pub before: Errors,
+    /// What the driver told of registers, if it did.
+    pub registers: Option<Registers>,
 }
 
 /// How far predictions of a group of kernels are off.
@@ -124,6 +127,7 @@ pub fn fit(sets: &[Measurement], start: &DeviceProfile) -> Fitted {
         scenes: grouped(&residuals, by_scene),
         held_out,
         before: errors("before", &before),
+        registers: registers(sets),
         residuals,
     }
 }
@@ -404,6 +408,7 @@ mod tests {
                 logic_seconds: 1e-4,
                 predicted: None,
                 registers: None,
+                binary_bytes: None,
             };
             let kernels = crate::measure::sample_for_fit(&all, true);
             set.kernels = kernels.into_iter().map(kernel).collect();
@@ -452,6 +457,26 @@ mod tests {
         let off = |r: &&Residual| (r.ratio - 1.0).abs() > 0.1;
         assert!(fitted.residuals.iter().filter(off).count() < fitted.residuals.len() / 20);
         assert!(fitted.residuals[0].ratio < 0.1);
+    }
+
+    #[test]
+    fn registers_are_a_line_over_live_numbers() {
+        let mut sets = measured_by(&shipped());
+        assert_eq!(fit(&sets[..1], &shipped()).registers, None);
+        for set in &mut sets {
+            for at in 0..set.kernels.len() {
+                let members = set.members(&set.kernels[at]).into_iter();
+                let live = members.filter_map(|m| set.materials[m].cost.as_ref().map(|c| c.live));
+                let live = live.max().expect("costs are known");
+                set.kernels[at].registers = Some(20 + 2 * live);
+            }
+        }
+        let line = registers(&sets).expect("the driver told");
+        assert!(
+            (line.base - 20.0).abs() < 1e-9 && (line.slope - 2.0).abs() < 1e-9,
+            "{line:?}"
+        );
+        assert!(line.residual < 1e-9 && line.rank_correlation > 0.999);
     }
 
     #[test]

@@ -102,6 +102,7 @@ fn one(
     let options = LabOptions {
         pool: Some(pool),
         repetitions: effort.repetitions,
+        statistics: true,
         ..LabOptions::default()
     };
     let facts = Facts::of_scene(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;

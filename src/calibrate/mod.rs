@@ -5,12 +5,14 @@ mod constants;
 mod fit;
 mod measure;
 mod minimise;
+mod registers;
 mod report;
 mod room;
 mod sources;
 
 pub use fit::{Errors, Fitted, Residual, fit, rank_correlation};
 pub use measure::{Effort, Step, measure};
+pub use registers::{Registers, registers};
 pub use report::text;
 
 use impasto_compiler::partition::DeviceProfile;

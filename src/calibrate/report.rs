@@ -20,6 +20,13 @@ pub fn text(fitted: &Fitted, all: bool) -> String {
     out += &table("scene", &fitted.scenes);
     out += "\n";
     out += &constants(fitted);
+    if let Some(r) = &fitted.registers {
+        let _ = writeln!(
+            out,
+            "\nregisters = {:.1} + {:.3} x live numbers, off by {:.1}, rank correlation {:.3} ({} kernels)",
+            r.base, r.slope, r.residual, r.rank_correlation, r.kernels
+        );
+    }
     out
 }
 

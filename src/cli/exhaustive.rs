@@ -39,6 +39,7 @@ impl ExhaustiveArgs {
             lab: LabOptions {
                 pool,
                 repetitions: self.repetitions,
+                statistics: true,
                 ..LabOptions::default()
             },
             limit: self.limit.map(Duration::from_secs),

@@ -84,6 +84,9 @@ pub struct Kernel {
     /// Registers that the driver gives a thread of it, where it tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub registers: Option<u32>,
+    /// Bytes of its machine code, where the driver tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub binary_bytes: Option<u64>,
 }
 
 /// Several measurements in a file.
@@ -226,6 +229,7 @@ mod tests {
                 logic_seconds: 1e-5,
                 predicted: None,
                 registers: None,
+                binary_bytes: None,
             }],
             logic_seconds: 0.1,
             other_seconds: 0.2,

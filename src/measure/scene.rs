@@ -135,7 +135,8 @@ impl<'p> Subject<'p> {
             items: measured.items,
             logic_seconds: measured.logic_seconds,
             predicted: None,
-            registers: None,
+            registers: measured.statistics.and_then(|s| s.registers),
+            binary_bytes: measured.statistics.and_then(|s| s.binary_bytes),
         }
     }
 

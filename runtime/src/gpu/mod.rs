@@ -9,9 +9,11 @@ use crate::error::RuntimeError;
 
 mod info;
 pub(crate) mod shader;
+pub(crate) mod statistics;
 mod timing;
 
 pub use info::GpuInfo;
+pub use statistics::KernelStatistics;
 pub use timing::Timing;
 
 /// How to choose and open a GPU.

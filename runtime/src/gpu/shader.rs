@@ -8,7 +8,10 @@ use crate::bvh;
 use crate::error::RuntimeError;
 
 /// Parses and validates `wgsl`, the text of the kernel called `kernel`.
-pub(crate) fn validate(kernel: &str, wgsl: &str) -> Result<naga::Module, RuntimeError> {
+pub(crate) fn validate(
+    kernel: &str,
+    wgsl: &str,
+) -> Result<(naga::Module, naga::valid::ModuleInfo), RuntimeError> {
     let failure = |message| RuntimeError::Shader {
         kernel: kernel.to_string(),
         message,
@@ -20,10 +23,10 @@ pub(crate) fn validate(kernel: &str, wgsl: &str) -> Result<naga::Module, Runtime
     let capabilities = naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32
         | naga::valid::Capabilities::SUBGROUP
         | naga::valid::Capabilities::SUBGROUP_BARRIER;
-    naga::valid::Validator::new(flags, capabilities)
+    let info = naga::valid::Validator::new(flags, capabilities)
         .validate(&module)
         .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
-    Ok(module)
+    Ok((module, info))
 }
 
 impl Gpu {

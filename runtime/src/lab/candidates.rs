@@ -9,7 +9,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel};
 use super::bench::Run;
 use super::{Candidate, Lab, Unmeasured, names, own_plan};
 use crate::error::RuntimeError;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, KernelStatistics};
 use crate::modules::{Composer, Feed, Kernel, Recipe, Sizes};
 use crate::render::build_step;
 use crate::resources::Resources;
@@ -37,6 +37,25 @@ impl Lab<'_> {
         self.build(kernels)?;
         let run = |composed: Result<Composed, Unmeasured>| self.finish(composed?);
         Ok(composed.into_iter().map(run).collect())
+    }
+
+    /// What the driver says of own and mixed kernels, if it is to be asked.
+    pub(super) fn tell(&self, candidates: &[Candidate]) -> Vec<Option<KernelStatistics>> {
+        let Some(statistics) = &self.statistics else {
+            return vec![None; candidates.len()];
+        };
+        let asked = |c: &Candidate| matches!(c.form, Form::Own | Form::Mixed);
+        let kernel = |candidate: &Candidate| {
+            let composed = Some(candidate)
+                .filter(|c| asked(c))
+                .map(|c| self.compose(c));
+            composed?.ok()?.kernels.pop()
+        };
+        let kernels: Vec<Option<Kernel>> = candidates.iter().map(kernel).collect();
+        crate::parallel::map(&kernels, |kernel| {
+            let kernel = kernel.as_ref()?;
+            statistics.of(&kernel.recipe.name, &kernel.wgsl, &kernel.bindings)
+        })
     }
 
     /// The logic kernel alone, of a kernel a material.

@@ -11,7 +11,8 @@ use impasto_compiler::partition::{Form, Plan, Strategy, Workload};
 use serde::Serialize;
 
 use crate::error::RuntimeError;
-use crate::gpu::{Gpu, Timing};
+use crate::gpu::statistics::Statistics;
+use crate::gpu::{Gpu, KernelStatistics, Timing};
 use crate::layout::Layout;
 use crate::modules::{Composer, Sizes};
 use crate::pool;
@@ -48,6 +49,9 @@ pub struct LabOptions {
     pub warm_iterations: u32,
     /// How often each kernel is timed; the median counts.
     pub repetitions: u32,
+    /// Whether the driver is asked for registers and sizes of own and mixed kernels, which are built once
+    /// more for that.
+    pub statistics: bool,
 }
 
 impl Default for LabOptions {
@@ -57,6 +61,7 @@ impl Default for LabOptions {
             technique: Technique::default(),
             warm_iterations: 24,
             repetitions: 9,
+            statistics: false,
         }
     }
 }
@@ -82,6 +87,8 @@ pub struct Measured {
     pub items: u64,
     /// Median GPU seconds of the logic kernel that filled its queues, or that it is part of.
     pub logic_seconds: f64,
+    /// What the driver says of it, if it was asked and answers.
+    pub statistics: Option<KernelStatistics>,
 }
 
 /// What an iteration of a plan took.
@@ -110,6 +117,7 @@ pub struct Lab<'a> {
     sizes: Sizes,
     technique: Technique,
     repetitions: u32,
+    statistics: Option<Statistics<'a>>,
     resources: Resources,
     snapshot: Snapshot,
     cache: Cache,
@@ -170,6 +178,7 @@ impl<'a> Lab<'a> {
             sizes: parts.sizes,
             technique: parts.technique,
             repetitions: options.repetitions.max(1),
+            statistics: options.statistics.then(|| Statistics::open(gpu)).flatten(),
             snapshot: Snapshot::new(gpu, &resources)?,
             resources,
             cache: Cache::default(),
@@ -226,12 +235,16 @@ impl<'a> Lab<'a> {
         let mut samples = self.time_those(&runs)?;
         let bare = samples.pop().and_then(Result::ok).unwrap_or_default();
         let bare = bench::median(bare.iter().map(|sample| sample.steps[0]));
-        let results = candidates.iter().zip(runs.iter().zip(samples));
-        let measured = results.map(|(candidate, (run, samples))| {
+        let told = self.tell(candidates);
+        let results = candidates.iter().zip(told).zip(runs.iter().zip(samples));
+        let measured = results.map(|((candidate, statistics), (run, samples))| {
             let (Ok(run), samples) = (run, samples?) else {
                 return Err(String::new());
             };
-            Ok(measured(candidate, run, &samples, bare))
+            Ok(Measured {
+                statistics,
+                ..measured(candidate, run, &samples, bare)
+            })
         });
         Ok(measured.collect())
     }
@@ -388,5 +401,6 @@ fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> 
             .last()
             .map_or(0, |sample| run.items(&sample.counters)),
         logic_seconds,
+        statistics: None,
     }
 }
