@@ -43,6 +43,9 @@ impl Renderer<'_> {
         status: &mut Status,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(), RuntimeError> {
+        if let Some(replan) = &mut self.replan {
+            replan.begin_pass(status.iterations);
+        }
         let ready = &self.ready;
         let options = pass.options(&self.options);
         ready

@@ -29,7 +29,7 @@ pub struct Replanning {
     pub source: Arc<dyn MaterialSource + Send + Sync>,
     /// What plans.
     pub planner: Planner,
-    /// Iterations before hits count: paths begin together, and the mixture of their lengths
+    /// Iterations of a pass before hits count: paths begin together, and the mixture of their lengths
     /// becomes steady.
     pub warm_iterations: u64,
     /// Iterations over which hits are counted, at least.
@@ -80,8 +80,8 @@ struct Settings {
 }
 
 enum Stage {
-    /// The mixture of paths becomes steady.
-    Warming,
+    /// The mixture of paths becomes steady, after the iteration that a pass began with.
+    Warming(u64),
     /// Hits are counted.
     Counting(Mark),
     /// A plan is made and compiled.
@@ -128,7 +128,7 @@ impl Renderer<'_> {
                 worthwhile: replanning.worthwhile.as_secs_f64(),
                 wait: replanning.wait,
             },
-            stage: Stage::Warming,
+            stage: Stage::Warming(0),
             workload: None,
             cancelled: Arc::default(),
         });
@@ -244,10 +244,18 @@ impl Replan {
         self.workload.clone()
     }
 
+    /// Counts anew in a pass: at the end of the one before slots idle, and at its beginning paths
+    /// begin together.
+    pub(super) fn begin_pass(&mut self, iterations: u64) {
+        if let Stage::Warming(_) | Stage::Counting(_) = self.stage {
+            self.stage = Stage::Warming(iterations);
+        }
+    }
+
     /// Goes on to the next stage if it is time.
     fn advance(&mut self, renderer: &Renderer<'_>, status: &Status, left: f64) {
         self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Warming if status.iterations >= self.settings.warm => {
+            Stage::Warming(begin) if status.iterations >= begin + self.settings.warm => {
                 Stage::Counting(Mark::of(status))
             }
             Stage::Counting(mark) => self.count(mark, renderer, status, left),

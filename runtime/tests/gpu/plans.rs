@@ -10,6 +10,7 @@ use impasto_runtime::film::Film;
 use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::report::Report;
+use impasto_runtime::technique::{Append, Choice, RayData, RayOrder};
 
 pub fn room() -> Room {
     Room {
@@ -230,6 +231,45 @@ fn binned_kernels_go_on_in_a_second_row() {
     };
     let reference = render(Strategy::Own, 64);
     assert_equal_but_for_rounding(&render(Strategy::Binned, 1), &reference);
+}
+
+/// Kernels of every form append and ask for rays in every way.
+#[test]
+fn every_form_renders_by_every_technique() {
+    let room = Room {
+        width: 8,
+        height: 8,
+        ..room()
+    };
+    let (world, surfaces) = (room.world(), surfaces());
+    let reference = render_plan(
+        &world,
+        &surfaces,
+        &plan(Strategy::Own, &surfaces),
+        &samples(4),
+    );
+    let forms = custom(&[
+        (Form::Binned, &[0, 3]),
+        (Form::Inline, &[1]),
+        (Form::Own, &[2]),
+    ]);
+    let binned = plan(Strategy::Binned, &surfaces);
+    for (append, _, _) in Append::ALL {
+        for (ray_data, ray_order) in [
+            (RayData::Slots, RayOrder::Queue),
+            (RayData::Requests, RayOrder::Queue),
+            (RayData::Slots, RayOrder::Coarse),
+        ] {
+            let mut options = samples(4);
+            options.technique.append = *append;
+            options.technique.ray_data = ray_data;
+            options.technique.ray_order = ray_order;
+            for plan in [&forms, &binned] {
+                let rendering = render_plan(&world, &surfaces, plan, &options);
+                assert_equal_but_for_rounding(&rendering.film, &reference.film);
+            }
+        }
+    }
 }
 
 /// A kernel by any name that has one material is the kernel that this material has of its own.
