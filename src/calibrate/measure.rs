@@ -22,8 +22,10 @@ pub struct Effort {
     pub pools: Vec<u32>,
     /// How often each kernel is timed.
     pub repetitions: u32,
-    /// Whether pairs of materials and every second palette are left out.
-    pub quick: bool,
+    /// How many of the palettes are measured.
+    pub palettes: usize,
+    /// Whether all pairs of materials are measured, or few subsets.
+    pub pairs: bool,
     /// Pixels along a side of the pictures that are rendered meanwhile.
     pub side: u32,
 }
@@ -34,13 +36,14 @@ impl Effort {
         let software = gpu.info().kind == "software";
         Self {
             pools: match (software, quick) {
-                (true, _) => vec![1 << 13],
+                (true, _) => vec![1 << 14],
                 (false, true) => vec![1 << 20],
                 (false, false) => vec![1 << 20, 1 << 22],
             },
             repetitions: if software { 5 } else { 9 },
-            quick: quick || software,
-            side: if software { 64 } else { 1024 },
+            palettes: if quick || software { 2 } else { 3 },
+            pairs: !quick && !software,
+            side: if software { 128 } else { 1024 },
         }
     }
 }
@@ -69,7 +72,7 @@ pub fn measure(
     let palettes = palettes();
     let mut cases: Vec<(&Palette, Coherence, u32)> = Vec::new();
     for pool in &effort.pools {
-        for palette in palettes.iter().step_by(if effort.quick { 2 } else { 1 }) {
+        for palette in palettes.iter().take(effort.palettes) {
             cases.extend([Coherence::Random, Coherence::Runs].map(|c| (palette, c, *pool)));
         }
     }
@@ -108,7 +111,7 @@ fn one(
     let facts = Facts::of_scene(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;
     let subject = Subject::new(scene, &program, facts, &options)?;
     let mut lab = subject.lab(gpu, &options)?;
-    let candidates = sample_for_fit(&subject.materials(), !effort.quick);
+    let candidates = sample_for_fit(&subject.materials(), effort.pairs);
     let timed = subject.time(&mut lab, &candidates, None::<Instant>, progress)?;
     for (candidate, why) in &timed.failed {
         warn(&format!(
@@ -130,5 +133,50 @@ fn compile(scene: &Scene, palette: &Palette) -> Result<Program, Error> {
     match compiled.program {
         Some(program) => Ok(program),
         None => Err(Error::Materials(text())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GpuOptions, calibrate};
+
+    #[test]
+    fn a_small_calibration_measures_and_fits() {
+        let gpu = Gpu::new(&GpuOptions::default()).expect("these tests need a GPU");
+        let effort = Effort {
+            pools: vec![1 << 12],
+            repetitions: 1,
+            palettes: 1,
+            pairs: false,
+            side: 64,
+        };
+        let mut steps = Vec::new();
+        let mut progress = |step: &Step<'_>| steps.push(step.at);
+        let mut warn = |why: &str| panic!("{why}");
+        let sets = measure(&gpu, &effort, &mut progress, &mut warn).expect("it is measured");
+        assert!(
+            steps.contains(&(0, 2)) && steps.contains(&(1, 2)),
+            "{steps:?}"
+        );
+        assert_eq!(sets.len(), 2);
+        // In the room hits of every material are everywhere, on the plane they lie together.
+        let hits = |set: &Measurement| {
+            let hits = set.workload.materials.iter();
+            hits.fold([0.0, 0.0], |[s, p], h| [s + h.share, p + h.present])
+        };
+        let ([room, in_room], [plane, on_plane]) = (hits(&sets[0]), hits(&sets[1]));
+        assert!(
+            in_room / room > 2.0 * on_plane / plane,
+            "{in_room} {room} {on_plane} {plane}"
+        );
+        let start = calibrate::start(&sets).expect("one GPU");
+        let fitted = calibrate::fit(&sets, &start);
+        assert_eq!(
+            fitted.residuals.len(),
+            sets.iter().map(|s| s.kernels.len()).sum::<usize>()
+        );
+        assert!(fitted.profile.check().is_ok());
+        assert!(!calibrate::text(&fitted, true).is_empty());
     }
 }

@@ -15,8 +15,8 @@ pub struct Palette {
     pub source: String,
 }
 
-/// The palettes: one of cheap materials, one of expensive ones, and one of loops whose turns depend on
-/// the place.
+/// The palettes: one of cheap materials, one with loops whose turns depend on the place, and one of
+/// expensive materials.
 pub fn palettes() -> Vec<Palette> {
     vec![
         palette(
@@ -30,17 +30,6 @@ pub fn palettes() -> Vec<Palette> {
             ],
         ),
         palette(
-            "dear",
-            vec![
-                ("plain", body("0.6")),
-                ("streams", body(&streams(4, 160))),
-                ("specials", body(&special(40))),
-                ("noises", body(&noises(6))),
-                ("long", body(&chain(2400))),
-                ("wide", body(&wide(56))),
-            ],
-        ),
-        palette(
             "loops",
             vec![
                 ("lobes", LOBES.to_string()),
@@ -49,6 +38,17 @@ pub fn palettes() -> Vec<Palette> {
                 ("rolls", body(&hashes(160))),
                 ("middling", body(&chain(500))),
                 ("wider", body(&wide(120))),
+            ],
+        ),
+        palette(
+            "dear",
+            vec![
+                ("plain", body("0.6")),
+                ("streams", body(&streams(4, 160))),
+                ("specials", body(&special(40))),
+                ("noises", body(&noises(6))),
+                ("long", body(&chain(2400))),
+                ("wide", body(&wide(56))),
             ],
         ),
     ]
