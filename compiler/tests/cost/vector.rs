@@ -3,6 +3,8 @@
 use impasto_compiler::cost::{self, Classes, Cost, Inputs, LANES};
 use impasto_compiler::inspect::At;
 
+use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile};
+
 use crate::common::program;
 
 /// The cost of a text's only material at `samples` points with texture coordinates in [0, 1).
@@ -123,4 +125,108 @@ fn the_same_function_called_on_both_sides_is_issued_twice() {
     assert!((cost.issued[5].turns - 100.0).abs() < 1e-9, "{cost:?}");
     // Both calls are in line, each with its loop.
     assert_eq!(cost.loops, 2);
+}
+
+/// A program of one material with an instance for each value of its parameter `name`.
+fn instances(text: &str, name: &str, values: &[&str]) -> Program {
+    let mut files = MemoryLoader::default();
+    files.add("m.impasto", text);
+    let request = |value: &&str| MaterialRequest {
+        params: vec![(name.to_owned(), (*value).to_owned())],
+        ..MaterialRequest::new(*value, "m.impasto")
+    };
+    let requests: Vec<MaterialRequest> = values.iter().map(request).collect();
+    let compiled = compile(&requests, &mut files);
+    compiled.program.expect("it compiles")
+}
+
+/// The cost of the only material of a program, with as many inputs for each instance.
+fn over_instances(program: &Program, each: usize) -> Cost {
+    assert_eq!(program.materials().len(), 1);
+    let mut inputs = Inputs::new(0);
+    let of = (0..program.instances().len() * each).map(|i| i / each);
+    let points: Vec<(usize, At)> = of.map(|i| (i, inputs.anywhere())).collect();
+    let found = cost::vector(program, 0, &points).expect("it ends");
+    found.expect("there are inputs")
+}
+
+#[test]
+fn instances_share_subgroups() {
+    let text = "use std::edf::uniform;
+        material m {
+            param turns: int = 1;
+            emission = uniform(color(slow(uv.x, turns)));
+        }
+        fn slow(x: float, turns: int) -> float {
+            var sum = x;
+            for i in 0 .. min(turns, 100) { sum = sqrt(sum + float(i)); }
+            sum
+        }";
+    let program = instances(text, "turns", &["8", "40"]);
+    // More than one batch, each of which has inputs of both.
+    for each in [256, 1024] {
+        let cost = over_instances(&program, each);
+        assert!((cost.issued[0].turns - 24.0).abs() < 1e-9, "{cost:?}");
+        assert!((cost.issued[1].turns - 32.0).abs() < 1.0, "{cost:?}");
+        assert!((cost.issued[5].turns - 40.0).abs() < 1e-3, "{cost:?}");
+        assert_eq!(
+            (cost.operations.evaluations, cost.loops),
+            (2 * each as u64, 1)
+        );
+        assert!(
+            cost.operations.max >= cost.operations.min + 32 * 3,
+            "{cost:?}"
+        );
+    }
+}
+
+#[test]
+fn bytes_are_rows_of_parameters_and_texels() {
+    let text = "use std::edf::uniform;
+        material m {
+            param tint: color = color(0.5);
+            emission = uniform(tint * uv.x);
+        }";
+    let program = instances(text, "tint", &["0.25", "0.5"]);
+    // Three floats are a row.
+    assert_eq!(over_instances(&program, 8).bytes, 16.0);
+    // One instance has its color in the code.
+    assert_eq!(
+        over_instances(&instances(text, "tint", &["0.25"]), 8).bytes,
+        0.0
+    );
+    // A texture: what is known of it, and four texels of eight bytes, here for half of all points.
+    let text = "use std::edf::uniform;
+        material m {
+            param paper: texture = \"a.png\";
+            emission = uniform(some(paper, uv));
+        }
+        fn some(t: texture, uv: vec2) -> color {
+            var c = color(0.0);
+            if uv.x < 0.5 { c = image(t, uv); }
+            c
+        }";
+    let cost = cost(text, 1024);
+    assert!(cost.operations.classes.texture > 0.4 && cost.operations.classes.texture < 0.6);
+    assert!(
+        (cost.bytes - 40.0 * cost.operations.classes.texture).abs() < 1e-9,
+        "{cost:?}"
+    );
+}
+
+#[test]
+fn code_counts_once_what_loops_repeat_and_what_branches_skip() {
+    let code = |value: &str, functions: &str| cost(&emitting(value, functions), 16).code;
+    let plain = code("color(uv.x)", "");
+    // Two sines and a sum.
+    assert_eq!(code("color(sin(uv.x) + sin(uv.y))", ""), plain + 3);
+    // The turn, a conversion, a sum and a root; the bound is a product, converted, and at most 64.
+    assert_eq!(code("color(turns(uv.x))", TURNS), plain + 7);
+}
+
+#[test]
+fn nothing_is_known_without_inputs() {
+    let program = program(&emitting("color(uv.x)", ""));
+    assert_eq!(cost::vector(&program, 0, &[]), Ok(None));
+    assert_eq!(cost::lines(&program, 0, &[]).map(|l| l.len()), Ok(0));
 }

@@ -126,23 +126,29 @@ fn material(out: &mut String, args: &CostArgs, m: &Change) {
         ("loops", f64::from(old.loops), f64::from(new.loops)),
         ("bytes read", old.bytes, new.bytes),
     ];
-    for (what, old, new) in rows.into_iter().filter(|(_, old, new)| old != new) {
+    for (what, old, new) in rows.into_iter().filter(|(_, old, new)| shows(*old, *new)) {
         row(out, what, old, new);
     }
     let change = 100.0 * (new.efficiency() - old.efficiency());
     let _ = writeln!(
         out,
-        "  {:20} {:>9} {:>9} {change:>+9.0}",
+        "  {:20} {:>9} {:>9} {change:>+9.1}",
         "SIMT efficiency",
         percent(old),
         percent(new)
     );
-    lines(out, &m.lines[..args.lines.min(m.lines.len())]);
+    let shown = m.lines.iter().filter(|l| shows(l.old, l.new));
+    lines(out, &shown.take(args.lines).collect::<Vec<_>>());
+}
+
+/// Is a change large enough for a number with one decimal?
+fn shows(old: f64, new: f64) -> bool {
+    (new - old).abs() >= 0.05
 }
 
 fn row(out: &mut String, what: &str, old: f64, new: f64) {
     let change = new - old;
-    let _ = write!(out, "  {what:20} {old:>9.0} {new:>9.0} {change:>+9.0}");
+    let _ = write!(out, "  {what:20} {old:>9.0} {new:>9.0} {change:>+9.1}");
     let _ = match old > 0.0 {
         true => writeln!(out, "  {:>+6.1} %", 100.0 * change / old),
         false => writeln!(out),
@@ -150,7 +156,7 @@ fn row(out: &mut String, what: &str, old: f64, new: f64) {
 }
 
 /// Lines of the source: `+` were not there before or cost nothing, `-` are not there now.
-fn lines(out: &mut String, lines: &[LineChange]) {
+fn lines(out: &mut String, lines: &[&LineChange]) {
     let texts = lines.iter().map(|l| shortened(&l.text).chars().count());
     let texts = texts.max().unwrap_or(0);
     for line in lines {
@@ -161,7 +167,7 @@ fn lines(out: &mut String, lines: &[LineChange]) {
         };
         let _ = writeln!(
             out,
-            "  {mark} {:>4}  {:texts$} {:>9.0} {:>9.0} {:>+9.0}",
+            "  {mark} {:>4}  {:texts$} {:>9.0} {:>9.0} {:>+9.1}",
             line.new_line.or(line.old_line).unwrap_or(0),
             shortened(&line.text),
             line.old,

@@ -117,16 +117,16 @@ fn lines(out: &mut String, args: &CostArgs, m: &MaterialCost) {
     let texts = shown.iter().map(|l| wide(shortened(&l.text))).max();
     let texts = texts.unwrap_or(0);
     for line in shown {
-        let _ = writeln!(
-            out,
-            "{:>width$}  {:texts$}  {:>7.0}  {:>3.0} %  {}",
+        let bar = "#".repeat((BAR * line.share).round() as usize);
+        let row = format!(
+            "{:>width$}  {:texts$}  {:>7.0}  {:>3.0} %  {bar}",
             place(line),
             shortened(&line.text),
             line.with_calls,
             100.0 * line.share,
-            "#".repeat((BAR * line.share).round() as usize),
             width = places + 2,
         );
+        let _ = writeln!(out, "{}", row.trim_end());
     }
 }
 
