@@ -91,6 +91,34 @@ fn a_function_in_line_belongs_to_its_own_lines_and_to_those_that_call_it() {
     );
 }
 
+#[test]
+fn calls_within_calls_belong_to_all_of_them() {
+    let (_, lines) = costs(
+        "use std::edf::uniform;
+         fn inner(x: float) -> float {
+             exp(x + 0.5)
+         }
+         fn outer(x: float) -> float {
+             let first = inner(x) * 3.0;
+             let second = inner(x * 5.0) * 7.0;
+             first + second
+         }
+         material m {
+             emission = uniform(color(
+                 outer(uv.x)
+                 + inner(uv.y)
+             ));
+         }",
+    );
+    let with_calls = |start: &str| line(&lines, start).with_calls;
+    // An exponential and its sum are two; besides, products, and the sum of both.
+    assert_eq!(with_calls("exp(x"), 6.0);
+    assert_eq!(with_calls("let first"), 3.0);
+    assert_eq!(with_calls("let second"), 4.0);
+    assert_eq!(with_calls("outer(uv.x)"), 8.0 + 1.0);
+    assert_eq!(with_calls("+ inner(uv.y)"), 2.0);
+}
+
 /// A function that is too large to go in line, which calls another.
 const LARGE: &str = "
     fn slow(x: float) -> float {
@@ -142,8 +170,8 @@ fn a_function_that_stays_is_shared_out_to_its_callers() {
 
 #[test]
 fn closures_belong_to_the_lines_that_made_them() {
-    let (cost, lines) = costs(
-        "use std::bsdf::{blinn_phong, diffuse};
+    let text = "use std::bsdf::{blinn_phong, diffuse};
+         use std::edf::uniform;
          fn coat(under: color) -> bsdf {
              layer(
                  blinn_phong(exponent: 40.0),
@@ -152,8 +180,8 @@ fn closures_belong_to_the_lines_that_made_them() {
          }
          material m {
              surface = coat(color(uv.x));
-         }",
-    );
+         }";
+    let (cost, lines) = costs(text);
     let whole = line(&lines, "surface = coat").with_calls;
     assert!(whole > 0.4 * cost.operations.mean, "{lines:#?}");
     let lobes = line(&lines, "blinn_phong(").with_calls + line(&lines, "diffuse(").with_calls;
@@ -163,4 +191,12 @@ fn closures_belong_to_the_lines_that_made_them() {
     );
     // Choosing a lobe and combining them belongs to the material as a whole.
     assert!(line(&lines, "material m").operations > 0.0);
+    // What comes after the call is not part of it.
+    let glowing = text.replace(
+        "coat(color(uv.x));",
+        "coat(color(uv.x));\nemission = uniform(color(sin(uv.y)));",
+    );
+    let (_, lines) = costs(&glowing);
+    assert!(line(&lines, "emission").operations > 0.0);
+    assert_eq!(line(&lines, "surface = coat").with_calls, whole);
 }

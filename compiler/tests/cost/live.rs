@@ -118,6 +118,23 @@ fn loops_keep_what_a_later_turn_needs() {
              %3: bool = lt %2, 1.0 if %3 { break }
          } return x",
     );
+    // So is x where the turn has no more use for it: beside three sines, the counter and its bound.
+    assert_live(
+        6,
+        "@0.a = 0.0 for @1.i in 0 .. n {
+             %0: float = load @0.a %1: float = add %0, x %2: vec3 = vec3(%1) %3 s: vec3 = sin %2
+             %4: float = dot %3, %3 @0.a = %4
+         } %5: float = load @0.a return %5",
+    );
+    // What is needed behind a loop is needed where its test ends it, though the body stores it anew:
+    // a beside v and three sines of it, x, n and the counter.
+    assert_live(
+        10,
+        "@0.a = x loop limit 9 {
+             %0 s: vec3 = sin v %1: float = dot %0, %0 %2: bool = lt %1, x
+         } while %2 { %3: float = to_float n @0.a = %3 }
+         %4: float = load @0.a return %4",
+    );
     // A while loop has a counter of its own; its test may use what the body changes.
     assert_live(
         3,

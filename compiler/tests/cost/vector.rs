@@ -65,6 +65,16 @@ fn more_lanes_issue_no_less() {
 }
 
 #[test]
+fn lanes_that_do_the_same_issue_what_one_does() {
+    let text = emitting("color(sin(uv.x) + cos(uv.y * 3.0))", "");
+    for samples in [1, 5, 77, 1500] {
+        let cost = cost(&text, samples);
+        assert!(cost.issued.iter().all(|i| *i == cost.issued[0]), "{cost:?}");
+        assert_eq!(cost.efficiency(), 1.0);
+    }
+}
+
+#[test]
 fn a_subgroup_stays_in_a_loop_as_long_as_its_longest_lane() {
     let cost = cost(&emitting("color(turns(uv.x))", TURNS), 4096);
     for (issued, lanes) in cost.issued.iter().zip(LANES) {
