@@ -1,9 +1,9 @@
 //! `cost`: what it counts, what it prints, and that the counts in the paper's scenes are true.
 
 use std::path::Path;
-use std::process::Command;
 
-use crate::common::{folder, impasto, root, write};
+use crate::common::{folder, impasto, write};
+use crate::generated::{generate, generated};
 
 /// The operations of a material's only evaluation class, from JSON.
 fn operations(source: &str) -> serde_json::Value {
@@ -146,50 +146,6 @@ fn instances_count_with_their_own_values_and_by_their_area() {
         (turns - own - expected).abs() < 0.1,
         "{turns} less {own} is not {expected}"
     );
-}
-
-/// Generates what belongs to a scene in `out`.
-fn generate(name: &str, out: &Path) {
-    let run = Command::new(env!("CARGO"))
-        .args([
-            "run",
-            "--quiet",
-            "--package",
-            "xtask",
-            "--",
-            "scenes",
-            name,
-            "--out",
-        ])
-        .arg(out)
-        .current_dir(root())
-        .output()
-        .expect("cargo runs");
-    assert!(
-        run.status.success(),
-        "{}",
-        String::from_utf8_lossy(&run.stderr)
-    );
-}
-
-/// A scene generated anew in `out`, beside copies of the scene file and of the materials.
-fn generated(name: &str, out: &Path) -> String {
-    generate(name, out);
-    for folder in ["materials", "materials/textures"] {
-        std::fs::create_dir_all(out.join(folder)).expect("a folder");
-        for entry in std::fs::read_dir(root().join(folder))
-            .expect(folder)
-            .flatten()
-        {
-            if entry.path().is_file() {
-                std::fs::copy(entry.path(), out.join(folder).join(entry.file_name()))
-                    .expect("it is copied");
-            }
-        }
-    }
-    let scene = format!("examples/{name}/scene.toml");
-    std::fs::copy(root().join(&scene), out.join(&scene)).expect("it is copied");
-    out.join(&scene).display().to_string()
 }
 
 /// Means of the materials of a generated crossover scene, by name.

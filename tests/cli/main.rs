@@ -8,7 +8,10 @@ mod cost_lines;
 mod emit_check;
 mod eval;
 mod film;
+#[path = "../generated/mod.rs"]
+mod generated;
 mod limits;
+mod plan;
 mod plans;
 mod rays;
 mod render;

@@ -7,7 +7,8 @@ use crate::shell::{self, Result, cargo};
 pub(crate) fn run() -> Result {
     shell::section("Writing snapshots");
     let mut test = cargo();
-    test.args(["test", "--package", "impasto", "--test", "snapshots"])
+    test.args(["test", "--package", "impasto"])
+        .args(["--test", "snapshots", "--test", "plans"])
         .env("INSTA_UPDATE", "always")
         .env("INSTA_FORCE_PASS", "1")
         .env_remove("CI");
@@ -15,10 +16,14 @@ pub(crate) fn run() -> Result {
 
     shell::section("What changed");
     let mut status = std::process::Command::new("git");
-    status
-        .current_dir(shell::root())
-        .args(["status", "--short", "--", "tests/snapshots"]);
+    status.current_dir(shell::root()).args([
+        "status",
+        "--short",
+        "--",
+        "tests/snapshots",
+        "tests/plans",
+    ]);
     shell::run(&mut status)?;
-    eprintln!("Review it with `git diff tests/snapshots` before committing.");
+    eprintln!("Review it with `git diff tests` before committing.");
     Ok(())
 }

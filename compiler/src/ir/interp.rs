@@ -46,6 +46,14 @@ pub struct Interpreter<'a, F> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfFuel;
 
+impl std::fmt::Display for OutOfFuel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the evaluation takes too long")
+    }
+}
+
+impl std::error::Error for OutOfFuel {}
+
 /// A call that waits for the one it made.
 struct Waiting {
     code: usize,

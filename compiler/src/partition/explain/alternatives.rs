@@ -221,12 +221,9 @@ fn deciding(before: &Prediction, after: &Prediction, more: f64) -> (&'static str
 
 /// Why a part grows or shrinks, in words.
 fn why(subject: &Subject, part: &str, more: f64, groups: &Groups, change: &Change) -> String {
-    let worst = |of: &mut dyn Iterator<Item = &(Form, Vec<usize>)>| {
-        of.map(|(form, members)| subject.diverges(*form, members))
-            .fold(1.0, f64::max)
-    };
-    let ways = worst(&mut change.new.iter());
-    let before = worst(&mut change.old.iter().map(|g| &groups[*g]));
+    let before = subject.lanes(change.old.iter().map(|g| &groups[*g]));
+    let after = subject.lanes(change.new.iter());
+    let width = subject.model.profile.subgroup;
     let kernels = |count: usize, inline: bool| count - usize::from(inline);
     let new = kernels(
         change.new.len(),
@@ -238,10 +235,12 @@ fn why(subject: &Subject, part: &str, more: f64, groups: &Groups, change: &Chang
         .filter(|g| groups[**g].0 != Form::Inline)
         .count();
     match (part, more >= 0.0) {
-        ("issue", true) if ways > before + 0.05 => format!("subgroups diverge {ways:.1} ways"),
+        ("issue", true) if after < 0.97 * before => format!(
+            "subgroups evaluate with {after:.1} of {width} lanes, not {before:.1}: neighbours take turns"
+        ),
         ("issue", true) => "all take the registers and the code of the heaviest".into(),
-        ("issue", false) if ways + 0.05 < before => {
-            format!("subgroups diverge {ways:.1} ways instead of {before:.1}")
+        ("issue", false) if after > 1.03 * before => {
+            format!("subgroups evaluate with {after:.1} of {width} lanes, not {before:.1}")
         }
         ("issue", false) => "registers and code are those of fewer materials".into(),
         ("launch" | "tail", true) if new > old => match new - old {
@@ -258,5 +257,46 @@ fn why(subject: &Subject, part: &str, more: f64, groups: &Groups, change: &Chang
         ("memory", false) => "path state is at hand or lies closer".into(),
         (_, true) => "hits go through a queue".into(),
         (_, false) => "hits go through no queue".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::cases::Case;
+    use super::*;
+
+    #[test]
+    fn reasons_follow_what_changes() {
+        let mut case = Case::new(3, 1);
+        for hits in &mut case.workload.materials {
+            (hits.share, hits.present) = (0.5, 1.0 - 0.5f64.powi(32));
+        }
+        (
+            case.workload.materials[2].share,
+            case.workload.materials[2].present,
+        ) = (0.0, 0.0);
+        let names: Vec<String> = (0..3).map(|m| format!("m{m}")).collect();
+        let groups: Groups = vec![(Form::Binned, vec![0, 1]), (Form::Own, vec![2])];
+        let plan = Plan::wavefront("test", groups.clone(), Vec::new(), &names);
+        let subject = Subject {
+            plan: &plan,
+            names: &names,
+            model: case.model(),
+            exact: true,
+        };
+        let said = |part: &str, more: f64, old: &[usize], new: Groups| {
+            let (what, old) = (String::new(), old.to_vec());
+            why(&subject, part, more, &groups, &Change { what, old, new })
+        };
+        let mixed = || vec![(Form::Mixed, vec![0, 1])];
+        let each = || vec![(Form::Own, vec![0]), (Form::Own, vec![1])];
+        assert!(said("issue", 1.0, &[0], mixed()).contains("with 16.0 of 32 lanes, not 32.0"));
+        assert!(said("issue", 1.0, &[0], each()).contains("of the heaviest"));
+        assert!(said("tail", 1.0, &[0], each()).contains("one more kernel"));
+        let all = || vec![(Form::Binned, vec![0, 1, 2])];
+        assert!(said("launch", -1.0, &[0, 1], all()).contains("one kernel less"));
+        let inline = || vec![(Form::Inline, vec![0, 1])];
+        assert!(said("memory", -1.0, &[0], inline()).contains("at hand"));
+        assert!(said("queue", -1.0, &[0], inline()).contains("no queue"));
     }
 }

@@ -212,6 +212,23 @@ impl Subject<'_> {
         }
     }
 
+    /// How many lanes evaluate at a time where `groups` do, on average.
+    fn lanes<'g>(&self, groups: impl Iterator<Item = &'g (Form, Vec<usize>)>) -> f64 {
+        let (mut hits, mut subgroups) = (0.0, 0.0);
+        for (form, members) in groups {
+            for m in members {
+                let (count, lanes) = self.model.subgroups(*form, *m, members);
+                hits += count * lanes;
+                subgroups += count;
+            }
+        }
+        if subgroups > 0.0 {
+            hits / subgroups
+        } else {
+            f64::from(self.model.profile.subgroup)
+        }
+    }
+
     /// What other strategies come to, by the same model.
     fn rivals(&self, seconds: f64) -> Vec<Rival> {
         let known = Known {
