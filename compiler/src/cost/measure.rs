@@ -19,6 +19,9 @@ const ROW: f64 = 16.0;
 /// floats (`texture.wgsl`).
 const LOOKUP: f64 = 8.0 + 4.0 * 8.0;
 
+/// Counts that a batch may hold: of very large code, fewer evaluations are put together at a time.
+const MOST_COUNTS: usize = 1 << 25;
+
 /// A material that was evaluated at some inputs.
 pub struct Measured<'p> {
     pub(super) program: &'p Program,
@@ -66,7 +69,7 @@ impl<'p> Measured<'p> {
         inputs: impl Iterator<Item = &'i (usize, At)>,
     ) -> Result<(), OutOfFuel> {
         let mut batch = Vec::new();
-        let mut set = None;
+        let (mut set, mut counted) = (None, 0);
         for (instance, at) in inputs {
             if set != Some(*instance) {
                 self.run
@@ -75,6 +78,11 @@ impl<'p> Measured<'p> {
             }
             self.evaluate(at)?;
             batch.push(self.count());
+            counted += batch.last().map_or(0, Vec::len);
+            if counted > MOST_COUNTS {
+                self.subgroups.add(&batch);
+                (batch, counted) = (Vec::new(), 0);
+            }
         }
         self.subgroups.add(&batch);
         Ok(())
