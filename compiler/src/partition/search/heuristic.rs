@@ -1,13 +1,13 @@
 //! A good partition of many materials: local moves from several starts.
 //!
-//! Starts are the partitions that need no thought (a kernel each, one mixed, one binned, all inline,
-//! each the better of a kernel of its own and inline), and what merging leaves of a kernel each. From each of them, until nothing gains:
+//! Starts are the partitions that need no thought: a kernel each, one mixed, one binned, all inline,
+//! and each the better of a kernel of its own and inline. From each of them, until nothing gains:
 //!
-//! 1. move one material to another kernel, to one of its own, or inline;
-//! 2. merge the two kernels that gain most by it, again and again;
-//! 3. divide a kernel in two along some order of its materials, or move one of the parts inline:
-//!    several have to leave a kernel together where each pays for itself only in company;
-//! 4. exchange two materials (where there are few).
+//! 1. merge the two kernels that gain most by it, again and again;
+//! 2. move each material to the kernel where it gains most, to one of its own, or inline;
+//! 3. divide anew what one kernel or two have, along some order of their materials, either part with a
+//!    queue or inline: several have to leave a kernel together where each pays for itself only in
+//!    company.
 //!
 //! After each move a kernel has the better of the forms that it may have. The best end wins. It is never
 //! worse than a start, so never worse than a uniform strategy.
@@ -26,8 +26,6 @@ pub struct Heuristic {
     pub bundles: usize,
     /// Most rounds of moves from each start.
     pub rounds: usize,
-    /// Most items of which pairs are exchanged.
-    pub exchange: usize,
     /// At how many places a kernel may be divided.
     pub cuts: usize,
 }
@@ -37,7 +35,6 @@ impl Default for Heuristic {
         Self {
             bundles: 64,
             rounds: 24,
-            exchange: 16,
             cuts: 16,
         }
     }
@@ -94,9 +91,7 @@ impl Heuristic {
                 break;
             }
             ends.push(end);
-            let few = moves.items.len() <= self.exchange;
-            let gained = moves.divide(&mut state, self.cuts) || few && moves.swap(&mut state);
-            if !gained {
+            if !moves.divide(&mut state, self.cuts) {
                 break;
             }
         }

@@ -294,39 +294,6 @@ impl Moves<'_> {
             order.into_iter().map(|at| items[at]).collect()
         })
     }
-
-    /// Exchanges pairs of items of different blocks as long as that gains. True if it did.
-    pub(super) fn swap(&self, state: &mut State) -> bool {
-        let mut swapped = false;
-        for a in 0..self.items.len() {
-            for b in 0..a {
-                if let Some(change) = self.swapped(state, a, b) {
-                    apply(state, change);
-                    swapped = true;
-                }
-            }
-        }
-        swapped
-    }
-
-    fn swapped(&self, state: &State, a: usize, b: usize) -> Option<Change> {
-        let of = |item| state.iter().position(|block| block.items.contains(&item));
-        let (i, j) = (of(a)?, of(b)?);
-        if i == j {
-            return None;
-        }
-        let exchange = |block: usize, out: usize, into: usize| {
-            let items = with(&without(&state[block].items, &[out]), &[into]);
-            self.like(&state[block], items)
-        };
-        let new = vec![exchange(i, a, b), exchange(j, b, a)];
-        let gain = state[i].seconds + state[j].seconds - Self::total(&new);
-        notable(gain, Self::total(state)).then(|| Change {
-            gain,
-            old: vec![i, j],
-            new,
-        })
-    }
 }
 
 /// Is a gain more than rounding, of a partition that takes `total`?
