@@ -8,12 +8,14 @@ mod minimise;
 mod registers;
 mod report;
 mod room;
+mod score;
 mod sources;
 
 pub use fit::{Errors, Fitted, Residual, fit, rank_correlation};
 pub use measure::{Effort, Step, measure};
 pub use registers::{Registers, registers};
 pub use report::text;
+pub use score::{Scored, Scores, score, scores_text};
 
 use impasto_compiler::partition::DeviceProfile;
 

@@ -8,6 +8,7 @@ use impasto::files;
 use impasto::measure::{Data, Measurement};
 
 use super::info::GpuArgs;
+use super::profile::Profile;
 use super::{Failure, Global, Outcome, print};
 
 #[derive(Args)]
@@ -19,6 +20,14 @@ pub(super) struct CalibrateArgs {
     /// exhaustive --format json`
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["data", "quick", "pool", "repetitions", "gpu", "checked", "validate_indirect"])]
     from: Vec<PathBuf>,
+    /// Fit nothing: say what this profile predicts of those measurements, and which plans it would choose
+    #[arg(
+        long,
+        value_name = "NAME|FILE",
+        requires = "from",
+        conflicts_with = "out"
+    )]
+    score: Option<String>,
     /// Where to keep the measurements, as JSON
     #[arg(long, value_name = "FILE")]
     data: Option<PathBuf>,
@@ -46,12 +55,24 @@ pub(super) fn run(args: &CalibrateArgs, global: &Global) -> Outcome {
     if args.from.is_empty() {
         sets = measure(args, global)?;
     }
+    if let Some(profile) = &args.score {
+        return score(&sets, &Profile::given(profile)?, global);
+    }
     let start = calibrate::start(&sets)?;
     let fitted = calibrate::fit(&sets, &start);
     write(args, &fitted)?;
     match global.json() {
         true => print(&format!("{:#}\n", serde_json::json!(fitted))),
         false => print(&calibrate::text(&fitted, global.verbose > 0)),
+    }
+}
+
+/// Says what a profile predicts of measurements.
+fn score(sets: &[Measurement], profile: &Profile, global: &Global) -> Outcome {
+    let scored = calibrate::score(sets, (&profile.name, &profile.profile))?;
+    match global.json() {
+        true => print(&format!("{:#}\n", serde_json::json!(scored))),
+        false => print(&calibrate::scores_text(&scored)),
     }
 }
 

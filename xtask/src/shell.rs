@@ -6,10 +6,14 @@ use std::process::{Command, Stdio};
 /// What went wrong, in a sentence for people.
 pub(crate) type Result<T = ()> = std::result::Result<T, String>;
 
-/// The root of the repository.
+/// The root of the repository: where this was built, or the current folder if that is not there, since a
+/// built xtask can be carried to another machine.
 pub(crate) fn root() -> &'static Path {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
-    manifest.parent().unwrap_or(manifest)
+    match manifest.parent() {
+        Some(built) if built.is_dir() => built,
+        _ => Path::new("."),
+    }
 }
 
 /// The cargo that runs this.

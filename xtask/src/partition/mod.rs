@@ -71,6 +71,10 @@ pub(crate) struct PartitionArgs {
     /// errors on the other half; needs no GPU
     #[arg(long)]
     held_out: bool,
+    /// Measure nothing: predict anew, with this profile and this version of the model, what the records
+    /// measured, and choose plans anew
+    #[arg(long, value_name = "NAME|FILE")]
+    repredict: Option<String>,
     /// Write page and plots from the JSON that is there, without measuring
     #[arg(long)]
     page: bool,
@@ -79,13 +83,15 @@ pub(crate) struct PartitionArgs {
 pub(crate) fn run(args: &PartitionArgs) -> Result {
     let json = args.out.join("partition.json");
     let mut results = Results::load(&json)?;
-    if !args.page {
-        measure(args, &mut results)?;
+    match &args.repredict {
+        Some(profile) => repredict(args, profile, &mut results)?,
+        None if args.page => {}
+        None => measure(args, &mut results)?,
     }
     if args.held_out {
         results.held_out = Some(held_out(args)?);
     }
-    if args.held_out || !args.page {
+    if args.held_out || args.repredict.is_some() || !args.page {
         write_whole(&json, &results.text()?)?;
     }
     let scenes: Result<Vec<Measured>> = results.scenes.iter().map(Measured::new).collect();
@@ -110,6 +116,7 @@ fn measure(args: &PartitionArgs, results: &mut Results) -> Result {
         (pools, _) => pools.to_vec(),
     };
     let cases = chosen(&args.only, cases::all()?)?;
+    results.version.clone_from(&version);
     let begun = Instant::now();
     for (round, &pool) in pools.iter().enumerate() {
         for (number, case) in cases.iter().enumerate() {
@@ -122,18 +129,17 @@ fn measure(args: &PartitionArgs, results: &mut Results) -> Result {
             }
             let place = round * cases.len() + number + 1;
             let count = pools.len() * cases.len();
-            eprint!("[{place}/{count}] {} with {pool} paths", case.name);
+            eprintln!("[{place}/{count}] {} with {pool} paths", case.name);
             let at = Instant::now();
             match one(args, &bench, case, pool, round == 0) {
                 Ok((record, line)) => {
-                    eprintln!(": {line} ({:.1} s)", at.elapsed().as_secs_f64());
+                    eprintln!("  {line} ({:.1} s)", at.elapsed().as_secs_f64());
                     put(results, case, &record)?;
                 }
-                Err(why) => eprintln!("\n  left out: {why}"),
+                Err(why) => eprintln!("  left out: {why}"),
             }
         }
     }
-    results.version = version;
     Ok(())
 }
 
@@ -185,7 +191,7 @@ fn one(
     let scene = record.scene(case)?;
     let measured = Measured::new(&scene)?;
     if let Some(why) = measured.disagreement(&answer::read(&record.answer)?) {
-        eprint!("\n  {why}\n ");
+        eprintln!("  {why}");
     }
     let best = measured.text(&measured.best);
     let ways = cases::ways(case, first, args.renders, &scene.auto, Some(&best));
@@ -210,16 +216,42 @@ fn put(results: &mut Results, case: &Case, record: &Record) -> Result {
     Ok(())
 }
 
+/// Replaces predictions and chosen plans of all records by those of a profile.
+fn repredict(args: &PartitionArgs, profile: &str, results: &mut Results) -> Result {
+    let impasto = paper::command(args.impasto.as_deref())?;
+    let cases = chosen(&args.only, cases::all()?)?;
+    let mut records: Vec<(u64, usize, PathBuf)> = Vec::new();
+    for path in record::paths(&args.records)? {
+        let of_path = record::case_of(&path).and_then(|(name, pool)| {
+            Some((pool, cases.iter().position(|case| case.name == name)?))
+        });
+        records.extend(of_path.map(|(pool, case)| (pool, case, path)));
+    }
+    records.sort();
+    for (_, case, path) in records {
+        let Some(mut record) = Record::load(&path)? else {
+            continue;
+        };
+        let mut command = std::process::Command::new(&impasto);
+        command
+            .arg("calibrate")
+            .args(["--format", "json", "--score", profile, "--from"])
+            .arg(&path);
+        record
+            .repredict(&shell::capture(&mut command)?)
+            .map_err(|e| format!("{}: {e}", path.display()))?;
+        record.save(&path)?;
+        put(results, &cases[case], &record)?;
+    }
+    results.fit = fit(profile)?;
+    profile.clone_into(&mut results.profile);
+    Ok(())
+}
+
 /// What the command says of a fit to half of the materials.
 fn held_out(args: &PartitionArgs) -> Result<HeldOut> {
     let impasto = paper::command(args.impasto.as_deref())?;
-    let folder = std::fs::read_dir(&args.records);
-    let folder = folder.map_err(|e| format!("cannot read {}: {e}", args.records.display()))?;
-    let paths = folder.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut records: Vec<PathBuf> = paths
-        .filter(|p| p.extension().is_some_and(|e| e == "json"))
-        .collect();
-    records.sort();
+    let records = record::paths(&args.records)?;
     let mut command = std::process::Command::new(impasto);
     command
         .arg("calibrate")

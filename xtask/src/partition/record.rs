@@ -59,10 +59,37 @@ impl Record {
         }
     }
 
-    fn save(&self, path: &Path) -> Result {
+    pub(super) fn save(&self, path: &Path) -> Result {
         let text = serde_json::to_string(self)
             .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
         crate::paper::write_whole(path, &text)
+    }
+
+    /// Replaces what was predicted and chosen by an answer of `impasto calibrate --score`; what was measured
+    /// stays, but for renders by a plan that is no longer chosen.
+    pub(super) fn repredict(&mut self, json: &str) -> Result {
+        let scored: Vec<Scored> = serde_json::from_str(json)
+            .map_err(|e| format!("the scores are not as expected: {e}"))?;
+        let [scored] =
+            <[Scored; 1]>::try_from(scored).map_err(|_| "there are not scores of one record")?;
+        let kernels = self.answer["kernels"]
+            .as_array_mut()
+            .ok_or("the record has no kernels")?;
+        if kernels.len() != scored.kernels.len() {
+            return Err("there are not as many scores as kernels".into());
+        }
+        for (kernel, score) in kernels.iter_mut().zip(&scored.kernels) {
+            kernel["predicted"] = serde_json::json!({ "total": score.predicted });
+        }
+        if self.answer["auto"] != scored.auto {
+            self.renders
+                .retain(|r| !["auto", "auto's plan"].contains(&r.label.as_str()));
+        }
+        self.answer["auto"] = scored.auto.into();
+        self.answer["profile"] = scored.profile.into();
+        // The regret that the answer has is of the plan it had chosen.
+        self.answer["regret"] = serde_json::Value::Null;
+        Ok(())
     }
 
     /// As the results keep it.
@@ -72,6 +99,37 @@ impl Record {
         scene.renders = self.renders.clone();
         Ok(scene)
     }
+}
+
+/// What is read of the scores of a record.
+#[derive(Deserialize)]
+struct Scored {
+    profile: String,
+    auto: String,
+    kernels: Vec<Score>,
+}
+
+#[derive(Deserialize)]
+struct Score {
+    predicted: f64,
+}
+
+/// All records of a folder, by name.
+pub(super) fn paths(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder);
+    let entries = entries.map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut paths: Vec<PathBuf> = paths
+        .filter(|p| p.extension().is_some_and(|e| e == "json"))
+        .collect();
+    paths.sort();
+    Ok(paths)
+}
+
+/// The scene's name and the pool of a record, from its file's name.
+pub(super) fn case_of(path: &Path) -> Option<(String, u64)> {
+    let (name, pool) = path.file_stem()?.to_str()?.rsplit_once('-')?;
+    Some((name.into(), pool.parse().ok()?))
 }
 
 impl Bench<'_> {
@@ -227,9 +285,15 @@ fn capture(command: &mut Command, limit: Duration) -> Result<String> {
     }
     match finished? {
         Some(true) => Ok(text),
-        Some(false) => Err(errors.trim_end().to_owned()),
+        Some(false) => Err(first_lines(&errors)),
         None => Err(format!("it took more than {} s", limit.as_secs())),
     }
+}
+
+/// What a command says is wrong, without hints at its usage.
+fn first_lines(errors: &str) -> String {
+    let lines = errors.lines().filter(|line| !line.trim().is_empty());
+    lines.take(2).collect::<Vec<_>>().join("; ")
 }
 
 /// Whether the child succeeded; none if it had to be stopped.
@@ -266,6 +330,51 @@ mod tests {
         assert_eq!(shell("echo yes", 5000).as_deref(), Ok("yes\n"));
         assert_eq!(shell("echo no >&2; exit 3", 5000), Err("no".into()));
         assert!(shell("exec sleep 30", 50).is_err_and(|why| why.contains("more than")));
+    }
+
+    #[test]
+    fn predictions_are_replaced_and_measurements_stay() {
+        let mut record = Record {
+            version: "v".into(),
+            command: String::new(),
+            answer: super::super::fixture::answer_json(),
+            renders: super::super::fixture::scene().renders,
+        };
+        let kernels: Vec<_> = (0..18)
+            .map(|i| serde_json::json!({ "predicted": 1e-6 * f64::from(i) }))
+            .collect();
+        let scores = |auto: &str, count: usize| {
+            serde_json::json!([{ "profile": "new", "auto": auto, "kernels": kernels[..count] }])
+                .to_string()
+        };
+        assert!(record.repredict(&scores("own:a|own:b|own:c", 17)).is_err());
+        record
+            .repredict(&scores("own:a|own:b|own:c", 18))
+            .expect("scores");
+        assert!(
+            record.renders.iter().any(|r| r.label == "auto's plan"),
+            "the same plan was rendered"
+        );
+        record
+            .repredict(&scores("mixed:a,b|inline:c", 18))
+            .expect("scores");
+        assert!(
+            !record.renders.iter().any(|r| r.label == "auto's plan"),
+            "that was another plan"
+        );
+        let scene = record
+            .scene(&super::super::fixture::case())
+            .expect("a scene");
+        assert_eq!((scene.kernels[5].2, scene.kernels[5].3), (5e-6, 45e-6));
+        assert_eq!(scene.auto, "mixed:a,b|inline:c");
+    }
+
+    #[test]
+    fn names_of_records_say_what_they_are_of() {
+        let case = super::super::fixture::case();
+        let path = Record::path(Path::new("records"), &case, 1 << 20);
+        assert_eq!(case_of(&path), Some(("tiny".into(), 1 << 20)));
+        assert_eq!(case_of(Path::new("index.json")), None);
     }
 
     #[test]
