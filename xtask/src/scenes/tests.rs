@@ -113,7 +113,7 @@ fn files_are_the_same_bytes_everywhere() {
         ("materials_preview", 0x71ca_6aa9_bf62_72ff),
         ("swatches", 0x796a_4e01_0c1d_c438),
         ("crossover", 0x3344_8263_48ef_db90),
-        ("mixes", 0x1b99_0b04_5b12_571b),
+        ("mixes", 0xff75_86c5_6533_0e12),
         ("textures", 0x0cdf_4d4d_b6dd_e235),
     ];
     assert_eq!(digests, expected, "{digests:#x?}");

@@ -9,7 +9,7 @@ use glam::{DVec3, dvec3};
 use super::super::Model;
 use super::super::mesh::Mesh;
 use super::super::obj::MtlEntry;
-use super::super::random::Random;
+use super::super::random::{Random, lattice};
 use super::super::shapes::{Topology, grid};
 
 /// Names of the places, in the booths column by column: paths are begun along the rows of a picture, and those that are
@@ -39,6 +39,10 @@ pub(super) const ROOM: DVec3 = dvec3(4.0, 3.0, 4.0);
 /// Triangles' legs on its walls.
 const CELL: f64 = 0.125;
 
+/// How far its corners are off the walls' planes. Boxes without any thickness, as those of tessellated planes are, make
+/// poor hierarchies: rays would take longer than materials.
+const BUMP: f64 = 0.005;
+
 /// Booths a row and a column.
 const SIDE: usize = 8;
 /// From the middle of a booth to that of the next, its width, and how deep it is, in metres.
@@ -59,8 +63,18 @@ pub(crate) fn room() -> Model {
         dvec3(0.0, 0.0, ROOM.z),
     ) {
         let cells = |side: DVec3| (side.length() / CELL).round() as usize;
+        let inward = right.cross(up).normalize();
         let wall = grid(cells(right), cells(up), Topology::Sheet, |u, v| {
-            origin + right * u + up * v
+            let place = origin + right * u + up * v;
+            // The walls meet where they are plane.
+            let is_edge = [u, v].iter().any(|t| *t <= 0.0 || *t >= 1.0);
+            let [x, y, z] = (place * 1e3).round().to_array().map(|c| c as i64);
+            let bump = if is_edge {
+                0.0
+            } else {
+                lattice(x, y, z, 64) - 0.5
+            };
+            place + inward * (2.0 * BUMP * bump)
         });
         mesh.add_by(wall, |_| lot.pick(&PLACES));
     }
@@ -137,7 +151,24 @@ mod tests {
         let triangles = welded(&mesh);
         assert!(is_closed(&triangles));
         let volume = signed_volume(&mesh.positions, &triangles);
-        assert!((volume + ROOM.x * ROOM.y * ROOM.z).abs() < 1e-9, "{volume}");
+        assert!(
+            (volume / -ROOM.element_product() - 1.0).abs() < 1e-3,
+            "{volume}"
+        );
+    }
+
+    #[test]
+    fn no_two_neighbours_on_a_wall_are_in_a_plane() {
+        let mesh = room().mesh;
+        let triangles = mesh.parts.iter().flat_map(|p| &p.triangles);
+        let thin = triangles.filter(|t| {
+            let points = t.map(|c| mesh.positions[c.position as usize]);
+            let size = points.iter().fold(DVec3::NEG_INFINITY, |m, p| m.max(*p))
+                - points.iter().fold(DVec3::INFINITY, |m, p| m.min(*p));
+            size.min_element() < 1e-6
+        });
+        // Those whose three corners are on edges of walls.
+        assert!(thin.count() <= 12);
     }
 
     #[test]
