@@ -5,9 +5,9 @@ use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use impasto_compiler::cost::Inputs;
-use impasto_compiler::partition::search::{Automatic, Groups, Search};
+use impasto_compiler::partition::search::{Automatic, Groups, Search, total};
 use impasto_compiler::partition::{
-    Calibrated, DeviceProfile, Form, Known, Plan, Strategy, TimeModel, Wanted, text,
+    Calibrated, DeviceProfile, Form, Known, Plan, Strategy, Wanted, text,
 };
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
@@ -103,54 +103,24 @@ pub fn exhaustive(
     let wanted = wanted(&plans, &materials);
     let timed = subject.time(&mut lab, &wanted, deadline, progress)?;
     let mut measurement = subject.measurement(gpu, &lab, &options.lab, timed.kernels);
-    let mut times = Times::default();
-    for at in 0..measurement.kernels.len() {
-        let members = measurement.members(&measurement.kernels[at]);
-        let kernel = &mut measurement.kernels[at];
-        kernel.predicted = Some(model.predict(kernel.form, &members));
-        times.insert(kernel.form, members, kernel.measured);
-    }
-    let best = Automatic.search(&known.problem(), &times);
-    plans.push(known.plan("best", best));
-    plans.extend(
-        times
-            .worst(&materials)
-            .map(|worst| known.plan("worst", worst)),
-    );
-    let mut numbers = Inputs::new(SEED);
-    for _ in 0..DRAWN {
-        let drawn = times.drawn(&materials, &mut numbers);
-        plans.extend(drawn.map(|groups| known.plan("sample", groups)));
-    }
+    let times = tabulate(&mut measurement, &model);
+    plans.extend(found(&known, &times, &materials));
     let late = deadline.is_some_and(|end| Instant::now() >= end);
     let whole = match late {
         true => vec![None; plans.len()],
         false => iterations(&mut lab, &plans)?,
     };
-    let beside = workload.logic_seconds + workload.other_seconds;
-    let describe = |(plan, whole): (&Plan, Option<Iteration>)| {
-        let groups = groups(plan);
-        let added = times.added(&groups);
-        PlanTime {
-            strategy: plan.strategy.clone(),
-            partition: text::print(plan, &facts.names),
-            predicted: groups
-                .iter()
-                .map(|(form, members)| model.seconds(*form, members))
-                .sum(),
-            added,
-            measured: whole.as_ref().map(|whole| whole.seconds),
-            kernels: whole.map_or_else(Vec::new, |whole| whole.kernels),
-            expected: added.map(|added| added + beside),
-        }
-    };
-    let plans: Vec<PlanTime> = plans.iter().zip(whole).map(describe).collect();
+    let plans = plans.iter().zip(whole);
+    let plans: Vec<PlanTime> = plans
+        .map(|(plan, whole)| PlanTime::new(plan, whole, &times, &model, &facts.names))
+        .collect();
     let of = |strategy: &str| plans.iter().find(|plan| plan.strategy == strategy);
-    let partition = |strategy| of(strategy).map_or_else(String::new, |plan| plan.partition.clone());
+    let partition = |strategy| of(strategy).map_or_else(String::new, |p| p.partition.clone());
     let ratio = |time: fn(&PlanTime) -> Option<f64>| {
         let best = of("best").and_then(time).filter(|best| *best > 0.0)?;
         Some(of("auto").and_then(time)? / best)
     };
+    let failed = timed.failed.iter();
     Ok(Answer {
         profile: profile.0.to_string(),
         auto: partition("auto"),
@@ -159,14 +129,59 @@ pub fn exhaustive(
         regret_of_iterations: ratio(|plan| plan.expected),
         planning_seconds,
         left_out: timed.left_out,
-        failed: timed
-            .failed
-            .iter()
+        failed: failed
             .map(|(c, why)| failure(c, &facts.names, why))
             .collect(),
         plans,
         measurement,
     })
+}
+
+/// The measured times as a table; each kernel is told what the model predicted.
+fn tabulate(measurement: &mut Measurement, model: &Calibrated<'_>) -> Times {
+    let mut times = Times::default();
+    for at in 0..measurement.kernels.len() {
+        let members = measurement.members(&measurement.kernels[at]);
+        let kernel = &mut measurement.kernels[at];
+        kernel.predicted = Some(model.predict(kernel.form, &members));
+        times.insert(kernel.form, members, kernel.measured);
+    }
+    times
+}
+
+/// The best plan by measured kernels, the worst, and some drawn by chance.
+fn found(known: &Known<'_>, times: &Times, materials: &[usize]) -> Vec<Plan> {
+    let best = Automatic.search(&known.problem(), times);
+    let mut plans = vec![known.plan("best", best)];
+    let worst = times.worst(materials);
+    plans.extend(worst.map(|groups| known.plan("worst", groups)));
+    let mut numbers = Inputs::new(SEED);
+    let drawn = (0..DRAWN).filter_map(|_| times.drawn(materials, &mut numbers));
+    plans.extend(drawn.map(|groups| known.plan("sample", groups)));
+    plans
+}
+
+impl PlanTime {
+    fn new(
+        plan: &Plan,
+        whole: Option<Iteration>,
+        times: &Times,
+        model: &Calibrated<'_>,
+        names: &[String],
+    ) -> Self {
+        let groups = groups(plan);
+        let added = times.added(&groups);
+        let beside = model.workload.logic_seconds + model.workload.other_seconds;
+        Self {
+            strategy: plan.strategy.clone(),
+            partition: text::print(plan, names),
+            predicted: total(model, &groups),
+            added,
+            measured: whole.as_ref().map(|whole| whole.seconds),
+            expected: added.map(|added| added + beside),
+            kernels: whole.map_or_else(Vec::new, |whole| whole.kernels),
+        }
+    }
 }
 
 fn failure(candidate: &Candidate, names: &[String], why: &str) -> String {

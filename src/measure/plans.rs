@@ -164,6 +164,12 @@ mod tests {
         let worst = times.worst(&[0, 1, 2]).expect("they are few");
         assert_eq!(worst, [(Form::Inline, vec![0, 1, 2])]);
         assert_eq!(times.worst(&(0..7).collect::<Vec<_>>()), None);
+        let mut saving = times.clone();
+        for ((form, _), seconds) in &mut saving.seconds {
+            *seconds *= if *form == "inline" { -1.0 } else { 1.0 };
+        }
+        let worst = saving.worst(&[0, 1, 2]).expect("they are few");
+        assert_eq!(worst, [(Form::Mixed, vec![0, 1, 2])]);
     }
 
     #[test]

@@ -79,6 +79,19 @@ fn what_is_measured_of_a_scene_makes_a_profile_that_plans() {
             .find(|plan| plan["strategy"] == name)
             .map(added)
     };
+    if of("best") > Some(0.0) {
+        let regret = of("auto").expect("a plan") / of("best").expect("a plan");
+        let said = answer["regret"].as_f64().expect("a number");
+        assert!((said / regret - 1.0).abs() < 1e-9, "{said} {regret}");
+    }
+    let partition = |name: &str| {
+        plans
+            .iter()
+            .find(|p| p["strategy"] == name)
+            .map(|p| &p["partition"])
+    };
+    assert_eq!(partition("best"), Some(&answer["best"]));
+    assert_eq!(partition("auto"), Some(&answer["auto"]));
     let (least, most) = (of("best").expect("a plan"), of("worst").expect("a plan"));
     for plan in plans {
         assert!(
