@@ -7,6 +7,7 @@ use impasto_compiler::partition::{Hits, Workload};
 
 use crate::layout::Layout;
 use crate::modules::Kernel;
+use crate::needs::Needs;
 use crate::stages::StageId;
 use crate::state;
 use crate::status::Status;
@@ -25,21 +26,32 @@ pub(crate) fn before_rendering(
     pool: u32,
 ) -> Workload {
     let unbound = &world.parts.unbound;
+    let geometry = geometry_bytes(world, materials);
     let hits = |(index, material): (usize, &MaterialInfo)| Hits {
         material: material.name.clone(),
         on_surface: !unbound.contains(&index),
         share: 0.0,
         present: 0.0,
+        loads: (traffic(layout.needs, material)[0] + geometry) as f64,
+        stores: traffic(layout.needs, material)[1] as f64,
     };
-    let [loads, stores] = state::traffic(layout.needs, StageId::Material);
     Workload {
         pool,
         materials: materials.iter().enumerate().map(hits).collect(),
-        loads: (loads + geometry_bytes(world, materials)) as f64,
-        stores: stores as f64,
         logic_seconds: 0.0,
         other_seconds: 0.0,
     }
+}
+
+/// Bytes of state that a hit of a material loads and stores: none is asked for a light sample where light
+/// cannot be sampled.
+fn traffic(needs: Needs, material: &MaterialInfo) -> [u64; 2] {
+    let lit = needs.shadow_rays && !material.delta_only;
+    let needs = Needs {
+        shadow_rays: lit,
+        ..needs
+    };
+    state::traffic(needs, StageId::Material)
 }
 
 /// Bytes of the triangle that was hit, as far as some material asks for it.

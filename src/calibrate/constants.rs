@@ -27,9 +27,9 @@ const fn time(name: &'static str, meaning: &'static str) -> About {
 }
 
 /// Every constant of the model.
-pub const ABOUT: [About; 14] = [
+pub const ABOUT: [About; 15] = [
     time("launch", "s, a dispatch that finds nothing to do"),
-    time("latency", "s, an operation of the last subgroup"),
+    time("latency", "s, an operation that waits for the one before"),
     time("alu", "s, float arithmetic of a subgroup"),
     time(
         "special",
@@ -39,31 +39,39 @@ pub const ABOUT: [About; 14] = [
     time("texture", "s, a texture lookup of a subgroup"),
     time("turns", "s, a turn of a loop of a subgroup"),
     time("memory", "s, a byte that a lane reads or writes"),
-    time("queue", "s, an item that goes through a queue"),
-    About {
-        name: "free_registers",
-        bounds: [16.0, 512.0],
-        meaning: "live numbers that cost nothing",
-    },
-    About {
-        name: "pressure",
-        bounds: [1e-3, 20.0],
-        meaning: "slowdown by a hundred more, as a share",
-    },
+    time(
+        "scatter",
+        "s, the same in addition where neighbours are elsewhere",
+    ),
     About {
         name: "code",
-        bounds: [100.0, 1e7],
+        bounds: [300.0, 1e6],
         meaning: "operations of code that caches hold",
     },
     About {
         name: "miss",
-        bounds: [1.0, 50.0],
-        meaning: "times as long outside of caches",
+        bounds: [1e-3, 10.0],
+        meaning: "slowdown by as much more code side by side, as a share",
     },
     About {
         name: "overlap",
         bounds: [1.0, 16.0],
-        meaning: "exponent by which arithmetic and memory overlap",
+        meaning: "exponent by which operations, memory and waiting overlap",
+    },
+    About {
+        name: "inline_loads",
+        bounds: [1e-3, 2.0],
+        meaning: "share of their loads that inline materials make",
+    },
+    About {
+        name: "free_registers",
+        bounds: [8.0, 256.0],
+        meaning: "live numbers that leave the logic kernel as it is",
+    },
+    About {
+        name: "pressure",
+        bounds: [1e-3, 20.0],
+        meaning: "its slowdown by a hundred more, as a share",
     },
 ];
 

@@ -365,6 +365,8 @@ mod tests {
                 } else {
                     0.2 + 0.03 * m as f64
                 },
+                loads: 112.0,
+                stores: 96.0,
             };
             let mut set = Measurement {
                 scene: format!("scene {index}"),
@@ -377,8 +379,6 @@ mod tests {
                 workload: Workload {
                     pool,
                     materials: (0..5).map(hits).collect(),
-                    loads: 112.0,
-                    stores: 96.0,
                     logic_seconds: 1e-4,
                     other_seconds: 1e-3,
                 },

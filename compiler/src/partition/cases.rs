@@ -43,7 +43,7 @@ impl Case {
             &mut w.latency,
             &mut w.alu,
             &mut w.memory,
-            &mut w.queue,
+            &mut w.scatter,
         ] {
             *constant *= random.magnitude(0.25, 4.0);
         }
@@ -64,15 +64,15 @@ impl Case {
                 on_surface: true,
                 share,
                 present: 1.0 - (1.0 - share).powf(draws),
+                loads: 64.0,
+                stores: 96.0,
             }
         };
         let materials = weights.iter().enumerate().map(hits).collect();
         let workload = Workload {
             pool: 1 << 20,
             materials,
-            loads: 64.0,
-            stores: 96.0,
-            logic_seconds: 0.0,
+            logic_seconds: 8e-5,
             other_seconds: 0.0,
         };
         Self {

@@ -1,23 +1,32 @@
 //! The time model: how long the kernels of a partition take, predicted from what their materials
 //! cost, how a scene hits them, and what the GPU's operations take.
 //!
-//! A kernel's time is
+//! A queued kernel takes `launch + busy`, and inline materials make the logic kernel longer by
+//! `busy + logic`, where
 //!
 //! ```text
-//! launch + tail + (issue^k + memory^k)^(1/k) + queue
+//! busy    = (issue^k + memory^k + latency^k)^(1/k)                          k = overlap
+//! issue   = sum over members: subgroups * operations that each issues * seconds by class * crowding
+//! memory  = sum over members: hits * (loads + stores) * (memory + scatter * (1 - density))
+//! latency = latency * operations of the longest subgroup * crowding
+//! crowding = 1 + miss * max(0, code of all members / code - 1)     where members are side by side
+//! logic   = logic kernel * pressure * max(0, live numbers - free_registers) / 100
 //! ```
 //!
-//! - `issue`: subgroups times the operations that each issues, weighted by class. A kernel that
-//!   evaluates one material (own, or a workgroup of binned) has hits/32 subgroups of that material. One
-//!   that evaluates several side by side (mixed, inline) runs each material in every subgroup in
-//!   which it is present, with as few lanes as it has there.
-//! - `memory`: the path state that a hit loads and stores; slots that are apart share no sector.
-//! - `tail`: the longest material run once by one subgroup, while the machine drains.
-//! - Registers and code beyond what caches hold make operations slower by a factor.
+//! - A kernel that evaluates one material (own, or a workgroup of binned) has hits/32 full subgroups of
+//!   it. One that evaluates several side by side (mixed, inline) runs each material in every
+//!   subgroup in which it is present, with as few lanes as it has there, one after the other.
+//! - `density` is the share of neighbouring slots that the kernel works on: where they are apart, each
+//!   hit reads sectors of memory for itself alone.
+//! - Side by side, materials that do not fit the caches of instructions together push each other out.
+//! - A logic kernel with inline materials has their registers, and so fewer threads at a time.
+//!
+//! The formulas are those of a set that were tried on measurements of an H200, which fitted best
+//! and chose best (docs/measurements.md).
 
 use super::Form;
 use super::profile::{DeviceProfile, Weights};
-use super::workload::{BLOCK, Workload};
+use super::workload::{BLOCK, Hits, Workload};
 use crate::cost::{Classes, Cost};
 
 /// What a search needs to know: the seconds that a kernel adds to an iteration.
@@ -32,17 +41,32 @@ pub trait TimeModel {
 pub struct Prediction {
     /// The dispatch and its drain.
     pub launch: f64,
-    /// The last subgroup.
-    pub tail: f64,
+    /// The longest subgroup by itself.
+    pub latency: f64,
     /// Operations.
     pub issue: f64,
     /// Memory.
     pub memory: f64,
-    /// Appending to and fetching from a queue.
-    pub queue: f64,
-    /// All together; operations and memory overlap.
+    /// By how much the logic kernel gets slower.
+    pub logic: f64,
+    /// All together; operations, memory and waiting overlap.
     pub total: f64,
+    /// What the prediction may be short of: not part of it, but of what a search compares.
+    pub doubt: f64,
 }
+
+impl Prediction {
+    /// The seconds that a search compares.
+    pub fn weighed(&self) -> f64 {
+        self.total + self.doubt
+    }
+}
+
+/// The share of the seconds of inline materials that is in doubt: their predictions err the most, and
+/// an inline material that was thought too cheap costs more than a queue that was not needed.
+const INLINE_DOUBT: f64 = 0.1;
+/// Subgroups of a workgroup, all of which wait for the one that takes longest.
+const GROUP: f64 = 8.0;
 
 /// The model of this project: cost vectors weighed by a device profile.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +81,28 @@ pub struct Calibrated<'a> {
 
 impl TimeModel for Calibrated<'_> {
     fn seconds(&self, form: Form, members: &[usize]) -> f64 {
-        self.predict(form, members).total
+        self.predict(form, members).weighed()
+    }
+}
+
+/// A member of a kernel: its cost and hits, and how they fall into subgroups.
+struct Member<'a> {
+    cost: Option<&'a Cost>,
+    hits: &'a Hits,
+    /// Hits in an iteration.
+    count: f64,
+    /// Subgroups that evaluate it.
+    subgroups: f64,
+    /// Its lanes in each.
+    lanes: f64,
+    /// The share of the kernel's subgroups that do.
+    present: f64,
+}
+
+impl Member<'_> {
+    fn issued(&self) -> Classes {
+        let cost = self.cost.map(|cost| cost.issued_by(self.lanes));
+        cost.unwrap_or_default()
     }
 }
 
@@ -65,131 +110,174 @@ impl Calibrated<'_> {
     /// The seconds of a kernel, in parts.
     pub fn predict(&self, form: Form, members: &[usize]) -> Prediction {
         let weights = &self.profile.weights;
-        let hits = self.hits(members);
-        let inline = form == Form::Inline;
-        let issue = self.issue(form, members);
-        let memory = weights.memory * self.bytes(form, members);
+        let members = self.members(form, members);
+        let crowding = self.crowding(form, &members);
+        let issue = crowding * self.issue(&members);
+        let memory = self.memory(form, &members);
+        let latency = crowding * weights.latency * longest(form, &members);
         let k = weights.overlap.max(1.0);
-        let busy = (issue.powf(k) + memory.powf(k)).powf(1.0 / k);
-        let (launch, tail, queue) = match inline {
-            true => (0.0, 0.0, 0.0),
-            false => (weights.launch, self.tail(members), weights.queue * hits),
+        let busy = norm([issue, memory, latency], k);
+        let (launch, logic) = match form {
+            Form::Inline => (0.0, self.logic(&members)),
+            _ => (weights.launch, 0.0),
         };
+        let total = launch + busy + logic;
         Prediction {
             launch,
-            tail,
+            latency,
             issue,
             memory,
-            queue,
-            total: launch + tail + busy + queue,
+            logic,
+            total,
+            doubt: match form {
+                Form::Inline => INLINE_DOUBT * total,
+                _ => 0.0,
+            },
         }
     }
 
-    fn cost(&self, material: usize) -> Option<&Cost> {
-        self.costs.get(material)?.as_ref()
+    /// In how many subgroups a kernel evaluates a member, and with how many lanes in each.
+    pub(super) fn subgroups(&self, form: Form, member: usize, members: &[usize]) -> (f64, f64) {
+        let at = members.iter().position(|m| *m == member);
+        let all = self.members(form, members);
+        let found = at.and_then(|at| all.get(at));
+        found.map_or((0.0, 1.0), |m| (m.subgroups, m.lanes))
     }
 
-    /// Hits of an iteration.
-    fn hits(&self, members: &[usize]) -> f64 {
-        f64::from(self.workload.pool) * self.share(members)
-    }
-
-    fn share(&self, members: &[usize]) -> f64 {
-        let of = |m: &usize| self.workload.materials.get(*m).map_or(0.0, |h| h.share);
-        members.iter().map(of).sum()
-    }
-
-    /// Seconds in which all subgroups issue their operations.
-    fn issue(&self, form: Form, members: &[usize]) -> f64 {
-        let live = members.iter().filter_map(|m| self.cost(*m)).map(|c| c.live);
-        let pressure = self.pressure(live.max().unwrap_or(0));
-        let code = members.iter().filter_map(|m| self.cost(*m)).map(|c| c.code);
-        let code = match form {
-            Form::Binned => code.max().unwrap_or(0),
-            _ => code.sum(),
+    fn members(&self, form: Form, members: &[usize]) -> Vec<Member<'_>> {
+        let hits = |m: &usize| self.workload.materials.get(*m);
+        let side_by_side = match form {
+            Form::Own | Form::Binned => None,
+            Form::Mixed => Some(members.iter().filter_map(hits).map(|h| h.share).sum()),
+            Form::Inline => Some(1.0),
         };
-        let one = |m: &usize| {
-            let Some(cost) = self.cost(*m) else {
-                return 0.0;
-            };
-            let (subgroups, lanes) = self.subgroups(form, *m, members);
-            subgroups * seconds(&self.profile.weights, &cost.issued_by(lanes))
+        let member = |m: &usize| {
+            let hits = hits(m)?;
+            let cost = self.costs.get(*m).and_then(Option::as_ref);
+            Some(self.member(cost, hits, side_by_side))
         };
-        members.iter().map(one).sum::<f64>() * pressure * self.misses(f64::from(code))
+        members.iter().filter_map(member).collect()
     }
 
-    /// In how many subgroups a member of a kernel runs, and with how many lanes.
-    pub fn subgroups(&self, form: Form, member: usize, members: &[usize]) -> (f64, f64) {
-        let Some(hits) = self.workload.materials.get(member) else {
-            return (0.0, 1.0);
-        };
-        let (width, pool) = (
-            f64::from(self.profile.subgroup),
-            f64::from(self.workload.pool),
-        );
+    /// A member of a kernel that evaluates it alone, or beside others that together are hit by
+    /// `side_by_side` of the slots.
+    fn member<'a>(
+        &self,
+        cost: Option<&'a Cost>,
+        hits: &'a Hits,
+        side_by_side: Option<f64>,
+    ) -> Member<'a> {
+        let width = f64::from(self.profile.subgroup.max(1));
+        let pool = f64::from(self.workload.pool);
         let count = pool * hits.share;
-        match form {
-            Form::Own | Form::Binned => (count / width, width),
-            Form::Mixed | Form::Inline => {
-                let all = match form {
-                    Form::Inline => 1.0,
-                    _ => self.share(members).max(f64::MIN_POSITIVE),
-                };
-                let within = (hits.share / all).min(1.0);
-                // Draws of a block of 32, brought to the width of a subgroup.
+        let (subgroups, lanes, present) = match side_by_side {
+            None => (count / width, width, 1.0),
+            Some(all) => {
+                let all = all.max(f64::MIN_POSITIVE);
                 let draws = (hits.draws() * width / f64::from(BLOCK)).max(1.0);
-                let present = 1.0 - (1.0 - within).powf(draws);
+                let present = 1.0 - (1.0 - (hits.share / all).min(1.0)).powf(draws);
                 let subgroups = pool * all / width * present;
-                (
-                    subgroups,
-                    (count / subgroups.max(f64::MIN_POSITIVE)).clamp(1.0, width),
-                )
+                let lanes = count / subgroups.max(f64::MIN_POSITIVE);
+                (subgroups, lanes.clamp(1.0, width), present)
             }
+        };
+        Member {
+            cost,
+            hits,
+            count,
+            subgroups,
+            lanes,
+            present,
         }
     }
 
-    /// Bytes of memory that a kernel's items take, wasted parts of sectors included.
-    fn bytes(&self, form: Form, members: &[usize]) -> f64 {
-        let state = match form {
-            // What logic has loaded is at hand.
-            Form::Inline => self.workload.stores,
-            _ => self.workload.loads + self.workload.stores,
+    /// Seconds in which all subgroups issue their operations, if their code is at hand.
+    fn issue(&self, members: &[Member<'_>]) -> f64 {
+        let one = |m: &Member<'_>| m.subgroups * seconds(&self.profile.weights, &m.issued());
+        members.iter().map(one).sum()
+    }
+
+    /// How many times as long operations take since code does not fit the caches.
+    fn crowding(&self, form: Form, members: &[Member<'_>]) -> f64 {
+        if matches!(form, Form::Own | Form::Binned) || members.len() < 2 {
+            return 1.0;
+        }
+        let weights = &self.profile.weights;
+        let code = members.iter().filter_map(|m| m.cost);
+        let code: f64 = code.map(|cost| f64::from(cost.code)).sum();
+        1.0 + weights.miss * (code / weights.code.max(1.0) - 1.0).max(0.0)
+    }
+
+    /// Seconds that path state and what materials read take, sectors of memory included that are
+    /// read for a part of them only.
+    fn memory(&self, form: Form, members: &[Member<'_>]) -> f64 {
+        let weights = &self.profile.weights;
+        // What logic has loaded is partly at hand.
+        let loads = match form {
+            Form::Inline => weights.inline_loads,
+            _ => 1.0,
         };
-        let waste = 2.0 - self.density(members);
-        let one = |m: &usize| {
-            let own = self.cost(*m).map_or(0.0, |c| c.bytes);
-            self.hits(&[*m]) * (state * waste + own)
+        let alone = matches!(form, Form::Own | Form::Binned);
+        let all = density(members);
+        let one = |m: &Member<'_>| {
+            let density = if alone {
+                density(std::slice::from_ref(m))
+            } else {
+                all
+            };
+            let state = loads * m.hits.loads + m.hits.stores;
+            let own = m.cost.map_or(0.0, |cost| cost.bytes);
+            let scattered = weights.scatter * (1.0 - density);
+            m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
         members.iter().map(one).sum()
     }
 
-    /// The share of a block's lanes that hit some member, in blocks where any does.
-    fn density(&self, members: &[usize]) -> f64 {
-        let share = self.share(members).min(1.0);
-        let weighted = members
-            .iter()
-            .filter_map(|m| self.workload.materials.get(*m));
-        let draws =
-            weighted.map(|h| h.share * h.draws()).sum::<f64>() / share.max(f64::MIN_POSITIVE);
-        let present = 1.0 - (1.0 - share).powf(draws.max(1.0));
-        (share / present.max(f64::MIN_POSITIVE)).min(1.0)
-    }
-
-    fn tail(&self, members: &[usize]) -> f64 {
-        let longest = |m: &usize| self.cost(*m).map_or(0.0, |c| c.issued_by(32.0).sum());
-        self.profile.weights.latency * members.iter().map(longest).fold(0.0, f64::max)
-    }
-
-    fn pressure(&self, live: u32) -> f64 {
+    /// Seconds by which the logic kernel gets slower for the registers of inline materials.
+    fn logic(&self, members: &[Member<'_>]) -> f64 {
         let weights = &self.profile.weights;
-        1.0 + weights.pressure * (f64::from(live) - weights.free_registers).max(0.0) / 100.0
+        let live = members.iter().filter_map(|m| m.cost).map(|cost| cost.live);
+        let live = f64::from(live.max().unwrap_or(0));
+        let beyond = (live - weights.free_registers).max(0.0) / 100.0;
+        self.workload.logic_seconds * weights.pressure * beyond
     }
+}
 
-    fn misses(&self, code: f64) -> f64 {
-        let weights = &self.profile.weights;
-        let outside = (1.0 - weights.code / code.max(1.0)).max(0.0);
-        1.0 + (weights.miss - 1.0).max(0.0) * outside
+/// Operations of the subgroup that takes longest. Side by side, a workgroup waits for all materials that
+/// some of its subgroups evaluate.
+fn longest(form: Form, members: &[Member<'_>]) -> f64 {
+    match form {
+        Form::Own | Form::Binned => {
+            // What nobody hits makes nobody wait.
+            let each = members
+                .iter()
+                .map(|m| m.subgroups.min(1.0) * m.issued().sum());
+            each.fold(0.0, f64::max)
+        }
+        Form::Mixed | Form::Inline => {
+            let met = |m: &Member<'_>| 1.0 - (1.0 - m.present).powf(GROUP);
+            members.iter().map(|m| met(m) * m.issued().sum()).sum()
+        }
     }
+}
+
+/// The share of a block's lanes that hit some member, in blocks where any does.
+fn density(members: &[Member<'_>]) -> f64 {
+    let share: f64 = members.iter().map(|m| m.hits.share).sum();
+    let share = share.clamp(f64::MIN_POSITIVE, 1.0);
+    let draws: f64 = members.iter().map(|m| m.hits.share * m.hits.draws()).sum();
+    let present = 1.0 - (1.0 - share).powf((draws / share).max(1.0));
+    (share / present.max(f64::MIN_POSITIVE)).min(1.0)
+}
+
+/// The `k`-norm of numbers that are not below zero: from their sum, for 1, to the largest.
+fn norm(parts: [f64; 3], k: f64) -> f64 {
+    let most = parts.into_iter().fold(0.0, f64::max);
+    if most <= 0.0 {
+        return 0.0;
+    }
+    let sum: f64 = parts.iter().map(|part| (part / most).powf(k)).sum();
+    most * sum.powf(1.0 / k)
 }
 
 /// Seconds of one subgroup's operations, all of the machine being busy.

@@ -26,14 +26,13 @@ pub struct DeviceProfile {
     pub fit: Fit,
 }
 
-/// The constants. Times are in seconds.
+/// The constants; the formulas they stand in are those of [`super::model`]. Times are in seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weights {
-    /// A dispatch that finds nothing to do: what a kernel more costs, with its drain.
+    /// What a kernel more costs: its dispatch, and the machine that drains before the next.
     pub launch: f64,
-    /// An operation of a subgroup that must wait for the one before: what the last subgroup of a
-    /// dispatch takes while the rest of the machine idles.
+    /// An operation of a subgroup that waits for the one before.
     pub latency: f64,
     /// A subgroup's operation of float arithmetic, all of the machine being busy; so the next.
     pub alu: f64,
@@ -45,20 +44,23 @@ pub struct Weights {
     pub texture: f64,
     /// A turn of a loop.
     pub turns: f64,
-    /// A byte of memory that one lane reads or writes, neighbours beside it.
+    /// A byte of memory that one lane reads or writes.
     pub memory: f64,
-    /// What an item costs that goes through a queue, appending and fetching.
-    pub queue: f64,
-    /// Live numbers that a thread may have without hiding less latency.
-    pub free_registers: f64,
-    /// By how much each further hundred of them slows operations down, as a share.
-    pub pressure: f64,
+    /// The same in addition where the neighbouring slots are not in the same kernel.
+    pub scatter: f64,
     /// Operations of code that the caches of instructions hold.
     pub code: f64,
-    /// How many times as long operations take whose code does not fit.
+    /// By which share operations get slower for each time more code that is evaluated side by side.
     pub miss: f64,
-    /// The exponent by which arithmetic and memory overlap: 1 adds them, infinity takes the longer.
+    /// The exponent by which operations, memory and waiting overlap: 1 adds them, infinity takes the
+    /// longest.
     pub overlap: f64,
+    /// The share of its loads that an inline material has to make by itself.
+    pub inline_loads: f64,
+    /// Live numbers that an inline material may have without making the logic kernel slower.
+    pub free_registers: f64,
+    /// By how much each further hundred of them slows that kernel down, as a share.
+    pub pressure: f64,
 }
 
 /// How well a model fits what was measured.
@@ -139,7 +141,7 @@ const MAX_SUBGROUP: u32 = 128;
 
 impl Weights {
     /// Every constant with its name in files.
-    pub fn named(&self) -> [(&'static str, f64); 14] {
+    pub fn named(&self) -> [(&'static str, f64); 15] {
         [
             ("launch", self.launch),
             ("latency", self.latency),
@@ -149,12 +151,13 @@ impl Weights {
             ("texture", self.texture),
             ("turns", self.turns),
             ("memory", self.memory),
-            ("queue", self.queue),
-            ("free_registers", self.free_registers),
-            ("pressure", self.pressure),
+            ("scatter", self.scatter),
             ("code", self.code),
             ("miss", self.miss),
             ("overlap", self.overlap),
+            ("inline_loads", self.inline_loads),
+            ("free_registers", self.free_registers),
+            ("pressure", self.pressure),
         ]
     }
 
@@ -167,7 +170,7 @@ impl Weights {
             texture: self.texture * times,
             turns: self.turns * times,
             memory: self.memory * times,
-            queue: self.queue * times,
+            scatter: self.scatter * times,
             ..self
         }
     }

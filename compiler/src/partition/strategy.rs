@@ -363,12 +363,12 @@ mod tests {
             on_surface: material != "lost",
             share: 0.2,
             present: 0.9,
+            loads: 64.0,
+            stores: 64.0,
         };
         Workload {
             pool: 1 << 20,
             materials: names().iter().map(hits).collect(),
-            loads: 64.0,
-            stores: 64.0,
             logic_seconds: 0.0,
             other_seconds: 0.0,
         }

@@ -16,10 +16,6 @@ pub struct Workload {
     pub pool: u32,
     /// Of each material of the program, in its order.
     pub materials: Vec<Hits>,
-    /// Bytes of path state that the material stage loads for a hit.
-    pub loads: f64,
-    /// Bytes of path state that it stores.
-    pub stores: f64,
     /// Seconds that the logic stage takes when it evaluates no material; 0 if not measured.
     pub logic_seconds: f64,
     /// Seconds that everything else takes but material kernels: new paths, rays, what lies between
@@ -39,6 +35,10 @@ pub struct Hits {
     /// The share of blocks of [`BLOCK`] neighbouring slots in which at least one hits it. As large as
     /// `share` where neighbours hit the same, 1 - (1 - share)^32 where they have nothing in common.
     pub present: f64,
+    /// Bytes of path state and geometry that a hit loads.
+    pub loads: f64,
+    /// Bytes of path state that it stores.
+    pub stores: f64,
 }
 
 impl Hits {
@@ -111,15 +111,14 @@ impl Workload {
         if sum > 1.0 + 1e-6 {
             return Some(format!("{sum} hits for each slot"));
         }
-        let others = [
-            ("loads", self.loads),
-            ("stores", self.stores),
+        let bytes = self.materials.iter();
+        let bytes = bytes.flat_map(|h| [("loads", h.loads), ("stores", h.stores)]);
+        let seconds = [
             ("logic_seconds", self.logic_seconds),
             ("other_seconds", self.other_seconds),
         ];
-        let wrong = others
-            .iter()
-            .find(|(_, value)| !value.is_finite() || *value < 0.0);
+        let mut others = bytes.chain(seconds);
+        let wrong = others.find(|(_, value)| !value.is_finite() || *value < 0.0);
         wrong.map(|(name, value)| format!("`{name}` is {value}"))
     }
 }
@@ -129,9 +128,9 @@ mod tests {
     use super::*;
 
     const TEXT: &str = r#"{"pool": 1024, "materials": [
-        {"material": "paint", "on_surface": true, "share": 0.25, "present": 0.5},
-        {"material": "glass", "on_surface": true, "share": 0.5, "present": 0.5}],
-        "loads": 64, "stores": 96, "logic_seconds": 0, "other_seconds": 1e-3}"#;
+        {"material": "paint", "on_surface": true, "share": 0.25, "present": 0.5, "loads": 64, "stores": 96},
+        {"material": "glass", "on_surface": true, "share": 0.5, "present": 0.5, "loads": 64, "stores": 96}],
+        "logic_seconds": 0, "other_seconds": 1e-3}"#;
 
     fn names() -> [String; 2] {
         ["glass", "paint"].map(String::from)
@@ -185,6 +184,8 @@ mod tests {
             on_surface: true,
             share,
             present,
+            loads: 64.0,
+            stores: 96.0,
         };
         assert!((hits(0.2, 0.2).draws() - 1.0).abs() < 1e-9);
         assert!((hits(0.2, 1.0 - 0.8f64.powi(32)).draws() - 32.0).abs() < 1e-6);

@@ -47,7 +47,7 @@ pub(super) fn best(subject: &Subject, groups: &Groups, k: usize) -> Option<Alter
         };
         let before = sum(&mut change.old.iter().map(|g| &groups[*g]));
         let after = sum(&mut change.new.iter());
-        (after.total - before.total, before, after, change)
+        (after.weighed() - before.weighed(), before, after, change)
     });
     let least = judged.min_by(|a, b| a.0.total_cmp(&b.0));
     least.map(|(more, before, after, change)| {
@@ -194,10 +194,11 @@ fn union(a: &[usize], b: &[usize]) -> Vec<usize> {
 fn add(a: Prediction, b: Prediction) -> Prediction {
     Prediction {
         launch: a.launch + b.launch,
-        tail: a.tail + b.tail,
+        latency: a.latency + b.latency,
         issue: a.issue + b.issue,
         memory: a.memory + b.memory,
-        queue: a.queue + b.queue,
+        logic: a.logic + b.logic,
+        doubt: a.doubt + b.doubt,
         total: a.total + b.total,
     }
 }
@@ -207,10 +208,11 @@ fn deciding(before: &Prediction, after: &Prediction, more: f64) -> (&'static str
     let parts = |p: &Prediction| {
         [
             ("launch", p.launch),
-            ("tail", p.tail),
+            ("latency", p.latency),
             ("issue", p.issue),
             ("memory", p.memory),
-            ("queue", p.queue),
+            ("logic", p.logic),
+            ("doubt", p.doubt),
         ]
     };
     let grown = parts(after).into_iter().zip(parts(before));
@@ -238,25 +240,31 @@ fn why(subject: &Subject, part: &str, more: f64, groups: &Groups, change: &Chang
         ("issue", true) if after < 0.97 * before => format!(
             "subgroups evaluate with {after:.1} of {width} lanes, not {before:.1}: neighbours take turns"
         ),
-        ("issue", true) => "all take the registers and the code of the heaviest".into(),
+        ("issue", true) => "together their code crowds the caches of instructions".into(),
         ("issue", false) if after > 1.03 * before => {
             format!("subgroups evaluate with {after:.1} of {width} lanes, not {before:.1}")
         }
-        ("issue", false) => "registers and code are those of fewer materials".into(),
-        ("launch" | "tail", true) if new > old => match new - old {
+        ("issue", false) => "less code crowds the caches of instructions".into(),
+        ("launch", true) if new > old => match new - old {
             1 => "one more kernel waits for its last subgroup".into(),
             more => format!("{more} more kernels wait for their last subgroups"),
         },
-        ("launch" | "tail", false) if new < old => match old - new {
+        ("launch", false) if new < old => match old - new {
             1 => "one kernel less waits for its last subgroup".into(),
             less => format!("{less} kernels less wait for their last subgroups"),
         },
-        ("launch" | "tail", _) => "the longest material drains last".into(),
+        ("launch", _) => "a dispatch more or less".into(),
+        ("latency", true) => "the longest subgroup takes longer by itself".into(),
+        ("latency", false) => "the longest subgroup is shorter".into(),
+        ("logic", true) => {
+            "the logic kernel takes their registers, and so runs fewer threads".into()
+        }
+        ("logic", false) => "the logic kernel has registers to spare".into(),
+        ("doubt", _) => "predictions of inline materials err the most".into(),
         ("memory", true) if new > old => "path state is read once more".into(),
         ("memory", true) => "path state that lies apart shares no reads".into(),
         ("memory", false) => "path state is at hand or lies closer".into(),
-        (_, true) => "hits go through a queue".into(),
-        (_, false) => "hits go through no queue".into(),
+        _ => "of all parts a little".into(),
     }
 }
 
@@ -291,12 +299,12 @@ mod tests {
         let mixed = || vec![(Form::Mixed, vec![0, 1])];
         let each = || vec![(Form::Own, vec![0]), (Form::Own, vec![1])];
         assert!(said("issue", 1.0, &[0], mixed()).contains("with 16.0 of 32 lanes, not 32.0"));
-        assert!(said("issue", 1.0, &[0], each()).contains("of the heaviest"));
-        assert!(said("tail", 1.0, &[0], each()).contains("one more kernel"));
+        assert!(said("issue", 1.0, &[0], each()).contains("crowds"));
+        assert!(said("launch", 1.0, &[0], each()).contains("one more kernel"));
         let all = || vec![(Form::Binned, vec![0, 1, 2])];
         assert!(said("launch", -1.0, &[0, 1], all()).contains("one kernel less"));
         let inline = || vec![(Form::Inline, vec![0, 1])];
         assert!(said("memory", -1.0, &[0], inline()).contains("at hand"));
-        assert!(said("queue", -1.0, &[0], inline()).contains("no queue"));
+        assert!(said("logic", 1.0, &[0], inline()).contains("registers"));
     }
 }

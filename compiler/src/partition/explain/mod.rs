@@ -164,7 +164,7 @@ impl Subject<'_> {
             members: members.iter().map(|m| self.member(*m)).collect(),
             predicted,
             share: if seconds > 0.0 {
-                predicted.total / seconds
+                predicted.weighed() / seconds
             } else {
                 0.0
             },

@@ -107,14 +107,15 @@ fn write_kernel(f: &mut fmt::Formatter<'_>, kernel: &Kernel) -> fmt::Result {
     writeln!(
         f,
         "{what}: {}, {share:.0} % of the materials' time",
-        time(p.total)
+        time(p.weighed())
     )?;
     let parts = [
         ("launch", p.launch),
-        ("tail", p.tail),
+        ("latency", p.latency),
         ("issue", p.issue),
         ("memory", p.memory),
-        ("queue", p.queue),
+        ("logic", p.logic),
+        ("doubt", p.doubt),
     ];
     let parts = parts.iter().filter(|(_, seconds)| *seconds > 0.0);
     let parts: Vec<String> = parts
