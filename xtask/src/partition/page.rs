@@ -50,15 +50,17 @@ const LIMITS: &str = "\n## How it is measured, and what that does not say\n\n\
     `impasto plan SCENE --strategy exhaustive --pool N` renders until paths of all lengths are mixed, keeps a copy of \
     what they\nare between two iterations, and times every kernel on this copy, again and again, by the GPU's \
     timestamps. The time of an\ninline set is what it adds to the logic kernel. Up to six materials, all sets are \
-    timed in all forms, and every plan is\nadded up; the best is the least of them. Beyond, single materials, the sets \
-    of the strategies' plans and a sample\ndrawn by lot are timed, and the best is that of the plans made of these: \
-    regret is then a lower bound. The least of many sums is\nalso the luckiest, which makes regret look larger by up \
+    timed in all forms, and every plan is\nadded up; the best is the least of them. Beyond, single materials, \
+    pairs, the\nsets of the strategies' plans, and larger sets drawn by lot are timed, as far as the time of a scene \
+    goes, and the best is that of\nthe plans made of these: regret is then a lower bound. The least of many sums is\nalso the luckiest, which makes regret look larger by up \
     to the spread of the measurements. Iterations at the start and at\nthe end of a picture, when few paths are alive, \
     are in none of this but in the whole renders.\n\n\
     ```text\n\
     cargo xtask scenes\n\
     cargo xtask partition                     # all of it; again, to go on where it stopped\n\
     cargo xtask partition --only stones_3     # one scene\n\
+    cargo xtask partition --repredict h200    # what was measured, predicted anew by a profile; no GPU\n\
+    cargo xtask partition --page --held-out   # the model fitted to half of the materials; no GPU\n\
     cargo xtask partition --page              # the page from the JSON alone\n\
     ```\n";
 
