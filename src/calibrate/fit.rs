@@ -312,7 +312,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::measure::{Adapter, Data, Material};
     use impasto_compiler::cost::{Classes, Inputs, LANES, Operations};
@@ -352,7 +352,7 @@ mod tests {
     }
 
     /// Scenes whose kernels take exactly what the model says by `truth`.
-    fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
+    pub(in super::super) fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
         let mut numbers = Inputs::new(7);
         let scene = |(index, pool): (usize, u32)| {
             let name = |m: usize| format!("m{index}{m}");

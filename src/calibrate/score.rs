@@ -106,3 +106,31 @@ pub fn scores_text(scored: &[Scored]) -> String {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::tests::measured_by;
+    use super::*;
+
+    #[test]
+    fn predictions_are_those_of_the_profile_and_its_choice_follows() {
+        let truth = DeviceProfile::named("h200").expect("shipped");
+        let sets = measured_by(&truth);
+        let scored = score(&sets, ("h200", &truth)).expect("plans");
+        assert_eq!(scored.len(), sets.len());
+        for (scored, set) in scored.iter().zip(&sets) {
+            assert_eq!(scored.kernels.len(), set.kernels.len());
+            assert!(scored.kernels.iter().all(|k| k.predicted == k.measured));
+        }
+        assert!(scores_text(&scored).contains("0.0 %"));
+        // Where a dispatch takes a second, no plan has one.
+        let mut slow = truth;
+        slow.weights.launch = 1.0;
+        for scored in score(&sets, ("slow", &slow)).expect("plans") {
+            let auto = &scored.auto;
+            assert!(auto.starts_with("inline:") && !auto.contains('|'), "{auto}");
+            let own = scored.kernels.iter().find(|k| k.form == Form::Own);
+            assert!(own.expect("an own kernel").predicted > 1.0);
+        }
+    }
+}
