@@ -2,6 +2,7 @@
 //! they took.
 
 mod constants;
+mod errors;
 mod fit;
 mod measure;
 mod minimise;
@@ -11,7 +12,8 @@ mod room;
 mod score;
 mod sources;
 
-pub use fit::{Errors, Fitted, Residual, fit, rank_correlation};
+pub use errors::{Errors, rank_correlation};
+pub use fit::{Fitted, Residual, fit};
 pub use measure::{Effort, Step, measure};
 pub use registers::{Registers, registers};
 pub use report::text;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::fit::rank_correlation;
+use super::errors::rank_correlation;
 use crate::measure::Measurement;
 
 /// Registers against the estimate, over kernels whose registers the driver told.

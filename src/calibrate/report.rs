@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::constants::{about, named};
-use super::fit::{Errors, Fitted, Residual};
+use super::errors::Errors;
+use super::fit::{Fitted, Residual};
 
 /// How many of the kernels that fit worst are listed, unless all are wanted.
 const WORST: usize = 20;
