@@ -7,7 +7,7 @@
 //! ```text
 //! busy    = (issue^k + memory^k + latency^k)^(1/k)                          k = overlap
 //! issue   = sum over members: subgroups * operations that each issues * seconds by class * crowding
-//! memory  = sum over members: hits * (loads + stores) * (memory + scatter * (1 - density))
+//! memory  = sum over members: hits * (loads + stores) * (memory + scatter * apart(density))
 //! latency = latency * operations of the longest subgroup * crowding
 //! crowding = 1 + miss * max(0, code of all members / code - 1)     where members are side by side
 //! logic   = logic kernel * pressure * max(0, live numbers - free_registers) / 100
@@ -16,8 +16,9 @@
 //! - A kernel that evaluates one material (own, or a workgroup of binned) has hits/32 full subgroups of
 //!   it. One that evaluates several side by side (mixed, inline) runs each material in every
 //!   subgroup in which it is present, with as few lanes as it has there, one after the other.
-//! - `density` is the share of neighbouring slots that the kernel works on: where they are apart, each
-//!   hit reads sectors of memory for itself alone.
+//! - `density` is the share of neighbouring slots that the kernel works on. Where they are apart, hits
+//!   read lines of memory for themselves alone: `apart` is 0 if all slots of a line of 16 are worked
+//!   on, and 1 if one is.
 //! - Side by side, materials that do not fit the caches of instructions together push each other out.
 //! - A logic kernel with inline materials has their registers, and so fewer threads at a time.
 //!
@@ -65,6 +66,8 @@ impl Prediction {
 /// The share of the seconds of inline materials that is in doubt: their predictions err the most, and
 /// an inline material that was thought too cheap costs more than a queue that was not needed.
 const INLINE_DOUBT: f64 = 0.1;
+/// Slots whose state is in one line of memory; of 4, 8 and 16, this fits an H200 best.
+const LINE: f64 = 16.0;
 /// Subgroups of a workgroup, all of which wait for the one that takes longest.
 const GROUP: f64 = 8.0;
 
@@ -208,8 +211,8 @@ impl Calibrated<'_> {
         1.0 + weights.miss * (code / weights.code.max(1.0) - 1.0).max(0.0)
     }
 
-    /// Seconds that path state and what materials read take, sectors of memory included that are
-    /// read for a part of them only.
+    /// Seconds that path state and what materials read take, lines of memory included that are read for
+    /// a part of them only.
     fn memory(&self, form: Form, members: &[Member<'_>]) -> f64 {
         let weights = &self.profile.weights;
         // What logic has loaded is partly at hand.
@@ -227,7 +230,7 @@ impl Calibrated<'_> {
             };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);
-            let scattered = weights.scatter * (1.0 - density);
+            let scattered = weights.scatter * apart(density);
             m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
         members.iter().map(one).sum()
@@ -268,6 +271,14 @@ fn density(members: &[Member<'_>]) -> f64 {
     let draws: f64 = members.iter().map(|m| m.hits.share * m.hits.draws()).sum();
     let present = 1.0 - (1.0 - share).powf((draws / share).max(1.0));
     (share / present.max(f64::MIN_POSITIVE)).min(1.0)
+}
+
+/// How much of what neighbours could share of a line of memory each has to read for itself, from 0
+/// to 1, if a random `density` of the slots is worked on: the lines that are met over the slots worked on.
+fn apart(density: f64) -> f64 {
+    let density = density.clamp(1e-3, 1.0);
+    let lines = (1.0 - (1.0 - density).powf(LINE)) / (LINE * density);
+    (lines - 1.0 / LINE) / (1.0 - 1.0 / LINE)
 }
 
 /// The `k`-norm of numbers that are not below zero: from their sum, for 1, to the largest.

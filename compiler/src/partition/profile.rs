@@ -46,7 +46,7 @@ pub struct Weights {
     pub turns: f64,
     /// A byte of memory that one lane reads or writes.
     pub memory: f64,
-    /// The same in addition where the neighbouring slots are not in the same kernel.
+    /// The same in addition where no neighbouring slot is in the same kernel.
     pub scatter: f64,
     /// Operations of code that the caches of instructions hold.
     pub code: f64,
