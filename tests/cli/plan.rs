@@ -33,7 +33,7 @@ fn it_explains_the_automatic_plan() {
     for part in [
         "plan `auto`",
         "profile: NVIDIA H200",
-        "1,048,576 paths",
+        "8,388,608 paths",
         "does not know",
         "paper",
     ] {
@@ -56,7 +56,7 @@ fn it_explains_the_automatic_plan() {
     let seconds = |v: &Value| part(v, "total") + part(v, "doubt");
     let sum: f64 = kernels.iter().map(seconds).sum();
     assert!((json["seconds"].as_f64().expect("a number") / sum - 1.0).abs() < 1e-9);
-    assert_eq!(json["workload"]["pool"], 1 << 20);
+    assert_eq!(json["workload"]["pool"], 1 << 23);
     assert_eq!(json["scene"], SCENE);
 }
 
@@ -157,7 +157,8 @@ fn materials_without_surface_get_no_kernel() {
     let scene = write(folder.path(), "scene.toml", &scene);
     let text = std::fs::read_to_string(root().join(WORKLOAD)).expect("the workload");
     let mut hits: Value = serde_json::from_str(&text).expect("JSON");
-    let water = json!({"material": "water", "on_surface": false, "share": 0.0, "present": 0.0});
+    let water = json!({"material": "water", "on_surface": false, "share": 0.0, "present": 0.0,
+        "loads": 64.0, "stores": 64.0});
     hits["materials"]
         .as_array_mut()
         .expect("a list")

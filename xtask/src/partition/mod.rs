@@ -219,6 +219,9 @@ fn put(results: &mut Results, case: &Case, record: &Record) -> Result {
 /// Replaces predictions and chosen plans of all records by those of a profile.
 fn repredict(args: &PartitionArgs, profile: &str, results: &mut Results) -> Result {
     let impasto = paper::command(args.impasto.as_deref())?;
+    if let Some(version) = &args.version {
+        results.version.clone_from(version);
+    }
     let cases = chosen(&args.only, cases::all()?)?;
     let mut records: Vec<(u64, usize, PathBuf)> = Vec::new();
     for path in record::paths(&args.records)? {

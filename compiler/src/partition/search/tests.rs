@@ -124,9 +124,9 @@ fn the_heuristic_comes_near_the_exact_search() {
     let count = |seed| 2 + (seed % 9) as usize;
     let calibrated = |count, seed| (count, Box::new(Owned(Case::new(count, seed))) as Box<_>);
     let (worst, mean) = excess(300, |seed| calibrated(count(seed), seed));
-    assert!(worst < 0.01 && mean < 0.0005, "worst {worst}, mean {mean}");
+    assert!(worst < 0.025 && mean < 0.0005, "worst {worst}, mean {mean}");
     let (worst, mean) = excess(5, |seed| calibrated(13, seed));
-    assert!(worst < 0.01, "of 13 materials: worst {worst}, mean {mean}");
+    assert!(worst < 0.025, "of 13 materials: worst {worst}, mean {mean}");
     let (worst, mean) = excess(150, |seed| {
         let count = count(seed);
         (count, Box::new(Pairs::new(count, seed)))
