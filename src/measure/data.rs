@@ -92,7 +92,7 @@ pub struct Kernel {
 /// Several measurements in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Data {
-    /// [`VERSION`] of the program that wrote it.
+    /// The version of the format.
     pub version: u32,
     /// The measurements.
     pub sets: Vec<Measurement>,
