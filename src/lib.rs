@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | [`load`] | a scene file | a [`Scene`]: geometry, lights, and which materials it binds |
 //! | [`compile`] | the `.impasto` files that the scene names | a [`Program`]: validated WGSL |
-//! | [`plan`] | the program's materials | a [`Plan`]: which of them share a kernel |
+//! | [`plan()`] | the program's materials | a [`Plan`]: which of them share a kernel |
 //! | [`render`] | scene, program and plan | a [`Rendering`]: the picture and a report |
 //!
 //! ```no_run
