@@ -106,12 +106,6 @@ pub fn workload(
     pool: Option<u32>,
 ) -> Result<Workload, RuntimeError> {
     let technique = Technique::default();
-    let world = World::new(
-        scene,
-        &program.infos(),
-        &MaterialSource::instances(program),
-        &program.textures(),
-        &technique,
-    )?;
+    let world = World::of_program(scene, program, &technique)?;
     profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
 }

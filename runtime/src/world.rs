@@ -4,7 +4,9 @@
 //! This is the boundary of the GPU side. A scene becomes a [`World`]; tests build small ones
 //! by hand, from a few lines of WGSL.
 
+use impasto_compiler::Program;
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
+use impasto_compiler::partition::{Plan, Strategy};
 
 use crate::camera::CameraFrame;
 use crate::lights;
@@ -31,6 +33,30 @@ pub struct World {
 }
 
 impl World {
+    /// The world of `scene`, whose materials compiled to `program`; rays are cast as `technique` says.
+    ///
+    /// # Errors
+    /// If the scene has what cannot be rendered.
+    pub fn of_program(
+        scene: &Scene,
+        program: &Program,
+        technique: &Technique,
+    ) -> Result<Self, SceneError> {
+        Self::new(
+            scene,
+            &program.infos(),
+            &MaterialSource::instances(program),
+            &program.textures(),
+            technique,
+        )
+    }
+
+    /// The plan that gives a kernel to each of `materials` that is on some surface.
+    pub(crate) fn own_plan(&self, materials: &[MaterialInfo]) -> Plan {
+        let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+        Strategy::Own.plan(&names).leaving_out(&self.parts.unbound)
+    }
+
     /// The world of a scene whose bindings compiled to `instances` of `materials`, reading
     /// `textures`; rays are cast as `technique` says.
     pub fn new(

@@ -85,13 +85,13 @@ pub fn about(name: &str) -> About {
     })
 }
 
-/// Every constant by its name.
+/// Every constant by its name, in alphabetical order.
 pub fn named(weights: &Weights) -> Vec<(String, f64)> {
-    let json = serde_json::to_value(weights).unwrap_or_default();
-    let fields = json.as_object().into_iter().flatten();
-    fields
-        .filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
-        .collect()
+    let mut all = weights
+        .named()
+        .map(|(name, value)| (name.to_owned(), value));
+    all.sort_by(|a, b| a.0.cmp(&b.0));
+    all.into()
 }
 
 /// The coordinates of constants: logarithms, in the order of [`named`].

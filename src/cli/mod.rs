@@ -9,6 +9,8 @@ use std::process::ExitCode;
 use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
 use impasto::compiler::diag::{self, Diagnostic};
 use impasto::compiler::source::SourceMap;
+use impasto::compiler::{self, MaterialRequest, Program};
+use impasto::{FileLoader, Scene};
 
 mod calibrate;
 mod check;
@@ -215,6 +217,25 @@ fn print(text: &str) -> Outcome {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Compiles what is asked for, and reports what is wrong with it.
+fn compile(
+    requests: &[MaterialRequest],
+    loader: &mut FileLoader,
+    global: &Global,
+) -> Result<Program, Failure> {
+    let compiled = compiler::compile(requests, loader);
+    global.report(&compiled.sources, &compiled.diagnostics);
+    compiled.program.ok_or(Failure::Diagnostics)
+}
+
+/// A scene and what its materials compile to.
+fn compiled_scene(path: &std::path::Path, global: &Global) -> Result<(Scene, Program), Failure> {
+    let scene = impasto::load(path).map_err(|e| Failure::Error(e.to_string()))?;
+    let mut loader = FileLoader::new(&scene.base);
+    let program = compile(&impasto::requests(&scene), &mut loader, global)?;
+    Ok((scene, program))
 }
 
 /// The text of a file that an option names.

@@ -1,20 +1,19 @@
 //! `impasto plan`: which materials share a kernel in a scene, and why.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
 use impasto::compiler::partition::{Calibrated, Plan, Wanted, Workload, file, text};
-use impasto::compiler::{self};
 use impasto::plan::Facts;
-use impasto::{FileLoader, Gpu, Program, Scene, files};
+use impasto::{Gpu, Program, Scene, files};
 use serde::Serialize;
 
 use super::exhaustive::ExhaustiveArgs;
 use super::info::GpuArgs;
 use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
-use super::{Failure, Global, Outcome, print, read_text};
+use super::{Failure, Global, Outcome, compiled_scene, print, read_text};
 
 #[derive(Args)]
 pub(super) struct PlanCommandArgs {
@@ -61,7 +60,7 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     for path in args.save.iter().chain(&args.save_workload) {
         files::check_writable(path)?;
     }
-    let (scene, program) = compile(&args.scene, global)?;
+    let (scene, program) = compiled_scene(&args.scene, global)?;
     let facts = Facts::of_scene(&scene, &program, args.samples as usize)
         .map_err(|_| "the materials take too long to evaluate; try fewer `--samples`".to_owned())?;
     // What is wrong with the plan is said before anything is rendered.
@@ -183,14 +182,4 @@ impl PlanCommandArgs {
         let text = text.map_err(|error| format!("cannot write the explanation: {error}"))?;
         print(&format!("{text}\n"))
     }
-}
-
-/// The scene and what its materials compile to.
-fn compile(path: &Path, global: &Global) -> Result<(Scene, Program), Failure> {
-    let scene = impasto::load(path).map_err(|e| Failure::Error(e.to_string()))?;
-    let mut loader = FileLoader::new(&scene.base);
-    let compiled = compiler::compile(&impasto::requests(&scene), &mut loader);
-    global.report(&compiled.sources, &compiled.diagnostics);
-    let program = compiled.program.ok_or(Failure::Diagnostics)?;
-    Ok((scene, program))
 }

@@ -7,7 +7,7 @@ use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::Form;
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
-use impasto_runtime::world::{MaterialSource, World};
+use impasto_runtime::world::World;
 
 use super::{Adapter, Kernel, Material, Measurement};
 use crate::plan::Facts;
@@ -56,13 +56,7 @@ impl<'p> Subject<'p> {
         facts: Facts,
         options: &LabOptions,
     ) -> Result<Self, Error> {
-        let world = World::new(
-            scene,
-            &program.infos(),
-            &MaterialSource::instances(program),
-            &program.textures(),
-            &options.technique,
-        );
+        let world = World::of_program(scene, program, &options.technique);
         Ok(Self {
             name: scene.name.clone(),
             program,

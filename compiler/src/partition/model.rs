@@ -100,13 +100,8 @@ struct Member<'a> {
     lanes: f64,
     /// The share of the kernel's subgroups that do.
     present: f64,
-}
-
-impl Member<'_> {
-    fn issued(&self) -> Classes {
-        let cost = self.cost.map(|cost| cost.issued_by(self.lanes));
-        cost.unwrap_or_default()
-    }
+    /// What each of them issues.
+    issued: Classes,
 }
 
 impl Calibrated<'_> {
@@ -191,18 +186,19 @@ impl Calibrated<'_> {
             subgroups,
             lanes,
             present,
+            issued: cost.map(|c| c.issued_by(lanes)).unwrap_or_default(),
         }
     }
 
     /// Seconds in which all subgroups issue their operations, if their code is at hand.
     fn issue(&self, members: &[Member<'_>]) -> f64 {
-        let one = |m: &Member<'_>| m.subgroups * seconds(&self.profile.weights, &m.issued());
+        let one = |m: &Member<'_>| m.subgroups * seconds(&self.profile.weights, &m.issued);
         members.iter().map(one).sum()
     }
 
     /// How many times as long operations take since code does not fit the caches.
     fn crowding(&self, form: Form, members: &[Member<'_>]) -> f64 {
-        if matches!(form, Form::Own | Form::Binned) || members.len() < 2 {
+        if !side_by_side(form) || members.len() < 2 {
             return 1.0;
         }
         let weights = &self.profile.weights;
@@ -220,13 +216,11 @@ impl Calibrated<'_> {
             Form::Inline => weights.inline_loads,
             _ => 1.0,
         };
-        let alone = matches!(form, Form::Own | Form::Binned);
         let all = density(members);
         let one = |m: &Member<'_>| {
-            let density = if alone {
-                density(std::slice::from_ref(m))
-            } else {
-                all
+            let density = match side_by_side(form) {
+                true => all,
+                false => density(std::slice::from_ref(m)),
             };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);
@@ -246,22 +240,21 @@ impl Calibrated<'_> {
     }
 }
 
+/// Whether the subgroups of a kernel of this form evaluate several materials.
+fn side_by_side(form: Form) -> bool {
+    matches!(form, Form::Mixed | Form::Inline)
+}
+
 /// Operations of the subgroup that takes longest. Side by side, a workgroup waits for all materials that
 /// some of its subgroups evaluate.
 fn longest(form: Form, members: &[Member<'_>]) -> f64 {
-    match form {
-        Form::Own | Form::Binned => {
-            // What nobody hits makes nobody wait.
-            let each = members
-                .iter()
-                .map(|m| m.subgroups.min(1.0) * m.issued().sum());
-            each.fold(0.0, f64::max)
-        }
-        Form::Mixed | Form::Inline => {
-            let met = |m: &Member<'_>| 1.0 - (1.0 - m.present).powf(GROUP);
-            members.iter().map(|m| met(m) * m.issued().sum()).sum()
-        }
+    if side_by_side(form) {
+        let met = |m: &Member<'_>| 1.0 - (1.0 - m.present).powf(GROUP);
+        return members.iter().map(|m| met(m) * m.issued.sum()).sum();
     }
+    // What nobody hits makes nobody wait.
+    let alone = |m: &Member<'_>| m.subgroups.min(1.0) * m.issued.sum();
+    members.iter().map(alone).fold(0.0, f64::max)
 }
 
 /// The share of a block's lanes that hit some member, in blocks where any does.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel};
 
 use super::bench::Run;
-use super::{Candidate, Lab, Unmeasured, names, own_plan};
+use super::{Candidate, Lab, Unmeasured};
 use crate::error::RuntimeError;
 use crate::gpu::{Gpu, KernelStatistics};
 use crate::modules::{Composer, Feed, Kernel, Recipe, Sizes};
@@ -60,7 +60,7 @@ impl Lab<'_> {
 
     /// The logic kernel alone, of a kernel a material.
     pub(super) fn bare_logic(&mut self) -> Result<Run, RuntimeError> {
-        let plan = own_plan(&self.materials, self.world);
+        let plan = self.own_plan();
         let composer = self.composer(&plan, false)?;
         let logic = composer.recipes().swap_remove(0);
         let composed = self.composed(&composer, vec![logic], Vec::new());
@@ -112,23 +112,33 @@ impl Lab<'_> {
         Ok(self.composed(&composer, recipes, composer.queue_table()))
     }
 
+    /// A kernel a material that is on some surface.
+    fn own_plan(&self) -> Plan {
+        self.makings.world.own_plan(&self.makings.materials)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let materials = self.makings.materials.iter();
+        materials.map(|m| m.name.clone()).collect()
+    }
+
     /// A plan with the candidate first, and an own kernel for every other material.
     fn plan_around(&self, candidate: &Candidate) -> Result<Plan, Unmeasured> {
         let (form, members) = (candidate.form, &candidate.members);
         let ascending = members.windows(2).all(|pair| pair[0] < pair[1]);
-        let known = members.iter().all(|m| *m < self.materials.len());
+        let known = members.iter().all(|m| *m < self.makings.materials.len());
         if members.is_empty() || !ascending || !known || form == Form::Own && members.len() > 1 {
             return Err(format!(
                 "there is no kernel of form {form:?} over {members:?}"
             ));
         }
-        let own = own_plan(&self.materials, self.world);
+        let own = self.own_plan();
         if form == Form::Own {
             return Ok(own);
         }
         let others = own.kernels.into_iter();
         let others = others.filter(|kernel| !members.contains(&kernel.materials[0]));
-        let subject = PlanKernel::new(form, members.clone(), &names(&self.materials));
+        let subject = PlanKernel::new(form, members.clone(), &self.names());
         Ok(Plan {
             kernels: std::iter::once(subject).chain(others).collect(),
             ..own

@@ -6,21 +6,17 @@
 //! logic kernel that sorts hits as the plan has it; here it looks the queue of a material up in a
 //! buffer, so that a few such kernels serve all subsets of the materials.
 
-use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
-use impasto_compiler::partition::{Form, Plan, Strategy, Workload};
+use impasto_compiler::partition::{Form, Plan, Workload};
 use serde::Serialize;
 
 use crate::error::RuntimeError;
 use crate::gpu::statistics::Statistics;
 use crate::gpu::{Gpu, KernelStatistics, Timing};
-use crate::layout::Layout;
 use crate::modules::{Composer, Sizes};
 use crate::pool;
-use crate::random::{self, Demand};
-use crate::render::RenderOptions;
+use crate::render::{ENDLESS, Makings, RenderOptions};
 use crate::resources::Resources;
 use crate::settings;
-use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Technique;
 use crate::workload;
 use crate::world::{MaterialSource, World};
@@ -33,9 +29,6 @@ mod snapshot;
 use bench::{Run, Sample};
 use candidates::Cache;
 use snapshot::Snapshot;
-
-/// Samples of each pixel: more than any number of iterations uses up.
-const ENDLESS: u32 = 1 << 24;
 
 /// How to measure.
 #[derive(Clone, Debug)]
@@ -108,14 +101,8 @@ pub type Unmeasured = String;
 /// A scene in mid-render.
 pub struct Lab<'a> {
     gpu: &'a Gpu,
-    world: &'a World,
-    source: &'a dyn MaterialSource,
-    materials: Vec<MaterialInfo>,
-    instances: Vec<InstanceInfo>,
-    tables: Vec<BufferData>,
-    random: ShaderPart,
+    makings: Makings<'a>,
     sizes: Sizes,
-    technique: Technique,
     repetitions: u32,
     statistics: Option<Statistics<'a>>,
     resources: Resources,
@@ -146,45 +133,29 @@ impl<'a> Lab<'a> {
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;
-        let (materials, instances) = (source.infos(), source.instances());
-        let own = own_plan(&materials, world);
+        let mut makings = Makings::new(gpu, world, source, render.technique);
+        let own = world.own_plan(&makings.materials);
         // No plan has more queues or counters: buffers of this layout do for all.
-        let mut layout = Layout::new(world, &materials, &own, &render.technique)?;
+        let mut layout = makings.layout(&own)?;
         layout.counters.binned = true;
         render.technique = layout.technique(render.technique);
-        let demand = Demand::of(world, &materials, layout.needs.shadow_rays);
-        let parts = Parts {
-            world,
-            source,
-            materials: &materials,
-            instances: &instances,
-            tables: &source
-                .tables()
-                .iter()
-                .map(BufferData::from)
-                .collect::<Vec<_>>(),
-            random: &random::part(render.technique.sampler, demand),
-            sizes: pool::sizes(gpu, world, &layout, &render)?,
-            technique: render.technique,
-            subgroup_size: gpu.subgroup_size(),
+        makings.technique = render.technique;
+        let sizes = pool::sizes(gpu, world, &layout, &render)?;
+        let composer = Composer {
+            queue_table: true,
+            ..makings.composer(&own, layout, sizes)
         };
-        let resources = Resources::new(gpu, &parts.composer(&own, layout, true), &render)?;
+        let resources = Resources::new(gpu, &composer, &render)?;
         let mut lab = Self {
             gpu,
-            world,
-            source,
-            tables: parts.tables.to_vec(),
-            random: parts.random.clone(),
-            sizes: parts.sizes,
-            technique: parts.technique,
+            sizes,
             repetitions: options.repetitions.max(1),
             statistics: options.statistics.then(|| Statistics::open(gpu)).flatten(),
             snapshot: Snapshot::new(gpu, &resources)?,
             resources,
             cache: Cache::default(),
-            workload: workload::before_rendering(world, &materials, &layout, parts.sizes.pool),
-            materials,
-            instances,
+            workload: workload::before_rendering(world, &makings.materials, &layout, sizes.pool),
+            makings,
         };
         lab.begin(&own, options.warm_iterations)?;
         Ok(lab)
@@ -328,62 +299,12 @@ impl<'a> Lab<'a> {
         plan: &'b Plan,
         queue_table: bool,
     ) -> Result<Composer<'b>, RuntimeError> {
-        let parts = Parts {
-            world: self.world,
-            source: self.source,
-            materials: &self.materials,
-            instances: &self.instances,
-            tables: &self.tables,
-            random: &self.random,
-            sizes: self.sizes,
-            technique: self.technique,
-            subgroup_size: self.gpu.subgroup_size(),
-        };
-        let layout = Layout::new(self.world, &self.materials, plan, &self.technique)?;
-        Ok(parts.composer(plan, layout, queue_table))
-    }
-}
-
-/// What all plans have in common.
-struct Parts<'b> {
-    world: &'b World,
-    source: &'b dyn MaterialSource,
-    materials: &'b [MaterialInfo],
-    instances: &'b [InstanceInfo],
-    tables: &'b [BufferData],
-    random: &'b ShaderPart,
-    sizes: Sizes,
-    technique: Technique,
-    subgroup_size: u32,
-}
-
-impl<'b> Parts<'b> {
-    fn composer(&self, plan: &'b Plan, layout: Layout, queue_table: bool) -> Composer<'b> {
-        Composer {
-            world: self.world,
-            source: self.source,
-            materials: self.materials,
-            instances: self.instances,
-            tables: self.tables,
-            plan,
-            layout,
-            sizes: self.sizes,
-            technique: self.technique,
+        let layout = self.makings.layout(plan)?;
+        Ok(Composer {
             queue_table,
-            subgroup_size: self.subgroup_size,
-            random: self.random.clone(),
-        }
+            ..self.makings.composer(plan, layout, self.sizes)
+        })
     }
-}
-
-/// A kernel a material that is on some surface.
-fn own_plan(materials: &[MaterialInfo], world: &World) -> Plan {
-    let plan = Strategy::Own.plan(&names(materials));
-    plan.leaving_out(&world.parts.unbound)
-}
-
-fn names(materials: &[MaterialInfo]) -> Vec<String> {
-    materials.iter().map(|m| m.name.clone()).collect()
 }
 
 fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> Measured {

@@ -13,6 +13,7 @@ use crate::film_file::Identity;
 use crate::gpu::Gpu;
 use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
+use crate::needs::Needs;
 use crate::pool;
 use crate::random::{self, Demand};
 use crate::report::MaterialReport;
@@ -20,7 +21,7 @@ use crate::resources::Resources;
 use crate::scene::Scene;
 use crate::schedule::{Schedule, Size, Step};
 use crate::settings;
-use crate::shader_part::BufferData;
+use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Technique;
 use crate::workload;
 use crate::world::{MaterialSource, World};
@@ -37,14 +38,15 @@ pub(super) struct Ready {
 }
 
 /// What the kernels of every plan for a world are made of.
-pub(super) struct Makings<'a> {
+pub(crate) struct Makings<'a> {
     pub world: &'a World,
     source: &'a dyn MaterialSource,
-    materials: Vec<MaterialInfo>,
+    pub materials: Vec<MaterialInfo>,
     instances: Vec<InstanceInfo>,
     tables: Vec<BufferData>,
-    technique: Technique,
+    pub technique: Technique,
     subgroup_size: u32,
+    random: ShaderPart,
 }
 
 impl<'g> Renderer<'g> {
@@ -56,13 +58,7 @@ impl<'g> Renderer<'g> {
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
-        let world = World::new(
-            scene,
-            &program.infos(),
-            &MaterialSource::instances(program),
-            &program.textures(),
-            &options.technique,
-        )?;
+        let world = World::of_program(scene, program, &options.technique)?;
         Self::from_world(gpu, &world, program, plan, options)
     }
 
@@ -121,16 +117,19 @@ impl<'g> Renderer<'g> {
 }
 
 impl<'a> Makings<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         gpu: &Gpu,
         world: &'a World,
         source: &'a dyn MaterialSource,
         technique: Technique,
     ) -> Self {
+        let materials = source.infos();
+        let demand = Demand::of(world, &materials, Needs::of(world, &materials).shadow_rays);
         Self {
             world,
             source,
-            materials: source.infos(),
+            materials,
+            random: random::part(technique.sampler, demand),
             instances: source.instances(),
             tables: source.tables().iter().map(BufferData::from).collect(),
             technique,
@@ -138,18 +137,17 @@ impl<'a> Makings<'a> {
         }
     }
 
-    pub(super) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
+    pub(crate) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
         Layout::new(self.world, &self.materials, plan, &self.technique)
     }
 
     /// What writes the kernels of a plan.
-    pub(super) fn composer<'b>(
+    pub(crate) fn composer<'b>(
         &'b self,
         plan: &'b Plan,
         layout: Layout,
         sizes: Sizes,
     ) -> Composer<'b> {
-        let demand = Demand::of(self.world, &self.materials, layout.needs.shadow_rays);
         let mut composer = Composer {
             world: self.world,
             source: self.source,
@@ -162,7 +160,7 @@ impl<'a> Makings<'a> {
             technique: self.technique,
             queue_table: false,
             subgroup_size: self.subgroup_size,
-            random: random::part(self.technique.sampler, demand),
+            random: self.random.clone(),
         };
         if self.technique.profile {
             composer.layout.counters.profiled = composer.recipes().len();

@@ -8,7 +8,7 @@ mod iterate;
 mod observe;
 mod replan;
 
-pub(crate) use build::build_step;
+pub(crate) use build::{Makings, build_step};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
 
@@ -31,6 +31,9 @@ use crate::workload::Mark;
 use crate::world::World;
 use build::Ready;
 use replan::{Change, Replan};
+
+/// Samples a pixel that no number of iterations uses up, for those who look on and want no picture.
+pub(crate) const ENDLESS: u32 = 1 << 24;
 
 /// What to render of a world.
 #[derive(Clone, Debug)]

@@ -1,9 +1,9 @@
 //! Looking at what a scene asks of material kernels without making a picture: the profiling pass of
 //! `impasto plan`.
 
-use impasto_compiler::partition::{Strategy, Workload};
+use impasto_compiler::partition::Workload;
 
-use super::{RenderOptions, Renderer};
+use super::{ENDLESS, RenderOptions, Renderer};
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::status::{Flight, Status};
@@ -11,8 +11,6 @@ use crate::technique::Technique;
 use crate::workload::Mark;
 use crate::world::{MaterialSource, World};
 
-/// Samples a pixel, which the iterations of a profiling pass never use up.
-const ENDLESS: u32 = 1 << 24;
 /// Iterations until the mixture of paths is steady, at most: paths of a pool begin together, and
 /// end at different lengths.
 const WARM: u32 = 32;
@@ -30,8 +28,7 @@ pub fn profile_workload(
     technique: Technique,
     iterations: u32,
 ) -> Result<Workload, RuntimeError> {
-    let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
-    let plan = Strategy::Own.plan(&names).leaving_out(&world.parts.unbound);
+    let plan = world.own_plan(&source.infos());
     let options = RenderOptions {
         samples: ENDLESS,
         pool,

@@ -7,14 +7,14 @@ mod table;
 use std::path::Path;
 
 use clap::Args;
+use impasto::FileLoader;
 use impasto::compiler::cost::{self, Cost, Inputs, Operations};
-use impasto::compiler::{self, Loader, MaterialRequest, Program};
+use impasto::compiler::{self, Loader, MaterialRequest};
 use impasto::cost::{MaterialCost, anywhere, of_scene};
-use impasto::{FileLoader, Scene};
 use serde::Serialize;
 use serde_json::json;
 
-use super::{Failure, Global, Outcome, print};
+use super::{Failure, Global, Outcome, compile, compiled_scene, print};
 
 #[derive(Args)]
 pub(super) struct CostArgs {
@@ -88,12 +88,7 @@ fn scene_materials(
     samples: usize,
     global: &Global,
 ) -> Result<Vec<MaterialCost>, Failure> {
-    let scene: Scene = impasto::load(path.as_ref()).map_err(|e| Failure::Error(e.to_string()))?;
-    let program = compile(
-        &impasto::requests(&scene),
-        &mut FileLoader::new(&scene.base),
-        global,
-    )?;
+    let (scene, program) = compiled_scene(path.as_ref(), global)?;
     of_scene(&scene, &program, samples).map_err(too_long)
 }
 
@@ -120,16 +115,6 @@ fn file_materials(
     }
     let program = compile(&requests, &mut loader, global)?;
     anywhere(&program, samples).map_err(too_long)
-}
-
-fn compile(
-    requests: &[MaterialRequest],
-    loader: &mut FileLoader,
-    global: &Global,
-) -> Result<Program, Failure> {
-    let compiled = compiler::compile(requests, loader);
-    global.report(&compiled.sources, &compiled.diagnostics);
-    compiled.program.ok_or(Failure::Diagnostics)
 }
 
 fn noise(samples: usize) -> Result<Vec<NoiseCost>, Failure> {
