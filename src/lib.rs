@@ -42,6 +42,7 @@ pub use runtime::render::{RenderOptions, Renderer, Rendering};
 pub use runtime::scene::{Scene, SceneError};
 
 pub mod calibrate;
+pub mod converge;
 pub mod cost;
 pub mod files;
 mod ir_text;

@@ -127,7 +127,7 @@ impl MaterialReport {
 }
 
 /// The GPU of a report.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
 pub struct AdapterReport {
     /// Its name.
     pub name: String,

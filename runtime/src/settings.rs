@@ -7,13 +7,6 @@ use crate::world::World;
 
 /// Fails, with what is possible, if a setting cannot be rendered.
 pub(crate) fn check(world: &World, options: &RenderOptions) -> Result<(), RuntimeError> {
-    let refuse = |setting, value: String, expected: &str| {
-        Err(RuntimeError::Setting {
-            setting,
-            value,
-            expected: expected.to_string(),
-        })
-    };
     let pixels = u64::from(world.width) * u64::from(world.height);
     if pixels == 0 || pixels > 1 << 29 {
         let size = format!("{} x {}", world.width, world.height);
@@ -23,6 +16,15 @@ pub(crate) fn check(world: &World, options: &RenderOptions) -> Result<(), Runtim
         let expected = format!("1 to {} segments", state::MAX_DEPTH);
         return refuse("max_depth", world.max_depth.to_string(), &expected);
     }
+    check_samples(options)?;
+    if options.pool == Some(0) {
+        return refuse("pool", "0".into(), "at least 1 path");
+    }
+    Ok(())
+}
+
+/// The same for which samples are taken.
+pub(crate) fn check_samples(options: &RenderOptions) -> Result<(), RuntimeError> {
     if options.samples == 0 {
         return refuse("samples", "0".into(), "at least 1 sample a pixel");
     }
@@ -35,8 +37,13 @@ pub(crate) fn check(world: &World, options: &RenderOptions) -> Result<(), Runtim
             "at most 2^32 - 2",
         );
     }
-    if options.pool == Some(0) {
-        return refuse("pool", "0".into(), "at least 1 path");
-    }
     Ok(())
+}
+
+fn refuse(setting: &'static str, value: String, expected: &str) -> Result<(), RuntimeError> {
+    Err(RuntimeError::Setting {
+        setting,
+        value,
+        expected: expected.to_string(),
+    })
 }

@@ -4,7 +4,8 @@
 //! A choice is declared here once; the command line, the report and the experiments read its
 //! names from `ALL`.
 
-use serde::Serialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::gpu::Gpu;
 
@@ -51,6 +52,16 @@ macro_rules! choices {
         impl Serialize for $choice {
             fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
                 to.serialize_str(self.name())
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $choice {
+            fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let name = String::deserialize(from)?;
+                let expected = || Self::ALL.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ");
+                Self::from_name(&name).ok_or_else(|| {
+                    D::Error::custom(format!("`{name}` is none of {}", expected()))
+                })
             }
         }
     )+ };

@@ -25,6 +25,7 @@ use crate::passes::{Keeping, Pass, Passes};
 use crate::queues::Scalar;
 use crate::report::{MaterialReport, Report, Resumed};
 use crate::scene::GeometryCounts;
+use crate::settings;
 use crate::status::Status;
 use crate::technique::Technique;
 use crate::workload::Mark;
@@ -51,6 +52,17 @@ pub struct RenderOptions {
     pub technique: Technique,
     /// Whether a wavefront's logic kernel counts what paths hit, for the report's workload.
     pub count_hits: bool,
+}
+
+/// Which samples of every pixel a render takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Samples {
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Index of the first.
+    pub first: u32,
+    /// How many, at least 1.
+    pub count: u32,
 }
 
 impl Default for RenderOptions {
@@ -142,6 +154,23 @@ impl<'g> Renderer<'g> {
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Rendering, RuntimeError> {
         self.render_passes(Some(keeping), progress)
+    }
+
+    /// Chooses which samples the next renders take, so that kernels that are built serve many renders.
+    ///
+    /// # Errors
+    /// If there are no such samples.
+    pub fn select(&mut self, samples: &Samples) -> Result<(), RuntimeError> {
+        let options = RenderOptions {
+            samples: samples.count,
+            first_sample: samples.first,
+            seed: samples.seed,
+            ..self.options.clone()
+        };
+        settings::check_samples(&options)?;
+        self.facts.identity.seed = samples.seed;
+        self.options = options;
+        Ok(())
     }
 
     /// What the samples of this render must have in common with others to be merged with them.
