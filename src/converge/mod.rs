@@ -4,3 +4,5 @@
 //! amounts to, and pages of plots and tables.
 
 pub mod data;
+pub mod flip;
+pub mod metrics;
