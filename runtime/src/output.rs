@@ -11,6 +11,38 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use crate::error::RuntimeError;
 use crate::film::Film;
+use crate::image_file;
+use crate::scene::SceneError;
+
+/// Reads a picture that this or another program wrote, `what` naming its use in errors. The values of
+/// OpenEXR and Radiance HDR files are taken as linear radiance, those of others are made linear; nothing
+/// is known of how many samples they are of.
+///
+/// # Errors
+/// If the file is no such picture, or a value in it is no finite number.
+pub fn read(path: &Path, what: &str) -> Result<Film, SceneError> {
+    let picture = image_file::load(path, what, true)?;
+    let (width, height) = (picture.width, picture.height);
+    let pixels: Vec<[f32; 3]> = picture
+        .texels
+        .iter()
+        .map(|[r, g, b, _]| [*r, *g, *b])
+        .collect();
+    let finite = |pixel: &[f32; 3]| pixel.iter().all(|value| value.is_finite());
+    if let Some(index) = pixels.iter().position(|pixel| !finite(pixel)) {
+        let (column, row) = (index as u32 % width, index as u32 / width);
+        let message = format!(
+            "the {what} is no finite number at the pixel {column},{row} (from the top left)"
+        );
+        return Err(SceneError::in_file(path, message));
+    }
+    Ok(Film {
+        width,
+        height,
+        samples: vec![0; pixels.len()],
+        pixels,
+    })
+}
 
 /// The formats by the extension of a file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,6 +176,28 @@ mod tests {
         let read = image::open(&png).expect("readable").into_rgb8();
         assert_eq!(read.as_raw(), &[0, 137, 188, 255, 255, 0]);
         assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 2);
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_what_is_no_number_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let exr = folder.path().join("a.exr");
+        write(&film(), &exr, 0.0).expect("written");
+        let back = read(&exr, "reference").expect("read");
+        assert_eq!((back.width, back.height), (2, 1));
+        assert_eq!(back.pixels, film().pixels);
+        for value in [f32::NAN, f32::INFINITY] {
+            let mut bad = film();
+            bad.pixels[1][2] = value;
+            write(&bad, &exr, 0.0).expect("written");
+            let error = read(&exr, "reference").expect_err("refused").to_string();
+            assert!(
+                error.contains("no finite number at the pixel 1,0"),
+                "{error}"
+            );
+            assert!(error.contains("a.exr"), "{error}");
+        }
+        assert!(read(&folder.path().join("none.exr"), "reference").is_err());
     }
 
     #[test]

@@ -6,3 +6,4 @@
 pub mod data;
 pub mod flip;
 pub mod metrics;
+pub mod pictures;
