@@ -61,7 +61,7 @@ impl Composer<'_> {
         } else {
             Storage::Registers
         };
-        let mut text = self.constants(recipe.counter);
+        let mut text = self.constants();
         text += &state::accessors(self.layout.needs, stages, storage);
         let mut parts: Vec<Part> = stages
             .iter()
@@ -118,9 +118,8 @@ impl Composer<'_> {
         ]
     }
 
-    fn constants(&self, nonfinite: usize) -> String {
+    fn constants(&self) -> String {
         let (world, sizes) = (self.world, self.sizes);
-        let nonfinite = self.layout.counters.nonfinite(nonfinite);
         let mut out = wgsl::constants_u32(&[
             ("POOL_SIZE", sizes.pool),
             ("WORKGROUP_SIZE", sizes.workgroup),
@@ -130,7 +129,6 @@ impl Composer<'_> {
             ("ROULETTE_START", world.roulette_start),
             ("NOTHING", u32::MAX),
             ("FILM_COUNT_PLANE", film::COUNT_PLANE as u32),
-            ("COUNTER_NONFINITE", nonfinite as u32),
         ]);
         if self.layout.needs.media {
             let [a, b, c, d] = world.parts.media.camera;
@@ -175,7 +173,7 @@ impl Composer<'_> {
         let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
         out += &self.source.wgsl(members);
         out += &surface_point(infos.iter().map(|m| m.inputs));
-        out
+        out + &dropped_row(members)
     }
 
     /// What the logic stage must know of every material that paths can hit, as functions of an instance.
@@ -259,6 +257,15 @@ impl Composer<'_> {
         ];
         parts.into_iter().flatten()
     }
+}
+
+/// The function that gives the row that samples of an instance are counted in if they are dropped.
+fn dropped_row(members: &[usize]) -> String {
+    let row = match members {
+        [sole] => format!("{sole}u"),
+        _ => format!("{MATERIAL_OF}(instance)"),
+    };
+    format!("fn dropped_row(instance: u32) -> u32 {{ return {row}; }}\n")
 }
 
 /// The function that fills a material's inputs, those that some member reads; the others get

@@ -56,7 +56,7 @@ impl Layout {
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
             binned: wavefront && of_kernels.iter().any(|queues| queues.len() > 1),
-            kernels: if wavefront { plan.kernels.len() } else { 1 },
+            materials: materials.len(),
             profiled: 0,
             hits: 0,
         };

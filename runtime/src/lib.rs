@@ -8,6 +8,7 @@
 pub mod bvh;
 pub mod camera;
 mod compose;
+pub mod dropped;
 pub mod error;
 pub mod film;
 pub mod film_file;

@@ -61,8 +61,6 @@ pub(crate) struct Recipe {
     pub members: Vec<usize>,
     /// How many threads it gets.
     pub feed: Feed,
-    /// Which counter of dropped samples is its own, if it evaluates materials.
-    pub counter: usize,
     /// WGSL of its requests and entry point.
     pub shell: String,
 }
@@ -76,7 +74,6 @@ impl Recipe {
             stages,
             members: Vec::new(),
             feed,
-            counter: 0,
             shell,
         }
     }

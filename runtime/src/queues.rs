@@ -6,6 +6,8 @@ use std::ops::Range;
 
 use impasto_compiler::partition::{Form, Plan};
 
+use crate::dropped::{self, Row};
+
 /// Which queues a wavefront has, in the order of the buffer: new paths, those of material
 /// kernels, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
 /// are ordered, there is as much room for the queue in that order, and for each of its items'
@@ -84,8 +86,6 @@ impl Queues {
 pub(crate) enum Scalar {
     /// Requests that found a queue full.
     Overflow,
-    /// Paths that ended with a radiance that is no number, or below zero.
-    FilmNonfinite,
     /// Samples above what the film holds.
     FilmClamped,
     /// The first pixel and sample that no slot was given yet.
@@ -104,9 +104,8 @@ pub(crate) enum Scalar {
     LostPaths,
 }
 
-const SCALARS: [(Scalar, &str); 11] = [
+const SCALARS: [(Scalar, &str); 10] = [
     (Scalar::Overflow, "OVERFLOW"),
-    (Scalar::FilmNonfinite, "FILM_NONFINITE"),
     (Scalar::FilmClamped, "FILM_CLAMPED"),
     (Scalar::NextPixel, "NEXT_PIXEL"),
     (Scalar::NextSample, "NEXT_SAMPLE"),
@@ -127,8 +126,8 @@ const FETCHED_OF: usize = PUSHED_STRIDE / 2;
 
 /// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
 /// when it was consumed, if a kernel is binned the first of its workgroups that works on that queue,
-/// then items consumed in 64 bits, then one count of dropped samples for
-/// each kernel that evaluates materials; in a profiling build lanes at work and lanes in all for
+/// then items consumed in 64 bits, then a row of dropped samples for
+/// each material and one for the film; in a profiling build lanes at work and lanes in all for
 /// each kernel, in 64 bits; then, apart from each other, the lengths of queues so
 /// far and, between those, how much threads have fetched of each; at last, if hits are counted, for
 /// each material its hits and the blocks of slots with any, both in 64 bits.
@@ -138,8 +137,8 @@ pub(crate) struct Counters {
     pub queues: usize,
     /// Whether a kernel works on several queues.
     pub binned: bool,
-    /// Number of kernels that evaluate materials.
-    pub kernels: usize,
+    /// Number of materials.
+    pub materials: usize,
     /// Number of kernels whose lanes are counted.
     pub profiled: usize,
     /// Number of materials whose hits are counted.
@@ -162,14 +161,25 @@ impl Counters {
         self.first_groups() + if self.binned { self.queues } else { 0 }
     }
 
-    /// The word that counts samples dropped by the `kernel`-th kernel that evaluates materials.
-    pub(crate) fn nonfinite(self, kernel: usize) -> usize {
-        self.items() + 2 * self.queues + kernel
+    /// The first row of dropped samples.
+    fn dropped(self) -> usize {
+        self.items() + 2 * self.queues
+    }
+
+    /// The row of those found when they were to be added to the film, after that of the last material.
+    pub(crate) fn film_row(self) -> usize {
+        self.materials
+    }
+
+    /// What one of those rows counted, in the words read back; `None` if nothing.
+    pub(crate) fn dropped_row(self, words: &[u32], row: usize) -> Option<Row> {
+        let at = self.dropped() + dropped::ROW_WORDS * row;
+        Row::read(words.get(at..at + dropped::ROW_WORDS)?)
     }
 
     /// The words that count the lanes of the `kernel`-th kernel.
     pub(crate) fn lanes(self, kernel: usize) -> usize {
-        self.nonfinite(self.kernels) + 4 * kernel
+        self.dropped() + dropped::ROW_WORDS * (self.materials + 1) + 4 * kernel
     }
 
     fn pushed(self) -> usize {
@@ -210,7 +220,7 @@ impl Counters {
         for (name, at) in scalars.chain(arrays) {
             let _ = writeln!(out, "const COUNTER_{name}: u32 = {at}u;");
         }
-        out
+        out + &dropped::constants(self.dropped(), self.materials)
     }
 
     /// The word that a scalar is kept in.
@@ -225,15 +235,10 @@ impl Counters {
         words.get(self.index(scalar)).copied().unwrap_or(0)
     }
 
-    /// Samples dropped because a value was no number, by kernels.
-    pub(crate) fn kernels_nonfinite(self, words: &[u32]) -> u64 {
-        let of_kernels = (0..self.kernels).filter_map(|kernel| words.get(self.nonfinite(kernel)));
-        of_kernels.map(|n| u64::from(*n)).sum()
-    }
-
-    /// The same with those found at the end of paths.
-    pub(crate) fn all_nonfinite(self, words: &[u32]) -> u64 {
-        self.kernels_nonfinite(words) + u64::from(self.scalar(words, Scalar::FilmNonfinite))
+    /// All samples dropped because a value was no number or below zero.
+    pub(crate) fn all_dropped(self, words: &[u32]) -> u64 {
+        let rows = (0..=self.film_row()).filter_map(|row| self.dropped_row(words, row));
+        rows.map(|row| row.samples()).sum()
     }
 
     /// The length of `queue` when it was consumed last, in the words read back.
@@ -283,14 +288,22 @@ mod tests {
         let counters = Counters {
             queues: queues.count(),
             binned: false,
-            kernels: 4,
+            materials: 4,
             profiled: 2,
             hits: 0,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
-        assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
-        assert_eq!(counters.nonfinite(0), 11 + 3 * 6);
-        assert!(counters.pushed() >= 11 + 3 * 6 + 4 + 2 * 4);
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
+        assert_eq!(counters.dropped(), 10 + 3 * 6);
+        let rows = dropped::ROW_WORDS * 5;
+        assert_eq!(counters.lanes(0), counters.dropped() + rows);
+        assert!(counters.pushed() >= counters.lanes(2));
+        let last = counters.dropped_row(&words, counters.film_row());
+        assert_eq!(
+            last.map(|row| row.nonfinite as usize),
+            Some(counters.lanes(0) - dropped::ROW_WORDS)
+        );
+        assert_eq!(counters.dropped_row(&words[..30], 0), None);
         assert_eq!(counters.utilisation(&words, 2), None);
         assert_eq!(counters.len(), counters.pushed() + 6 * PUSHED_STRIDE);
         let binned = Counters {

@@ -5,13 +5,15 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::Serialize;
 
+use crate::dropped::Dropped;
 use crate::film::Film;
 use crate::gpu::GpuInfo;
 use crate::layout::Layout;
-use crate::modules::{Feed, Kernel};
+use crate::modules::{Feed, Kernel, Recipe};
 use crate::queues::Scalar;
 use crate::render::RenderOptions;
 use crate::scene::GeometryCounts;
+use crate::stages::StageId;
 use crate::status::Status;
 use crate::technique::Technique;
 
@@ -88,6 +90,10 @@ pub struct Report {
     /// Samples dropped because a value was no finite number, or below zero: those that
     /// kernels dropped at a material, and those found when a path ended.
     pub nonfinite_samples: u64,
+    /// Those of them that this run found to be below zero, and finite.
+    pub negative_samples: u64,
+    /// The ones that this run found, by kernel and material, each with an example.
+    pub dropped: Vec<Dropped>,
     /// Samples cut to what the film holds.
     pub clamped_samples: u64,
     /// Requests lost because a queue was full; anything but 0 is a defect.
@@ -228,14 +234,17 @@ impl Inputs<'_> {
         } else {
             self.wall_seconds
         };
-        let kernels = Ran {
+        let ran = Ran {
             layout: self.layout,
             kernels: self.kernels,
             materials: self.materials,
             pool: self.pool,
         };
-        let kernels = kernels.report(status, paths);
+        let kernels = ran.report(status, paths);
         let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
+        let before = status.before.dropped.iter().cloned();
+        let dropped = before.chain(ran.dropped(status, film.width, self.options.seed));
+        let dropped = Dropped::merged(dropped);
         Report {
             strategy: self.strategy.to_string(),
             plan: partition(self.plan, self.materials),
@@ -268,8 +277,9 @@ impl Inputs<'_> {
             kernels,
             workload: self.workload,
             nonfinite_samples: self.resumed.nonfinite
-                + status.before.nonfinite
-                + self.layout.counters.all_nonfinite(&status.counters),
+                + dropped.iter().map(Dropped::samples).sum::<u64>(),
+            negative_samples: dropped.iter().map(|d| d.negative).sum(),
+            dropped,
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),
@@ -315,7 +325,6 @@ impl Ran<'_> {
         let iterations = status.iterations - status.before.iterations;
         let (recipe, counters) = (&kernel.recipe, self.layout.counters);
         let name = |index: &usize| self.materials.get(*index).map(|m| m.name.clone());
-        let nonfinite = counters.nonfinite(recipe.counter);
         KernelReport {
             name: recipe.name.clone(),
             form: recipe.form,
@@ -333,10 +342,32 @@ impl Ran<'_> {
             },
             gpu_seconds: seconds,
             utilisation: None,
-            nonfinite_samples: match recipe.form {
-                Some(_) => status.counters.get(nonfinite).map_or(0, |n| u64::from(*n)),
-                None => 0,
-            },
+            nonfinite_samples: rows(recipe)
+                .filter_map(|row| counters.dropped_row(&status.counters, row))
+                .map(|row| row.samples())
+                .sum(),
         }
     }
+
+    /// What each dropped for every material, and the one that fills the film for none. The picture is
+    /// `width` pixels wide.
+    pub(crate) fn dropped(&self, status: &Status, width: u32, seed: u32) -> Vec<Dropped> {
+        let counters = self.layout.counters;
+        let mut out = Vec::new();
+        for Kernel { recipe, .. } in self.kernels {
+            let fills = recipe.stages.contains(&StageId::Logic);
+            for row in rows(recipe).chain(fills.then_some(counters.film_row())) {
+                let material = self.materials.get(row).map(|m| m.name.as_str());
+                if let Some(found) = counters.dropped_row(&status.counters, row) {
+                    out.push(Dropped::new(&recipe.name, material, &found, width, seed));
+                }
+            }
+        }
+        out
+    }
+}
+
+/// The rows of the samples that a kernel drops at materials: it alone evaluates those.
+fn rows(recipe: &Recipe) -> impl Iterator<Item = usize> {
+    recipe.members.iter().copied()
 }

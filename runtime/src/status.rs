@@ -1,5 +1,6 @@
 //! What the host learns while a render runs: counters and times of each submission.
 
+use crate::dropped::Dropped;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::queues::Counters;
@@ -23,14 +24,14 @@ pub(crate) struct Status {
 }
 
 /// What was done by a plan that another took over from, as far as it is not part of the totals.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Before {
     /// Iterations run.
     pub iterations: u64,
     /// Requests for new paths.
     pub asked: u64,
-    /// Samples that kernels dropped.
-    pub nonfinite: u64,
+    /// Samples that were dropped.
+    pub dropped: Vec<Dropped>,
 }
 
 impl Status {

@@ -37,12 +37,9 @@ impl Composer<'_> {
 
     /// The logic kernel, which also evaluates the materials that have no queue.
     fn logic(&self) -> Recipe {
-        let inline = self.plan.kernels.iter().enumerate();
-        let inline: Vec<_> = inline.filter(|(_, k)| k.form == Form::Inline).collect();
-        let members: Vec<usize> = inline
-            .iter()
-            .flat_map(|(_, k)| k.materials.clone())
-            .collect();
+        let inline = self.plan.kernels.iter();
+        let inline: Vec<_> = inline.filter(|k| k.form == Form::Inline).collect();
+        let members: Vec<usize> = inline.iter().flat_map(|k| k.materials.clone()).collect();
         let mut stages = vec![StageId::Logic];
         let mut run = "logic(slot);".to_string();
         if !members.is_empty() {
@@ -60,21 +57,20 @@ impl Composer<'_> {
         });
         Recipe {
             name: StageId::Logic.stage().name.to_string(),
-            form: inline.first().map(|(_, kernel)| kernel.form),
+            form: inline.first().map(|kernel| kernel.form),
             stages,
             members,
             feed: Feed::Pool,
-            counter: inline.first().map_or(0, |(index, _)| *index),
             shell,
         }
     }
 
     /// The kernels that evaluate the materials of queues.
     fn material_kernels(&self) -> impl Iterator<Item = Recipe> {
-        let kernels = self.plan.kernels.iter().enumerate();
+        let kernels = self.plan.kernels.iter();
         let kernels = kernels.zip(Queues::of_kernels(self.plan));
-        let queued = kernels.filter(|((_, k), _)| k.form != Form::Inline);
-        queued.map(|((counter, planned), queues)| {
+        let queued = kernels.filter(|(k, _)| k.form != Form::Inline);
+        queued.map(|(planned, queues)| {
             let instance = match self.instances_of(&planned.materials)[..] {
                 [only] => format!("{only}u"),
                 _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
@@ -97,7 +93,6 @@ impl Composer<'_> {
                     1 => Feed::Queue(first),
                     _ => Feed::Queues { first, count },
                 },
-                counter,
                 shell,
             }
         })

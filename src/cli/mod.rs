@@ -17,6 +17,7 @@ mod check;
 mod checkpoint;
 mod completions;
 mod cost;
+mod dropped;
 mod emit;
 mod eval;
 mod exhaustive;

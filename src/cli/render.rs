@@ -22,6 +22,7 @@ use impasto::{
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::checkpoint::CheckpointArgs;
+use super::dropped;
 use super::info::GpuArgs;
 use super::outputs::{Outputs, parse_exposure};
 use super::profile::Profile;
@@ -32,7 +33,7 @@ use super::{Failure, Global, Outcome, interrupt, print, runtime};
 #[derive(Args)]
 pub(super) struct RenderArgs {
     /// The scene, a TOML file
-    scene: PathBuf,
+    pub(super) scene: PathBuf,
     /// The picture: `.exr` (linear radiance; a `.png` is written beside it), `.png` alone, or `.film`
     /// for a part that `impasto merge` takes
     #[arg(short, long, value_name = "FILE")]
@@ -47,7 +48,7 @@ pub(super) struct RenderArgs {
     checkpoint: CheckpointArgs,
     /// Width and height in pixels, as in 640x480; the scene's own otherwise
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(u32, u32)>,
+    pub(super) size: Option<(u32, u32)>,
     /// Seed of all random numbers: equal seeds give equal pictures
     #[arg(long, default_value_t = 0)]
     seed: u32,
@@ -124,7 +125,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     }
     outputs.write(&rendering.film, &rendering.sums, args.exposure)?;
     write_report(&rendering.report, args)?;
-    summarise(&rendering, &outputs, global);
+    summarise(&rendering, args, &outputs, global);
     match is_complete(&rendering) {
         true => Ok(()),
         false => Err(Failure::Interrupted),
@@ -271,7 +272,7 @@ fn is_complete(rendering: &Rendering) -> bool {
 }
 
 /// What was written, and how it went.
-fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
+fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global: &Global) {
     let report = &rendering.report;
     let pixels = f64::from(report.width) * f64::from(report.height);
     let samples = report.paths as f64 / pixels;
@@ -301,11 +302,8 @@ fn summarise(rendering: &Rendering, outputs: &Outputs, global: &Global) {
             report.triangles,
         ));
     }
-    if report.nonfinite_samples > 0 {
-        let lost = report.nonfinite_samples;
-        global.note(&format!(
-            "warning: {lost} samples were not finite and were left out"
-        ));
+    for warning in dropped::warnings(report, args) {
+        global.note(&warning);
     }
     if report.queue_overflow > 0 {
         let lost = report.queue_overflow;

@@ -52,7 +52,7 @@ fn a_picture_a_look_at_it_and_a_report() {
 }
 
 /// What every report has; docs/report.md says what they mean.
-const REPORT_FIELDS: [&str; 17] = [
+const REPORT_FIELDS: [&str; 19] = [
     "adapter",
     "strategy",
     "plan",
@@ -65,6 +65,8 @@ const REPORT_FIELDS: [&str; 17] = [
     "path_state_bytes",
     "kernels",
     "nonfinite_samples",
+    "negative_samples",
+    "dropped",
     "queue_overflow",
     "triangles",
     "placed_triangles",

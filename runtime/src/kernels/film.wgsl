@@ -6,10 +6,12 @@
 
 const FILM_LIMIT: f32 = 0x1p32;
 
-fn film_add(pixel: u32, radiance: vec3<f32>) {
+// `place` is pixel, sample and vertex.
+fn film_add(place: vec3<u32>, radiance: vec3<f32>) {
+    let pixel = place.x;
     var sample = radiance;
     if !is_light(sample) {
-        atomicAdd(&counters[COUNTER_FILM_NONFINITE], 1u);
+        count_dropped(DROPPED_AT_FILM, is_finite(sample), DROPPED_BY_RADIANCE, place);
         sample = vec3<f32>(0.0);
     }
     if any(sample > vec3<f32>(FILM_LIMIT)) {

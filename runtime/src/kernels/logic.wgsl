@@ -68,7 +68,7 @@ fn logic(slot: u32) {
         }
     }
     if instance == NOTHING {
-        film_add(pixel, path.radiance);
+        film_add(vec3<u32>(pixel, ray.sample, vertex), path.radiance);
         request_new_path();
         return;
     }

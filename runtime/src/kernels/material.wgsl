@@ -20,9 +20,11 @@ fn material(slot: u32, instance: u32) {
     let point = surface_point(hit, 1.0);
 #endif
     let vertex = (path.flags & DEPTH_MASK) - 1u;
+    let place = vec3<u32>(origin.pixel, arrived.sample, vertex);
 
 #if varying_emission
-    path.radiance += carried.throughput * material_emission(instance, point, wo);
+    path.radiance += carried.throughput
+        * checked_emission(material_emission(instance, point, wo), instance, place);
     store_radiance(slot, path);
     if vertex >= MAX_DEPTH {
         store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));
@@ -39,7 +41,7 @@ fn material(slot: u32, instance: u32) {
     }
 #endif
     let u = random_numbers(origin.pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
-    let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u));
+    let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u), instance, place);
 
     let weight = carried.throughput * scattered.throughput;
     store_throughput(slot, PathThroughput(weight, scattered.pdf));
@@ -83,18 +85,44 @@ fn leave_surface(position: vec3<f32>, side: vec3<f32>, direction: vec3<f32>) -> 
     return offset_origin(position, select(-side, side, dot(side, direction) > 0.0));
 }
 
-// A sample with a value that is no number is dropped whole, and counted for its kernel.
-fn checked_sample(sample: MaterialSample) -> MaterialSample {
+// A sample with a value that is no number or below zero is dropped whole, and counted for its material.
+fn checked_sample(sample: MaterialSample, instance: u32, place: vec3<u32>) -> MaterialSample {
     let densities = vec3<f32>(sample.pdf, sample.light_pdf, 0.0);
-    if is_light(sample.throughput) && is_light(sample.light_throughput) && is_light(densities)
-        && is_finite(sample.wi) {
+    let light = vec4<bool>(
+        is_light(sample.throughput), is_light(densities), is_light(sample.light_throughput), true
+    );
+    let finite = vec4<bool>(
+        is_finite(sample.throughput), is_finite(densities), is_finite(sample.light_throughput),
+        is_finite(sample.wi)
+    );
+    if all(light & finite) {
         return sample;
     }
-    atomicAdd(&counters[COUNTER_NONFINITE], 1u);
+    let negative = all(finite);
+    let right = select(finite, light, negative);
+    var value = DROPPED_BY_DIRECTION;
+    if !right.x {
+        value = DROPPED_BY_THROUGHPUT;
+    } else if !right.y {
+        value = DROPPED_BY_PDF;
+    } else if !right.z {
+        value = DROPPED_BY_LIGHT_THROUGHPUT;
+    }
+    count_dropped(dropped_row(instance), negative, value, place);
     let none = vec3<f32>(0.0);
     return MaterialSample(none, 0.0, none, 0.0, none, 0.0);
 }
 
+#if varying_emission
+fn checked_emission(emission: vec3<f32>, instance: u32, place: vec3<u32>) -> vec3<f32> {
+    if is_light(emission) {
+        return emission;
+    }
+    count_dropped(dropped_row(instance), is_finite(emission), DROPPED_BY_EMISSION, place);
+    return vec3<f32>(0.0);
+}
+
+#endif
 #if shadow_rays
 // The ray from the moved origin to the point that was sampled, ending just before it, since
 // the light itself must not occlude. Discrete lights far away stay in their direction.

@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 
 use impasto_compiler::partition::Workload;
 
+use crate::dropped::Dropped;
 use crate::error::RuntimeError;
 use crate::film::{Film, Sums};
 use crate::film_file::{FilmFile, Identity, Range};
@@ -251,9 +252,10 @@ impl<'g> Renderer<'g> {
         let sums = Sums::new(width, height, words);
         let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
         let (counters, read) = (self.ready.layout.counters, &status.counters);
+        let before: u64 = status.before.dropped.iter().map(Dropped::samples).sum();
         Ok(FilmFile {
             identity: self.facts.identity,
-            nonfinite: resumed.nonfinite + status.before.nonfinite + counters.all_nonfinite(read),
+            nonfinite: resumed.nonfinite + before + counters.all_dropped(read),
             clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
             ranges: vec![Range {
                 first: self.options.first_sample.into(),

@@ -14,6 +14,7 @@ use impasto_compiler::partition::{Form, Plan, Workload};
 use super::Renderer;
 use super::background::{Job, Made};
 use super::build::Ready;
+use crate::dropped::Dropped;
 use crate::queues::{Counters, Queues};
 use crate::report::{Ran, ReplanReport, partition};
 use crate::status::{Before, Status};
@@ -206,11 +207,15 @@ impl Renderer<'_> {
 
     /// Makes the present plan's counters go on from those of the `old` one.
     fn take_over(&self, old: &Ready, status: &mut Status) {
+        let (width, seed) = (self.facts.width, self.options.seed);
+        let dropped = self.ran(old).dropped(status, width, seed);
+        let dropped = status.before.dropped.drain(..).chain(dropped);
+        let dropped: Vec<Dropped> = dropped.collect();
         let (counters, words) = (old.layout.counters, &status.counters);
         let before = Before {
             iterations: status.iterations,
             asked: status.before.asked + counters.items_of(words, Queues::NEW_PATH),
-            nonfinite: status.before.nonfinite + counters.kernels_nonfinite(words),
+            dropped,
         };
         let (from, to) = (old.resources.counters(), self.ready.resources.counters());
         let bytes = 4 * Counters::SCALARS as u64;

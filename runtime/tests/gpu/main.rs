@@ -6,6 +6,7 @@
 
 mod casts;
 mod determinism;
+mod dropped;
 mod film;
 mod furnace;
 mod info;

@@ -36,6 +36,10 @@ pub enum Kind {
     Mirror,
     /// Lambertian, but every result is NaN.
     Broken,
+    /// Lambertian, but for an assignment to a member of its `sample`.
+    Wrong(&'static str),
+    /// Lambertian, and emits a NaN that is known only when evaluated.
+    GlowingWrong,
 }
 
 /// A list of stub materials.
@@ -50,7 +54,7 @@ pub fn materials(kinds: &[Kind]) -> Materials {
         delta_only: *kind == Kind::Mirror,
         crosses: false,
         transmissive: false,
-        varying_emission: matches!(kind, Kind::Glowing(..)),
+        varying_emission: matches!(kind, Kind::Glowing(..) | Kind::GlowingWrong),
         inputs: InputSet {
             normal: true,
             ..InputSet::default()
@@ -102,13 +106,25 @@ impl MaterialSource for Materials {
         let mut evaluation = String::new();
         let mut emission = String::new();
         for &member in members {
+            let glows = self.kinds[member] == Kind::GlowingWrong;
             let call = match self.kinds[member] {
+                Kind::Wrong(assignment) => {
+                    evaluation += &format!(
+                        "case {member}u: {{ var sample = diffuse(0.5, n, wo, wl, u); {assignment}; return sample; }}\n"
+                    );
+                    continue;
+                }
+                Kind::GlowingWrong => "diffuse(0.5, n, wo, wl, u)".to_string(),
                 Kind::Diffuse(a) | Kind::Glowing(a, _) => format!("diffuse({a:?}, n, wo, wl, u)"),
                 Kind::Failing(a) => format!("failing({a:?}, n, wo, wl, u)"),
                 Kind::Mirror => "mirror(n, wo)".to_string(),
                 Kind::Broken => "diffuse(sqrt(-1.0 - u.x), n, wo, wl, u)".to_string(),
             };
             evaluation += &format!("case {member}u: {{ return {call}; }}\n");
+            if glows {
+                emission +=
+                    &format!("case {member}u: {{ return vec3<f32>(sqrt(-2.0 - wo.x)); }}\n");
+            }
             if let Kind::Glowing(_, radiance) = self.kinds[member] {
                 emission += &format!("case {member}u: {{ return vec3<f32>({radiance:?}); }}\n");
             }
