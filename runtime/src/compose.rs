@@ -8,6 +8,7 @@ use impasto_compiler::abi::{InputSet, MATERIAL_OF, MaterialInfo};
 
 use crate::fingerprint::Fingerprint;
 use crate::modules::{Composer, Kernel, Recipe};
+use crate::needs::Need;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
 use crate::state::{self, Storage};
@@ -96,7 +97,7 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 9] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 11] {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
@@ -104,6 +105,8 @@ impl Composer<'_> {
         let has = |holds: fn(&MaterialInfo) -> bool| self.infos(members).into_iter().any(holds);
         [
             ("shadow_rays", needs.shadow_rays),
+            ("slot_shadows", needs.met(Need::SlotShadows)),
+            ("own_shadow_origins", needs.met(Need::OwnShadowOrigins)),
             ("media", needs.media),
             ("changes_medium", needs.media && has(|m| m.transmissive)),
             (
@@ -154,6 +157,7 @@ impl Composer<'_> {
             Part::Numbers => include_str!("kernels/numbers.wgsl").to_string(),
             Part::Geometry => parts.geometry.wgsl.clone(),
             Part::Surface => parts.surface.wgsl.clone(),
+            Part::Mis => crate::lights::mis().wgsl,
             Part::Lights => parts.lights.wgsl.clone(),
             Part::Media => {
                 let part = parts.media.part.as_ref();

@@ -171,6 +171,7 @@ impl Composer<'_> {
         let absorption = all.absorption && shadow_rays;
         Needs {
             shadow_rays,
+            crossing_shadows: all.crossing_shadows,
             media: all.media && (absorption || has(|m| m.transmissive || m.inputs.exterior_ior)),
             absorption,
             overlap: false,

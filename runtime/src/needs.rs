@@ -14,6 +14,10 @@ pub(crate) enum Need {
     ShadowRays,
     /// The same, where rays are part of the path's state.
     SlotShadows,
+    /// Of these, where shadow rays may begin on another side of a surface than extension rays.
+    OwnShadowOrigins,
+    /// Where they do not.
+    SharedOrigins,
     /// Rays in buffers of their own.
     Requests,
     /// A medium that some result depends on.
@@ -33,6 +37,8 @@ pub(crate) enum Need {
 pub(crate) struct Needs {
     /// Light is sampled somewhere.
     pub shadow_rays: bool,
+    /// A material that light is sampled for may be crossed.
+    pub crossing_shadows: bool,
     /// Rays are in buffers of their own.
     pub requests: bool,
     /// Paths carry the media they are in.
@@ -51,10 +57,12 @@ impl Needs {
     /// What a scene and its materials need. Of `requests` and `order` the technique decides.
     pub(crate) fn of(world: &World, materials: &[MaterialInfo]) -> Self {
         let media = &world.parts.media;
+        let shadow_rays = world.parts.has_sampled_lights
+            && world.max_depth > 1
+            && materials.iter().any(|m| !m.delta_only);
         Self {
-            shadow_rays: world.parts.has_sampled_lights
-                && world.max_depth > 1
-                && materials.iter().any(|m| !m.delta_only),
+            shadow_rays,
+            crossing_shadows: shadow_rays && materials.iter().any(|m| !m.delta_only && m.crosses),
             media: media.part.is_some(),
             absorption: media.absorb,
             overlap: media.overlap,
@@ -70,6 +78,8 @@ impl Needs {
             Need::Always => true,
             Need::ShadowRays => self.shadow_rays,
             Need::SlotShadows => self.shadow_rays && !self.requests,
+            Need::OwnShadowOrigins => self.met(Need::SlotShadows) && self.crossing_shadows,
+            Need::SharedOrigins => self.met(Need::SlotShadows) && !self.crossing_shadows,
             Need::Requests => self.requests,
             Need::Media => self.media,
             Need::Absorption => self.absorption,

@@ -44,6 +44,8 @@ pub(crate) enum Part {
     Geometry,
     /// What a hit says of the surface.
     Surface,
+    /// Weights of light samples against scattered rays.
+    Mis,
     /// Sampling and evaluation of lights.
     Lights,
     /// The media that paths are in.
@@ -84,6 +86,7 @@ pub(crate) const STAGES: [Stage; 7] = [
             (Part::Film, Always),
             (Part::Geometry, Always),
             (Part::Surface, Always),
+            (Part::Mis, Always),
             (Part::Lights, Always),
             (Part::Media, Absorption),
         ],
@@ -105,6 +108,7 @@ pub(crate) const STAGES: [Stage; 7] = [
             (Part::Numbers, Always),
             (Part::Geometry, Always),
             (Part::Surface, Always),
+            (Part::Mis, ShadowRays),
             (Part::Media, Media),
             (Part::Materials, Always),
         ],

@@ -1,9 +1,11 @@
 //! A path's state: the one table of its fields, and the WGSL that is derived from it.
 //!
-//! A field is one `vec4<u32>` in memory, a structure with named components in WGSL. Stages
-//! reach it through `load_FIELD(slot)` and `store_FIELD(slot, value)` only. In the wavefront
-//! these access a structure of arrays or an array of structures (Laine et al. 2013, section 4.3);
-//! in the megakernel the same names access private variables.
+//! A field is one `vec4<u32>` in memory. Much of it matters for a part of an iteration only: from where a ray
+//! was cast until what it hit is known, from the choice of a light until the material has answered. So a
+//! field may have several uses, each a name with components of its own, for the words mean one
+//! thing here and another there. Stages reach a use through `load_USE(slot)` and `store_USE(slot, value)` only.
+//! In the wavefront these access a structure of arrays or an array of structures (Laine et al. 2013,
+//! section 4.3); in the megakernel the same names access private variables.
 
 use std::fmt::Write;
 
@@ -54,10 +56,18 @@ impl Type {
     }
 }
 
-/// One field of a path's state.
+/// One field of a path's state: four words, which exist if one of their uses does.
 #[derive(Debug)]
 pub(crate) struct Field {
-    /// Its name; the WGSL structure is `Path` and the name in camel case.
+    /// What the words mean, in the order of an iteration.
+    pub uses: &'static [Use],
+}
+
+/// A meaning of a field's words.
+#[derive(Debug)]
+pub(crate) struct Use {
+    /// Its name; the WGSL structure is `Path` and the name in camel case. No two that exist
+    /// in a scene are called the same.
     pub name: &'static str,
     /// Its components, four words in all.
     pub components: &'static [(&'static str, Type)],
@@ -69,105 +79,158 @@ pub(crate) struct Field {
     pub writers: &'static [StageId],
 }
 
-use Need::{Always, Media, Requests, ShadowRays, SlotShadows};
+use Need::{Always, Media, OwnShadowOrigins, Requests, ShadowRays, SharedOrigins, SlotShadows};
 use Type::{F32, U32, Vec3, Words};
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 11] = [
-    // The extension ray: from the camera or the last vertex.
+pub(crate) const FIELDS: [Field; 9] = [
     Field {
-        name: "ray_origin",
-        components: &[("origin", Vec3), ("pixel", U32)],
-        need: Always,
-        readers: &[Logic, Material, BinExtension, Extension],
-        writers: &[NewPath, Material],
-    },
-    Field {
-        name: "ray_direction",
-        components: &[("direction", Vec3), ("sample", U32)],
-        need: Always,
-        readers: &[Logic, Material, BinExtension, Extension],
-        writers: &[NewPath, Material],
-    },
-    // What it hit: distance, barycentrics, primitive. Until the next extension ray is cast,
-    // the primitive is the one that both kinds of ray start on.
-    Field {
-        name: "hit",
-        components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
-        need: Always,
-        readers: &[Logic, Material, Extension],
-        writers: &[NewPath, Logic, Extension],
-    },
-    // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle
-    // with which the extension ray was sampled (0: a discrete direction).
-    Field {
-        name: "throughput",
-        components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
-        need: Always,
-        readers: &[Logic, Material, Extension],
-        writers: &[NewPath, Logic, Material, Extension],
-    },
-    // Radiance gathered so far; the flags are declared in `constants`.
-    Field {
-        name: "radiance",
-        components: &[("radiance", Vec3), ("flags", U32)],
-        need: Always,
-        readers: &[Logic, Material],
-        writers: &[NewPath, Logic, Material],
-    },
-    // The sample of a light: where it is, and the ray that asks whether it is seen.
-    Field {
-        name: "shadow_ray",
-        components: &[("direction", Vec3), ("distance", F32)],
-        need: ShadowRays,
-        readers: &[Material, BinShadow, Shadow],
-        writers: &[Logic, Material],
-    },
-    Field {
-        name: "shadow_origin",
-        components: &[("origin", Vec3), ("skip", U32)],
-        need: SlotShadows,
-        readers: &[BinShadow, Shadow],
-        writers: &[Material],
-    },
-    // The path's throughput toward it (0: occluded), and the density with which the material
-    // would have sampled that direction.
-    Field {
-        name: "light_throughput",
-        components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
-        need: ShadowRays,
-        readers: &[Logic],
-        writers: &[Material, Shadow],
-    },
-    // Its radiance over its density, and the density (0: a discrete light).
-    Field {
-        name: "light_radiance",
-        components: &[("radiance", Vec3), ("light_pdf", F32)],
-        need: ShadowRays,
-        readers: &[Logic],
-        writers: &[Logic],
-    },
-    // The places of its rays in buffers of their own, where their results will be.
-    Field {
-        name: "requests",
-        components: &[
-            ("extension", U32),
-            ("shadow", U32),
-            ("unused0", U32),
-            ("unused1", U32),
+        uses: &[
+            // The extension ray: from the camera or the last vertex.
+            Use {
+                name: "ray_origin",
+                components: &[("origin", Vec3), ("pixel", U32)],
+                need: Always,
+                readers: &[Logic, Material, BinExtension, Extension],
+                writers: &[NewPath, Material],
+            },
+            // Where a light was sampled, the way to it: when that is asked for, where the ray began
+            // is known no longer, since the hit says where the vertex is.
+            Use {
+                name: "light_direction",
+                components: &[("direction", Vec3), ("pixel", U32)],
+                need: ShadowRays,
+                readers: &[Material],
+                writers: &[Logic],
+            },
+            // Where no material is crossed, both rays begin at the same place.
+            Use {
+                name: "shadow_origin",
+                components: &[("origin", Vec3), ("pixel", U32)],
+                need: SharedOrigins,
+                readers: &[BinShadow, Shadow],
+                writers: &[Material],
+            },
         ],
-        need: Requests,
-        readers: &[Logic],
-        writers: &[NewPath, Material],
     },
-    // The media it is in; see `kernels/media.wgsl`.
     Field {
-        name: "media",
-        components: &[("stack", Words)],
-        need: Media,
-        readers: &[Logic, Material, Extension],
-        writers: &[NewPath, Material, Extension],
+        uses: &[Use {
+            name: "ray_direction",
+            components: &[("direction", Vec3), ("sample", U32)],
+            need: Always,
+            readers: &[Logic, Material, BinExtension, Extension],
+            writers: &[NewPath, Material],
+        }],
+    },
+    Field {
+        uses: &[
+            // What the extension ray hit: distance, barycentrics, primitive. Until the next is cast,
+            // the primitive is the one that both kinds of ray start on.
+            Use {
+                name: "hit",
+                components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
+                need: Always,
+                readers: &[Logic, Material, Extension],
+                writers: &[NewPath, Logic, Extension],
+            },
+            // The shadow ray's direction, once the material has been evaluated at the hit.
+            Use {
+                name: "shadow_direction",
+                components: &[("direction", Vec3), ("primitive", U32)],
+                need: SlotShadows,
+                readers: &[BinShadow, Shadow],
+                writers: &[Material],
+            },
+        ],
+    },
+    Field {
+        uses: &[
+            // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle
+            // with which the extension ray was sampled (0: a discrete direction).
+            Use {
+                name: "throughput",
+                components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
+                need: Always,
+                readers: &[Logic, Material, Extension],
+                writers: &[NewPath, Logic, Material, Extension],
+            },
+            // What is carried to the next vertex, and the density with which a light was
+            // sampled there (0: a discrete light), once emission has been weighed by the former.
+            Use {
+                name: "carried",
+                components: &[("throughput", Vec3), ("light_pdf", F32)],
+                need: ShadowRays,
+                readers: &[Material],
+                writers: &[Logic],
+            },
+        ],
+    },
+    Field {
+        // Radiance gathered so far; the flags are declared in `constants`.
+        uses: &[Use {
+            name: "radiance",
+            components: &[("radiance", Vec3), ("flags", U32)],
+            need: Always,
+            readers: &[Logic, Material],
+            writers: &[NewPath, Logic, Material],
+        }],
+    },
+    Field {
+        uses: &[
+            // The sample of a light: its radiance over its density, and how far it is.
+            Use {
+                name: "light",
+                components: &[("radiance", Vec3), ("distance", F32)],
+                need: ShadowRays,
+                readers: &[Material],
+                writers: &[Logic],
+            },
+            // What of it reaches the camera unless the shadow ray is blocked (then 0), and how far
+            // that goes.
+            Use {
+                name: "contribution",
+                components: &[("radiance", Vec3), ("distance", F32)],
+                need: ShadowRays,
+                readers: &[Logic, Shadow],
+                writers: &[Material, Shadow],
+            },
+        ],
+    },
+    Field {
+        // Where the shadow ray begins if that may be on another side than where the extension ray does.
+        uses: &[Use {
+            name: "shadow_origin",
+            components: &[("origin", Vec3), ("pixel", U32)],
+            need: OwnShadowOrigins,
+            readers: &[BinShadow, Shadow],
+            writers: &[Material],
+        }],
+    },
+    Field {
+        // The places of its rays in buffers of their own, where their results will be.
+        uses: &[Use {
+            name: "requests",
+            components: &[
+                ("extension", U32),
+                ("shadow", U32),
+                ("unused0", U32),
+                ("unused1", U32),
+            ],
+            need: Requests,
+            readers: &[Logic],
+            writers: &[NewPath, Material],
+        }],
+    },
+    Field {
+        // The media it is in; see `kernels/media.wgsl`.
+        uses: &[Use {
+            name: "media",
+            components: &[("stack", Words)],
+            need: Media,
+            readers: &[Logic, Material, Extension],
+            writers: &[NewPath, Material, Extension],
+        }],
     },
 ];
 
@@ -195,9 +258,23 @@ pub(crate) fn constants() -> String {
     )
 }
 
+impl Field {
+    /// The uses that exist.
+    fn uses(&self, needs: Needs) -> impl Iterator<Item = &'static Use> {
+        self.uses.iter().filter(move |u| needs.met(u.need))
+    }
+
+    /// Its name, that of its first use.
+    fn name(&self) -> &'static str {
+        self.uses.first().map_or("", |u| u.name)
+    }
+}
+
 /// The fields that exist, in the order of memory.
 pub(crate) fn fields(needs: Needs) -> impl Iterator<Item = &'static Field> {
-    FIELDS.iter().filter(move |f| needs.met(f.need))
+    FIELDS
+        .iter()
+        .filter(move |f| f.uses(needs).next().is_some())
 }
 
 /// Bytes a path takes in memory.
@@ -205,13 +282,13 @@ pub(crate) fn path_bytes(needs: Needs) -> u64 {
     fields(needs).count() as u64 * FIELD_BYTES
 }
 
-/// Bytes of state that `stage` loads and stores for a path, if it uses all of its fields.
+/// Bytes of state that `stage` loads and stores for a path, if it accesses every field that it lists once.
 pub(crate) fn traffic(needs: Needs, stage: StageId) -> [u64; 2] {
-    let bytes = |touches: fn(&Field) -> &'static [StageId]| {
-        let touched = fields(needs).filter(|f| touches(f).contains(&stage));
+    let bytes = |stages: fn(&Use) -> &'static [StageId]| {
+        let touched = fields(needs).filter(|f| f.uses(needs).any(|u| stages(u).contains(&stage)));
         touched.count() as u64 * FIELD_BYTES
     };
-    [bytes(|f| f.readers), bytes(|f| f.writers)]
+    [bytes(|u| u.readers), bytes(|u| u.writers)]
 }
 
 /// Where accessors find the state.
@@ -223,66 +300,68 @@ pub(crate) enum Storage {
     Registers,
 }
 
-/// Structures and accessors for the fields that `stages` access; nothing else is declared, so
-/// that a stage that reaches for a field it does not list fails validation.
+/// Structures and accessors for the uses of fields that `stages` access; nothing else is declared, so
+/// that a stage that reaches for what it does not list fails validation.
 pub(crate) fn accessors(needs: Needs, stages: &[StageId], storage: Storage) -> String {
     let mut out = String::new();
     let count = fields(needs).count();
     for (region, field) in fields(needs).enumerate() {
-        let place = match storage {
-            Storage::Memory(StateLayout::Arrays) => Some(format!("{region}u * POOL_SIZE + slot")),
-            Storage::Memory(StateLayout::Pairs) => {
-                let (first, half) = (region - region % 2, region % 2);
-                Some(match first + 1 < count {
-                    true => format!("{first}u * POOL_SIZE + 2u * slot + {half}u"),
-                    false => format!("{first}u * POOL_SIZE + slot"),
-                })
+        let place = place(field, region, count, storage);
+        let mut accessed = String::new();
+        for u in field.uses(needs) {
+            let read = u.readers.iter().any(|s| stages.contains(s));
+            let written = u.writers.iter().any(|s| stages.contains(s));
+            if read || written {
+                accessed += &structure(u);
             }
-            Storage::Memory(StateLayout::Structures) => {
-                Some(format!("{count}u * slot + {region}u"))
+            if read {
+                accessed += &load(u, &place);
             }
-            Storage::Registers => None,
-        };
-        let read = field.readers.iter().any(|s| stages.contains(s));
-        let written = field.writers.iter().any(|s| stages.contains(s));
-        if !read && !written {
-            continue;
+            if written {
+                accessed += &store(u, &place);
+            }
         }
-        out += &structure(field);
-        if place.is_none() {
-            let (name, ty) = (field.name, type_name(field));
-            let _ = writeln!(out, "var<private> state_{name}: {ty};");
+        if !accessed.is_empty() && storage == Storage::Registers {
+            let _ = writeln!(out, "var<private> {place}: vec4<u32>;");
         }
-        if read {
-            out += &load(field, place.as_deref());
-        }
-        if written {
-            out += &store(field, place.as_deref());
-        }
+        out += &accessed;
     }
     out
 }
 
-fn type_name(field: &Field) -> String {
-    let camel = field.name.split('_').map(|word| {
+/// Where the words of a field are, the `region`-th of `count`.
+fn place(field: &Field, region: usize, count: usize, storage: Storage) -> String {
+    match storage {
+        Storage::Memory(StateLayout::Arrays) => format!("state[{region}u * POOL_SIZE + slot]"),
+        Storage::Memory(StateLayout::Pairs) => {
+            let (first, half) = (region - region % 2, region % 2);
+            match first + 1 < count {
+                true => format!("state[{first}u * POOL_SIZE + 2u * slot + {half}u]"),
+                false => format!("state[{first}u * POOL_SIZE + slot]"),
+            }
+        }
+        Storage::Memory(StateLayout::Structures) => format!("state[{count}u * slot + {region}u]"),
+        Storage::Registers => format!("state_{}", field.name()),
+    }
+}
+
+fn type_name(u: &Use) -> String {
+    let camel = u.name.split('_').map(|word| {
         let (first, rest) = word.split_at(1);
         first.to_uppercase() + rest
     });
     format!("Path{}", camel.collect::<String>())
 }
 
-fn structure(field: &Field) -> String {
+fn structure(u: &Use) -> String {
     let member = |(name, ty): &(&str, Type)| format!("{name}: {}", ty.wgsl());
-    let members: Vec<String> = field.components.iter().map(member).collect();
-    format!("struct {} {{ {} }}\n", type_name(field), members.join(", "))
+    let members: Vec<String> = u.components.iter().map(member).collect();
+    format!("struct {} {{ {} }}\n", type_name(u), members.join(", "))
 }
 
-/// Reads the word of `state` at `place`, or the private variable.
-fn load(field: &Field, place: Option<&str>) -> String {
-    let (name, ty) = (field.name, type_name(field));
-    let Some(place) = place else {
-        return format!("fn load_{name}(slot: u32) -> {ty} {{ return state_{name}; }}\n");
-    };
+/// Reads the words at `place`.
+fn load(u: &Use, place: &str) -> String {
+    let (name, ty) = (u.name, type_name(u));
     let mut first = 0;
     let part = |(_, component): &(&str, Type)| {
         let swizzle = &"xyzw"[first..first + component.words()];
@@ -292,29 +371,26 @@ fn load(field: &Field, place: Option<&str>) -> String {
             _ => format!("bitcast<{}>(words.{swizzle})", component.wgsl()),
         }
     };
-    let parts: Vec<String> = field.components.iter().map(part).collect();
+    let parts: Vec<String> = u.components.iter().map(part).collect();
     format!(
         "fn load_{name}(slot: u32) -> {ty} {{\n    \
-         let words = state[{place}];\n    \
+         let words = {place};\n    \
          return {ty}({});\n}}\n",
         parts.join(", ")
     )
 }
 
-/// Writes the word of `state` at `place`, or the private variable.
-fn store(field: &Field, place: Option<&str>) -> String {
-    let (name, ty) = (field.name, type_name(field));
-    let Some(place) = place else {
-        return format!("fn store_{name}(slot: u32, value: {ty}) {{ state_{name} = value; }}\n");
-    };
+/// Writes the words at `place`.
+fn store(u: &Use, place: &str) -> String {
+    let (name, ty) = (u.name, type_name(u));
     let part = |(component, ty): &(&str, Type)| match ty {
         Type::U32 | Type::Words => format!("value.{component}"),
         _ => format!("bitcast<{}>(value.{component})", ty.words_type()),
     };
-    let parts: Vec<String> = field.components.iter().map(part).collect();
+    let parts: Vec<String> = u.components.iter().map(part).collect();
     format!(
         "fn store_{name}(slot: u32, value: {ty}) {{\n    \
-         state[{place}] = vec4<u32>({});\n}}\n",
+         {place} = vec4<u32>({});\n}}\n",
         parts.join(", ")
     )
 }
@@ -326,6 +402,7 @@ mod tests {
 
     const EVERYTHING: Needs = Needs {
         shadow_rays: true,
+        crossing_shadows: true,
         requests: false,
         media: true,
         absorption: true,
@@ -350,7 +427,11 @@ mod tests {
             requests: true,
             ..EVERYTHING
         };
-        for needs in [EVERYTHING, requests] {
+        let shared = Needs {
+            crossing_shadows: false,
+            ..EVERYTHING
+        };
+        for needs in [EVERYTHING, requests, shared] {
             let text = format!(
                 "const POOL_SIZE: u32 = 1u;\n\
                  @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
@@ -359,40 +440,61 @@ mod tests {
             let (module, _) = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
             let mut layouter = naga::proc::Layouter::default();
             layouter.update(module.to_ctx()).expect("a layout");
-            for field in fields(needs) {
-                check_layout(field, &module, &layouter);
+            for u in fields(needs).flat_map(|f| f.uses(needs)) {
+                check_layout(u, &module, &layouter);
             }
         }
     }
 
-    fn check_layout(field: &Field, module: &naga::Module, layouter: &naga::proc::Layouter) {
+    fn check_layout(u: &Use, module: &naga::Module, layouter: &naga::proc::Layouter) {
         let (handle, ty) = module
             .types
             .iter()
-            .find(|(_, ty)| ty.name.as_deref() == Some(&type_name(field)))
-            .expect("the field's structure");
-        assert_eq!(
-            u64::from(layouter[handle].size),
-            FIELD_BYTES,
-            "{}",
-            field.name
-        );
+            .find(|(_, ty)| ty.name.as_deref() == Some(&type_name(u)))
+            .expect("the use's structure");
+        assert_eq!(u64::from(layouter[handle].size), FIELD_BYTES, "{}", u.name);
         let naga::TypeInner::Struct { members, .. } = &ty.inner else {
-            panic!("{} is no structure", field.name);
+            panic!("{} is no structure", u.name);
         };
         let mut words = 0;
-        for ((name, ty), member) in field.components.iter().zip(members) {
+        for ((name, ty), member) in u.components.iter().zip(members) {
             assert_eq!(member.name.as_deref(), Some(*name));
-            assert_eq!(member.offset as usize, words * 4, "{}.{name}", field.name);
+            assert_eq!(member.offset as usize, words * 4, "{}.{name}", u.name);
             words += ty.words();
         }
         assert_eq!(words * 4, FIELD_BYTES as usize);
     }
 
+    /// A stage that stores one use and one that loads another of the same field mean the same words, so
+    /// components that both have must be at the same place.
+    #[test]
+    fn uses_of_a_field_agree_on_what_they_share() {
+        let offset = |u: &Use, name: &str| {
+            let before = u.components.iter().take_while(|(n, _)| *n != name);
+            before.map(|(_, ty)| ty.words()).sum::<usize>()
+        };
+        for field in &FIELDS {
+            for (a, b) in field
+                .uses
+                .iter()
+                .flat_map(|a| field.uses.iter().map(move |b| (a, b)))
+            {
+                for shared in a.components.iter().filter(|c| b.components.contains(c)) {
+                    assert_eq!(offset(a, shared.0), offset(b, shared.0), "{}", a.name);
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_scene_without_sampled_lights_stores_no_shadow_rays() {
         assert_eq!(path_bytes(Needs::default()), 80);
-        assert_eq!(path_bytes(EVERYTHING), 160);
+        let lit = Needs {
+            shadow_rays: true,
+            ..Needs::default()
+        };
+        assert_eq!(path_bytes(lit), 96);
+        assert_eq!(path_bytes(EVERYTHING), 128);
         let text = accessors(
             Needs::default(),
             &EVERY_STAGE,
@@ -402,18 +504,31 @@ mod tests {
         assert!(!text.contains("media"), "{text}");
     }
 
-    /// A stage listed as a reader or writer that does not access the field would make kernels
+    /// A stage listed as a reader or writer that does not access the words would make kernels
     /// carry code they do not use, and the table a lie.
     #[test]
-    fn stages_access_every_field_that_lists_them() {
+    fn stages_access_every_use_that_lists_them() {
+        let all = || FIELDS.iter().flat_map(|f| f.uses);
         for stage in &crate::stages::STAGES {
-            for field in &FIELDS {
-                for (access, listed) in [("load", field.readers), ("store", field.writers)] {
-                    let call = format!("{access}_{}(", field.name);
+            for u in all() {
+                for (access, stages) in [("load", readers as fn(&Use) -> _), ("store", writers)] {
+                    let call = format!("{access}_{}(", u.name);
+                    let of_name = all().filter(|other| other.name == u.name);
+                    let listed = of_name
+                        .map(stages)
+                        .any(|s: &[StageId]| s.contains(&stage.id));
                     let calls = stage.body.contains(&call);
-                    assert_eq!(calls, listed.contains(&stage.id), "{}: {call}", stage.name);
+                    assert_eq!(calls, listed, "{}: {call}", stage.name);
                 }
             }
         }
+    }
+
+    fn readers(u: &Use) -> &'static [StageId] {
+        u.readers
+    }
+
+    fn writers(u: &Use) -> &'static [StageId] {
+        u.writers
     }
 }

@@ -23,7 +23,7 @@ fn logic(slot: u32) {
 
 #if shadow_rays
     if (path.flags & PATH_LIT) != 0u {
-        path.radiance += sampled_light(slot);
+        path.radiance += light_contribution(slot);
     }
 #endif
     // A throughput of zero says that scattering failed and no ray was cast.
@@ -36,7 +36,10 @@ fn logic(slot: u32) {
 #endif
 #if absorption
         carried.throughput *= transmittance(load_media(slot).stack, hit.t);
+#if shadow_rays
+#else
         store_throughput(slot, carried);
+#endif
 #endif
         if hit.primitive == NOTHING {
             path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
@@ -62,7 +65,10 @@ fn logic(slot: u32) {
         let survival = survival_probability(carried.throughput);
         if unit_numbers(bits).w < survival {
             carried.throughput /= survival;
+#if shadow_rays
+#else
             store_throughput(slot, carried);
+#endif
         } else {
             instance = NOTHING;
         }
@@ -75,10 +81,19 @@ fn logic(slot: u32) {
 
     path.flags = (path.flags & ~PATH_LIT) + 1u;
 #if shadow_rays
+    var light_pdf = 0.0;
     if vertex < MAX_DEPTH && scatters_sampled_light(instance) {
         let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
-        path.flags |= choose_light(slot, position, bits);
+        let light = sample_light(position, bits);
+        if any(light.radiance > vec3<f32>(0.0)) {
+            // For the material stage to aim at.
+            path.flags |= PATH_LIT;
+            light_pdf = light.pdf;
+            store_light(slot, PathLight(light.radiance, light.distance));
+            store_light_direction(slot, PathLightDirection(light.wi, pixel));
+        }
     }
+    store_carried(slot, PathCarried(carried.throughput, light_pdf));
 #endif
     store_radiance(slot, path);
     request_material(instance);
@@ -91,32 +106,14 @@ fn survival_probability(throughput: vec3<f32>) -> f32 {
 }
 
 #if shadow_rays
-// The light sample of the last vertex; the shadow ray has zeroed its throughput if occluded.
-fn sampled_light(slot: u32) -> vec3<f32> {
+// What the light sample of the last vertex brings; nothing if the shadow ray was blocked.
+fn light_contribution(slot: u32) -> vec3<f32> {
 #if requests
     if shadow_results[load_requests(slot).shadow] != 0u {
         return vec3<f32>(0.0);
     }
 #endif
-    let reach = load_light_throughput(slot);
-    let light = load_light_radiance(slot);
-    // Scattering cannot hit a discrete light (pdf 0), so its sample counts fully.
-    var weight = 1.0;
-    if light.light_pdf > 0.0 {
-        weight = power_heuristic(light.light_pdf, reach.bsdf_pdf);
-    }
-    return reach.throughput * light.radiance * weight;
-}
-
-// Samples a light for the material stage to aim at; the flag to set.
-fn choose_light(slot: u32, position: vec3<f32>, bits: vec4<u32>) -> u32 {
-    let light = sample_light(position, bits);
-    if !any(light.radiance > vec3<f32>(0.0)) {
-        return 0u;
-    }
-    store_shadow_ray(slot, PathShadowRay(light.wi, light.distance));
-    store_light_radiance(slot, PathLightRadiance(light.radiance, light.pdf));
-    return PATH_LIT;
+    return load_contribution(slot).radiance;
 }
 #endif
 #if requests

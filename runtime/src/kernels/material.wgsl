@@ -3,9 +3,15 @@
 fn material(slot: u32, instance: u32) {
     var path = load_radiance(slot);
     let hit = load_hit(slot);
-    let origin = load_ray_origin(slot);
     let arrived = load_ray_direction(slot);
+#if shadow_rays
+    let aimed = load_light_direction(slot);
+    let pixel = aimed.pixel;
+    let carried = load_carried(slot);
+#else
+    let pixel = load_ray_origin(slot).pixel;
     let carried = load_throughput(slot);
+#endif
     let side = hit_geometric_normal(hit.primitive);
     let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
     let wo = -arrived.direction;
@@ -20,7 +26,7 @@ fn material(slot: u32, instance: u32) {
     let point = surface_point(hit, 1.0);
 #endif
     let vertex = (path.flags & DEPTH_MASK) - 1u;
-    let place = vec3<u32>(origin.pixel, arrived.sample, vertex);
+    let place = vec3<u32>(pixel, arrived.sample, vertex);
 
 #if varying_emission
     path.radiance += carried.throughput
@@ -34,20 +40,19 @@ fn material(slot: u32, instance: u32) {
     var wl = vec3<f32>(0.0);
 #if shadow_rays
     let lit = (path.flags & PATH_LIT) != 0u;
-    var light = PathShadowRay(vec3<f32>(0.0), 0.0);
     if lit {
-        light = load_shadow_ray(slot);
-        wl = light.direction;
+        wl = aimed.direction;
     }
 #endif
-    let u = random_numbers(origin.pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
+    let u = random_numbers(pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
     let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u), instance, place);
 
     let weight = carried.throughput * scattered.throughput;
     store_throughput(slot, PathThroughput(weight, scattered.pdf));
-    if any(weight > vec3<f32>(0.0)) {
+    let goes_on = any(weight > vec3<f32>(0.0));
+    if goes_on {
         let start = leave_surface(position, side, scattered.wi);
-        store_ray_origin(slot, PathRayOrigin(start, origin.pixel));
+        store_ray_origin(slot, PathRayOrigin(start, pixel));
         store_ray_direction(slot, PathRayDirection(scattered.wi, arrived.sample));
         request_extension(start, scattered.wi, hit.primitive);
     }
@@ -58,21 +63,29 @@ fn material(slot: u32, instance: u32) {
 #endif
 #if shadow_rays
     if lit {
+        let light = load_light(slot);
         var reach = carried.throughput * scattered.light_throughput;
 #if absorption
         // The way to the light is in one medium: boundaries, like everything, cast shadows.
         let stays = (dot(side, wl) < 0.0) == inside;
-        let way = select(media_beyond(media, medium, inside), media, stays);
-        reach *= transmittance(way, light.distance);
+        let beyond = select(media_beyond(media, medium, inside), media, stays);
+        reach *= transmittance(beyond, light.distance);
 #endif
-        store_light_throughput(slot, PathLightThroughput(reach, scattered.light_pdf));
+        let start = leave_surface(position, side, wl);
+        let way = aim(wl, light.distance, start - position);
+        let share = light_share(carried.light_pdf, scattered.light_pdf);
+        store_contribution(slot, PathContribution(reach * light.radiance * share, way.distance));
         if any(reach > vec3<f32>(0.0)) {
-            let start = leave_surface(position, side, wl);
-            let way = aim(light, start - position);
-#if requests
+#if slot_shadows
+            store_shadow_direction(slot, PathShadowDirection(way.direction, hit.primitive));
+#if own_shadow_origins
+            store_shadow_origin(slot, PathShadowOrigin(start, pixel));
 #else
-            store_shadow_origin(slot, PathShadowOrigin(start, hit.primitive));
-            store_shadow_ray(slot, way);
+            // Both rays leave to the side that the path came from.
+            if !goes_on {
+                store_shadow_origin(slot, PathShadowOrigin(start, pixel));
+            }
+#endif
 #endif
             request_shadow(start, hit.primitive, way.direction, way.distance);
         }
@@ -124,15 +137,27 @@ fn checked_emission(emission: vec3<f32>, instance: u32, place: vec3<u32>) -> vec
 
 #endif
 #if shadow_rays
+// The weight of a light sample. Scattering cannot hit a discrete light (density 0), so its sample
+// counts fully.
+fn light_share(light_pdf: f32, bsdf_pdf: f32) -> f32 {
+    if light_pdf > 0.0 {
+        return power_heuristic(light_pdf, bsdf_pdf);
+    }
+    return 1.0;
+}
+
+// A shadow ray's direction and length.
+struct Way { direction: vec3<f32>, distance: f32 }
+
 // The ray from the moved origin to the point that was sampled, ending just before it, since
 // the light itself must not occlude. Discrete lights far away stay in their direction.
-fn aim(light: PathShadowRay, moved: vec3<f32>) -> PathShadowRay {
-    if light.distance > 1e18 {
-        return light;
+fn aim(direction: vec3<f32>, distance: f32, moved: vec3<f32>) -> Way {
+    if distance > 1e18 {
+        return Way(direction, distance);
     }
-    let to_light = light.direction * light.distance - moved;
-    let distance = length(to_light);
-    return PathShadowRay(to_light / max(distance, 1e-30), distance * 0.9999);
+    let to_light = direction * distance - moved;
+    let left = length(to_light);
+    return Way(to_light / max(left, 1e-30), left * 0.9999);
 }
 #endif
 #if requests

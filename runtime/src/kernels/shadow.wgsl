@@ -12,17 +12,18 @@ fn keep_shadow(request: u32, blocked: bool) {
 }
 #else
 fn shadow_request(slot: u32) -> array<vec4<u32>, 2> {
-    let start = load_shadow_origin(slot);
-    let ray = load_shadow_ray(slot);
+    let origin = load_shadow_origin(slot).origin;
+    let ray = load_shadow_direction(slot);
+    let distance = load_contribution(slot).distance;
     return array<vec4<u32>, 2>(
-        vec4<u32>(bitcast<vec3<u32>>(start.origin), start.skip),
-        vec4<u32>(bitcast<vec3<u32>>(ray.direction), bitcast<u32>(ray.distance))
+        vec4<u32>(bitcast<vec3<u32>>(origin), ray.primitive),
+        vec4<u32>(bitcast<vec3<u32>>(ray.direction), bitcast<u32>(distance))
     );
 }
 
 fn keep_shadow(slot: u32, blocked: bool) {
     if blocked {
-        store_light_throughput(slot, PathLightThroughput(vec3<f32>(0.0), 0.0));
+        store_contribution(slot, PathContribution(vec3<f32>(0.0), 0.0));
     }
 }
 #endif

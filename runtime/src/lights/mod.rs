@@ -30,7 +30,7 @@ const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
 /// The lights of a scene.
 #[derive(Clone, Debug)]
 pub struct Lights {
-    /// `sample_light`, `light_hit` and `light_escape`; needs the surface part.
+    /// `sample_light`, `light_hit` and `light_escape`; needs the surface part and [`mis`].
     pub part: ShaderPart,
     /// For each triangle of the world its index in the light table, or [`NO_LIGHT`].
     pub of_triangle: Vec<u32>,
@@ -68,6 +68,14 @@ impl Lights {
             of_triangle,
             has_sampled: is_any_sampled(&kinds),
         }
+    }
+}
+
+/// Weights of light samples against scattered rays: `power_heuristic`.
+pub fn mis() -> ShaderPart {
+    ShaderPart {
+        wgsl: include_str!("../kernels/mis.wgsl").to_owned(),
+        buffers: Vec::new(),
     }
 }
 

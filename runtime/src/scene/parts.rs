@@ -5,7 +5,7 @@
 //! | `geometry` | `triangle_vertices`, `primitive_instance` | |
 //! | `bvh` | `Hit`, `NO_PRIMITIVE`, `trace_closest`, `trace_any`, the steps of casts | `geometry` |
 //! | `surface` | `hit_position`, `hit_normal`, ..., `offset_origin` | `geometry` |
-//! | `lights` | `sample_light`, `light_hit`, `light_escape`, `power_heuristic` | `surface` |
+//! | `lights` | `sample_light`, `light_hit`, `light_escape` | `surface`, `lights::mis` |
 //! | `media` | `active_medium`, `media_beyond`, `transmittance`, ... | `geometry` |
 //! | `texture` | `texture_fetch` | |
 

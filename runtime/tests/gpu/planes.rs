@@ -344,8 +344,6 @@ fn offset_origin(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> { return p
 const LIGHTS: &str = "
 const SKY_PDF: f32 = 0.07957747;
 
-fn power_heuristic(a: f32, b: f32) -> f32 { let r = b / a; return 1.0 / (1.0 + r * r); }
-
 fn light_hit(primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> { return vec3<f32>(0.0); }
 
 fn sky(direction: vec3<f32>) -> vec3<f32> { return vec3<f32>(select(SKY_BACK, SKY_FRONT, direction.z > 0.0)); }

@@ -355,8 +355,8 @@ fn what_a_scene_does_not_need_is_absent_from_its_kernels() {
         let shadowed = texts(&Room::default(), &surfaces, strategy);
         for name in [
             "fn shadow(",
-            "fn choose_light(",
-            "light_throughput(slot",
+            "fn light_contribution(",
+            "store_contribution(",
             "wants_shadow",
         ] {
             assert!(!needless.contains(name), "{strategy:?}: {name}");
@@ -513,7 +513,7 @@ fn settings_that_cannot_be_rendered_are_named() {
     large.pool = Some(1 << 30);
     let message = refused(room(), large);
     assert!(
-        message.contains("max_") && message.contains("154618822656"),
+        message.contains("max_") && message.contains("103079215104"),
         "{message}"
     );
 }

@@ -301,8 +301,6 @@ fn offset_origin(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> { return p
 ";
 
 const LIGHTS: &str = "
-fn power_heuristic(a: f32, b: f32) -> f32 { let r = b / a; return 1.0 / (1.0 + r * r); }
-
 fn emits(primitive: u32) -> bool { return ((EMITTERS >> primitive) & 1u) == 1u; }
 
 // Density by solid angle of a point on an emitting wall, seen from a distance under a cosine.

@@ -258,7 +258,14 @@ pub(crate) fn evaluate(
     count: usize,
     rows: usize,
 ) -> Vec<Row> {
-    let all = [&parts.geometry, &parts.bvh, &parts.surface, &parts.lights];
+    let mis = impasto_runtime::lights::mis();
+    let all = [
+        &parts.geometry,
+        &parts.bvh,
+        &parts.surface,
+        &mis,
+        &parts.lights,
+    ];
     run(&all, body, input, count, rows)
 }
 

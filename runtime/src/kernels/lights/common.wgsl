@@ -15,17 +15,6 @@ fn no_light_sample() -> LightSample {
 // Distance to lights at infinity.
 const FAR_AWAY: f32 = 3e38;
 
-// The weight of a technique with density a where another has density b (Veach 1997, beta = 2).
-// In this form neither squares overflow nor zeros divide; both weights sum to 1.
-fn power_heuristic(a: f32, b: f32) -> f32 {
-    if a <= 0.0 {
-        return 0.0;
-    }
-    let ratio = min(a, b) / max(a, b);
-    let smaller = ratio * ratio / (1.0 + ratio * ratio);
-    return select(smaller, 1.0 - smaller, a >= b);
-}
-
 // The weight of a direction that scattering chose with density `bsdf_pdf` (0: a camera ray or a
 // discrete lobe, which light samples cannot replace) and that light samples have density `light_pdf` of.
 fn scattering_weight(bsdf_pdf: f32, light_pdf: f32) -> f32 {

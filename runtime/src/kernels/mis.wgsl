@@ -1,0 +1,13 @@
+// Multiple importance sampling: light that both samples of lights and scattered rays find is weighted,
+// so that both together count once.
+
+// The weight of a technique with density a where another has density b (Veach 1997, beta = 2).
+// In this form neither squares overflow nor zeros divide; both weights sum to 1.
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    if a <= 0.0 {
+        return 0.0;
+    }
+    let ratio = min(a, b) / max(a, b);
+    let smaller = ratio * ratio / (1.0 + ratio * ratio);
+    return select(smaller, 1.0 - smaller, a >= b);
+}
