@@ -13,6 +13,8 @@ pub mod error;
 pub mod film;
 pub mod film_file;
 mod fingerprint;
+pub mod first_hit;
+
 pub mod gpu;
 mod image_file;
 pub mod lab;

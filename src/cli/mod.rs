@@ -16,6 +16,7 @@ mod calibrate;
 mod check;
 mod checkpoint;
 mod completions;
+mod converge;
 mod cost;
 mod dropped;
 mod emit;
@@ -86,6 +87,8 @@ enum Command {
     Eval(eval::EvalArgs),
     /// Render a scene
     Render(Box<render::RenderArgs>),
+    /// Measure how fast renders come near the truth: error against run time
+    Converge(Box<converge::ConvergeArgs>),
     /// Time ray casts alone, by every technique
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
@@ -124,6 +127,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
+        Command::Converge(args) => converge::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),
         Command::Plan(args) => plan::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),

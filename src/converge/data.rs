@@ -44,7 +44,8 @@ pub struct Reference {
     pub samples: Option<u64>,
     /// Its own error, estimated from its two independent halves; unknown of a picture that was given.
     pub error: Option<Errors>,
-    /// The same, of its squared error (MSE), relative to the smallest mean squared error of any render.
+    /// Its RMSE relative to the smallest RMSE that is shown, which is the root of the mean over a point's
+    /// seeds. Unknown if its own error is, or if renders have none while it has.
     pub relative_error: Option<f64>,
     /// GPU time that it took, in seconds.
     pub gpu_seconds: f64,
@@ -127,11 +128,11 @@ pub struct Fit {
 /// What the pixels in which a material is seen first contribute.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialShare {
-    /// Its name; none for pixels that see no surface.
+    /// The name that the scene binds it by; none for pixels that see a light or what surrounds everything.
     pub name: Option<String>,
     /// Share of the pixels.
     pub pixels: f64,
-    /// Share of the squared error of the picture with the most samples of the first series.
+    /// Share of the squared error of the renders with the most samples of the first series.
     pub mse: f64,
     /// The same of relMSE.
     pub relmse: f64,

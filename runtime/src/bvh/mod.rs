@@ -115,7 +115,7 @@ fn tree_over(boxes: &[Aabb], traversal: Traversal, leaf_size: u32) -> Bvh {
 }
 
 /// The tree with one triangle a leaf.
-fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
+pub(crate) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     let indices = (0..boxes.len() as u32).collect();
     let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
         PRESET.ploc_search_distance,
@@ -129,7 +129,7 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-fn bounds(corners: &[glam::Vec3; 3]) -> Aabb {
+pub(crate) fn bounds(corners: &[glam::Vec3; 3]) -> Aabb {
     let [a, b, c] = corners.map(Vec3A::from);
     Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }

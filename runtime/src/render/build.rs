@@ -116,6 +116,26 @@ impl<'g> Renderer<'g> {
     }
 }
 
+/// What the samples of a render must have in common with others to be merged with them, without building
+/// its kernels.
+///
+/// # Errors
+/// If the world cannot be rendered so.
+pub fn identity(
+    gpu: &Gpu,
+    world: &World,
+    source: &dyn MaterialSource,
+    options: &RenderOptions,
+) -> Result<Identity, RuntimeError> {
+    settings::check(world, options)?;
+    let makings = Makings::new(gpu, world, source, options.technique.within(gpu));
+    let plan = world.own_plan(&makings.materials);
+    let layout = makings.layout(&plan)?;
+    let sizes = pool::sizes(gpu, world, &layout, options)?;
+    let composer = makings.composer(&plan, layout, sizes);
+    Ok(Facts::of(&composer, options.seed).identity)
+}
+
 impl<'a> Makings<'a> {
     pub(crate) fn new(
         gpu: &Gpu,

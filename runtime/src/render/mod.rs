@@ -8,6 +8,7 @@ mod iterate;
 mod observe;
 mod replan;
 
+pub use build::identity;
 pub(crate) use build::{Makings, build_step};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
@@ -172,6 +173,11 @@ impl<'g> Renderer<'g> {
         self.facts.identity.seed = samples.seed;
         self.options = options;
         Ok(())
+    }
+
+    /// Paths in flight.
+    pub fn pool(&self) -> u32 {
+        self.ready.sizes.pool
     }
 
     /// What the samples of this render must have in common with others to be merged with them.

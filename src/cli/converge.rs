@@ -1,0 +1,340 @@
+//! `impasto converge`: error against run time, of several scenes, strategies and samplers.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use impasto::compiler::partition::{Needs, Wanted};
+use impasto::converge::data::{Convergence, Reference};
+use impasto::converge::pictures::Pictures;
+use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
+use impasto::converge::{Progress, Settings, StudyError, Subject, study};
+use impasto::runtime::report::AdapterReport;
+use impasto::runtime::scene::FilmSettings;
+use impasto::runtime::technique::{Choice, Sampler};
+use impasto::{Gpu, files};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::info::GpuArgs;
+use super::render::{parse_size, progress_bar};
+use super::{Failure, Global, Outcome, compiled_scene, interrupt};
+
+#[derive(Args)]
+pub(super) struct ConvergeArgs {
+    /// The scenes, TOML files
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// The folder of results; a study that was ended goes on from what is in it
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+    /// How materials share kernels: names as of `impasto render --strategy`
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = parse_strategy)]
+    strategies: Vec<Wanted>,
+    /// Where random numbers come from: sobol, owen, independent
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = parse_sampler)]
+    samplers: Vec<Sampler>,
+    /// Renders of each number of samples, which differ in their seeds
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    seeds: u32,
+    /// The most samples a pixel; those below are a quarter of the next each
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    max_spp: u32,
+    /// The fewest samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    min_spp: u32,
+    /// Width and height in pixels, as in 640x480; each scene's own otherwise
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Takes this picture for the truth instead of making one
+    #[arg(long, value_name = "R.exr")]
+    reference: Option<PathBuf>,
+    /// The most samples a pixel of a reference that is made; 4096 times the renders' otherwise
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..1 << 32))]
+    reference_spp: Option<u64>,
+    /// Seconds for a scene, after which nothing new is begun
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    time: Option<f64>,
+    /// The first seed
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Removes results that are in the folder
+    #[arg(long)]
+    fresh: bool,
+    /// Paths in flight; chosen by the size of the picture otherwise
+    #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
+    pool: Option<u32>,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+fn parse_strategy(name: &str) -> Result<Wanted, String> {
+    let wanted = Wanted::parse(name).map_err(|error| error.to_string())?;
+    match wanted.row().needs {
+        Needs::Measurements => Err("only `impasto plan` measures kernels".into()),
+        _ => Ok(wanted),
+    }
+}
+
+fn parse_sampler(name: &str) -> Result<Sampler, String> {
+    let known: Vec<&str> = Sampler::ALL.iter().map(|(_, name, _)| *name).collect();
+    Sampler::from_name(name).ok_or_else(|| format!("expected one of {}", known.join(", ")))
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(seconds),
+        _ => Err("expected a number of seconds, 0 or more".into()),
+    }
+}
+
+pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
+    let settings = args.settings()?;
+    let names = names(&args.scenes);
+    make_folder(&args.out)?;
+    files::check_writable(&args.out.join("convergence.json"))?;
+    interrupt::install()?;
+    let gpu = args.gpu.open()?;
+    let mut convergence = Convergence {
+        command: command(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        adapter: adapter(&gpu),
+        scenes: Vec::new(),
+    };
+    let mut pictures = Pictures::default();
+    for (path, name) in args.scenes.iter().zip(names) {
+        let (found, shown) = args.study(path, name, &gpu, &settings, global)?;
+        note_reference(&found.name, &found.reference, global);
+        convergence.scenes.push(found);
+        pictures.scenes.push(shown);
+    }
+    write(&args.out, &convergence, &pictures)?;
+    global.note(&format!("wrote {}", args.out.join("convergence.json").display()));
+    Ok(())
+}
+
+impl ConvergeArgs {
+    fn settings(&self) -> Result<Settings, Failure> {
+        let end = self
+            .seed
+            .checked_add(self.seeds)
+            .filter(|end| *end <= SEEDS[0]);
+        let end = end.ok_or_else(|| {
+            let most = SEEDS[0] - self.seeds;
+            format!("`--seed {}` is too large: at most {most}, so that seeds do not meet those of the reference", self.seed)
+        })?;
+        if self.min_spp > self.max_spp {
+            let (least, most) = (self.min_spp, self.max_spp);
+            return Err(format!("`--min-spp {least}` is more than `--max-spp {most}`").into());
+        }
+        Ok(Settings {
+            strategies: distinct(&self.strategies),
+            samplers: distinct(&self.samplers),
+            samples: quarters(self.min_spp, self.max_spp),
+            seeds: self.seed..end,
+            pool: self.pool,
+            reference: self.reference.clone(),
+            reference_samples: self.reference_spp.unwrap_or(4096 * u64::from(self.max_spp)),
+            time: self.time.map(Duration::from_secs_f64),
+            fresh: self.fresh,
+        })
+    }
+
+    fn study(
+        &self,
+        path: &Path,
+        name: String,
+        gpu: &Gpu,
+        settings: &Settings,
+        global: &Global,
+    ) -> Result<Studied, Failure> {
+        let begin = Instant::now();
+        let (mut scene, program) = compiled_scene(path, global)?;
+        for warning in &scene.warnings {
+            global.note(&format!("warning: {warning}"));
+        }
+        if let Some((width, height)) = self.size {
+            scene.film = FilmSettings { width, height };
+        }
+        let subject = Subject {
+            name,
+            scene: &scene,
+            program: &program,
+            material_seconds: begin.elapsed().as_secs_f64(),
+        };
+        let bar = bar(global);
+        let mut progress = |progress: &Progress| {
+            bar.set_length(progress.all as u64);
+            bar.set_position(progress.done as u64);
+            if bar.message() != progress.what {
+                global.detail(&progress.what);
+                bar.set_message(progress.what.clone());
+            }
+            match interrupt::requested() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let found = study(gpu, &subject, &self.out, settings, &mut progress);
+        bar.finish_and_clear();
+        found.map_err(|error| self.failure(error, global))
+    }
+
+    fn failure(&self, error: StudyError, global: &Global) -> Failure {
+        match error {
+            StudyError::Interrupted => {
+                let folder = self.out.display();
+                global.note(&format!(
+                    "what is done is in `{folder}`; the same command goes on from it"
+                ));
+                Failure::Interrupted
+            }
+            error => Failure::Error(error.to_string()),
+        }
+    }
+}
+
+type Studied = (
+    impasto::converge::data::SceneConvergence,
+    impasto::converge::pictures::ScenePictures,
+);
+
+/// Powers of four times the least, up to the most, which is the last if it is one of them.
+fn quarters(least: u32, most: u32) -> Vec<u32> {
+    let next = |samples: &u32| samples.checked_mul(4).filter(|next| *next <= most);
+    std::iter::successors(Some(least), next).collect()
+}
+
+/// Each of some values once, in their order.
+fn distinct<T: PartialEq + Copy>(values: &[T]) -> Vec<T> {
+    let mut distinct = Vec::new();
+    for value in values {
+        if !distinct.contains(value) {
+            distinct.push(*value);
+        }
+    }
+    distinct
+}
+
+/// A name for each scene, by its file or, where that is `scene.toml`, by its folder; equal ones are numbered.
+fn names(scenes: &[PathBuf]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for path in scenes {
+        let name = plain(&name(path));
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let mut free = std::iter::once(name.clone()).chain(numbered);
+        let free = free.find(|name| !names.contains(name));
+        names.push(free.unwrap_or_default());
+    }
+    names
+}
+
+fn name(path: &Path) -> String {
+    let text = |name: Option<&std::ffi::OsStr>| name.map(|n| n.to_string_lossy().into_owned());
+    let stem = text(path.file_stem()).unwrap_or_default();
+    if stem != "scene" {
+        return stem;
+    }
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    text(whole.parent().and_then(Path::file_name)).unwrap_or(stem)
+}
+
+/// The name with nothing in it that means something in a path or an address.
+fn plain(name: &str) -> String {
+    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let name: String = name
+        .chars()
+        .map(|c| if safe(c) { c } else { '_' })
+        .collect();
+    match name.trim_start_matches('.') {
+        "" => "scene".into(),
+        name => name.into(),
+    }
+}
+
+fn make_folder(folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let why = files::reason(&error);
+        format!("cannot make the folder `{}`: {why}", folder.display())
+    })
+}
+
+/// What was typed, with the program's name alone in the place of its path.
+fn command() -> String {
+    let words = std::env::args().skip(1);
+    let quoted = words.map(|word| match word.contains(char::is_whitespace) {
+        true => format!("'{word}'"),
+        false => word,
+    });
+    let words: Vec<String> = std::iter::once("impasto".to_owned())
+        .chain(quoted)
+        .collect();
+    words.join(" ")
+}
+
+fn adapter(gpu: &Gpu) -> AdapterReport {
+    let info = gpu.info();
+    AdapterReport {
+        name: info.name,
+        backend: info.backend,
+        driver: info.driver,
+    }
+}
+
+/// Says if errors are to be taken with care, because the reference is not much better.
+fn note_reference(scene: &str, reference: &Reference, global: &Global) {
+    let Some(relative) = reference.relative_error.filter(|r| *r > GOOD_ENOUGH) else {
+        return;
+    };
+    let samples = reference.samples.unwrap_or_default();
+    global.note(&format!(
+        "warning: the reference of `{scene}` has {:.1} % of the smallest error shown after {samples} \
+         samples, where {:.0} % was wanted: small errors say more of it than of the renders\n  \
+         hint: run the command again with more `--time` or `--reference-spp`; it goes on from there",
+        100.0 * relative,
+        100.0 * GOOD_ENOUGH,
+    ));
+}
+
+fn bar(global: &Global) -> ProgressBar {
+    let bar = progress_bar(global);
+    let template = "{msg} {wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn write(folder: &Path, convergence: &Convergence, _pictures: &Pictures) -> Result<(), Failure> {
+    let path = folder.join("convergence.json");
+    let text = serde_json::to_string_pretty(convergence)
+        .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
+    Ok(files::write_whole(&path, format!("{text}\n").as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_powers_of_four_times_the_least() {
+        assert_eq!(quarters(1, 64), [1, 4, 16, 64]);
+        assert_eq!(quarters(1, 63), [1, 4, 16]);
+        assert_eq!(quarters(3, 50), [3, 12, 48]);
+        assert_eq!(quarters(8, 8), [8]);
+        assert_eq!(quarters(1 << 31, u32::MAX), [1 << 31]);
+    }
+
+    #[test]
+    fn scenes_have_names_that_are_theirs_alone() {
+        let paths = [
+            "a/x.toml",
+            "b/x.toml",
+            "c/x y.toml",
+            "d/..toml",
+            "examples/cornell/scene.toml",
+        ];
+        let names = names(&paths.map(PathBuf::from));
+        assert_eq!(names, ["x", "x-2", "x_y", "scene", "cornell"]);
+    }
+}
