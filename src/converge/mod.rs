@@ -13,6 +13,7 @@ pub mod fit;
 pub mod flip;
 mod materials;
 pub mod metrics;
+pub mod page;
 pub mod pictures;
 pub mod reference;
 mod series;
