@@ -176,7 +176,8 @@ impl Composer<'_> {
         let textures = self.world.parts.texture.as_ref().filter(|_| textured);
         let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
         out += &self.source.wgsl(members);
-        out += &surface_point(infos.iter().map(|m| m.inputs));
+        let moved = self.world.parts.moved;
+        out += &surface_point(infos.iter().map(|m| m.inputs), moved);
         out + &dropped_row(members)
     }
 
@@ -273,8 +274,8 @@ fn dropped_row(members: &[usize]) -> String {
 }
 
 /// The function that fills a material's inputs, those that some member reads; the others get
-/// what is at hand.
-fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
+/// what is at hand. Coordinates of a scene that is `moved` are not those of the world.
+fn surface_point(inputs: impl Iterator<Item = InputSet>, moved: bool) -> String {
     let all = inputs.fold(InputSet::default(), |a, b| InputSet {
         position: a.position || b.position,
         normal: a.normal || b.normal,
@@ -291,7 +292,11 @@ fn surface_point(inputs: impl Iterator<Item = InputSet>) -> String {
          return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior);\n}}\n",
         pick(
             all.position,
-            "hit_position(hit.primitive, barycentrics)",
+            if moved {
+                "in_world(hit_position(hit.primitive, barycentrics))"
+            } else {
+                "hit_position(hit.primitive, barycentrics)"
+            },
             "vec3<f32>(0.0)"
         ),
         pick(

@@ -92,9 +92,9 @@ fn crowd(random: &mut Random, scale: f32, world: bool) -> Scene {
         if index % 7 == 0 {
             // A shear as well.
             let mut rows = [0.0; 12];
-            rows.fill_with(|| random.range(-0.4 * scale, 0.4 * scale));
+            rows.fill_with(|| f64::from(random.range(-0.4 * scale, 0.4 * scale)));
             for axis in 0..3 {
-                rows[5 * axis] += 0.7 * scale;
+                rows[5 * axis] += 0.7 * f64::from(scale);
             }
             transform = Transform::from_rows(rows);
         }

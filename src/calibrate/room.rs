@@ -44,6 +44,7 @@ pub fn scene(palette: &Palette, coherence: Coherence, side: u32) -> Scene {
     let mut scene = Scene {
         name: format!("{} {name}", palette.name),
         base: ".".into(),
+        origin: Default::default(),
         camera: camera(coherence),
         camera_media: Vec::new(),
         film: FilmSettings {

@@ -53,7 +53,7 @@ pub fn of_scene(
     let surfaces = points::surfaces(mesh, program);
     measure(program, |material, info| {
         let mut inputs = Inputs::named(&info.name);
-        surfaces[material].points(mesh, samples, info.crosses, &mut inputs)
+        surfaces[material].points((mesh, scene.origin), samples, info.crosses, &mut inputs)
     })
 }
 

@@ -32,10 +32,11 @@ pub(super) fn surfaces(mesh: &Mesh, program: &Program) -> Vec<Surfaces> {
 }
 
 impl Surfaces {
-    /// Points with their instances, in equal steps of area, each step with a point in it.
+    /// Points with their instances, in equal steps of area, each step with a point in it. The mesh's
+    /// coordinates count from a place in the world.
     pub fn points(
         &self,
-        mesh: &Mesh,
+        (mesh, origin): (&Mesh, DVec3),
         samples: usize,
         passes: bool,
         inputs: &mut Inputs,
@@ -47,7 +48,8 @@ impl Surfaces {
             let area = total * (i as f64 + inputs.unit()) / samples as f64;
             let found = self.area.partition_point(|&end| end <= area);
             let triangle = self.triangles[found.min(self.triangles.len() - 1)] as usize;
-            let at = on_triangle(mesh, triangle, [inputs.unit(), inputs.unit()]);
+            let mut at = on_triangle(mesh, triangle, [inputs.unit(), inputs.unit()]);
+            at.position = (DVec3::from(at.position) + origin).to_array();
             (mesh.materials[triangle] as usize, inputs.lit(at, passes))
         };
         (0..samples).map(point).collect()

@@ -5,10 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::bindings::Bindings;
 use super::description::{Description, GeometrySpec};
 use super::load::Source;
 use super::mesh::{MAX_COORDINATE, Oddities};
+use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
 use super::split::MAX_TRIANGLES;
 use super::{Light, MaterialBinding, Mesh, Object, Placement, SceneError, Transform};
@@ -19,11 +22,14 @@ const SHARE_FROM: usize = 1 << 20;
 
 /// What the `[[geometry]]` and `[[lights]]` of a scene come to.
 pub(super) struct Assembled {
+    /// Where the coordinates of everything else count from.
+    pub(super) origin: DVec3,
     pub(super) mesh: Mesh,
     pub(super) objects: Vec<Object>,
     pub(super) placements: Vec<Placement>,
     pub(super) materials: Vec<MaterialBinding>,
     pub(super) camera_media: Vec<u32>,
+    pub(super) lights: Vec<Light>,
 }
 
 /// Puts together what `description` of the scene at `path` says of `sources`, by the names that
@@ -53,6 +59,8 @@ pub(super) fn assemble(
         path,
         bindings: Bindings::new(&description.materials),
         copies: copies(&entries),
+        origin: origin(&entries, description),
+        object_origins: Vec::new(),
         mesh: Mesh::default(),
         objects: Vec::new(),
         placements: Vec::new(),
@@ -61,12 +69,36 @@ pub(super) fn assemble(
     for entry in &entries {
         assembly.push(entry)?;
     }
-    for (index, light) in description.lights.iter().enumerate() {
+    let lights = description.lights.iter();
+    let lights: Vec<Light> = lights.map(|l| l.seen_from(assembly.origin)).collect();
+    for (index, light) in lights.iter().enumerate() {
         if let Light::Quad(quad) = light {
             assembly.mesh.push_quad(quad, index as u32);
         }
     }
-    assembly.finish(description)
+    assembly.finish(description, lights)
+}
+
+/// Where the coordinates of a scene of these entries count from.
+fn origin(entries: &[Entry], description: &Description) -> DVec3 {
+    let mut extents: BTreeMap<&str, Extent> = BTreeMap::new();
+    let mut all = Extent::default();
+    for Entry {
+        spec,
+        source,
+        places,
+    } in entries
+    {
+        let of_file = extents
+            .entry(&spec.obj)
+            .or_insert_with(|| Extent::of(&source.obj));
+        for place in &places.list {
+            all.add_placed(of_file, &spec.transform.then(&place.transform));
+        }
+    }
+    let corners = description.lights.iter().filter_map(|l| l.corners());
+    corners.flatten().for_each(|corner| all.add(corner));
+    origin::of(&all)
 }
 
 /// The places of entries that name a file of them.
@@ -104,6 +136,9 @@ struct Assembly<'d, 'w> {
     path: &'d Path,
     bindings: Bindings<'d>,
     copies: BTreeMap<&'d str, usize>,
+    origin: DVec3,
+    /// Where the coordinates of each object count from, in its OBJ file.
+    object_origins: Vec<DVec3>,
     mesh: Mesh,
     objects: Vec<Object>,
     placements: Vec<Placement>,
@@ -175,7 +210,9 @@ impl<'d> Assembly<'d, '_> {
         let mut oddities = Oddities::default();
         for (place, materials) in entry.places.list.iter().zip(materials) {
             let transform = self.transform(entry, &place.transform)?;
-            let found = self.mesh.push_obj(path, obj, &transform, materials)?;
+            let found = self
+                .mesh
+                .push_obj(path, obj, &transform, self.origin, materials)?;
             oddities.without_area += found.without_area;
             oddities.turned += found.turned;
         }
@@ -197,8 +234,9 @@ impl<'d> Assembly<'d, '_> {
         for (place, materials) in entry.places.list.iter().zip(materials) {
             let transform = self.transform(entry, &place.transform)?;
             let columns = transform.matrix.abs();
-            let reach = columns * glam::DVec3::splat(largest.into()) + transform.translation.abs();
-            if reach.max_element() > f64::from(MAX_COORDINATE) {
+            let transform = transform.before(self.object_origins[object as usize]);
+            let reach = columns * DVec3::splat(largest.into()) + transform.translation.abs();
+            if reach.max_element() > MAX_COORDINATE {
                 let reach = reach.max_element() as f32;
                 let message = format!("the geometry reaches {reach:e} m from the origin");
                 let hint = format!("coordinates may go up to {MAX_COORDINATE:e}; see `scale`");
@@ -206,7 +244,7 @@ impl<'d> Assembly<'d, '_> {
             }
             self.placements.push(Placement {
                 object,
-                transform,
+                transform: transform.moved(-self.origin),
                 materials: Arc::clone(materials),
             });
         }
@@ -222,10 +260,12 @@ impl<'d> Assembly<'d, '_> {
         let Source { path, obj, .. } = entry.source;
         let slots: Vec<u32> = (0..obj.materials.len() as u32).collect();
         let mut mesh = Mesh::default();
-        let oddities = mesh.push_obj(path, obj, &Transform::default(), &slots)?;
+        let at = origin::of(&Extent::of(obj));
+        let oddities = mesh.push_obj(path, obj, &Transform::default(), at, &slots)?;
         mesh.simplify();
         let name = name.clone();
         self.objects.push(Object { name, mesh });
+        self.object_origins.push(at);
         Ok((self.objects.len() as u32 - 1, oddities))
     }
 
@@ -262,18 +302,24 @@ impl<'d> Assembly<'d, '_> {
         }
     }
 
-    fn finish(mut self, description: &Description) -> Result<Assembled, SceneError> {
+    fn finish(
+        mut self,
+        description: &Description,
+        lights: Vec<Light>,
+    ) -> Result<Assembled, SceneError> {
         if self.mesh.is_empty() && self.placements.is_empty() {
             return Err(no_triangle(self.path, description.geometry.is_empty()));
         }
         self.mesh.simplify();
         let camera_media = self.bindings.of_camera(&description.camera_media)?;
         Ok(Assembled {
+            origin: self.origin,
             mesh: self.mesh,
             objects: self.objects,
             placements: self.placements,
             materials: self.bindings.finish(self.warnings),
             camera_media,
+            lights,
         })
     }
 }

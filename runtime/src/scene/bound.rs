@@ -77,6 +77,7 @@ mod tests {
         Scene {
             name: String::new(),
             base: Default::default(),
+            origin: glam::DVec3::ZERO,
             camera: Camera {
                 position: glam::Vec3::ZERO,
                 look_at: glam::Vec3::X,

@@ -1,7 +1,7 @@
 //! What a scene file says, before any file that it names is read. `docs/scenes.md` describes the
 //! format.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use toml::de::DeValue;
 
 use super::document::{Document, Table, Value, numbers};
@@ -19,15 +19,63 @@ const MAX_DEPTH: u32 = 65_535;
 
 pub(super) struct Description {
     pub(super) name: Option<String>,
-    pub(super) camera: Camera,
+    pub(super) camera: CameraSpec,
     /// Materials whose interiors the camera is in, outermost first.
     pub(super) camera_media: Vec<MaterialName>,
     pub(super) film: FilmSettings,
     pub(super) integrator: Integrator,
     pub(super) geometry: Vec<GeometrySpec>,
     pub(super) materials: Vec<MaterialSpec>,
-    pub(super) lights: Vec<Light>,
+    pub(super) lights: Vec<LightSpec>,
     pub(super) environment: Option<EnvironmentSpec>,
+}
+
+/// The camera, and where it is and looks at in the world.
+pub(super) struct CameraSpec {
+    camera: Camera,
+    position: DVec3,
+    look_at: DVec3,
+}
+
+impl CameraSpec {
+    /// The camera in coordinates that count from `origin`.
+    pub(super) fn seen_from(&self, origin: DVec3) -> Camera {
+        Camera {
+            position: (self.position - origin).as_vec3(),
+            look_at: (self.look_at - origin).as_vec3(),
+            ..self.camera
+        }
+    }
+}
+
+/// A light, and where in the world its corner is if it has one.
+pub(super) struct LightSpec {
+    light: Light,
+    pub(super) corner: Option<DVec3>,
+}
+
+impl LightSpec {
+    /// The light in coordinates that count from `origin`.
+    pub(super) fn seen_from(&self, origin: DVec3) -> Light {
+        match (&self.light, self.corner) {
+            (Light::Quad(quad), Some(corner)) => Light::Quad(QuadLight {
+                corner: (corner - origin).as_vec3(),
+                ..quad.clone()
+            }),
+            (light, _) => light.clone(),
+        }
+    }
+
+    /// The corners of a light with a surface.
+    pub(super) fn corners(&self) -> Option<[DVec3; 4]> {
+        match (&self.light, self.corner) {
+            (Light::Quad(quad), Some(corner)) => {
+                let [u, v] = [quad.u, quad.v].map(|edge| edge.as_dvec3());
+                Some([corner, corner + u, corner + v, corner + u + v])
+            }
+            _ => None,
+        }
+    }
 }
 
 /// The name of a material where something uses it.
@@ -102,12 +150,12 @@ impl Description {
     }
 }
 
-fn camera(root: &mut Table) -> Result<(Camera, Vec<MaterialName>), SceneError> {
+fn camera(root: &mut Table) -> Result<(CameraSpec, Vec<MaterialName>), SceneError> {
     let hint = "add a [camera] table with `position`, `look_at` and `fov`";
     let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
     let mut table = value.table("[camera]")?;
-    let position = table.require("position")?.vector()?;
-    let look_at = table.require("look_at")?.vector()?;
+    let position = table.require("position")?.place()?;
+    let look_at = table.require("look_at")?.place()?;
     let up = optional(&mut table, "up", Value::vector, Vec3::Y)?;
     let fov = table.require("fov")?;
     let fov = fov.float_where("an angle in degrees between 0 and 180", |v| {
@@ -116,28 +164,33 @@ fn camera(root: &mut Table) -> Result<(Camera, Vec<MaterialName>), SceneError> {
     let aperture = |v: &Value| v.float_where("a diameter, 0 or more", |v| v >= 0.0);
     let aperture = optional(&mut table, "aperture", aperture, 0.0)?;
     let focus = |v: &Value| v.float_where("a distance above 0", |v| v > 0.0);
-    let focus = optional(&mut table, "focus", focus, position.distance(look_at))?;
+    let distance = position.distance(look_at) as f32;
+    let focus = optional(&mut table, "focus", focus, distance)?;
     let media = table.get("medium").map(|v| camera_media(&v)).transpose()?;
-    let camera = Camera {
+    let spec = CameraSpec {
+        camera: Camera {
+            position: Vec3::ZERO,
+            look_at: (look_at - position).as_vec3(),
+            up,
+            fov,
+            aperture,
+            focus,
+        },
         position,
         look_at,
-        up,
-        fov,
-        aperture,
-        focus,
     };
-    if position == look_at {
+    if spec.camera.look_at == Vec3::ZERO {
         return Err(table
             .error("[camera] looks at its own position")
             .hint("`position` and `look_at` must differ"));
     }
-    if camera.basis()[0] == Vec3::ZERO {
+    if spec.camera.basis()[0] == Vec3::ZERO {
         return Err(table
             .error("`up` of [camera] is zero or along the view")
             .hint("choose an `up` that is not parallel to `look_at` - `position`"));
     }
     table.finish()?;
-    Ok((camera, media.unwrap_or_default()))
+    Ok((spec, media.unwrap_or_default()))
 }
 
 /// One name, or several from the outermost medium inwards.
@@ -286,25 +339,28 @@ pub(super) fn float_source(value: f32) -> String {
 }
 
 /// `vec2(a, b)`, `color(r, g, b)` or `vec4(a, b, c, d)`; colors stand for other triples, too.
-pub(super) fn array_source(numbers: &[f32]) -> String {
+pub(super) fn array_source(numbers: &[f64]) -> String {
     let name = match numbers.len() {
         2 => "vec2",
         3 => "color",
         _ => "vec4",
     };
-    let values: Vec<String> = numbers.iter().map(|&v| float_source(v)).collect();
+    let values: Vec<String> = numbers.iter().map(|&v| float_source(v as f32)).collect();
     format!("{name}({})", values.join(", "))
 }
 
-fn lights(root: &mut Table) -> Result<Vec<Light>, SceneError> {
+fn lights(root: &mut Table) -> Result<Vec<LightSpec>, SceneError> {
     let Some(value) = root.get("lights") else {
         return Ok(Vec::new());
     };
     let light = |mut table: Table| {
         let kind = table.require("kind")?;
         let light = match kind.string()? {
-            "quad" => Light::Quad(quad(&mut table)?),
-            "distant" => Light::Distant(distant(&mut table)?),
+            "quad" => quad(&mut table)?,
+            "distant" => LightSpec {
+                light: Light::Distant(distant(&mut table)?),
+                corner: None,
+            },
             _ => return Err(kind.mismatch("\"quad\" or \"distant\"")),
         };
         table.finish()?;
@@ -313,9 +369,10 @@ fn lights(root: &mut Table) -> Result<Vec<Light>, SceneError> {
     value.tables("lights")?.into_iter().map(light).collect()
 }
 
-fn quad(table: &mut Table) -> Result<QuadLight, SceneError> {
+fn quad(table: &mut Table) -> Result<LightSpec, SceneError> {
+    let corner = table.require("corner")?.place()?;
     let quad = QuadLight {
-        corner: table.require("corner")?.vector()?,
+        corner: Vec3::ZERO,
         u: table.require("u")?.vector()?,
         v: table.require("v")?.vector()?,
         radiance: table.require("radiance")?.rgb()?,
@@ -328,7 +385,10 @@ fn quad(table: &mut Table) -> Result<QuadLight, SceneError> {
         quad.corner + quad.u + quad.v,
     ];
     match super::mesh::has_area(&corners) {
-        true => Ok(quad),
+        true => Ok(LightSpec {
+            light: Light::Quad(quad),
+            corner: Some(corner),
+        }),
         false => Err(table
             .error("the quad light has no area")
             .hint("its edges `u` and `v` must not be zero or parallel")),

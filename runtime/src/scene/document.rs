@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use impasto_compiler::diag::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -192,7 +192,8 @@ impl<'d> Value<'d> {
 
     /// A finite number.
     pub(super) fn float(&self) -> Result<f32, SceneError> {
-        number(self.item()).ok_or_else(|| self.mismatch("a finite number"))
+        let value = number(self.item()).map(|v| v as f32);
+        value.ok_or_else(|| self.mismatch("a finite number"))
     }
 
     /// A finite number for which `holds`.
@@ -201,14 +202,22 @@ impl<'d> Value<'d> {
         expected: &str,
         holds: impl Fn(f32) -> bool,
     ) -> Result<f32, SceneError> {
-        let value = number(self.item()).filter(|&v| holds(v));
-        value.ok_or_else(|| self.mismatch(expected))
+        let value = number(self.item()).map(|v| v as f32);
+        value
+            .filter(|&v| holds(v))
+            .ok_or_else(|| self.mismatch(expected))
     }
 
     /// Three finite numbers.
     pub(super) fn vector(&self) -> Result<Vec3, SceneError> {
-        let vector: [f32; 3] = self.array("three finite numbers, as [x, y, z]")?;
-        Ok(vector.into())
+        Ok(self.place()?.as_vec3())
+    }
+
+    /// Three finite numbers that say where something is. Single precision would lose what is small
+    /// against its distance from the origin.
+    pub(super) fn place(&self) -> Result<DVec3, SceneError> {
+        let place: [f64; 3] = self.array("three finite numbers, as [x, y, z]")?;
+        Ok(place.into())
     }
 
     /// Linear RGB, not negative: three numbers, or one for a grey.
@@ -219,7 +228,8 @@ impl<'d> Value<'d> {
         };
         let rgb = rgb.filter(|rgb| rgb.iter().all(|&c| c >= 0.0));
         let expected = "a number or [r, g, b], finite and not negative";
-        Ok(rgb.ok_or_else(|| self.mismatch(expected))?.into())
+        let rgb = rgb.ok_or_else(|| self.mismatch(expected))?;
+        Ok(DVec3::from(rgb).as_vec3())
     }
 
     /// The table, which errors call `name`.
@@ -252,7 +262,7 @@ impl<'d> Value<'d> {
     }
 
     /// `N` finite numbers.
-    pub(super) fn array<const N: usize>(&self, expected: &str) -> Result<[f32; N], SceneError> {
+    pub(super) fn array<const N: usize>(&self, expected: &str) -> Result<[f64; N], SceneError> {
         let array = numbers(self.item()).and_then(|v| v.try_into().ok());
         array.ok_or_else(|| self.mismatch(expected))
     }
@@ -264,18 +274,18 @@ pub(super) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
     quoted.join(", ")
 }
 
-/// A finite number that fits `f32`.
-pub(super) fn number(value: &DeValue) -> Option<f32> {
-    let number = match value {
-        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok()? as f32,
+/// A finite number in the range of `f32`.
+pub(super) fn number(value: &DeValue) -> Option<f64> {
+    let number: f64 = match value {
+        DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok()? as f64,
         DeValue::Float(f) => f.as_str().parse().ok()?,
         _ => return None,
     };
-    number.is_finite().then_some(number)
+    (number as f32).is_finite().then_some(number)
 }
 
 /// An array of finite numbers.
-pub(super) fn numbers(value: &DeValue) -> Option<Vec<f32>> {
+pub(super) fn numbers(value: &DeValue) -> Option<Vec<f64>> {
     let items = value.as_array()?.iter();
     items.map(|item| number(item.get_ref())).collect()
 }

@@ -41,7 +41,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     Ok(Scene {
         name: description.name.unwrap_or_else(|| default_name(path)),
         base,
-        camera: description.camera,
+        origin: assembled.origin,
+        camera: description.camera.seen_from(assembled.origin),
         camera_media: assembled.camera_media,
         film: description.film,
         integrator: description.integrator,
@@ -49,7 +50,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         objects: assembled.objects,
         placements: assembled.placements,
         materials: assembled.materials,
-        lights: description.lights,
+        lights: assembled.lights,
         environment,
         warnings,
     })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::obj::{Obj, ObjTriangle};
 use super::{QuadLight, SceneError, Transform};
@@ -11,14 +11,14 @@ use super::{QuadLight, SceneError, Transform};
 pub const NO_MATERIAL: u32 = u32::MAX;
 
 /// Largest coordinate in metres: products of three still fit a float.
-pub(super) const MAX_COORDINATE: f32 = 1e12;
+pub(super) const MAX_COORDINATE: f64 = 1e12;
 
 /// Triangles, one entry a triangle in each list.
 ///
 /// Vertices are counter-clockwise seen from outside, which defines the geometric normal.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Corners in metres.
+    /// Corners in metres, from where the coordinates of the scene or of the object count.
     pub positions: Vec<[Vec3; 3]>,
     /// Unit shading normals at the corners; `None` where the triangle is flat.
     /// Empty if every triangle is.
@@ -77,19 +77,22 @@ impl Mesh {
         }
     }
 
-    /// Adds the triangles of an OBJ file, whose materials have the indices `materials`.
+    /// Adds the triangles of an OBJ file, whose materials have the indices `materials`, where
+    /// `transform` puts them, in coordinates that count from `origin`.
     pub(super) fn push_obj(
         &mut self,
         path: &Path,
         obj: &Obj,
         transform: &Transform,
+        origin: DVec3,
         materials: &[u32],
     ) -> Result<Oddities, SceneError> {
         let mut oddities = Oddities::default();
         let mirrored = transform.is_mirrored();
         for triangle in &obj.triangles {
-            let positions = triangle.positions.map(|p| transform.point(p));
-            check_range(path, &positions)?;
+            let places = triangle.positions.map(|p| transform.place(p));
+            check_range(path, &places)?;
+            let positions = places.map(|p| (p - origin).as_vec3());
             if !has_area(&positions) {
                 oddities.without_area += 1;
                 continue;
@@ -193,13 +196,16 @@ impl Mesh {
     }
 }
 
-fn check_range(path: &Path, positions: &[Vec3; 3]) -> Result<(), SceneError> {
-    let largest = positions.iter().map(|p| p.abs().max_element());
-    let largest = largest.fold(0.0, f32::max);
+fn check_range(path: &Path, places: &[DVec3; 3]) -> Result<(), SceneError> {
+    let largest = places.iter().map(|p| p.abs().max_element());
+    let largest = largest.fold(0.0, f64::max);
     if largest <= MAX_COORDINATE {
         return Ok(());
     }
-    let message = format!("the geometry reaches {largest:e} m from the origin");
+    let message = format!(
+        "the geometry reaches {:e} m from the origin",
+        largest as f32
+    );
     Err(SceneError::in_file(path, message).hint(format!(
         "coordinates may go up to {MAX_COORDINATE:e}; see `scale`"
     )))

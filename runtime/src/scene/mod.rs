@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 mod assemble;
 mod bindings;
@@ -18,6 +18,7 @@ mod load;
 mod mesh;
 mod mtl;
 mod obj;
+mod origin;
 mod parts;
 mod placed;
 mod placements;
@@ -40,6 +41,10 @@ pub struct Scene {
     pub name: String,
     /// Folder of the scene file, against which material and texture paths are resolved.
     pub base: PathBuf,
+    /// Where in the world the coordinates of everything below count from: near what is far away,
+    /// since single precision knows places by their distance from 0. It is 0 for a scene around the
+    /// world's own.
+    pub origin: DVec3,
     /// Where it is seen from.
     pub camera: Camera,
     /// The materials whose interiors the camera is in, outermost first, as indices into

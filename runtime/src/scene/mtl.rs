@@ -45,8 +45,8 @@ impl MtlValue {
     /// not given. `None` leaves the parameter at its default. Pictures are resolved against
     /// `folder`, that of the MTL file.
     pub(super) fn source(self, mtl: Option<&tobj::Material>, folder: &Path) -> Option<String> {
-        let color = |value: Option<[f32; 3]>, missing| array_source(&value.unwrap_or([missing; 3]));
-        let float = |value: Option<f32>, missing| float_source(value.unwrap_or(missing));
+        let color = |value: Option<[f64; 3]>, missing| array_source(&value.unwrap_or([missing; 3]));
+        let float = |value: Option<f64>, missing| float_source(value.unwrap_or(missing) as f32);
         Some(match self {
             MtlValue::Kd => color(mtl.and_then(|m| m.diffuse), 0.8),
             MtlValue::Ks => color(mtl.and_then(|m| m.specular), 0.0),

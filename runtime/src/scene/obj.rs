@@ -6,7 +6,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::SceneError;
 
@@ -24,7 +24,7 @@ pub(super) struct Obj {
 
 /// One triangle as the file has it.
 pub(super) struct ObjTriangle {
-    pub(super) positions: [Vec3; 3],
+    pub(super) positions: [DVec3; 3],
     pub(super) normals: Option<[Vec3; 3]>,
     pub(super) uvs: Option<[Vec2; 3]>,
     /// Index into [`Obj::materials`].
@@ -152,7 +152,7 @@ impl<'p> Scan<'p> {
             "vt" => 2,
             _ => 3 + usize::from(has_weight),
         };
-        let mut values = [0.0f32, 0.0, 0.0, 1.0];
+        let mut values = [0.0f64, 0.0, 0.0, 1.0];
         for (found, word) in words[..kept].iter().enumerate() {
             if word.is_empty() && found < needed {
                 let message = format!("{} has {found} of {needed} numbers", what());
@@ -164,7 +164,10 @@ impl<'p> Scan<'p> {
                 self.error(line, message)
             })?;
         }
-        if !values[..3].iter().all(|v| (v / values[3]).is_finite()) {
+        if !values[..3]
+            .iter()
+            .all(|v| ((v / values[3]) as f32).is_finite())
+        {
             return Err(self.error(line, format!("{} is not finite: {}", what(), rest.trim())));
         }
         self.vertices += key;
@@ -292,15 +295,17 @@ fn parse(scan: &Scan) -> Result<Vec<ObjTriangle>, tobj::LoadError> {
         for first in (0..mesh.indices.len()).step_by(3) {
             let [has_uv, has_normal] = scan.attributes[triangles.len()];
             let corners = [first, first + 1, first + 2];
-            let triple = |values: &[f32], indices: &[u32]| {
-                corners.map(|k| Vec3::from_slice(&values[3 * indices[k] as usize..]))
+            let triple = |values: &[f64], indices: &[u32]| {
+                corners.map(|k| DVec3::from_slice(&values[3 * indices[k] as usize..]))
             };
             let pair = |k: usize| {
-                Vec2::from_slice(&mesh.texcoords[2 * mesh.texcoord_indices[k] as usize..])
+                let first = 2 * mesh.texcoord_indices[k] as usize;
+                DVec2::from_slice(&mesh.texcoords[first..]).as_vec2()
             };
             triangles.push(ObjTriangle {
                 positions: triple(&mesh.positions, &mesh.indices),
-                normals: has_normal.then(|| triple(&mesh.normals, &mesh.normal_indices)),
+                normals: has_normal
+                    .then(|| triple(&mesh.normals, &mesh.normal_indices).map(|n| n.as_vec3())),
                 uvs: has_uv.then(|| corners.map(pair)),
                 material: mesh.material_id.unwrap_or_default(),
             });

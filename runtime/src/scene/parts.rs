@@ -9,7 +9,7 @@
 //! | `media` | `active_medium`, `media_beyond`, `transmittance`, ... | `geometry` |
 //! | `texture` | `texture_fetch` | |
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 
 use super::surface::{geometry_part, surface_part};
@@ -20,6 +20,7 @@ use crate::media::Media;
 use crate::shader_part::ShaderPart;
 use crate::technique::{Stack, Technique};
 use crate::texture;
+use crate::wgsl;
 
 /// Everything a kernel may include to read the scene.
 #[derive(Clone, Debug)]
@@ -32,6 +33,9 @@ pub struct SceneParts {
     pub bounds: [Vec3; 2],
     /// Positions, normals and coordinates of hits.
     pub surface: ShaderPart,
+    /// Do materials read positions that [`Scene::origin`] has to be added to? Then `surface` has
+    /// `in_world`.
+    pub moved: bool,
     /// Light samples and the emission that paths run into. `light_hit` is the emission of
     /// materials with `Emission::Uniform` (and of quad lights); that of `Emission::Varying` is
     /// left to `material_emission`.
@@ -62,11 +66,13 @@ impl SceneParts {
         let texture = texture::part(textures, &scene.base)?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
         let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
+        let reads_position = materials.iter().any(|m| m.inputs.position);
+        let moved = reads_position && scene.origin != DVec3::ZERO;
         let split = Split::new(scene, instances, technique.copies)?;
         let lights = |order: &[u32]| {
             Lights::build(scene, &split.world, split.bounds, order, instances, &media)
         };
-        let (geometry, bvh, surface, lights) = if split.placements.is_empty() {
+        let (geometry, bvh, mut surface, lights) = if split.placements.is_empty() {
             let mesh = &*split.world;
             let bvh = Bvh::build(mesh, technique.traversal);
             let lights = lights(bvh.order());
@@ -88,10 +94,14 @@ impl SceneParts {
                 lights,
             )
         };
+        if moved {
+            surface.wgsl += &in_world(scene.origin);
+        }
         Ok(SceneParts {
             geometry,
             bvh,
             surface,
+            moved,
             bounds: split.bounds,
             lights: lights.part,
             has_sampled_lights: lights.has_sampled,
@@ -101,6 +111,12 @@ impl SceneParts {
             texture,
         })
     }
+}
+
+/// The place in the world of a place in the scene's own coordinates.
+fn in_world(origin: DVec3) -> String {
+    wgsl::constant_vec3("WORLD_ORIGIN", origin.as_vec3())
+        + "\nfn in_world(position: vec3<f32>) -> vec3<f32> {\n    return position + WORLD_ORIGIN;\n}\n"
 }
 
 /// A trail says where a ray is in one tree, not in two.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use toml::de::DeValue;
 
 use super::description::MaterialName;
@@ -83,10 +83,11 @@ pub(super) fn transform(table: &mut Table) -> Result<Transform, SceneError> {
             let vector = |value: &Option<Value>| {
                 value
                     .as_ref()
-                    .map_or(Ok(Vec3::ZERO), |value| value.vector())
+                    .map_or(Ok(DVec3::ZERO), |value| value.place())
             };
             let scale = scale_value.as_ref().map_or(Ok(Vec3::ONE), scale)?;
-            Transform::new(scale, vector(rotate_value)?, vector(translate_value)?)
+            let rotate = vector(rotate_value)?.as_vec3();
+            Transform::new(scale, rotate, Vec3::ZERO).moved(vector(translate_value)?)
         }
     };
     match (transform.is_invertible(), matrix) {
@@ -139,7 +140,7 @@ pub(super) fn places(table: &mut Table) -> Result<PlacesSpec, SceneError> {
 }
 
 /// Columns that hold numbers, in the order of [`Line::numbers`], and what they are if left out.
-const COLUMNS: [(&str, f32); 22] = [
+const COLUMNS: [(&str, f64); 22] = [
     ("x", 0.0),
     ("y", 0.0),
     ("z", 0.0),
@@ -274,7 +275,8 @@ impl Header {
         for (column, word) in self.columns.iter().zip(words(line)) {
             match column {
                 Some(column) => {
-                    let value = word.parse().ok().filter(|v: &f32| v.is_finite());
+                    let value = word.parse().ok();
+                    let value = value.filter(|v: &f64| (*v as f32).is_finite());
                     let name = COLUMNS[*column].0;
                     let message =
                         || error(format!("`{word}` in column `{name}` is no finite number"));
@@ -294,15 +296,16 @@ impl Header {
         }
     }
 
-    fn transform(&self, numbers: &[f32; COLUMNS.len()]) -> Transform {
+    fn transform(&self, numbers: &[f64; COLUMNS.len()]) -> Transform {
         let [x, y, z, rx, ry, rz, sx, sy, sz, scale, rows @ ..] = *numbers;
         match self.has_matrix {
             true => Transform::from_rows(rows),
             false => Transform::new(
-                scale * Vec3::new(sx, sy, sz),
-                Vec3::new(rx, ry, rz),
-                Vec3::new(x, y, z),
-            ),
+                (scale * DVec3::new(sx, sy, sz)).as_vec3(),
+                DVec3::new(rx, ry, rz).as_vec3(),
+                Vec3::ZERO,
+            )
+            .moved(DVec3::new(x, y, z)),
         }
     }
 }

@@ -39,8 +39,8 @@ impl Transform {
     }
 
     /// The first three rows of a 4 x 4 matrix that maps columns, the translation last in each.
-    pub fn from_rows(rows: [f32; 12]) -> Self {
-        let at = |row: usize, column: usize| f64::from(rows[4 * row + column]);
+    pub fn from_rows(rows: [f64; 12]) -> Self {
+        let at = |row: usize, column: usize| rows[4 * row + column];
         let column = |c: usize| DVec3::new(at(0, c), at(1, c), at(2, c));
         Transform {
             matrix: DMat3::from_cols(column(0), column(1), column(2)),
@@ -62,6 +62,19 @@ impl Transform {
             matrix: next.matrix * self.matrix,
             translation: next.matrix * self.translation + next.translation,
         }
+    }
+
+    /// This transform, and then a move.
+    pub(crate) fn moved(&self, by: DVec3) -> Transform {
+        Transform {
+            translation: self.translation + by,
+            ..*self
+        }
+    }
+
+    /// The same for points whose coordinates count from `origin`.
+    pub(crate) fn before(&self, origin: DVec3) -> Transform {
+        self.moved(self.matrix * origin)
     }
 
     /// Can it be undone? Not if it maps everything to a plane, or so close to one that rounding
@@ -86,7 +99,12 @@ impl Transform {
 
     /// Where a point goes.
     pub fn point(&self, p: Vec3) -> Vec3 {
-        (self.matrix * p.as_dvec3() + self.translation).as_vec3()
+        self.place(p.as_dvec3()).as_vec3()
+    }
+
+    /// Where a point goes, without rounding to single precision.
+    pub(crate) fn place(&self, p: DVec3) -> DVec3 {
+        self.matrix * p + self.translation
     }
 
     /// The unit normal of a surface that had the normal `n`; zero where that is zero.
@@ -147,7 +165,7 @@ mod tests {
             assert!(!of(Vec3::new(1.0, 1e-8, 1.0)).is_invertible());
         }
         assert!(!Transform::new(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO).is_invertible());
-        assert!(!Transform::from_rows([f32::NAN; 12]).is_invertible());
+        assert!(!Transform::from_rows([f64::NAN; 12]).is_invertible());
         let rows = [1.0, 2.0, 3.0, 0.0, 2.0, 4.0, 6.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         assert!(!Transform::from_rows(rows).is_invertible());
     }

@@ -6,6 +6,7 @@
 
 mod casts;
 mod determinism;
+mod extremes;
 mod dropped;
 mod film;
 mod furnace;
@@ -21,6 +22,8 @@ mod placed;
 mod planes;
 mod plans;
 mod random;
+#[path = "../../../compiler/tests/common/record.rs"]
+mod record;
 mod replan;
 mod scene;
 mod stub;

@@ -285,6 +285,7 @@ impl Planes {
                     buffers: vec![BufferData::new("planes", "array<vec4<u32>>", &rows)],
                 },
                 bvh: text(count + TRAVERSAL),
+                moved: false,
                 surface: text(SURFACE.to_string()),
                 lights: text(constants + LIGHTS),
                 media,

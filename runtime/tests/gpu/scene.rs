@@ -62,6 +62,12 @@ material liquid {
     surface = smooth_dielectric(ior: ior / exterior_ior);
     interior = medium(absorption: absorption, ior: ior, priority: priority);
 }
+material chart {
+    param origin: point = point(0);
+    let place = position - origin;
+    surface = diffuse(0);
+    emission = uniform(color(1 + place.x, 1 + place.y, 1 + place.z));
+}
 material net { surface = diffuse(1); opacity = 0.5; }
 material ember {
     param priority: int = 3;
@@ -79,8 +85,13 @@ impl Loader for Folder<'_> {
     }
 }
 
-/// Loads a scene with this TOML after a common head, and compiles its materials.
+/// Loads a scene, and compiles its materials.
 pub fn load(toml: &str) -> (Scene, Program) {
+    load_with(toml, &[])
+}
+
+/// The same, with more files for it to name.
+pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     let folder = tempfile::tempdir().expect("a folder");
     let files = [
         ("room.obj", ROOM),
@@ -89,7 +100,7 @@ pub fn load(toml: &str) -> (Scene, Program) {
         ("m.impasto", MATERIALS),
         ("scene.toml", toml),
     ];
-    for (name, text) in files {
+    for (name, text) in files.iter().chain(more) {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
     let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));

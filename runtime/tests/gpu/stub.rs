@@ -406,6 +406,7 @@ impl Room {
                 },
                 bvh: text(geometry + TRAVERSAL),
                 bounds: [Vec3::NEG_ONE, Vec3::ONE],
+                moved: false,
                 surface: text(SURFACE.to_string()),
                 lights: text(constants + LIGHTS),
                 media: Media::default(),

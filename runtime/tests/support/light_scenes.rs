@@ -16,6 +16,7 @@ pub(crate) fn dark_scene() -> Scene {
     let mut scene = Scene {
         name: "test".into(),
         base: ".".into(),
+        origin: Default::default(),
         camera: Camera {
             position: Vec3::ZERO,
             look_at: Vec3::Z,

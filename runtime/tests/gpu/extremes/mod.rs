@@ -1,0 +1,4 @@
+//! Pictures and functions of kernels at the ends of what scenes can ask for: sizes and places far
+//! from 1 and 0, lights of any size, numbers at the ends of their range.
+
+mod places;
