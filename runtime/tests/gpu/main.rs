@@ -6,8 +6,8 @@
 
 mod casts;
 mod determinism;
-mod extremes;
 mod dropped;
+mod extremes;
 mod film;
 mod furnace;
 mod info;

@@ -106,14 +106,22 @@ fn tilted_plane(at: At) -> String {
     let (sine, cosine) = TILT.sin_cos();
     let mut text = String::from("usemtl plane\n");
     for (j, i) in (0..=n).flat_map(|j| (0..=n).map(move |i| (j, i))) {
-        let (s, t) = (2.0 * i as f64 / n as f64 - 1.0, 2.0 * j as f64 / n as f64 - 1.0);
+        let (s, t) = (
+            2.0 * i as f64 / n as f64 - 1.0,
+            2.0 * j as f64 / n as f64 - 1.0,
+        );
         let [x, y, z] = [s * cosine, s * sine, -t];
         let [x, y, z] = [x + at.offset[0], y + at.offset[1], z + at.offset[2]];
         text += &format!("v {x:?} {y:?} {z:?}\n");
     }
     for (j, i) in (0..n).flat_map(|j| (0..n).map(move |i| (j, i))) {
         let index = |j: usize, i: usize| 1 + j * (n + 1) + i;
-        let corners = [index(j, i), index(j, i + 1), index(j + 1, i + 1), index(j + 1, i)];
+        let corners = [
+            index(j, i),
+            index(j, i + 1),
+            index(j + 1, i + 1),
+            index(j + 1, i),
+        ];
         let [a, b, c, d] = corners;
         text += &format!("f {a} {b} {c} {d}\n");
     }
@@ -149,8 +157,7 @@ fn scenes(at: At) -> Vec<(&'static str, String)> {
         "[[geometry]]\nobj = 'smooth.obj'\nshare = true\nplacements = [{}]\n",
         each.join(", ")
     );
-    let absorbing =
-        format!("params.absorption = [{absorption:?}, {absorption:?}, {absorption:?}]");
+    let absorbing = format!("params.absorption = [{absorption:?}, {absorption:?}, {absorption:?}]");
     vec![
         (
             "a box with a block of silver, lit by a quad",
@@ -158,8 +165,14 @@ fn scenes(at: At) -> Vec<(&'static str, String)> {
         ),
         (
             "smooth glass that absorbs, and a lens",
-            (room(12) + &at.geometry("smooth.obj", "") + &material("ball", "liquid", &absorbing) + &lamp)
-                .replace("fov = 60.0", &format!("fov = 60.0, aperture = {}", at.length(0.05))),
+            (room(12)
+                + &at.geometry("smooth.obj", "")
+                + &material("ball", "liquid", &absorbing)
+                + &lamp)
+                .replace(
+                    "fov = 60.0",
+                    &format!("fov = 60.0, aperture = {}", at.length(0.05)),
+                ),
         ),
         (
             "a ball that shines",
@@ -217,7 +230,10 @@ fn scaling_by_powers_of_two_changes_no_bit() {
             .note();
             assert!(good, "{place}: {parted}");
             // Compilers of real GPUs fold constants as they like.
-            assert!(away.film == home.film || gpu().info().kind != "software", "{place}");
+            assert!(
+                away.film == home.film || gpu().info().kind != "software",
+                "{place}"
+            );
             assert!(red(&home).any(|v| v > 0.01), "{name} is black");
         }
     }
@@ -238,7 +254,13 @@ fn scaling_by_ten_thousand_changes_hardly_a_path() {
 fn moving_by_a_hundred_kilometres_changes_hardly_a_path() {
     let moved = scenes(At::moved([1e5, -1e5, 1e5]));
     for ((name, home), (_, away)) in scenes(HOME).into_iter().zip(moved) {
-        assert_alike(name, "a scene moved by 1e5 along each axis", &home, &away, 1e5);
+        assert_alike(
+            name,
+            "a scene moved by 1e5 along each axis",
+            &home,
+            &away,
+            1e5,
+        );
     }
     let moved = scenes(At::moved([131_072.0, -262_144.0, 524_288.0]));
     for ((name, home), (_, away)) in scenes(HOME).into_iter().zip(moved) {
@@ -288,12 +310,14 @@ fn no_ray_meets_the_plane_that_it_left() {
         let lit = format!(
             "[[lights]]\nkind = 'distant'\nto_light = [{cosine:?}, {sine:?}, 0]\nirradiance = 3\n"
         );
-        let toml = at.head([0.2, 1.4, 0.3], [0.0; 3], 40.0, 2)
+        let toml = at.head([0.2, 1.4, 0.3], [0.0; 3], 25.0, 2)
             + &at.geometry("plane.obj", "")
             + &material("plane", "dull", "")
             + &lit;
         let rendering = picture(&toml, 16);
-        let worst = red(&rendering).map(|v| (v / expected - 1.0).abs()).fold(0.0, f64::max);
+        let worst = red(&rendering)
+            .map(|v| (v / expected - 1.0).abs())
+            .fold(0.0, f64::max);
         let good = Row {
             table: "19",
             subject: "a plane of triangles under a grazing sun",
@@ -323,7 +347,12 @@ fn a_file_of_large_coordinates_keeps_its_digits() {
         let step = scene.origin.abs().max_element();
         assert!(step > 9e4, "{}", scene.origin);
         let flat = scene.flattened().expect("small");
-        let worst = flat.mesh.positions.iter().flatten().zip(near.mesh.positions.iter().flatten());
+        let worst = flat
+            .mesh
+            .positions
+            .iter()
+            .flatten()
+            .zip(near.mesh.positions.iter().flatten());
         let offset = glam::DVec3::from(far.offset);
         let worst = worst
             .map(|(a, b)| (a.as_dvec3() + scene.origin - offset - b.as_dvec3()).length())
@@ -334,7 +363,11 @@ fn a_file_of_large_coordinates_keeps_its_digits() {
             what: "error in metres of a plane 2 m wide",
             worst,
             bound: Bound::AtMost(1e-6),
-            place: if share { "as an object" } else { "in the world" },
+            place: if share {
+                "as an object"
+            } else {
+                "in the world"
+            },
         }
         .note();
         assert!(good, "{worst}");
@@ -363,8 +396,14 @@ fn materials_read_positions_in_the_world() {
             }
             let seen = rendering.film.pixels.iter().filter(|p| p[0] > 0.0).count();
             assert!(seen > 50, "{seen} pixels see the block");
-            let columns: Vec<f32> = rendering.film.pixels[8 * 24 + 9..8 * 24 + 15].iter().map(|p| p[0]).collect();
-            assert!(columns.is_sorted() && columns[5] > columns[0] + 0.1, "{columns:?}");
+            let columns: Vec<f32> = rendering.film.pixels[8 * 24 + 9..8 * 24 + 15]
+                .iter()
+                .map(|p| p[0])
+                .collect();
+            assert!(
+                columns.is_sorted() && columns[5] > columns[0] + 0.1,
+                "{columns:?}"
+            );
         }
     }
 }
@@ -379,7 +418,11 @@ fn closed_boxes_leak_no_light() {
         ("moved by 1e5", At::moved([1e5, 1e5, -1e5])),
     ] {
         let lamp = at.quad([-0.1, 0.1, -0.1], [0.2, 0.0, 0.0], [0.0, 0.0, 0.2], 1e4);
-        for (obj, bound) in [("room.obj", "wall"), ("smooth.obj", "ball"), ("block.obj", "block")] {
+        for (obj, bound) in [
+            ("room.obj", "wall"),
+            ("smooth.obj", "ball"),
+            ("block.obj", "block"),
+        ] {
             let toml = |position| {
                 at.head(position, [0.0; 3], 60.0, 6)
                     + &at.geometry(obj, "rotate = [10, 20, 30]")
