@@ -226,6 +226,7 @@ mod tests {
         Scene {
             name: String::new(),
             base: Default::default(),
+            origin: Default::default(),
             camera: Camera {
                 position: Vec3::new(0.0, 0.0, 10.0),
                 look_at: Vec3::ZERO,
