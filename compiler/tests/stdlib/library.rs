@@ -287,7 +287,7 @@ fn rounded(c: Const) -> Const {
 }
 
 /// How exact the documentation says that something is: `exact` or `within X`.
-fn promise(docs: &str, topic: &str) -> Option<f64> {
+pub fn promise(docs: &str, topic: &str) -> Option<f64> {
     let rest = docs.split_once(topic)?.1.trim_start();
     if rest.starts_with("exact") {
         return Some(0.0);

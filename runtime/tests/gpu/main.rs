@@ -12,6 +12,9 @@ mod film;
 mod furnace;
 mod info;
 mod lab;
+#[allow(dead_code)] // the rest is for tests of the library itself
+#[path = "../../../compiler/tests/stdlib/library.rs"]
+mod library;
 mod lights;
 mod lost;
 mod many_lights;
