@@ -35,7 +35,7 @@ pub(crate) enum Access {
 }
 
 /// The runtime's own buffers: name, type, access.
-pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 12] = [
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 13] = [
     ("run", "Run", Access::Uniform),
     ("state", "array<vec4<u32>>", Access::ReadWrite),
     ("queues", "array<u32>", Access::ReadWrite),
@@ -48,10 +48,11 @@ pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 12] = [
     ("shadow_rays", "array<vec4<u32>>", Access::ReadWrite),
     ("shadow_results", "array<u32>", Access::ReadWrite),
     ("queue_table", "array<u32>", Access::Read),
+    ("pixel_list", "array<u32>", Access::Read),
 ];
 
 /// Members of the uniform `run`, the settings that do not change a kernel's text.
-pub(crate) const RUN_MEMBERS: [&str; 4] = ["seed", "first_sample", "samples", "unused"];
+pub(crate) const RUN_MEMBERS: [&str; 4] = ["seed", "first_sample", "samples", "pixels"];
 
 impl Composer<'_> {
     /// Writes the text of the kernel that comes `index`-th in an iteration.
@@ -97,7 +98,7 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 11] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 12] {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
@@ -118,6 +119,7 @@ impl Composer<'_> {
             ("requests", needs.requests),
             ("fetched", self.fetches(stage)),
             ("varying_emission", needs.varying_emission),
+            ("some_pixels", needs.some_pixels),
         ]
     }
 

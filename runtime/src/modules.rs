@@ -176,6 +176,7 @@ impl Composer<'_> {
             absorption,
             overlap: false,
             order: false,
+            some_pixels: false,
             requests: all.requests,
             varying_emission: has(|m| m.varying_emission),
         }
@@ -195,6 +196,7 @@ impl Composer<'_> {
             ("work", hands_out),
             ("regenerates", self.regenerates()),
             ("fetched", fetched),
+            ("some_pixels", self.layout.needs.some_pixels),
         ];
         let text = self.layout.queues.constants()
             + &wgsl::constants_u32(&[

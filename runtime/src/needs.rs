@@ -51,10 +51,13 @@ pub(crate) struct Needs {
     pub varying_emission: bool,
     /// Rays are cast in an order of their own.
     pub order: bool,
+    /// Only some pixels are rendered.
+    pub some_pixels: bool,
 }
 
 impl Needs {
-    /// What a scene and its materials need. Of `requests` and `order` the technique decides.
+    /// What a scene and its materials need. Of `requests` and `order` the technique decides, of
+    /// `some_pixels` what is asked for.
     pub(crate) fn of(world: &World, materials: &[MaterialInfo]) -> Self {
         let media = &world.parts.media;
         let shadow_rays = world.parts.has_sampled_lights
@@ -69,6 +72,7 @@ impl Needs {
             varying_emission: materials.iter().any(|m| m.varying_emission),
             order: false,
             requests: false,
+            some_pixels: false,
         }
     }
 

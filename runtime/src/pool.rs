@@ -64,7 +64,8 @@ pub(crate) fn sizes(
         .min(limits.max_storage_buffer_binding_size);
     let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
     let default = default_pool(gpu, layout, state_bytes + queue_bytes);
-    let paths = pixels.saturating_mul(u64::from(options.samples));
+    let rendered = options.pixel_count(world.width, world.height);
+    let paths = rendered.saturating_mul(u64::from(options.samples));
     let enough = u32::try_from(paths).unwrap_or(u32::MAX);
     let pool = options
         .pool

@@ -226,7 +226,7 @@ pub(crate) struct Inputs<'a> {
 
 impl Inputs<'_> {
     pub(crate) fn report(self, status: &Status, film: &Film) -> Report {
-        let pixels = u64::from(film.width) * u64::from(film.height);
+        let pixels = self.options.pixel_count(film.width, film.height);
         let all_paths = film.total_samples();
         let paths = all_paths.saturating_sub(pixels * u64::from(self.resumed.samples));
         let gpu_seconds = if self.timed {

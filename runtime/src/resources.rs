@@ -58,6 +58,9 @@ impl Resources {
         gpu.check()?;
         let resources = Self { buffers };
         resources.set_run(gpu, options);
+        if let Some(pixels) = &options.pixels {
+            resources.set_pixels(gpu, pixels);
+        }
         Ok(resources)
     }
 
@@ -78,6 +81,13 @@ impl Resources {
         let words = run_words(options);
         let run = &self.buffers[own("run")];
         gpu.queue.write_buffer(run, 0, bytemuck::cast_slice(&words));
+    }
+
+    /// Writes which pixels are rendered.
+    pub(crate) fn set_pixels(&self, gpu: &Gpu, pixels: &[u32]) {
+        let list = &self.buffers[own("pixel_list")];
+        gpu.queue
+            .write_buffer(list, 0, bytemuck::cast_slice(pixels));
     }
 
     pub(crate) fn arguments(&self) -> &wgpu::Buffer {
@@ -231,6 +241,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
     let layout = &composer.layout;
     let pool = u64::from(composer.sizes.pool);
     let queues = layout.counters.queues as u64;
+    let pixels = u64::from(composer.world.width) * u64::from(composer.world.height);
     match name {
         "run" => 4 * RUN_MEMBERS.len() as u64,
         "state" => pool * layout.path_bytes(),
@@ -241,13 +252,13 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "arguments" => 12 * queues,
         "queue_table" if composer.queue_table => 4 * composer.materials.len() as u64,
         "queue_table" => 0,
+        // Any choice of pixels fits.
+        "pixel_list" if layout.needs.some_pixels => 4 * pixels,
+        "pixel_list" => 0,
         name if RAY_BUFFERS.iter().any(|(buffer, ..)| *buffer == name) => {
             pool * layout.ray_bytes(name)
         }
-        _ => {
-            let pixels = u64::from(composer.world.width) * u64::from(composer.world.height);
-            4 * pixels * film::PLANES as u64
-        }
+        _ => 4 * pixels * film::PLANES as u64,
     }
 }
 
@@ -257,6 +268,10 @@ fn run_words(options: &RenderOptions) -> [u32; RUN_MEMBERS.len()] {
         "seed" => random::hash_seed(options.seed),
         "first_sample" => options.first_sample,
         "samples" => options.samples,
+        "pixels" => options
+            .pixels
+            .as_ref()
+            .map_or(0, |pixels| pixels.len() as u32),
         _ => 0,
     })
 }
@@ -266,14 +281,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kernels_are_told_a_hashed_seed_and_the_range_of_samples() {
+    fn kernels_are_told_a_hashed_seed_the_range_of_samples_and_how_many_pixels() {
         let options = RenderOptions {
             seed: 4,
             first_sample: 5,
             samples: 6,
+            pixels: Some([3, 9].into()),
             ..RenderOptions::default()
         };
-        assert_eq!(run_words(&options)[..3], [random::hash_seed(4), 5, 6]);
-        assert_eq!(RUN_MEMBERS[..3], ["seed", "first_sample", "samples"]);
+        assert_eq!(run_words(&options), [random::hash_seed(4), 5, 6, 2]);
+        assert_eq!(RUN_MEMBERS, ["seed", "first_sample", "samples", "pixels"]);
     }
 }

@@ -17,10 +17,30 @@ pub(crate) fn check(world: &World, options: &RenderOptions) -> Result<(), Runtim
         return refuse("max_depth", world.max_depth.to_string(), &expected);
     }
     check_samples(options)?;
+    if let Some(some) = &options.pixels {
+        check_pixels(some, world.width, world.height)?;
+    }
     if options.pool == Some(0) {
         return refuse("pool", "0".into(), "at least 1 path");
     }
     Ok(())
+}
+
+/// The same for which pixels are rendered.
+pub(crate) fn check_pixels(some: &[u32], width: u32, height: u32) -> Result<(), RuntimeError> {
+    let all = u64::from(width) * u64::from(height);
+    let ascending = some.windows(2).all(|pair| pair[0] < pair[1]);
+    let last = some.last().map(|last| u64::from(*last));
+    if ascending && last.is_some_and(|last| last < all) {
+        return Ok(());
+    }
+    let value = match last {
+        None => "empty".to_string(),
+        Some(_) if !ascending => "not ascending".to_string(),
+        Some(last) => format!("up to {last}"),
+    };
+    let expected = format!("at least one of the indices below {all}, ascending");
+    refuse("the choice of pixels", value, &expected)
 }
 
 /// The same for which samples are taken.

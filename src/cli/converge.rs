@@ -109,7 +109,10 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
         pictures.scenes.push(shown);
     }
     write(&args.out, &convergence, &pictures)?;
-    global.note(&format!("wrote {}", args.out.join("convergence.json").display()));
+    global.note(&format!(
+        "wrote {}",
+        args.out.join("convergence.json").display()
+    ));
     Ok(())
 }
 

@@ -191,6 +191,7 @@ impl RenderArgs {
             pool: self.pool,
             technique: self.technique.technique(),
             count_hits,
+            pixels: None,
         }
     }
 }

@@ -1,23 +1,53 @@
 //! Who makes the noise: errors and time of the pixels in which each material is seen first.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use impasto_compiler::partition::Plan;
 use impasto_runtime::first_hit;
+use impasto_runtime::render::{RenderOptions, Renderer, Samples};
+use impasto_runtime::technique::Sampler;
 
 use super::StudyError;
 use super::data::MaterialShare;
+use super::store::Store;
 use super::subject::Stage;
+use super::watch::Watch;
+
+/// How often the pool is filled to time a material's pixels: when few paths are left, most of it idles.
+const POOLS: u64 = 4;
+/// Samples a pixel that a material is timed by, at least and at most.
+const TIMED_SAMPLES: [u64; 2] = [4, 1 << 16];
+
+/// Pixels by the material that they see first; `None` is no material.
+type Pixels = BTreeMap<Option<u32>, Arc<[u32]>>;
+/// GPU seconds that a sample of all pixels of each takes.
+type Seconds = BTreeMap<Option<u32>, f64>;
 
 /// The shares of all materials that are seen, those in most pixels first, when a pixel's squared and
-/// relative squared errors are `errors`.
+/// relative squared errors are `errors`. Their pixels are rendered by `plan` and `sampler`, unless the times
+/// are kept in `store`.
+///
+/// # Errors
+/// If the GPU fails, times cannot be kept, or an end was asked for.
 pub(super) fn shares(
     errors: &[[f64; 2]],
     stage: &Stage<'_>,
+    (plan, sampler): (&Plan, Sampler),
+    store: &Store,
+    watch: &mut Watch<'_>,
 ) -> Result<Vec<MaterialShare>, StudyError> {
     let scene = stage.subject.scene;
     let seen = first_hit::materials(scene);
     let pixels = by_material(&seen);
-    let seconds: BTreeMap<Option<u32>, f64> = BTreeMap::new();
+    let seconds = match store.times(&plan.strategy, sampler) {
+        Some(kept) if kept.keys().eq(pixels.keys()) => kept,
+        _ => {
+            let seconds = time(&pixels, stage, plan, sampler, watch)?;
+            store.keep_times(&plan.strategy, sampler, &seconds)?;
+            seconds
+        }
+    };
     let name = |material: u32| {
         scene
             .materials
@@ -28,18 +58,67 @@ pub(super) fn shares(
 }
 
 /// The pixels in which each is seen first.
-fn by_material(seen: &[Option<u32>]) -> BTreeMap<Option<u32>, Vec<u32>> {
+fn by_material(seen: &[Option<u32>]) -> Pixels {
     let mut pixels: BTreeMap<Option<u32>, Vec<u32>> = BTreeMap::new();
     for (pixel, material) in (0..).zip(seen) {
         pixels.entry(*material).or_default().push(pixel);
     }
+    let pixels = pixels.into_iter();
     pixels
+        .map(|(material, some)| (material, some.into()))
+        .collect()
+}
+
+/// Renders the pixels of each material alone.
+fn time(
+    pixels: &Pixels,
+    stage: &Stage<'_>,
+    plan: &Plan,
+    sampler: Sampler,
+    watch: &mut Watch<'_>,
+) -> Result<Seconds, StudyError> {
+    let mut seconds = Seconds::new();
+    let Some(first) = pixels.values().next() else {
+        return Ok(seconds);
+    };
+    watch.begin(&format!("{}: materials", stage.subject.name))?;
+    let options = RenderOptions {
+        pixels: Some(first.clone()),
+        ..stage.options(sampler, 1 << 16)
+    };
+    let (world, program) = (&stage.world, stage.subject.program);
+    let mut renderer = Renderer::from_world(stage.gpu, world, program, plan, &options)?;
+    let mut warm = false;
+    for (material, some) in pixels {
+        renderer.select_pixels(some.clone())?;
+        let count = timed_samples(u64::from(renderer.pool()), some.len() as u64);
+        let samples = Samples {
+            seed: 0,
+            first: 0,
+            count,
+        };
+        if !warm {
+            watch.render_aside(&mut renderer, &samples)?;
+            warm = true;
+        }
+        let rendering = watch.render_aside(&mut renderer, &samples)?;
+        let each = rendering.report.gpu_seconds / f64::from(count);
+        seconds.insert(*material, each);
+    }
+    Ok(seconds)
+}
+
+/// Samples a pixel that fill a pool some times over.
+fn timed_samples(pool: u64, pixels: u64) -> u32 {
+    let [least, most] = TIMED_SAMPLES;
+    let enough = (POOLS * pool).div_ceil(pixels.max(1));
+    enough.clamp(least, most) as u32
 }
 
 fn table(
-    pixels: &BTreeMap<Option<u32>, Vec<u32>>,
+    pixels: &Pixels,
     errors: &[[f64; 2]],
-    seconds: &BTreeMap<Option<u32>, f64>,
+    seconds: &Seconds,
     name: &dyn Fn(u32) -> Option<String>,
 ) -> Vec<MaterialShare> {
     let error = |pixels: &[u32], which: usize| -> f64 {
@@ -50,7 +129,7 @@ fn table(
     };
     let all = |which| errors.iter().map(|error| error[which]).sum::<f64>();
     let all_seconds: f64 = seconds.values().sum();
-    let count: usize = pixels.values().map(Vec::len).sum();
+    let count: usize = pixels.values().map(|some| some.len()).sum();
     let mut shares: Vec<MaterialShare> = pixels
         .iter()
         .map(|(material, pixels)| MaterialShare {
@@ -78,7 +157,7 @@ mod tests {
     fn shares_add_up_and_the_most_seen_is_first() {
         let seen = [Some(1), None, Some(0), Some(0), None, Some(0)];
         let errors: Vec<[f64; 2]> = (1..7).map(|i| [f64::from(i), 1.0]).collect();
-        let seconds = BTreeMap::from([(None, 1.0), (Some(0), 2.0), (Some(1), 5.0)]);
+        let seconds = Seconds::from([(None, 1.0), (Some(0), 2.0), (Some(1), 5.0)]);
         let name = |i: u32| Some(format!("m{i}"));
         let shares = table(&by_material(&seen), &errors, &seconds, &name);
         let names: Vec<_> = shares.iter().map(|s| s.name.as_deref()).collect();
@@ -91,10 +170,18 @@ mod tests {
     }
 
     #[test]
+    fn few_pixels_are_sampled_more_often() {
+        assert_eq!(timed_samples(1000, 4000), 4);
+        assert_eq!(timed_samples(1000, 1), 4000);
+        assert_eq!(timed_samples(1 << 23, 1), 1 << 16);
+        assert_eq!(timed_samples(1000, 3), 1334);
+    }
+
+    #[test]
     fn nothing_has_no_share() {
         let seen = [Some(0), None];
         let name = |_: u32| Some("a".to_string());
-        let shares = table(&by_material(&seen), &[[0.0; 2]; 2], &BTreeMap::new(), &name);
+        let shares = table(&by_material(&seen), &[[0.0; 2]; 2], &Seconds::new(), &name);
         for share in &shares {
             assert_eq!([share.mse, share.relmse, share.seconds], [0.0; 3]);
         }

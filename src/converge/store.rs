@@ -4,6 +4,7 @@
 //! A file appears under its name only when it is whole. The record of a render comes after its picture,
 //! so that a record that can be read stands for a render that is there.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,8 @@ const KEY: &str = "study.json";
 const REFERENCE: &str = "reference.json";
 /// The two halves of a reference.
 const HALVES: [&str; 2] = ["reference-a.film", "reference-b.film"];
+/// How long the pixels of each material take.
+const TIMES: &str = "materials.json";
 /// The folder of renders.
 const RUNS: &str = "runs";
 
@@ -68,6 +71,14 @@ pub struct Record {
 pub struct ReferenceRecord {
     /// GPU time that its samples took, in seconds.
     pub gpu_seconds: f64,
+}
+
+/// How long the pixels of each material take: its index and GPU seconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Times {
+    strategy: String,
+    sampler: Sampler,
+    seconds: Vec<(Option<u32>, f64)>,
 }
 
 /// The folder of one scene.
@@ -219,6 +230,35 @@ impl Store {
         self.write(REFERENCE, record)
     }
 
+    /// How long the pixels of each material took that were timed by a strategy and sampler.
+    pub(super) fn times(
+        &self,
+        strategy: &str,
+        sampler: Sampler,
+    ) -> Option<BTreeMap<Option<u32>, f64>> {
+        let times: Times = read(&self.folder.join(TIMES))?;
+        let fits = times.strategy == strategy && times.sampler == sampler;
+        fits.then(|| times.seconds.into_iter().collect())
+    }
+
+    /// Keeps that.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(super) fn keep_times(
+        &self,
+        strategy: &str,
+        sampler: Sampler,
+        seconds: &BTreeMap<Option<u32>, f64>,
+    ) -> Result<(), StudyError> {
+        let times = Times {
+            strategy: strategy.to_owned(),
+            sampler,
+            seconds: seconds.iter().map(|(m, s)| (*m, *s)).collect(),
+        };
+        self.write(TIMES, &times)
+    }
+
     fn write<T: Serialize>(&self, name: &str, value: &T) -> Result<(), StudyError> {
         let path = self.folder.join(name);
         let text = serde_json::to_string_pretty(value)
@@ -254,7 +294,7 @@ impl Store {
         };
         let runs = self.folder.join(RUNS);
         gone(fs::remove_dir_all(&runs), &runs)?;
-        for name in HALVES.into_iter().chain([REFERENCE, KEY]) {
+        for name in HALVES.into_iter().chain([REFERENCE, TIMES, KEY]) {
             let path = self.folder.join(name);
             gone(fs::remove_file(&path), &path)?;
         }

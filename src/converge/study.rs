@@ -11,7 +11,7 @@ use impasto_runtime::gpu::Gpu;
 use impasto_runtime::output;
 use impasto_runtime::technique::{Choice, Sampler};
 
-use super::data::{Errors, Point, Reference, Run, SceneConvergence, Series};
+use super::data::{Errors, MaterialShare, Point, Reference, Run, SceneConvergence, Series};
 use super::pictures::{self, RenderPictures, ScenePictures};
 use super::reference::{Goal, Maker};
 use super::series::Task;
@@ -84,7 +84,7 @@ pub fn study(
     let series = study.series(&taken, &truth)?;
     reference.relative_error = relative(&reference, &series);
     let scene_pictures = study.pictures(&taken, &truth)?;
-    let materials = materials::shares(&study.first_errors(&taken, &truth)?, &stage)?;
+    let materials = study.materials(&plans, &taken, &truth, &mut watch)?;
     let convergence = SceneConvergence {
         name: subject.name.clone(),
         size: (stage.world.width, stage.world.height),
@@ -227,6 +227,22 @@ impl Study<'_> {
             fits: fit::fits(&points),
             points,
         })
+    }
+
+    /// Who makes the noise of the first series, and takes its time.
+    fn materials(
+        &self,
+        plans: &[(String, Plan)],
+        taken: &[Taken],
+        truth: &Film,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<MaterialShare>, StudyError> {
+        let (Some((_, plan)), Some(first)) = (plans.first(), taken.first()) else {
+            return Ok(Vec::new());
+        };
+        let errors = self.first_errors(taken, truth)?;
+        let by = (plan, first.sampler);
+        materials::shares(&errors, self.stage, by, self.store, watch)
     }
 
     /// Squared errors of every pixel, absolute and relative: means over the largest renders of the first

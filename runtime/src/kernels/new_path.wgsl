@@ -5,12 +5,21 @@
 
 fn new_path(slot: u32, item: u32) {
     let place = atomicLoad(&counters[COUNTER_WORK_PIXEL]) + item;
-    let sample = atomicLoad(&counters[COUNTER_WORK_SAMPLE]) + place / PIXELS;
+#if some_pixels
+    let pixels = run.pixels;
+#else
+    let pixels = PIXELS;
+#endif
+    let sample = atomicLoad(&counters[COUNTER_WORK_SAMPLE]) + place / pixels;
     if sample >= run.samples {
         store_radiance(slot, PathRadiance(vec3<f32>(0.0), PATH_RETIRED));
         return;
     }
-    let pixel = place % PIXELS;
+#if some_pixels
+    let pixel = pixel_list[place % pixels];
+#else
+    let pixel = place % pixels;
+#endif
     let index = run.first_sample + sample;
     let ray = camera_ray(pixel, random_numbers(pixel, index, DRAW_CAMERA));
     store_ray_origin(slot, PathRayOrigin(ray.origin, pixel));

@@ -104,24 +104,29 @@ fn hand_out_work() {
     let sample = atomicLoad(&counters[COUNTER_NEXT_SAMPLE]);
     atomicStore(&counters[COUNTER_WORK_PIXEL], pixel);
     atomicStore(&counters[COUNTER_WORK_SAMPLE], sample);
+#if some_pixels
+    let pixels = run.pixels;
+#else
+    let pixels = PIXELS;
+#endif
     let left = run.samples - sample;
     let place = pixel + asking;
-    if place / PIXELS >= left {
+    if place / pixels >= left {
         atomicStore(&counters[COUNTER_NEXT_PIXEL], 0u);
         atomicStore(&counters[COUNTER_NEXT_SAMPLE], run.samples);
-        atomicAdd(&counters[COUNTER_RETIRED], asking - claimed(left, pixel, asking));
+        atomicAdd(&counters[COUNTER_RETIRED], asking - claimed(left, pixel, pixels, asking));
     } else {
-        atomicStore(&counters[COUNTER_NEXT_PIXEL], place % PIXELS);
-        atomicStore(&counters[COUNTER_NEXT_SAMPLE], sample + place / PIXELS);
+        atomicStore(&counters[COUNTER_NEXT_PIXEL], place % pixels);
+        atomicStore(&counters[COUNTER_NEXT_SAMPLE], sample + place / pixels);
     }
 }
 
-// How many of those asking still get work, when `left` samples of a pixel are left and the
+// How many of those asking still get work, when `left` samples of each of `pixels` are left and the
 // first of them begins at `pixel`.
-fn claimed(left: u32, pixel: u32, asking: u32) -> u32 {
+fn claimed(left: u32, pixel: u32, pixels: u32, asking: u32) -> u32 {
     if left == 0u {
         return 0u;
     }
-    return min(asking, left * PIXELS - pixel);
+    return min(asking, left * pixels - pixel);
 }
 #endif

@@ -81,7 +81,8 @@ impl Job {
                 reason: "a megakernel cannot go on with paths that are under way".into(),
             });
         }
-        let makings = Makings::new(gpu, &self.world, &*self.source, self.technique);
+        let mut makings = Makings::new(gpu, &self.world, &*self.source, self.technique);
+        makings.some_pixels = present.layout.needs.some_pixels;
         let layout = makings.layout(plan)?;
         let queues = 4 * u64::from(sizes.pool) * layout.queue_words();
         gpu.check_binding_size("the queues of the new plan", queues)?;

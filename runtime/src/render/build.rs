@@ -45,6 +45,8 @@ pub(crate) struct Makings<'a> {
     instances: Vec<InstanceInfo>,
     tables: Vec<BufferData>,
     pub technique: Technique,
+    /// Whether only some pixels are rendered.
+    pub some_pixels: bool,
     subgroup_size: u32,
     random: ShaderPart,
 }
@@ -75,6 +77,7 @@ impl<'g> Renderer<'g> {
         options.technique = options.technique.within(gpu);
         settings::check(world, &options)?;
         let mut makings = Makings::new(gpu, world, source, options.technique);
+        makings.some_pixels = options.pixels.is_some();
         let layout = makings.layout(plan)?;
         options.technique = layout.technique(options.technique);
         makings.technique = options.technique;
@@ -83,7 +86,7 @@ impl<'g> Renderer<'g> {
         if options.count_hits {
             composer.layout.counters.hits = counted_materials(gpu, &composer);
         }
-        let facts = Facts::of(&composer, options.seed);
+        let facts = Facts::of(&composer, &options);
         let resources = Resources::new(gpu, &composer, &options)?;
         let build = |kernel: &Kernel| build_step(gpu, kernel, &resources, sizes);
         let (kernels, steps) = build_all(&composer, build)?;
@@ -133,7 +136,7 @@ pub fn identity(
     let layout = makings.layout(&plan)?;
     let sizes = pool::sizes(gpu, world, &layout, options)?;
     let composer = makings.composer(&plan, layout, sizes);
-    Ok(Facts::of(&composer, options.seed).identity)
+    Ok(Facts::of(&composer, options).identity)
 }
 
 impl<'a> Makings<'a> {
@@ -153,12 +156,15 @@ impl<'a> Makings<'a> {
             instances: source.instances(),
             tables: source.tables().iter().map(BufferData::from).collect(),
             technique,
+            some_pixels: false,
             subgroup_size: gpu.subgroup_size(),
         }
     }
 
     pub(crate) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
-        Layout::new(self.world, &self.materials, plan, &self.technique)
+        let mut layout = Layout::new(self.world, &self.materials, plan, &self.technique)?;
+        layout.needs.some_pixels = self.some_pixels;
+        Ok(layout)
     }
 
     /// What writes the kernels of a plan.
@@ -191,8 +197,9 @@ impl<'a> Makings<'a> {
 
 impl Facts {
     /// What is known before kernels are built, which takes yet unknown time.
-    fn of(composer: &Composer<'_>, seed: u32) -> Self {
+    fn of(composer: &Composer<'_>, options: &RenderOptions) -> Self {
         let world = composer.world;
+        let scene = composer.fingerprint();
         let (width, height) = (world.width, world.height);
         Self {
             strategy: composer.plan.strategy.clone(),
@@ -203,10 +210,11 @@ impl Facts {
             identity: Identity {
                 width,
                 height,
-                seed,
+                seed: options.seed,
                 sampler: composer.technique.sampler,
-                scene: composer.fingerprint(),
+                scene: options.fingerprint(scene),
             },
+            scene,
             materials: MaterialReport::of(composer.materials, composer.instances),
             workload: workload::before_rendering(
                 world,

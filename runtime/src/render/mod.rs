@@ -7,13 +7,16 @@ mod build;
 mod iterate;
 mod observe;
 mod replan;
+mod selection;
 
 pub use build::identity;
 pub(crate) use build::{Makings, build_step};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
+pub use selection::Samples;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use impasto_compiler::partition::Workload;
@@ -27,7 +30,6 @@ use crate::passes::{Keeping, Pass, Passes};
 use crate::queues::Scalar;
 use crate::report::{MaterialReport, Report, Resumed};
 use crate::scene::GeometryCounts;
-use crate::settings;
 use crate::status::Status;
 use crate::technique::Technique;
 use crate::workload::Mark;
@@ -54,17 +56,9 @@ pub struct RenderOptions {
     pub technique: Technique,
     /// Whether a wavefront's logic kernel counts what paths hit, for the report's workload.
     pub count_hits: bool,
-}
-
-/// Which samples of every pixel a render takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Samples {
-    /// The seed of all random numbers.
-    pub seed: u32,
-    /// Index of the first.
-    pub first: u32,
-    /// How many, at least 1.
-    pub count: u32,
+    /// The pixels to render, ascending, each as row x width + column; all if `None`. The others have no
+    /// samples, and those given have the bits that they have in the whole picture.
+    pub pixels: Option<Arc<[u32]>>,
 }
 
 impl Default for RenderOptions {
@@ -76,6 +70,7 @@ impl Default for RenderOptions {
             pool: None,
             technique: Technique::default(),
             count_hits: false,
+            pixels: None,
         }
     }
 }
@@ -124,6 +119,8 @@ struct Facts {
     geometry: GeometryCounts,
     max_depth: u32,
     identity: Identity,
+    /// The fingerprint of all pixels.
+    scene: u64,
     materials: Vec<MaterialReport>,
     /// What is known of the workload before rendering.
     workload: Workload,
@@ -156,23 +153,6 @@ impl<'g> Renderer<'g> {
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Rendering, RuntimeError> {
         self.render_passes(Some(keeping), progress)
-    }
-
-    /// Chooses which samples the next renders take, so that kernels that are built serve many renders.
-    ///
-    /// # Errors
-    /// If there are no such samples.
-    pub fn select(&mut self, samples: &Samples) -> Result<(), RuntimeError> {
-        let options = RenderOptions {
-            samples: samples.count,
-            first_sample: samples.first,
-            seed: samples.seed,
-            ..self.options.clone()
-        };
-        settings::check_samples(&options)?;
-        self.facts.identity.seed = samples.seed;
-        self.options = options;
-        Ok(())
     }
 
     /// Paths in flight.
@@ -271,8 +251,10 @@ impl<'g> Renderer<'g> {
         })
     }
 
+    /// How many pixels are rendered.
     fn pixels(&self) -> u64 {
-        u64::from(self.facts.width) * u64::from(self.facts.height)
+        self.options
+            .pixel_count(self.facts.width, self.facts.height)
     }
 
     /// What a new plan was made from, or else what was counted so far.

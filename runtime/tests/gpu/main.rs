@@ -21,6 +21,7 @@ mod many_lights;
 mod media;
 mod ops;
 mod passes;
+mod pixels;
 mod placed;
 mod planes;
 mod plans;
