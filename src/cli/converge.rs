@@ -9,7 +9,7 @@ use impasto::compiler::partition::{Needs, Wanted};
 use impasto::converge::data::{Convergence, Reference};
 use impasto::converge::pictures::Pictures;
 use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
-use impasto::converge::{Progress, Settings, StudyError, Subject, study};
+use impasto::converge::{Progress, Settings, StudyError, Subject, page, study};
 use impasto::runtime::report::AdapterReport;
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Choice, Sampler};
@@ -108,11 +108,8 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
         convergence.scenes.push(found);
         pictures.scenes.push(shown);
     }
-    write(&args.out, &convergence, &pictures)?;
-    global.note(&format!(
-        "wrote {}",
-        args.out.join("convergence.json").display()
-    ));
+    page::write(&args.out, &convergence, &pictures)?;
+    global.note(&format!("wrote {}", args.out.join("index.html").display()));
     Ok(())
 }
 
@@ -306,13 +303,6 @@ fn bar(global: &Global) -> ProgressBar {
         bar.set_style(style);
     }
     bar
-}
-
-fn write(folder: &Path, convergence: &Convergence, _pictures: &Pictures) -> Result<(), Failure> {
-    let path = folder.join("convergence.json");
-    let text = serde_json::to_string_pretty(convergence)
-        .map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
-    Ok(files::write_whole(&path, format!("{text}\n").as_bytes())?)
 }
 
 #[cfg(test)]
