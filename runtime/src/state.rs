@@ -409,6 +409,7 @@ mod tests {
         overlap: true,
         varying_emission: true,
         order: true,
+        some_pixels: true,
     };
     const EVERY_STAGE: [StageId; 7] = [
         Logic,

@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod common;
+mod converge;
 mod cost;
 mod cost_lines;
 mod emit_check;
