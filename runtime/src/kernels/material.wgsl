@@ -149,15 +149,16 @@ fn light_share(light_pdf: f32, bsdf_pdf: f32) -> f32 {
 // A shadow ray's direction and length.
 struct Way { direction: vec3<f32>, distance: f32 }
 
-// The ray from the moved origin to the point that was sampled, ending just before it, since
-// the light itself must not occlude. Discrete lights far away stay in their direction.
+// The ray from the moved origin to the point that was sampled. Its end is off the light already, which must
+// not occlude itself; a few units in the last place make up for rounding here. Discrete lights far
+// away stay in their direction.
 fn aim(direction: vec3<f32>, distance: f32, moved: vec3<f32>) -> Way {
     if distance > 1e18 {
         return Way(direction, distance);
     }
     let to_light = direction * distance - moved;
     let left = length(to_light);
-    return Way(to_light / max(left, 1e-30), left * 0.9999);
+    return Way(to_light / max(left, 1e-30), left * 0.999999);
 }
 #endif
 #if requests

@@ -11,13 +11,16 @@ fn sample_area(pick: LightPick, position: vec3<f32>, point: vec3<f32>, normal: v
     let scaled = to_light / scale;
     let distance = scale * length(scaled);
     let wi = normalize(scaled);
-    let pdf = pick.probability * area_density(distance, -dot(wi, normal), area);
+    let cosine = -dot(wi, normal);
+    let pdf = pick.probability * area_density(distance, cosine, area);
     if !(pdf > 0.0) {
         return no_light_sample();
     }
-    // Up to a point just off the surface, on the side that is lit; and at grazing angles, where
-    // that point is hardly nearer, shorter by some units in the last place.
-    let reach = dot(offset_origin(point, normal) - position, wi) * 0.999995;
+    // Up to a point just off the surface, on the side that is lit. At grazing angles that point is
+    // hardly nearer, and rounding moves where the ray meets the surface by its units in the last place
+    // over the cosine. Never by more than that: what is close before a light far away shades it.
+    let slack = clamp(1e-6 / cosine, 2e-6, 1e-4);
+    let reach = dot(offset_origin(point, normal) - position, wi) * (1.0 - slack);
     return LightSample(wi, reach, light_radiance(pick.light) / pdf, pdf);
 }
 

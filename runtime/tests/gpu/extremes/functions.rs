@@ -232,6 +232,48 @@ fn densities_of_light_samples_hold_for_lights_of_any_size() {
     );
 }
 
+/// Row 20: a light seen at any angle is not hidden by itself, nor by its own other half.
+#[test]
+fn no_light_hides_itself() {
+    let mut random = Random::new(36);
+    let mut worst = Worst::default();
+    for case in 0..effort(30, 600) {
+        let size = 10f32.powf(random.range(-3.0, 3.0));
+        let normal = random.direction();
+        let u = normal.any_orthonormal_vector();
+        let v = normal.cross(u);
+        // From straight on to a thousandth of a radian.
+        let cosine = 10f32.powf(random.range(-3.0, 0.0));
+        let along = (random.uniform() * u + random.uniform() * v).normalize_or(u);
+        let toward = cosine * normal + (1.0 - cosine * cosine).max(0.0).sqrt() * along;
+        let offset = size * random.range(0.0, 20.0) * random.direction();
+        let distance = size * random.range(2.0, 100.0);
+        let corner = offset - 0.5 * size * (u + v);
+        let light = quad(
+            corner.to_array(),
+            (size * u).to_array(),
+            (size * v).to_array(),
+            1.0,
+        );
+        let mut scene = dark_scene();
+        scene.mesh.positions[0] = scene.mesh.positions[0].map(|p| 100.0 * size * p);
+        push_quad(&mut scene, light);
+        let position = offset + distance * toward;
+        let samples = sample(&parts(&scene, &[]), position, 500, case as u64 + 1);
+        let lit = samples.iter().filter(|s| s.radiance != Vec3::ZERO);
+        let hidden = lit.filter(|s| !s.visible && s.wi.y > -0.5).count();
+        worst.see(hidden as f64, || {
+            format!("a quad {size:e} wide, {distance:e} away, seen at a cosine of {cosine:e}")
+        });
+    }
+    worst.hold(
+        "20",
+        "quad light",
+        "samples of 500 that the light itself hides",
+        0.0,
+    );
+}
+
 /// Row 11: the ends of the random numbers, in every position and in every kind of light.
 #[test]
 fn no_light_sample_at_the_ends_of_random_numbers_is_broken() {

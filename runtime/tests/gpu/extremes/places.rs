@@ -408,6 +408,49 @@ fn materials_read_positions_in_the_world() {
     }
 }
 
+/// A shade close below a lamp far away: a shadow ray that ended where it is small against its length
+/// before the lamp would end before the shade as well.
+#[test]
+fn shades_close_to_a_far_lamp_keep_its_light() {
+    for (place, at) in [
+        ("at home", HOME),
+        ("times 1e-4", At::scaled(1e-4)),
+        ("times 1e4", At::scaled(1e4)),
+    ] {
+        let shade = at.length(60.0 - 0.002);
+        let shade = format!(
+            "[[geometry]]\nobj = 'plane.obj'\nscale = {}\nrotate = [0, 0, {:?}]\ntranslate = [0, {shade}, 0]\n",
+            at.length(1.0),
+            -TILT.to_degrees()
+        );
+        let toml = |height: f64, shade: &str| {
+            at.head([0.2, 1.4, 0.3], [0.0; 3], 25.0, 2)
+                + &at.geometry("plane.obj", "")
+                + &material("plane", "dull", "")
+                + shade
+                + &at.quad([-0.2, height, -0.2], [0.4, 0.0, 0.0], [0.0, 0.0, 0.4], 1e4)
+        };
+        let leaks = red(&picture(&toml(60.0, &shade), 16))
+            .filter(|v| *v > 0.0)
+            .count() as f64;
+        let good = Row {
+            table: "19",
+            subject: "a floor 60 m below a lamp with a shade 2 mm before it",
+            what: "pixels that are not black",
+            worst: leaks,
+            bound: Bound::AtMost(0.0),
+            place,
+        }
+        .note();
+        assert!(good, "{place}: {leaks}");
+        let lit = picture(&toml(60.0, ""), 16);
+        assert!(
+            red(&lit).all(|v| v > 0.01),
+            "{place}: the lamp hides itself"
+        );
+    }
+}
+
 /// Light in a closed box stays there, whatever the size of the box.
 #[test]
 fn closed_boxes_leak_no_light() {
