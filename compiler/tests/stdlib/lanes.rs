@@ -1,30 +1,32 @@
-//! Runs IR for many inputs at once, so that a million samples of a BSDF take a second.
+//! Runs IR for many inputs at once, in double precision or in single, so that a million samples
+//! of a BSDF take a second.
 //!
 //! Values are columns, one number a lane; a column of length one is the same in every lane. All
 //! lanes follow both sides of a branch and stores are masked. What is not written here as a loop
 //! goes through the op table; `lanes_and_interpreter_agree` holds both to the same bits.
 
+mod ops;
+
 use std::rc::Rc;
 
-use impasto_compiler::ir::value::Value;
+use impasto_compiler::ir::value::Real;
 use impasto_compiler::ir::{
     Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type,
 };
-use impasto_compiler::ops::{self, Op};
 
 /// One component in every lane.
 #[derive(Clone, Debug)]
-pub enum Column {
-    Float(Rc<Vec<f64>>),
+pub enum Column<F = f64> {
+    Float(Rc<Vec<F>>),
     Int(Rc<Vec<i32>>),
     Bool(Rc<Vec<bool>>),
 }
 
 /// A value: its components in order, structs flattened.
-pub type Lanes = Vec<Column>;
+pub type Lanes<F = f64> = Vec<Column<F>>;
 
-impl Column {
-    pub fn floats(&self) -> &[f64] {
+impl<F: Real> Column<F> {
+    pub fn floats(&self) -> &[F] {
         match self {
             Column::Float(v) => v,
             _ => panic!("not a float column: {self:?}"),
@@ -55,17 +57,17 @@ impl Column {
 }
 
 /// A column of floats.
-pub fn floats(values: Vec<f64>) -> Column {
+pub fn floats<F>(values: Vec<F>) -> Column<F> {
     Column::Float(Rc::new(values))
 }
 
 /// The same floats in every lane.
-pub fn uniform(components: &[f64]) -> Lanes {
-    components.iter().map(|&x| floats(vec![x])).collect()
+pub fn uniform<F: Real>(components: &[f64]) -> Lanes<F> {
+    components.iter().map(|&x| floats(vec![F::of(x)])).collect()
 }
 
 /// The same constant in every lane.
-pub fn constant(c: &Const) -> Lanes {
+pub fn constant<F: Real>(c: &Const) -> Lanes<F> {
     match c {
         Const::Bool(b) => vec![Column::Bool(Rc::new(vec![*b]))],
         Const::Int(i) => vec![Column::Int(Rc::new(vec![*i]))],
@@ -73,9 +75,31 @@ pub fn constant(c: &Const) -> Lanes {
     }
 }
 
+/// Constants of one type, a lane each.
+pub fn constants<'a, F: Real>(values: impl Iterator<Item = &'a Const>) -> Lanes<F> {
+    let mut columns: Lanes<F> = Vec::new();
+    for value in values {
+        for (c, one) in constant::<F>(value).into_iter().enumerate() {
+            match (columns.get_mut(c), one) {
+                (Some(Column::Float(all)), Column::Float(x)) => Rc::make_mut(all).push(x[0]),
+                (Some(Column::Int(all)), Column::Int(x)) => Rc::make_mut(all).push(x[0]),
+                (Some(Column::Bool(all)), Column::Bool(x)) => Rc::make_mut(all).push(x[0]),
+                (_, first) => columns.push(first),
+            }
+        }
+    }
+    columns
+}
+
+/// Vectors, a lane each.
+pub fn vectors<F: Real, const N: usize>(values: &[[f64; N]]) -> Lanes<F> {
+    let column = |c: usize| floats(values.iter().map(|v| F::of(v[c])).collect());
+    (0..N).map(column).collect()
+}
+
 /// Component `c` of `value` in lane `l`.
-pub fn float_at(value: &Lanes, c: usize, l: usize) -> f64 {
-    at(value[c].floats(), l)
+pub fn float_at<F: Real>(value: &Lanes<F>, c: usize, l: usize) -> f64 {
+    at(value[c].floats(), l).f64()
 }
 
 fn at<T: Copy>(v: &[T], l: usize) -> T {
@@ -83,12 +107,12 @@ fn at<T: Copy>(v: &[T], l: usize) -> T {
 }
 
 /// Runs function `id` of `module`.
-pub fn call(module: &Module, id: FunctionId, args: Vec<Lanes>) -> Lanes {
+pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> Lanes<F> {
     run(module, &module.functions[id.index()], args)
 }
 
 /// Runs a function that need not be in the module.
-pub fn run(module: &Module, f: &Function, args: Vec<Lanes>) -> Lanes {
+pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {
     let locals = f.locals.iter().map(|l| zero(module, l.ty)).collect();
     let mut frame = Frame {
         module,
@@ -101,25 +125,25 @@ pub fn run(module: &Module, f: &Function, args: Vec<Lanes>) -> Lanes {
     frame.get(f.value)
 }
 
-fn zero(module: &Module, ty: Type) -> Lanes {
+fn zero<F: Real>(module: &Module, ty: Type) -> Lanes<F> {
     match ty {
         Type::Bool => constant(&Const::Bool(false)),
         Type::Int => constant(&Const::Int(0)),
         Type::Struct(id) => {
             let fields = module.structs[id.index()].fields.iter();
-            fields.flat_map(|(_, ty)| zero(module, *ty)).collect()
+            fields.flat_map(|(_, ty)| zero::<F>(module, *ty)).collect()
         }
         Type::Mat3 => uniform(&[0.0; 9]),
         _ => uniform(&vec![0.0; ty.width().unwrap_or(1)]),
     }
 }
 
-struct Frame<'a> {
+struct Frame<'a, F> {
     module: &'a Module,
     f: &'a Function,
-    params: Vec<Lanes>,
-    locals: Vec<Lanes>,
-    values: Vec<Option<Lanes>>,
+    params: Vec<Lanes<F>>,
+    locals: Vec<Lanes<F>>,
+    values: Vec<Option<Lanes<F>>>,
 }
 
 /// How a block ended, in all lanes alike.
@@ -130,7 +154,7 @@ enum Flow {
     Continue,
 }
 
-impl Frame<'_> {
+impl<F: Real> Frame<'_, F> {
     fn block(&mut self, block: &Block, mask: Option<&[bool]>) -> Flow {
         for stmt in block {
             let flow = self.stmt(stmt, mask);
@@ -232,7 +256,7 @@ impl Frame<'_> {
         Flow::Next
     }
 
-    fn get(&self, id: ExprId) -> Lanes {
+    fn get(&self, id: ExprId) -> Lanes<F> {
         match &self.f.expr(id).kind {
             ExprKind::Const(c) => constant(c),
             ExprKind::Param(i) => self.params[*i as usize].clone(),
@@ -244,13 +268,13 @@ impl Frame<'_> {
         }
     }
 
-    fn eval(&self, id: ExprId) -> Lanes {
+    fn eval(&self, id: ExprId) -> Lanes<F> {
         let e = self.f.expr(id);
-        let args: Vec<Lanes> = e.kind.operands().iter().map(|&a| self.get(a)).collect();
+        let args: Vec<Lanes<F>> = e.kind.operands().iter().map(|&a| self.get(a)).collect();
         match &e.kind {
             ExprKind::Op(op, operands) => {
                 let types: Vec<Type> = operands.iter().map(|&a| self.f.ty(a)).collect();
-                fast(*op, &args).unwrap_or_else(|| by_table(*op, &types, &args))
+                ops::fast(*op, &args).unwrap_or_else(|| ops::by_table(*op, &types, &args))
             }
             ExprKind::Load(local) => self.locals[local.index()].clone(),
             ExprKind::Compose(_) => match args.concat() {
@@ -268,7 +292,7 @@ impl Frame<'_> {
                     panic!("{}: a field of no struct", self.f.name);
                 };
                 let fields = &self.module.structs[id.index()].fields;
-                let width = |ty: Type| zero(self.module, ty).len();
+                let width = |ty: Type| zero::<F>(self.module, ty).len();
                 let start: usize = fields[..*i as usize].iter().map(|(_, ty)| width(*ty)).sum();
                 args[0][start..start + width(e.ty)].to_vec()
             }
@@ -277,7 +301,7 @@ impl Frame<'_> {
     }
 }
 
-fn store(place: &mut Column, value: &Column, mask: Option<&[bool]>) {
+fn store<F: Real>(place: &mut Column<F>, value: &Column<F>, mask: Option<&[bool]>) {
     let Some(mask) = mask else {
         *place = value.clone();
         return;
@@ -297,189 +321,28 @@ fn masked<T: Copy>(mask: &[bool], new: &[T], old: &[T]) -> Vec<T> {
         .collect()
 }
 
-// ---- Ops ---------------------------------------------------------------------------------
-
-/// The ops that BSDFs spend their time in, as loops over floats.
-fn fast(op: Op, args: &[Lanes]) -> Option<Lanes> {
-    let all_floats = args.iter().flatten().all(|c| matches!(c, Column::Float(_)));
-    let zero_safe = |x: f64, y: f64| if y == 0.0 { 0.0 } else { x / y };
-    let low = |x: f64, y: f64| if y < x { y } else { x };
-    let high = |x: f64, y: f64| if x < y { y } else { x };
-    if let (Op::Select, [cond, a, b]) = (op, args)
-        && matches!(a[0], Column::Float(_))
-    {
-        let picked = |(a, b): (&Column, &Column)| choose(cond[0].bools(), a.floats(), b.floats());
-        return Some(a.iter().zip(b).map(picked).collect());
-    }
-    if let Op::And | Op::Or = op {
-        return Some(vec![logic(op, &args[0][0], &args[1][0])]);
-    }
-    if !all_floats {
-        return None;
-    }
-    Some(match op {
-        Op::Neg => map1(args, |x| -x),
-        Op::Add => map2(args, |x, y| x + y),
-        Op::Sub => map2(args, |x, y| x - y),
-        Op::Mul => map2(args, |x, y| x * y),
-        Op::Div => map2(args, zero_safe),
-        Op::Min => map2(args, low),
-        Op::Max => map2(args, high),
-        Op::Clamp => map2(&[map2(&args[..2], high), args[2].clone()], low),
-        Op::Saturate => map1(args, |x| low(high(x, 0.0), 1.0)),
-        Op::Mix => {
-            let kept = map2(&[args[0].clone(), map1(&args[2..], |t| 1.0 - t)], |x, t| {
-                x * t
-            });
-            map2(&[kept, map2(&args[1..], |y, t| y * t)], |x, y| x + y)
-        }
-        Op::Abs => map1(args, f64::abs),
-        Op::Exp => map1(args, |x| x.min(88.0).exp()),
-        Op::Log => map1(args, |x| x.max(ops::TINY).ln()),
-        Op::InverseSqrt => map1(args, |x| {
-            if x > 0.0 {
-                1.0 / high(x, ops::TINY).sqrt()
-            } else {
-                0.0
-            }
-        }),
-        Op::Normalize => {
-            let inverse = |d: f64| if d > ops::TINY { 1.0 / d.sqrt() } else { 0.0 };
-            let scale = map1(&[vec![dot(&args[0], &args[0])]], inverse);
-            map2(&[args[0].clone(), scale], |x, s| {
-                if s == 0.0 { 0.0 } else { x * s }
-            })
-        }
-        Op::Sqrt => map1(args, |x| high(x, 0.0).sqrt()),
-        Op::Sin => map1(args, f64::sin),
-        Op::Cos => map1(args, f64::cos),
-        Op::Dot => vec![dot(&args[0], &args[1])],
-        Op::Less => vec![compare(args, |x, y| x < y)],
-        Op::LessEqual => vec![compare(args, |x, y| x <= y)],
-        Op::Greater => vec![compare(args, |x, y| x > y)],
-        Op::GreaterEqual => vec![compare(args, |x, y| x >= y)],
-        _ => return None,
-    })
-}
-
-fn map1(args: &[Lanes], f: impl Fn(f64) -> f64) -> Lanes {
-    let column = |c: &Column| floats(c.floats().iter().map(|&x| f(x)).collect());
-    args[0].iter().map(column).collect()
-}
-
-fn map2(args: &[Lanes], f: impl Fn(f64, f64) -> f64) -> Lanes {
-    let width = args[0].len().max(args[1].len());
-    let part = |k: usize, c: usize| args[k][if args[k].len() == 1 { 0 } else { c }].floats();
-    (0..width)
-        .map(|c| floats(zip(part(0, c), part(1, c), &f)))
-        .collect()
-}
-
-fn zip<T>(a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> T) -> Vec<T> {
-    match (a, b) {
-        ([x], _) => b.iter().map(|&y| f(*x, y)).collect(),
-        (_, [y]) => a.iter().map(|&x| f(x, *y)).collect(),
-        _ => a.iter().zip(b).map(|(&x, &y)| f(x, y)).collect(),
-    }
-}
-
-fn dot(a: &Lanes, b: &Lanes) -> Column {
-    let products = a
-        .iter()
-        .zip(b)
-        .map(|(x, y)| zip(x.floats(), y.floats(), |x, y| x * y));
-    floats(products.fold(vec![0.0], |sum, p| zip(&sum, &p, |s, x| s + x)))
-}
-
-fn compare(args: &[Lanes], f: impl Fn(f64, f64) -> bool) -> Column {
-    Column::Bool(Rc::new(zip(args[0][0].floats(), args[1][0].floats(), f)))
-}
-
-fn logic(op: Op, a: &Column, b: &Column) -> Column {
-    let (a, b) = (a.bools(), b.bools());
-    let one = |l: usize| match op {
-        Op::And => at(a, l) && at(b, l),
-        _ => at(a, l) || at(b, l),
-    };
-    Column::Bool(Rc::new((0..a.len().max(b.len())).map(one).collect()))
-}
-
-fn choose(cond: &[bool], a: &[f64], b: &[f64]) -> Column {
-    let lanes = cond.len().max(a.len()).max(b.len());
-    floats(
-        (0..lanes)
-            .map(|l| if at(cond, l) { at(a, l) } else { at(b, l) })
-            .collect(),
-    )
-}
-
-/// Any op, lane by lane through the op table.
-fn by_table(op: Op, types: &[Type], args: &[Lanes]) -> Lanes {
-    let lanes = args.iter().flatten().map(Column::len).max().unwrap_or(1);
-    let mut out: Lanes = Vec::new();
-    let mut values = Vec::with_capacity(args.len());
-    for l in 0..lanes {
-        values.clear();
-        values.extend(types.iter().zip(args).map(|(ty, a)| gather(*ty, a, l)));
-        let result = ops::evaluate(op, &values);
-        if l == 0 {
-            out = empty(&result, lanes);
-        }
-        scatter(&result, &mut out);
-    }
-    out
-}
-
-fn gather(ty: Type, value: &Lanes, l: usize) -> Value<f64> {
-    match ty {
-        Type::Bool => Value::Bool(at(value[0].bools(), l)),
-        Type::Int => Value::Int(at(value[0].ints(), l)),
-        _ => {
-            let mut components = [0.0; 4];
-            for (c, column) in value.iter().enumerate() {
-                components[c] = at(column.floats(), l);
-            }
-            Value::vector(&components[..value.len()])
-        }
-    }
-}
-
-fn empty(like: &Value<f64>, lanes: usize) -> Lanes {
-    match like {
-        Value::Bool(_) => vec![Column::Bool(Rc::new(Vec::with_capacity(lanes)))],
-        Value::Int(_) => vec![Column::Int(Rc::new(Vec::with_capacity(lanes)))],
-        value => vec![(); value.components().len()]
-            .iter()
-            .map(|()| floats(Vec::with_capacity(lanes)))
-            .collect(),
-    }
-}
-
-fn scatter(value: &Value<f64>, out: &mut Lanes) {
-    for (c, column) in out.iter_mut().enumerate() {
-        match column {
-            Column::Float(v) => Rc::make_mut(v).push(value.components()[c]),
-            Column::Int(v) => Rc::make_mut(v).push(value.as_int()),
-            Column::Bool(v) => Rc::make_mut(v).push(value.as_bool()),
-        }
-    }
-}
-
 #[test]
 fn lanes_and_interpreter_agree() {
+    agree::<f64>();
+    agree::<f32>();
+}
+
+/// Holds both to the same bits in one precision, for every BSDF.
+fn agree<F: Real>() {
     use super::statistics::Numbers;
     use impasto_compiler::ir::interp::Interpreter;
+    use impasto_compiler::ir::value::Value;
     for bsdf in super::library::bsdfs() {
         let mut n = Numbers::new(1);
         for case in &bsdf.cases {
-            let wo: Vec<[f64; 3]> = (0..50).map(|_| n.direction()).collect();
-            let other: Vec<[f64; 3]> = (0..50).map(|_| n.direction().map(f64::abs)).collect();
-            let column = |v: &[[f64; 3]]| -> Lanes {
+            let wo: Vec<[f64; 3]> = (0..25).map(|_| n.direction()).collect();
+            let other: Vec<[f64; 3]> = (0..25).map(|_| n.direction().map(f64::abs)).collect();
+            let column = |v: &[[f64; 3]]| -> Lanes<F> {
                 (0..3)
-                    .map(|c| floats(v.iter().map(|v| v[c]).collect()))
+                    .map(|c| floats(v.iter().map(|v| F::of(v[c])).collect()))
                     .collect()
             };
-            let first: Vec<Lanes> = case.args.iter().map(constant).collect();
+            let first: Vec<Lanes<F>> = case.args.iter().map(constant).collect();
             for (method, takes_two) in [
                 (bsdf.sample, true),
                 (bsdf.eval, true),
@@ -491,7 +354,7 @@ fn lanes_and_interpreter_agree() {
                 args.extend(takes_two.then(|| column(&other)));
                 let lanes = call(&bsdf.module, method, args);
                 for l in 0..wo.len() {
-                    let mut args: Vec<Value<f64>> = case.args.iter().map(Value::constant).collect();
+                    let mut args: Vec<Value<F>> = case.args.iter().map(Value::constant).collect();
                     args.push(Value::vector(&wo[l]));
                     args.extend(takes_two.then(|| Value::vector(&other[l])));
                     let one = Interpreter::new(&bsdf.module, u64::MAX)

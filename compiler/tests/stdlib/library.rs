@@ -4,10 +4,14 @@
 //! Lines of a BSDF's doc comment that tests read:
 //! `Try: name = value | value` (any Impasto constants; the default is tried anyway),
 //! `Albedo: within 0.02.` or `Albedo: exact.` (and `..., from inside within 0.3`: on the side of
-//! the greater index), `Precision: within 0.01.` (relative error in single precision, where it is
-//! large; and `weights within 0.002`, of value over density), `Not reciprocal`, `Radiance:`, which
+//! the greater index), `Not reciprocal`, `Radiance:`, which
 //! says that what passes is scaled by the squared ratio of the indices, given by the parameter
-//! `ior`, and `Straight:`, which says that what passes is not refracted.
+//! `ior`, and `Straight:`, which says that what passes is not refracted. Lines of their own are
+//! `Range: name = low .. high, ...`, between which a search draws parameters (colors and floats
+//! that are not told: 0 to 1), `Furnace: within 0.01 with name: value, ...`: with these arguments
+//! all light is kept, whatever the others are, and `Region: within 0.01 where condition`: a part
+//! of the parameters and directions where single precision may be off by more (see `region`), and
+//! `Weights: at most 10`, of value over density.
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
 use impasto_compiler::ir::{Closure, ClosureId, Const, FunctionId, Material, Methods, Module};
@@ -25,14 +29,14 @@ pub struct Bsdf {
     pub albedo_within: f64,
     /// The same for directions on the side of the greater index.
     pub albedo_within_inside: f64,
-    /// How far single precision may be off, where the documentation says so.
-    pub precision_within: Option<f64>,
-    /// The same for value over density, `weights within X.`
-    pub weight_within: Option<f64>,
     /// Is it the same with the directions exchanged?
     pub reciprocal: bool,
     /// Is transmitted radiance scaled by the indices?
     pub scales_radiance: bool,
+    /// Its documentation, line by line.
+    pub lines: Vec<String>,
+    /// Types of its parameters, as written.
+    pub types: Vec<String>,
     pub module: Module,
     pub sample: FunctionId,
     pub eval: FunctionId,
@@ -74,12 +78,7 @@ pub fn bsdfs_with(values: &[&str]) -> Vec<Bsdf> {
 /// The BSDF that a file of the library defines under its own name.
 fn bsdf(name: &str, text: &str, extremes: &[&str]) -> Bsdf {
     let documented = documented(name, text, extremes);
-    build(
-        name,
-        documented.kind == ClosureKind::DeltaBsdf,
-        &documented.docs,
-        &documented.calls,
-    )
+    build(name, &documented, &documented.calls)
 }
 
 /// The BSDF `name` with one set of arguments.
@@ -87,8 +86,7 @@ pub fn bsdf_with(name: &str, call: &str) -> Bsdf {
     let file = impasto_stdlib::file("bsdf", name);
     let file = file.unwrap_or_else(|| panic!("no std::bsdf::{name}"));
     let documented = documented(name, file.text, &[]);
-    let delta = documented.kind == ClosureKind::DeltaBsdf;
-    build(name, delta, &documented.docs, &[call.to_owned()])
+    build(name, &documented, &[call.to_owned()])
 }
 
 /// What a file says of the closure that it defines under its own name.
@@ -96,6 +94,10 @@ pub struct Documented {
     kind: ClosureKind,
     /// Its doc comment in one line.
     pub docs: String,
+    /// The same, line by line.
+    pub lines: Vec<String>,
+    /// Types of its parameters, as written.
+    pub types: Vec<String>,
     /// Argument lists to try.
     pub calls: Vec<String>,
 }
@@ -135,6 +137,8 @@ pub fn documented(name: &str, text: &str, extremes: &[&str]) -> Documented {
     Documented {
         kind: def.kind,
         docs: item.docs.join(" "),
+        types: def.params.iter().map(|p| p.ty.node.to_string()).collect(),
+        lines: item.docs.iter().map(|l| l.trim().to_owned()).collect(),
         calls: combinations(&tried),
     }
 }
@@ -197,7 +201,8 @@ fn arguments(tried: &[Tried], chosen: &[usize]) -> String {
 }
 
 /// Has the compiler evaluate the argument lists, each in a material of its own.
-fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
+fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
+    let docs = documented.docs.as_str();
     let materials = calls
         .iter()
         .enumerate()
@@ -251,11 +256,11 @@ fn build(name: &str, delta: bool, docs: &str, calls: &[String]) -> Bsdf {
     });
     Bsdf {
         name: name.to_owned(),
-        delta,
+        delta: documented.kind == ClosureKind::DeltaBsdf,
+        lines: documented.lines.clone(),
+        types: documented.types.clone(),
         albedo_within,
         albedo_within_inside: promise(docs, "from inside").unwrap_or(albedo_within),
-        precision_within: promise(docs, "Precision:"),
-        weight_within: promise(docs, "weights"),
         reciprocal: !docs.contains("Not reciprocal"),
         scales_radiance: docs.contains("Radiance:"),
         sample,
@@ -297,6 +302,12 @@ pub fn promise(docs: &str, topic: &str) -> Option<f64> {
 }
 
 impl Bsdf {
+    /// What its documentation says on lines that begin with `topic`.
+    pub fn said<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a str> {
+        let lines = self.lines.iter();
+        lines.filter_map(move |l| Some(l.strip_prefix(topic)?.trim()))
+    }
+
     /// What the power that goes from `wi` to `wo` is over the radiance: undoes the scaling of
     /// what passes.
     pub fn power_over_radiance(&self, case: &Case, wo_z: f64, wi_z: f64) -> f64 {

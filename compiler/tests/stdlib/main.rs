@@ -17,8 +17,13 @@ mod microfacet;
 mod noise;
 mod normals;
 mod precision;
+#[path = "../common/record.rs"]
+mod record;
+mod region;
 mod sampling;
+mod search;
 mod sheen;
+mod space;
 mod statistics;
 mod subsurface;
 mod symmetry;

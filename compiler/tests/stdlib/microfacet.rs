@@ -102,7 +102,7 @@ fn film_color(cos_o: f64, film: f64, base: Complex, thickness: f64) -> [f64; 3] 
 
 const FILM: &str = "
     fn film(c: float, d: float, n: float, ior: color, k: color) -> color =
-        film_reflectance(c, d, n, ior, k);
+        film_reflectance(c, conductor_q2(c, ior, k), d, n, ior, k);
     fn wave(path: float) -> Waves = spectral_wave(path);
     fn root(re: color, im: color) -> Waves = waves_root(Waves(re, im));
     fn one(top: float, re: color, im: color, turn: float) -> color {

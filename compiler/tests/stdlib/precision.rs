@@ -1,22 +1,22 @@
-//! What single precision makes of the BSDFs: its error against double precision, and answers at
-//! the ends of every range.
-
-use std::collections::BTreeMap;
-use std::sync::Mutex;
+//! What single precision makes of the BSDFs at the values that their documentation asks to try, and
+//! at every place that a search once found wanting; and answers at the ends of every range.
 
 use impasto_compiler::ir::FunctionId;
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::{Real, Value};
 
-use super::library::{Bsdf, Case};
+use super::lanes;
+use super::library::{Bsdf, Case, bsdf_with};
+use super::record::{Bound, Row, effort};
+use super::region::Regions;
+use super::search::{errors, measure};
+use super::space::Space;
 use super::statistics::{Numbers, direction};
 
 /// Pairs of directions for each case.
-const PAIRS: usize = 150;
-
-/// The greatest relative error of values and densities that is fine where documentation
-/// (`Precision: within X.`) promises nothing.
-const FINE: f64 = 2e-4;
+fn pairs() -> usize {
+    effort(512, 1 << 15)
+}
 
 fn call<F: Real>(bsdf: &Bsdf, case: &Case, method: FunctionId, rest: &[&[f64]]) -> Vec<f64> {
     let mut args: Vec<Value<F>> = case.args.iter().map(Value::constant).collect();
@@ -25,79 +25,98 @@ fn call<F: Real>(bsdf: &Bsdf, case: &Case, method: FunctionId, rest: &[&[f64]]) 
     value.expect("enough fuel").to_f64()
 }
 
-fn rounded(w: [f64; 3]) -> [f64; 3] {
-    w.map(|x| f64::from(x as f32))
-}
-
-/// A direction, often near the horizon.
-fn view(n: &mut Numbers) -> [f64; 3] {
-    let z = n.between(-1.0, 1.0);
-    let z = if n.unit() < 0.3 { 0.02 * z } else { z };
-    rounded(direction(z, n.between(0.0, std::f64::consts::TAU)))
-}
-
-/// The worst relative error of `eval`, `pdf` and their quotient over pairs that `sample` makes.
-fn worst(bsdf: &Bsdf, case: &Case, n: &mut Numbers) -> [f64; 2] {
-    let mut worst = [0.0f64; 2];
-    let mut grow = |slot: usize, exact: f64, found: f64, density: f64| {
-        // Where next to nothing is reflected of what comes, relative errors say nothing about
-        // pictures.
-        let error = (exact - found).abs() / exact.abs().max(1e-4 * density.max(1.0));
-        worst[slot] = worst[slot].max(error);
-    };
-    for _ in 0..PAIRS {
-        let wo = view(n);
-        let [u @ .., _] = n.four();
-        let wi = call::<f32>(bsdf, case, bsdf.sample, &[&wo, &u]);
-        if wi.iter().all(|x| *x == 0.0) || wo[2].abs() < 1e-3 || wi[2].abs() < 1e-3 {
-            continue;
-        }
-        let both = |method| {
-            [
-                call::<f64>(bsdf, case, method, &[&wo, &wi]),
-                call::<f32>(bsdf, case, method, &[&wo, &wi]),
-            ]
-        };
-        let ([value, value32], [pdf, pdf32]) = (both(bsdf.eval), both(bsdf.pdf));
-        grow(0, pdf[0], pdf32[0], 1.0);
-        for c in 0..3 {
-            grow(0, value[c], value32[c], pdf[0]);
-            grow(1, value[c] / pdf[0], value32[c] / pdf32[0], 1.0);
-        }
-    }
-    worst
-}
-
 #[test]
-#[expect(clippy::print_stdout, reason = "the table is read with --nocapture")]
 fn single_precision_is_near_double_precision() {
     let all = super::library::bsdfs();
     let work: Vec<(&Bsdf, &Case)> = all
         .iter()
         .flat_map(|b| b.cases.iter().map(move |c| (b, c)))
         .collect();
-    let table: Mutex<BTreeMap<&str, [f64; 2]>> = Mutex::new(BTreeMap::new());
     super::each_in_parallel(&work, |i, (bsdf, case)| {
-        let [value, weight] = worst(bsdf, case, &mut Numbers::new(i as u64));
-        let mut table = table.lock().expect("no panic while it is held");
-        let row = table.entry(&bsdf.name).or_default();
-        *row = [row[0].max(value), row[1].max(weight)];
+        let space = Space::fixed(case.args.clone());
+        let mut n = Numbers::new(i as u64);
+        let points: Vec<Vec<f64>> = (0..pairs())
+            .map(|_| (0..space.dimensions()).map(|_| n.unit()).collect())
+            .collect();
         let mut faults = Vec::new();
-        let most = bsdf.precision_within.unwrap_or(FINE);
-        if value > most {
-            faults.push(format!(
-                "value or density off by {value:.1e}, more than {most:.1e}"
-            ));
+        let found = measure(bsdf, &space, &Regions::of(bsdf), &points);
+        for m in found.iter().filter(|m| m.counts) {
+            let worst = m.errors.iter().fold(0.0f64, |a, &b| a.max(b));
+            if worst > m.within {
+                let (most, wo, wi) = (m.within, m.wo, m.wi);
+                faults.push(format!(
+                    "off by {worst:.1e}, more than {most:.1e}: {wo:?} {wi:?}"
+                ));
+            }
         }
-        let most = bsdf.weight_within.unwrap_or(FINE);
-        if weight > most {
-            faults.push(format!("weight off by {weight:.1e}, more than {most:.1e}"));
-        }
+        faults.truncate(3);
         (case.label.clone(), faults)
     });
-    for (name, [value, weight]) in table.into_inner().expect("no panic while it was held") {
-        println!("{name:20} worst relative error: value, pdf {value:.1e}; weight {weight:.1e}");
-    }
+}
+
+/// A line of `regressions/`: a BSDF with its arguments, and two directions.
+fn found_case(line: &str) -> Option<(&str, &str, [f64; 3], [f64; 3])> {
+    let (call, directions) = line.split_once(" | ")?;
+    let (wo, wi) = directions.split_once(" | ")?;
+    let (name, args) = call.split_once('(')?;
+    let three = |text: &str| -> Option<[f64; 3]> {
+        let numbers: Vec<f64> = text.split(' ').filter_map(|x| x.parse().ok()).collect();
+        numbers.try_into().ok()
+    };
+    Some((name, args.strip_suffix(')')?, three(wo)?, three(wi)?))
+}
+
+#[test]
+fn places_that_were_found_wanting_stay_good() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/stdlib/regressions");
+    let files = std::fs::read_dir(folder).expect("regressions/").flatten();
+    let texts = files.map(|f| std::fs::read_to_string(f.path()).expect("a text"));
+    let all: String = texts.collect();
+    let lines = all.lines().filter(|l| !l.starts_with('#') && !l.is_empty());
+    let lines: Vec<&str> = lines.collect();
+    assert!(lines.len() >= 10, "only {} places", lines.len());
+    super::each_in_parallel(&lines, |_, line| {
+        let (name, args, wo, wi) = found_case(line).expect("name(arguments) | wo | wi");
+        let bsdf = bsdf_with(name, args);
+        let case = &bsdf.cases[0];
+        let both = |method| {
+            let answers = [
+                call::<f64>(&bsdf, case, method, &[&wo, &wi]),
+                call::<f32>(&bsdf, case, method, &[&wo, &wi]),
+            ];
+            answers.map(|v| v[0])
+        };
+        let [pdf, pdf32] = both(bsdf.pdf);
+        let value = call::<f64>(&bsdf, case, bsdf.eval, &[&wo, &wi]);
+        let value32 = call::<f32>(&bsdf, case, bsdf.eval, &[&wo, &wi]);
+        let four = |pdf: f64, v: &[f64]| [pdf, v[0], v[1], v[2]];
+        let (exact, single) = (four(pdf, &value), four(pdf32, &value32));
+        let [a, b, c] = errors(&exact, &single, false);
+        let mut all: Vec<_> = case.args.iter().map(lanes::constant).collect();
+        all.extend([lanes::uniform(&wo), lanes::uniform(&wi)]);
+        let within = Regions::of(&bsdf).within(&all, 1)[0];
+        let worst = a.max(b).max(c);
+        let row = Row {
+            table: "precision",
+            subject: name,
+            what: "error where a search once found it too great, over what is stated",
+            worst: worst / within,
+            bound: Bound::AtMost(1.0),
+            place: line,
+        };
+        let mut faults = Vec::new();
+        if !row.note() {
+            faults.push(format!("off by {worst:.1e}, more than {within:.1e}"));
+        }
+        if exact
+            .iter()
+            .chain(&single)
+            .any(|v| !(*v >= 0.0 && v.is_finite()))
+        {
+            faults.push(format!("{exact:?}, {single:?}"));
+        }
+        ((*line).to_owned(), faults)
+    });
 }
 
 /// Cosines at the ends of their range.

@@ -1,0 +1,122 @@
+//! Where single precision may be off by more than elsewhere: lines
+//! `Region: within 0.01 where condition` of a BSDF's documentation. The condition is Impasto, over
+//! the BSDF's parameters, `wo` and `wi`, so what people read is what the tests run.
+
+use impasto_compiler::ir::FunctionId;
+use impasto_compiler::ir::Module;
+
+use super::lanes::{self, Column, Lanes};
+use super::library::Bsdf;
+use super::text::Text;
+
+/// The greatest relative error of values, densities and weights outside all stated regions.
+pub const FINE: f64 = 1e-4;
+
+/// Conditions that documentation names.
+const NAMED: &str = "
+    // Does light meet the facet that mirrors or refracts it next to the edge of total reflection,
+    // where the slope of Fresnel's formula is infinite, or along the facet?
+    fn edge_of_reflection(wo: vector, wi: vector, ior: float) -> bool {
+        let o = upper(wo);
+        let i = beside(wo, wi);
+        let n = index_met(wo, ior);
+        if wo.z * wi.z > 0.0 {
+            let a = dot(o, normalize(o + i));
+            let b = dot(o, normalize(o + mirrored(i)));
+            let d = (n - 1.0) * (n + 1.0);
+            abs(d + a * a) < 1e-3 || abs(d + b * b) < 1e-3
+        } else {
+            facet_grazed(o, i, n) || facet_grazed(o, mirrored(i), n)
+        }
+    }
+    fn facet_grazed(o: vector, i: vector, n: float) -> bool {
+        let m = normalize(o + i * n);
+        abs(dot(o, m)) < 0.01 || abs(dot(i, m)) < 0.01
+    }
+    // The same for metals, seen from outside: where nothing is absorbed, they are dielectrics.
+    fn edge_of_metal(wo: vector, wi: vector, ior: color, k: color) -> bool {
+        let c = abs(dot(wo, half_vector(wo, wi)));
+        let q2 = conductor_q2(c, ior, k);
+        let far = abs(q2) + 2.0 * ior * k;
+        min(far.r, min(far.g, far.b)) < 1e-3
+    }
+    fn least_alpha(ior: float, roughness: float, anisotropy: float) -> float {
+        let a = boundary_alpha(contrasting(ior), roughness, anisotropy);
+        min(a.x, a.y)
+    }
+";
+
+/// The stated regions of a BSDF.
+pub struct Regions {
+    module: Option<Module>,
+    stated: Vec<(FunctionId, f64)>,
+}
+
+impl Regions {
+    /// Those that the documentation of `bsdf` states.
+    pub fn of(bsdf: &Bsdf) -> Self {
+        let parsed = bsdf.said("Region:").map(|line| {
+            let (within, condition) = line.strip_prefix("within ")?.split_once(" where ")?;
+            Some((condition.trim_end_matches('.'), within.parse::<f64>().ok()?))
+        });
+        let parsed = parsed.map(|r| {
+            r.unwrap_or_else(|| panic!("{}: `Region: within X where condition`", bsdf.name))
+        });
+        let parsed: Vec<(&str, f64)> = parsed.collect();
+        if parsed.is_empty() {
+            return Self {
+                module: None,
+                stated: Vec::new(),
+            };
+        }
+        let functions = parsed.iter().enumerate();
+        let functions: String = functions
+            .map(|(i, (condition, _))| {
+                format!(
+                    "fn region_{i}({}) -> bool = {condition};\n",
+                    parameters(bsdf)
+                )
+            })
+            .collect();
+        let text = Text::new(&(functions + NAMED));
+        let stated = parsed.iter().enumerate();
+        let stated = stated.map(|(i, (_, within))| (text.id(&format!("region_{i}")), *within));
+        Self {
+            stated: stated.collect(),
+            module: Some(text.module),
+        }
+    }
+
+    /// What error is stated in each lane, `FINE` outside all regions.
+    pub fn within(&self, args: &[Lanes], lanes: usize) -> Vec<f64> {
+        let mut within = vec![FINE; lanes];
+        for (id, stated) in &self.stated {
+            let module = self.module.as_ref().expect("regions have code");
+            let holds = lanes::call::<f64>(module, *id, args.to_vec());
+            let Column::Bool(holds) = &holds[0] else {
+                panic!("a condition is a bool")
+            };
+            for (l, within) in within.iter_mut().enumerate() {
+                if holds[if holds.len() == 1 { 0 } else { l }] {
+                    *within = within.max(*stated);
+                }
+            }
+        }
+        within
+    }
+}
+
+/// Parameters of a condition. Dimensions are left out: a length is a float of metres.
+fn parameters(bsdf: &Bsdf) -> String {
+    let def = bsdf.module.closures.iter().find(|c| c.name == bsdf.name);
+    let names = def.expect("the bsdf itself").params.iter().zip(&bsdf.types);
+    let each = names.map(|(p, ty)| {
+        let ty = if ty == "length" || ty == "angle" {
+            "float"
+        } else {
+            ty
+        };
+        format!("{}: {ty}, ", p.name)
+    });
+    each.collect::<String>() + "wo: vector, wi: vector"
+}
