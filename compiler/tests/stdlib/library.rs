@@ -14,7 +14,9 @@
 //! `Weights: at most 10`, of value over density.
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
-use impasto_compiler::ir::{Closure, ClosureId, Const, FunctionId, Material, Methods, Module};
+use impasto_compiler::ir::{
+    Closure, ClosureId, Const, FunctionId, Local, Material, Methods, Module,
+};
 use impasto_compiler::source::FileId;
 use impasto_compiler::{MemoryLoader, check, diag, parser, passes};
 
@@ -232,7 +234,7 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
     else {
         panic!("`{name}` is no bsdf")
     };
-    let ior = def.params.iter().position(|p| p.name == "ior");
+    let params = def.params.clone();
     let cases = checked
         .checked
         .into_iter()
@@ -240,10 +242,7 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         .map(|(mut material, call)| {
             let surface = material.surface.expect("a surface");
             let args = arguments_of(&module, &mut material, surface);
-            let ior = match ior.map(|i| &args[i]) {
-                Some(Const::Float(v)) if v.len() == 1 && !docs.contains("Straight:") => v[0],
-                _ => 1.0,
-            };
+            let ior = ior_of(&params, docs, &args);
             Case {
                 label: format!("{name}({call})"),
                 args,
@@ -269,6 +268,15 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         albedo,
         cases,
         module,
+    }
+}
+
+/// The ratio of the indices on both sides, 1 where it changes nothing.
+fn ior_of(params: &[Local], docs: &str, args: &[Const]) -> f64 {
+    let ior = params.iter().zip(args).find(|(p, _)| p.name == "ior");
+    match ior {
+        Some((_, Const::Float(v))) if v.len() == 1 && !docs.contains("Straight:") => v[0],
+        _ => 1.0,
     }
 }
 
@@ -306,6 +314,14 @@ impl Bsdf {
     pub fn said<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a str> {
         let lines = self.lines.iter();
         lines.filter_map(move |l| Some(l.strip_prefix(topic)?.trim()))
+    }
+
+    /// The case of other arguments.
+    pub fn case(&self, label: String, args: Vec<Const>) -> Case {
+        let def = self.module.closures.iter().find(|c| c.name == self.name);
+        let params = &def.expect("the bsdf itself").params;
+        let ior = ior_of(params, &self.lines.join(" "), &args);
+        Case { label, args, ior }
     }
 
     /// What the power that goes from `wi` to `wo` is over the radiance: undoes the scaling of

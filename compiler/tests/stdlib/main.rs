@@ -6,6 +6,7 @@ mod bumps;
 mod cells;
 mod delta;
 mod emission;
+mod energy;
 mod fresnel;
 mod known;
 mod lanes;

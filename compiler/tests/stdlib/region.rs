@@ -1,6 +1,7 @@
 //! Where single precision may be off by more than elsewhere: lines
 //! `Region: within 0.01 where condition` of a BSDF's documentation. The condition is Impasto, over
-//! the BSDF's parameters, `wo` and `wi`, so what people read is what the tests run.
+//! the BSDF's parameters, `wo` and `wi`, so what people read is what the tests run. `a jump where`
+//! says that the formula itself jumps there, from one value to 0: rounding takes either side.
 
 use impasto_compiler::ir::FunctionId;
 use impasto_compiler::ir::Module;
@@ -33,7 +34,15 @@ const NAMED: &str = "
         let m = normalize(o + i * n);
         abs(dot(o, m)) < 0.01 || abs(dot(i, m)) < 0.01
     }
-    // The same for metals, seen from outside: where nothing is absorbed, they are dielectrics.
+    // Does the facet that refracts the light stand upright? Beyond that there is none.
+    fn facet_at_horizon(wo: vector, wi: vector, ior: float) -> bool {
+        let o = upper(wo);
+        let i = beside(wo, wi);
+        let n = index_met(wo, ior);
+        let upright = min(abs(normalize(o + i * n).z), abs(normalize(o + mirrored(i) * n).z));
+        wo.z * wi.z < 0.0 && upright < 1e-3
+    }
+    // The edge of total reflection for metals, seen from outside: where nothing is absorbed, they are dielectrics.
     fn edge_of_metal(wo: vector, wi: vector, ior: color, k: color) -> bool {
         let c = abs(dot(wo, half_vector(wo, wi)));
         let q2 = conductor_q2(c, ior, k);
@@ -56,8 +65,12 @@ impl Regions {
     /// Those that the documentation of `bsdf` states.
     pub fn of(bsdf: &Bsdf) -> Self {
         let parsed = bsdf.said("Region:").map(|line| {
-            let (within, condition) = line.strip_prefix("within ")?.split_once(" where ")?;
-            Some((condition.trim_end_matches('.'), within.parse::<f64>().ok()?))
+            let (what, condition) = line.split_once(" where ")?;
+            let within = match what {
+                "a jump" => f64::INFINITY,
+                what => what.strip_prefix("within ")?.parse().ok()?,
+            };
+            Some((condition.trim_end_matches('.'), within))
         });
         let parsed = parsed.map(|r| {
             r.unwrap_or_else(|| panic!("{}: `Region: within X where condition`", bsdf.name))

@@ -3,7 +3,7 @@
 //! the space, then climbers from the worst of them with steps that shrink. Seeds are fixed, so a
 //! search finds the same in every run.
 
-use impasto_compiler::ir::Const;
+use impasto_compiler::ir::FunctionId;
 use impasto_compiler::ir::value::Real;
 
 use super::lanes::{self, Lanes};
@@ -67,7 +67,8 @@ pub fn measure(
             let exact = four(&pdf64, &value64, l);
             let found = four(&pdf32, &value32, l);
             let is_free = free[l].is_some() && !bsdf.delta;
-            let power = power(bsdf, &space.args(&points[l]), wo[l][2], wi[l][2]);
+            let case = bsdf.case(String::new(), space.args(&points[l]));
+            let power = bsdf.power_over_radiance(&case, wo[l][2], wi[l][2]);
             let weight = color(&exact)
                 .iter()
                 .fold(0.0f64, |a, v| a.max(v * power / exact[0]));
@@ -89,7 +90,7 @@ pub fn measure(
 
 fn call<F: Real>(
     bsdf: &Bsdf,
-    method: impasto_compiler::ir::FunctionId,
+    method: FunctionId,
     args: &[Lanes<F>],
     wo: &[[f64; 3]],
     other: &[[f64; 3]],
@@ -127,22 +128,6 @@ pub fn errors(exact: &[f64; 4], found: &[f64; 4], is_free: bool) -> [f64; 3] {
         }
     }
     errors
-}
-
-/// What brings radiance to power, see `Bsdf::power_over_radiance`.
-fn power(bsdf: &Bsdf, args: &[Const], wo_z: f64, wi_z: f64) -> f64 {
-    let def = bsdf.module.closures.iter().find(|c| c.name == bsdf.name);
-    let params = &def.expect("the bsdf itself").params;
-    let ior = params.iter().zip(args).find(|(p, _)| p.name == "ior");
-    let ior = match ior {
-        Some((_, Const::Float(v))) if v.len() == 1 => v[0],
-        _ => 1.0,
-    };
-    match bsdf.scales_radiance && wo_z * wi_z < 0.0 {
-        true if wo_z > 0.0 => ior * ior,
-        true => 1.0 / (ior * ior),
-        false => 1.0,
-    }
 }
 
 /// The worst points by `score`, worst first, each with its score.

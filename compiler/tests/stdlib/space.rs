@@ -34,6 +34,8 @@ pub struct Space {
     /// Names and types of the parameters.
     named: Vec<(String, String)>,
     axes: Vec<Axis>,
+    /// Least cosine of `wo`.
+    least: f64,
 }
 
 impl Space {
@@ -68,13 +70,30 @@ impl Space {
         }
         let names = params.iter().map(|p| p.name.clone());
         let named = names.zip(bsdf.types.iter().cloned()).collect();
-        Self { base, named, axes }
+        let least = LEAST_COSINE;
+        Self {
+            base,
+            named,
+            axes,
+            least,
+        }
+    }
+
+    /// The same, seen from cosines of at least `least` only.
+    pub fn seen_above(self, least: f64) -> Self {
+        Self { least, ..self }
     }
 
     /// Nothing but directions: the arguments are as they are.
     pub fn fixed(base: Vec<Const>) -> Self {
         let (named, axes) = (Vec::new(), Vec::new());
-        Self { base, named, axes }
+        let least = LEAST_COSINE;
+        Self {
+            base,
+            named,
+            axes,
+            least,
+        }
     }
 
     /// Coordinates of a point.
@@ -105,7 +124,7 @@ impl Space {
     /// The outgoing direction at a point.
     pub fn wo(&self, x: &[f64]) -> [f64; 3] {
         let x = &x[self.axes.len()..];
-        somewhere(x[0], x[1])
+        somewhere(x[0], x[1], self.least)
     }
 
     /// The random numbers at a point, with the 24 bits of a kernel's.
@@ -118,7 +137,7 @@ impl Space {
     /// The incoming direction, if the point chooses it freely.
     pub fn free_wi(&self, x: &[f64]) -> Option<[f64; 3]> {
         let x = &x[self.axes.len() + 2..];
-        (x[3] < FREE).then(|| somewhere(x[0], x[1]))
+        (x[3] < FREE).then(|| somewhere(x[0], x[1], LEAST_COSINE))
     }
 
     /// The arguments at a point, as written in a call.
@@ -154,10 +173,10 @@ fn single(x: f64) -> f64 {
     f64::from(x as f32)
 }
 
-/// A direction on either side, often near the horizon.
-fn somewhere(x: f64, turn: f64) -> [f64; 3] {
+/// A direction on either side, often near the least cosine.
+fn somewhere(x: f64, turn: f64, least: f64) -> [f64; 3] {
     let c = 2.0 * x - 1.0;
-    let z = (c * c).clamp(LEAST_COSINE, 1.0).copysign(c);
+    let z = (least + (1.0 - least) * c * c).copysign(c);
     direction(z, turn * std::f64::consts::TAU).map(single)
 }
 
