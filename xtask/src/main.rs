@@ -14,6 +14,7 @@ mod paper;
 mod partition;
 mod scenes;
 mod shell;
+mod stress;
 mod test;
 
 #[derive(Parser)]
@@ -29,6 +30,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Build and run every test of the workspace
     Test(test::TestArgs),
+    /// Run the tests of numerical stability at full effort, and write docs/stability.md
+    Stress(stress::StressArgs),
     /// Accept the present output as the expected one of the snapshot tests
     Bless,
     /// Generate the geometry, environment maps and textures of the example scenes
@@ -43,6 +46,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
+        Command::Stress(args) => stress::run(&args),
         Command::Bless => bless::run(),
         Command::Scenes(args) => scenes::run(&args),
         Command::Paper(args) => paper::run(&args),

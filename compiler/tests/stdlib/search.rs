@@ -206,7 +206,7 @@ const GOALS: [Goal; 5] = [
 ];
 
 /// Where a search ended, for each goal.
-fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Vec<(f64, Vec<f64>, Measured)> {
+fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Worst<Measured> {
     let regions = Regions::of(bsdf);
     let mut n = Numbers::new(seed);
     let points: Vec<Vec<f64>> = (0..effort(2, 32) * BATCH)
@@ -215,8 +215,8 @@ fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Vec<(f64, Vec<f64>, Measur
     let dense: Vec<(Vec<f64>, Measured)> = points
         .chunks(BATCH)
         .flat_map(|b| {
-            b.to_vec()
-                .into_iter()
+            b.iter()
+                .cloned()
                 .zip(measure(bsdf, space, &regions, b))
         })
         .collect();

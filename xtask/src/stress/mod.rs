@@ -1,0 +1,130 @@
+//! `cargo xtask stress`: the tests of numerical stability at full effort, and docs/stability.md.
+//!
+//! There is no second list of cases here. The same tests that `cargo xtask test` runs look at
+//! more directions, samples and restarts where `IMPASTO_EFFORT` is `full`, and keep each number
+//! they measure as a row of a file where `IMPASTO_STRESS_ROWS` names a folder. Rows are written
+//! as they are measured, so a test that fails does not take the others' with it.
+
+mod page;
+mod rows;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use crate::adapter;
+use crate::shell::{self, Result, cargo};
+
+/// A test target and which of its tests measure stability; all of them if it says none.
+struct Target {
+    package: &'static str,
+    target: &'static str,
+    filters: &'static [&'static str],
+    needs_adapter: bool,
+}
+
+const TARGETS: [Target; 3] = [
+    Target {
+        package: "impasto-compiler",
+        target: "stdlib",
+        filters: &[],
+        needs_adapter: false,
+    },
+    Target {
+        package: "impasto-compiler",
+        target: "materials",
+        filters: &[],
+        needs_adapter: false,
+    },
+    Target {
+        package: "impasto-runtime",
+        target: "gpu",
+        filters: &["extremes"],
+        needs_adapter: true,
+    },
+];
+
+#[derive(Args)]
+pub(crate) struct StressArgs {
+    /// As little effort as `cargo xtask test`, for trying
+    #[arg(long)]
+    fast: bool,
+    /// Leave out what needs an adapter
+    #[arg(long)]
+    no_gpu: bool,
+    /// Where the page is written
+    #[arg(long, default_value = "docs/stability.md")]
+    out: std::path::PathBuf,
+}
+
+/// How a target's tests ended.
+struct Ended {
+    name: String,
+    took: Duration,
+    failed: bool,
+}
+
+/// Runs every target, writes the page of what was measured, and fails if anything is bad.
+pub(crate) fn run(args: &StressArgs) -> Result {
+    let folder = shell::root().join("target/stress");
+    rows::clear(&folder)?;
+    if !args.no_gpu {
+        adapter::prepare()?;
+    }
+    let targets = TARGETS.iter().filter(|t| !(args.no_gpu && t.needs_adapter));
+    let ended: Vec<Ended> = targets.map(|t| tested(t, args, &folder)).collect();
+
+    let rows = rows::read(&folder)?;
+    let text = page::page(&rows, &ended, args.fast, args.no_gpu);
+    let out = shell::root().join(&args.out);
+    std::fs::write(&out, text).map_err(|e| format!("{} cannot be written: {e}", out.display()))?;
+    eprintln!("{} rows in {}", rows.len(), out.display());
+
+    let bad = rows.iter().filter(|r| !r.good).count();
+    let failed: Vec<&str> = ended
+        .iter()
+        .filter(|e| e.failed)
+        .map(|e| e.name.as_str())
+        .collect();
+    match (bad, failed.as_slice()) {
+        _ if rows.is_empty() => Err("no test kept a row".to_owned()),
+        (0, []) => Ok(()),
+        (0, failed) => Err(format!("tests of {} failed", failed.join(", "))),
+        (bad, _) => Err(format!(
+            "{bad} of {} verdicts are bad, see {}",
+            rows.len(),
+            out.display()
+        )),
+    }
+}
+
+/// Runs one target. A failure is kept, not returned: the others' rows are wanted all the same.
+fn tested(target: &Target, args: &StressArgs, folder: &Path) -> Ended {
+    let name = format!("{} {}", target.package, target.target);
+    shell::section(&format!("Testing {name}"));
+    let mut test = cargo();
+    test.args([
+        "test",
+        "-p",
+        target.package,
+        "--test",
+        target.target,
+        "--no-fail-fast",
+    ]);
+    test.arg("--").args(target.filters);
+    test.env("IMPASTO_STRESS_ROWS", folder).env("CI", "true");
+    if !args.fast {
+        test.env("IMPASTO_EFFORT", "full");
+    }
+    let start = Instant::now();
+    let result = shell::run(&mut test);
+    if let Err(message) = &result {
+        eprintln!("{message}");
+    }
+    Ended {
+        name,
+        took: start.elapsed(),
+        failed: result.is_err(),
+    }
+}
