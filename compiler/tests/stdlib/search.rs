@@ -133,12 +133,15 @@ pub fn errors(exact: &[f64; 4], found: &[f64; 4], is_free: bool) -> [f64; 3] {
 /// The worst points by `score`, worst first, each with its score.
 pub type Worst<T> = Vec<(f64, Vec<f64>, T)>;
 
+/// Measures points: a score and what else is known of each.
+pub type Ask<'a, T> = dyn Fn(&[Vec<f64>]) -> Vec<(f64, T)> + 'a;
+
 /// Climbs from the worst `climbers` of `first` for `rounds`, `children` steps from each at a time.
 pub fn climb<T: Clone>(
     mut best: Worst<T>,
     [climbers, rounds, children]: [usize; 3],
     n: &mut Numbers,
-    ask: &dyn Fn(&[Vec<f64>]) -> Vec<(f64, T)>,
+    ask: &Ask<'_, T>,
 ) -> Worst<T> {
     best.sort_by(|a, b| b.0.total_cmp(&a.0));
     best.truncate(climbers);
