@@ -11,7 +11,7 @@ pub(super) fn install() -> Result<(), String> {
         if REQUESTED.swap(true, Ordering::SeqCst) {
             std::process::exit(130);
         }
-        super::say("\nstopping; once more to quit without the picture");
+        super::say("\nstopping; once more to quit at once");
     };
     ctrlc::set_handler(handler).map_err(|error| format!("cannot handle Ctrl-C: {error}"))
 }

@@ -27,6 +27,10 @@ pub const GOOD_ENOUGH: f64 = 0.05;
 
 /// GPU seconds after which what is sampled is kept: what an interruption loses at most, twice.
 const KEPT_EVERY: f64 = 10.0;
+/// Samples of a half that tell how long one takes.
+const FIRST_PORTION: u32 = 16;
+/// An error that is so small beside the picture itself, in the root mean square, is that of single precision.
+const ROUNDING: f64 = 1e-7;
 /// Samples are at least doubled, and at most multiplied by this, between two looks at the error.
 const GROWTH: [f64; 2] = [2.0, 16.0];
 
@@ -57,6 +61,8 @@ pub(super) struct Maker<'a> {
     renderer: Option<Renderer<'a>>,
     halves: [Option<FilmFile>; 2],
     record: ReferenceRecord,
+    /// Samples of a half between two times that it is kept.
+    portion: u32,
 }
 
 impl<'a> Maker<'a> {
@@ -77,6 +83,7 @@ impl<'a> Maker<'a> {
             renderer: None,
             halves,
             record,
+            portion: FIRST_PORTION,
         })
     }
 
@@ -102,6 +109,7 @@ impl<'a> Maker<'a> {
                 error: rmse(&made.half, &made.film)?,
             };
             let wanted = GOOD_ENOUGH * smallest(&made.film)?;
+            let wanted = wanted.max(ROUNDING * root_mean_square(&made.film));
             let out_of_time = self.done() < target || clock.left() <= 0.0;
             if look.error <= wanted || self.done() >= goal.most || out_of_time {
                 return Ok(made);
@@ -131,11 +139,9 @@ impl<'a> Maker<'a> {
         });
         watch.expect(missing.iter().sum());
         watch.begin(&format!("{}: the reference", self.stage.subject.name))?;
-        // The first portion tells how long a sample takes.
-        let mut portion = target.clamp(1, 16);
         loop {
             let level = self.level();
-            let end = level.saturating_add(portion).min(target.max(level));
+            let end = level.saturating_add(self.portion).min(target.max(level));
             let begin = std::time::Instant::now();
             let gpu_before = self.record.gpu_seconds;
             let mut taken = 0.0;
@@ -152,7 +158,9 @@ impl<'a> Maker<'a> {
                 return Ok(());
             }
             let kept = (KEPT_EVERY / gpu_each.max(1e-9)) as u32;
-            portion = kept.min(portion.saturating_mul(8)).clamp(1, affordable);
+            self.portion = kept
+                .min(self.portion.saturating_mul(8))
+                .clamp(1, affordable);
         }
     }
 
@@ -242,6 +250,11 @@ impl<'a> Maker<'a> {
 fn rmse(picture: &Film, reference: &Film) -> Result<f64, StudyError> {
     let [mse, _] = metrics::mean_squared(picture, reference).map_err(StudyError::Picture)?;
     Ok(mse.sqrt())
+}
+
+fn root_mean_square(film: &Film) -> f64 {
+    let squares = film.pixels.iter().flatten().map(|v| f64::from(*v).powi(2));
+    (squares.sum::<f64>() / (3 * film.pixels.len().max(1)) as f64).sqrt()
 }
 
 /// What a look at a reference says.

@@ -101,7 +101,7 @@ impl Key {
         differs("version", self.version.clone(), other.version.clone())
             .or_else(|| differs("the size", size(self), size(other)))
             .or_else(|| {
-                let name = |key: &Key| format!("`{}`", key.adapter.name);
+                let name = |key: &Key| format!("`{}` ({})", key.adapter.name, key.adapter.backend);
                 differs("the GPU", name(self), name(other))
             })
             .or_else(|| {
@@ -391,7 +391,10 @@ mod tests {
         let changes: [(Change, &str); 6] = [
             (|k| k.version = "2".into(), "version 1, not 2"),
             (|k| k.size = (2, 2), "the size 2x1, not 2x2"),
-            (|k| k.adapter.name = "z".into(), "the GPU `a`, not `z`"),
+            (
+                |k| k.adapter.name = "z".into(),
+                "the GPU `a` (b), not `z` (b)",
+            ),
             (|k| k.adapter.driver = "z".into(), "the driver `c`, not `z`"),
             (|k| k.pool = Some(7), "a pool of the default, not 7"),
             (|k| k.scene = "0".into(), "another scene or other materials"),

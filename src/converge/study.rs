@@ -373,3 +373,86 @@ fn mean_squared(film: &Film, truth: &Film) -> Result<f64, StudyError> {
     let [mse, _] = metrics::mean_squared(film, truth).map_err(StudyError::Picture)?;
     Ok(mse)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(errors: &[&[f64]]) -> Series {
+        let run = |mse: &f64| Run {
+            seed: 0,
+            gpu_seconds: 1.0,
+            errors: Errors {
+                mse: *mse,
+                ..Errors::default()
+            },
+            dropped: 0,
+        };
+        let point = |(samples, errors): (u32, &&[f64])| Point {
+            samples,
+            runs: errors.iter().map(run).collect(),
+        };
+        Series {
+            strategy: "own".into(),
+            sampler: Sampler::Owen,
+            compile_seconds: 0.0,
+            points: (1..).zip(errors).map(point).collect(),
+            fits: BTreeMap::new(),
+        }
+    }
+
+    #[test]
+    fn a_reference_is_held_against_the_smallest_error_shown() {
+        let of = |mse: f64, all: &[Series]| {
+            let reference = Reference {
+                error: Some(Errors {
+                    mse,
+                    ..Errors::default()
+                }),
+                ..given_reference()
+            };
+            relative(&reference, all)
+        };
+        let all = [series(&[&[9.0], &[1.0, 7.0]]), series(&[&[8.0, 10.0]])];
+        // 4 is the smallest mean over seeds, and roots are compared.
+        assert_eq!(of(0.01, &all), Some(0.05));
+        assert_eq!(of(0.0, &all), Some(0.0));
+        let exact = [series(&[&[0.0]])];
+        assert_eq!(of(0.0, &exact), Some(0.0));
+        assert_eq!(of(0.01, &exact), None);
+        assert_eq!(relative(&given_reference(), &all), None);
+    }
+
+    #[test]
+    fn pictures_are_of_middling_and_most_samples() {
+        let record = |samples, seed| Record {
+            strategy: "own".into(),
+            sampler: Sampler::Owen,
+            samples,
+            seed,
+            gpu_seconds: 0.0,
+            timed: 1,
+            compile_seconds: 0.0,
+            dropped: 0,
+        };
+        let taken = |all: &[u32]| Taken {
+            strategy: "own".into(),
+            sampler: Sampler::Owen,
+            records: all
+                .iter()
+                .flat_map(|n| [record(*n, 5), record(*n, 6)])
+                .collect(),
+        };
+        let shown = |all: &[u32]| -> Vec<(u32, u32)> {
+            let taken = taken(all);
+            taken.shown().iter().map(|r| (r.samples, r.seed)).collect()
+        };
+        assert_eq!(shown(&[1, 4, 16, 64, 256]), [(16, 5), (256, 5)]);
+        assert_eq!(shown(&[1, 4]), [(1, 5), (4, 5)]);
+        assert_eq!(shown(&[1]), [(1, 5)]);
+        assert!(shown(&[]).is_empty());
+        let taken = taken(&[1, 4]);
+        let largest: Vec<u32> = taken.largest().map(|r| r.samples).collect();
+        assert_eq!(largest, [4, 4]);
+    }
+}
