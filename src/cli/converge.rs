@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use impasto::compiler::partition::{Needs, Wanted};
-use impasto::converge::data::{Convergence, Reference};
-use impasto::converge::pictures::Pictures;
+use impasto::converge::data::{Convergence, Metric, Reference, SceneConvergence};
+use impasto::converge::pictures::{Pictures, ScenePictures};
 use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
 use impasto::converge::{Progress, Settings, StudyError, Subject, page, study};
 use impasto::runtime::report::AdapterReport;
@@ -18,7 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::info::GpuArgs;
 use super::render::{parse_size, progress_bar};
-use super::{Failure, Global, Outcome, compiled_scene, interrupt};
+use super::{Failure, Global, Outcome, compiled_scene, interrupt, print};
 
 #[derive(Args)]
 pub(super) struct ConvergeArgs {
@@ -104,11 +104,14 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     let mut pictures = Pictures::default();
     for (path, name) in args.scenes.iter().zip(names) {
         let (found, shown) = args.study(path, name, &gpu, &settings, global)?;
-        note_reference(&found.name, &found.reference, global);
+        summarise(&found, global);
         convergence.scenes.push(found);
         pictures.scenes.push(shown);
     }
     page::write(&args.out, &convergence, &pictures)?;
+    if global.json() {
+        print(&format!("{:#}\n", serde_json::json!(convergence)))?;
+    }
     global.note(&format!("wrote {}", args.out.join("index.html").display()));
     Ok(())
 }
@@ -194,10 +197,7 @@ impl ConvergeArgs {
     }
 }
 
-type Studied = (
-    impasto::converge::data::SceneConvergence,
-    impasto::converge::pictures::ScenePictures,
-);
+type Studied = (SceneConvergence, ScenePictures);
 
 /// Powers of four times the least, up to the most, which is the last if it is one of them.
 fn quarters(least: u32, most: u32) -> Vec<u32> {
@@ -279,6 +279,24 @@ fn adapter(gpu: &Gpu) -> AdapterReport {
         backend: info.backend,
         driver: info.driver,
     }
+}
+
+/// What came out, in a line a series.
+fn summarise(found: &SceneConvergence, global: &Global) {
+    for series in &found.series {
+        let fit = series.fits.get(&Metric::Rmse);
+        let slope = fit.and_then(|fit| fit.slope);
+        let slope = slope.map_or(String::new(), |s| format!("RMSE falls as samples^{s:.2}, "));
+        let efficiency = fit.and_then(|fit| fit.efficiency);
+        let efficiency = efficiency.map_or("-".into(), |e| format!("{e:.3e}"));
+        global.note(&format!(
+            "{}: {}, {}: {slope}1/(MSE s) is {efficiency}",
+            found.name,
+            series.strategy,
+            series.sampler.name(),
+        ));
+    }
+    note_reference(&found.name, &found.reference, global);
 }
 
 /// Says if errors are to be taken with care, because the reference is not much better.

@@ -178,6 +178,14 @@ fn a_study_leaves_its_files_and_goes_on_where_it_was() {
     };
     assert_eq!(errors(&resumed), errors(&first));
 
+    // Nor does a reference depend on when it was made.
+    let half = at.join("out/cornell/reference-b.film");
+    let film = std::fs::read(&half).expect("a film");
+    std::fs::remove_file(&half).expect("removed");
+    study(SCENE, at, arguments).exits(0);
+    assert_eq!(std::fs::read(&half).expect("a film"), film);
+    assert_eq!(errors(&convergence(at)), errors(&first));
+
     // More seeds and samples go on from what is there; another size does not.
     let more = "--size 24x16 --pool 384 --max-spp 16 --seeds 3 --reference-spp 64";
     study(SCENE, at, more).exits(0);
@@ -211,6 +219,26 @@ fn independent_samples_converge_as_they_must_and_owen_faster() {
     assert!(slope(1) < -1.1, "slope {}", slope(1));
     let page = std::fs::read_to_string(at.join("out/index.html")).expect("the page");
     assert!(page.contains("smooth"));
+}
+
+/// With as many samples in each half as a series has, by the same sampler, the mean of both has half
+/// the squared error of a render, and a render differs from it by that and its own.
+#[test]
+fn a_reference_knows_its_error() {
+    let folder = folder();
+    let at = folder.path();
+    let scene = smooth(at, LAMP);
+    let arguments = "--samplers owen --min-spp 16 --max-spp 16 --seeds 8 --reference-spp 32";
+    study(&scene, at, arguments)
+        .exits(0)
+        .says("warning: the reference");
+    let found = &convergence(at).scenes[0];
+    let own = found.reference.error.expect("two halves").mse;
+    let runs = &found.series[0].points[0].runs;
+    let shown = runs.iter().map(|run| run.errors.mse).sum::<f64>() / runs.len() as f64;
+    assert!((own / shown - 1.0 / 3.0).abs() < 0.06, "{}", own / shown);
+    let relative = found.reference.relative_error.expect("known");
+    assert!((relative - (own / shown).sqrt()).abs() < 1e-9, "{relative}");
 }
 
 #[test]
@@ -282,6 +310,14 @@ fn a_single_point_and_a_black_scene_have_pages() {
     );
     let page = std::fs::read_to_string(at.join("out/index.html")).expect("the page");
     assert!(page.contains("equals the reference"));
+
+    // Without noise there is nothing to gain by a better reference.
+    let scene = smooth(at, "environment.color = 1.0");
+    study(&scene, at, "--max-spp 4 --seeds 2 --fresh").exits(0);
+    let found = &convergence(at).scenes[0];
+    assert!(found.reference.samples.is_some_and(|n| n <= 64));
+    let errors = found.series[0].points[1].runs[0].errors;
+    assert!(errors.mse < 1e-12, "{errors:?}");
 
     let scene = smooth(at, LAMP);
     study(
@@ -431,6 +467,19 @@ fn ctrl_c_keeps_what_is_finished() {
         "--max-spp 16 --seeds 1 --reference-spp 8 --pool 4096",
     )
     .exits(0);
+    // What is kept is whole: the picture of a render that nobody ended.
+    let kept = names(&runs).into_iter();
+    let kept: Vec<String> = kept.filter(|n| n.ends_with(".exr")).collect();
+    let last = kept.last().expect("some picture");
+    let samples = last.split('-').next().expect("samples");
+    let samples = samples.trim_start_matches('0');
+    let whole = at.join("whole.exr").display().to_string();
+    let render = ["render", &scene, "--spp", samples, "--strategy", "own"];
+    impasto(&[&render[..], &["--out", &whole]].concat()).exits(0);
+    let bytes = |path: &Path| std::fs::read(path).expect("a picture");
+    let same = bytes(&runs.join(last)) == bytes(Path::new(&whole));
+    assert!(same, "{last} is not the render of {samples} samples");
+
     let after: Vec<Vec<u8>> = ["0000001-0.json", "0000004-0.json", "0000016-0.json"]
         .map(|name| std::fs::read(runs.join(name)).expect("a record"))
         .into();
