@@ -252,7 +252,7 @@ pub(super) fn material_name(material: &MaterialShare) -> String {
     material
         .name
         .clone()
-        .unwrap_or_else(|| "(no surface)".into())
+        .unwrap_or_else(|| "(light or background)".into())
 }
 
 fn gallery(pictures: &ScenePictures) -> Vec<Block> {
