@@ -88,13 +88,41 @@ impl Sums {
         for pixel in 0..count {
             for channel in 0..3 {
                 let sum = self.sum(channel, pixel) + other.sum(channel, pixel);
-                for word in 0..SUM_WORDS {
-                    let at = (SUM_WORDS * channel + word) * count + pixel;
-                    self.words[at] = (sum >> (32 * word)) as u32;
-                }
+                self.set(channel, pixel, sum);
             }
             let at = COUNT_PLANE * count + pixel;
             self.words[at] = self.words[at].saturating_add(other.words[at]);
+        }
+    }
+
+    /// Takes the sums of some of these samples away.
+    pub(crate) fn subtract(&mut self, part: &Sums) {
+        let count = self.pixel_count();
+        for pixel in 0..count {
+            for channel in 0..3 {
+                let sum = self.sum(channel, pixel).saturating_sub(part.sum(channel, pixel));
+                self.set(channel, pixel, sum);
+            }
+            let at = COUNT_PLANE * count + pixel;
+            self.words[at] = self.words[at].saturating_sub(part.words[at]);
+        }
+    }
+
+    /// Samples of a pixel.
+    pub(crate) fn count(&self, pixel: usize) -> u32 {
+        self.plane(COUNT_PLANE)[pixel]
+    }
+
+    /// The sum of radiance in a pixel.
+    pub(crate) fn radiance(&self, channel: usize, pixel: usize) -> f64 {
+        self.sum(channel, pixel) as f64 * UNIT
+    }
+
+    fn set(&mut self, channel: usize, pixel: usize, sum: u128) {
+        let count = self.pixel_count();
+        for word in 0..SUM_WORDS {
+            let at = (SUM_WORDS * channel + word) * count + pixel;
+            self.words[at] = (sum >> (32 * word)) as u32;
         }
     }
 
@@ -162,6 +190,16 @@ mod tests {
         sum.add(&pixel([1, 1, (1 << 80) + (1 << 63)], 3));
         let expected = [1 << 32, 1 << 64, (1 << 80) + (1 << 63) + (1 << 56) + 12345];
         assert_eq!(sum, pixel(expected, 100_000_003));
+    }
+
+    #[test]
+    fn what_was_added_can_be_taken_away() {
+        let (a, b) = (pixel([1, (1 << 64) + 7, 9], 5), pixel([(1 << 40) - 1, 3, 0], 2));
+        let mut sum = a.clone();
+        sum.add(&b);
+        sum.subtract(&b);
+        assert_eq!(sum, a);
+        assert_eq!((a.count(0), a.radiance(0, 0)), (5, UNIT));
     }
 
     #[test]

@@ -69,6 +69,8 @@ pub(crate) struct Pass {
     pub resumed: u32,
     /// Samples taken before this pass.
     pub done: u32,
+    /// Those of them that are by the seed of this pass.
+    pub before: u32,
     /// Samples of this pass.
     pub samples: u32,
     /// Which pass of this run it is, from 1.
@@ -83,6 +85,7 @@ impl Pass {
             begin,
             resumed,
             done: resumed,
+            before: resumed,
             samples: 0,
             number: 1,
             stopped: false,
@@ -92,13 +95,14 @@ impl Pass {
     /// Goes on to the next.
     pub(crate) fn advance(&mut self) {
         self.done += self.samples;
+        self.before += self.samples;
         self.number += 1;
     }
 
     /// What kernels are told.
     pub(crate) fn options(&self, all: &RenderOptions) -> RenderOptions {
         RenderOptions {
-            first_sample: all.first_sample + self.done,
+            first_sample: all.first_sample + self.before,
             samples: self.samples,
             ..all.clone()
         }

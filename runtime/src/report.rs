@@ -16,6 +16,7 @@ use crate::scene::GeometryCounts;
 use crate::stages::StageId;
 use crate::status::Status;
 use crate::technique::Technique;
+use crate::until::{Check, Ending};
 
 /// What a render did. Times are in seconds, sizes in bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -94,6 +95,12 @@ pub struct Report {
     pub negative_samples: u64,
     /// The ones that this run found, by kernel and material, each with an example.
     pub dropped: Vec<Dropped>,
+    /// Estimates of the error while rendering, if it was rendered until a goal; absent otherwise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub convergence: Vec<Check>,
+    /// Why such a render ended: `relmse`, `rmse`, `time`, `samples` or `interrupt`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended_by: Option<Ending>,
     /// Samples cut to what the film holds.
     pub clamped_samples: u64,
     /// Requests lost because a queue was full; anything but 0 is a defect.
@@ -280,6 +287,8 @@ impl Inputs<'_> {
                 + dropped.iter().map(Dropped::samples).sum::<u64>(),
             negative_samples: dropped.iter().map(|d| d.negative).sum(),
             dropped,
+            convergence: Vec::new(),
+            ended_by: None,
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),

@@ -33,6 +33,7 @@ mod rays;
 mod render;
 mod strategy;
 mod technique;
+mod until;
 
 /// A material language, and the wavefront path tracer its compiler feeds.
 #[derive(Parser)]

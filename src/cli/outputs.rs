@@ -49,6 +49,11 @@ impl Outputs {
         }
     }
 
+    /// Is it a part of a render?
+    pub(super) fn is_film(&self) -> bool {
+        self.film.is_some()
+    }
+
     /// The names of the files, for people.
     pub(super) fn names(&self) -> String {
         let files = self.pictures.iter().chain(&self.film);

@@ -16,6 +16,7 @@ use impasto::runtime::media::MAX_NESTED;
 use impasto::runtime::render::{Progress, Replanning};
 use impasto::runtime::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::scene::FilmSettings;
+use impasto::runtime::until::{Check, Ending, Goals};
 use impasto::{
     FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files, plan,
 };
@@ -28,6 +29,7 @@ use super::outputs::{Outputs, parse_exposure};
 use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
 use super::technique::TechniqueArgs;
+use super::until::{self, UntilArgs};
 use super::{Failure, Global, Outcome, interrupt, print, runtime};
 
 #[derive(Args)]
@@ -38,9 +40,11 @@ pub(super) struct RenderArgs {
     /// for a part that `impasto merge` takes
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// Samples per pixel
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
-    spp: u32,
+    /// Samples per pixel: 64 otherwise
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    #[command(flatten)]
+    until: UntilArgs,
     /// Index of the first sample: ranges that do not overlap can be rendered apart and merged
     #[arg(long, value_name = "INDEX", default_value_t = 0)]
     samples_from: u32,
@@ -96,6 +100,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     if let Some(report) = &args.report {
         files::check_writable(report)?;
     }
+    let goals = args.until.goals(args.spp, &outputs)?;
     let start = args.checkpoint.read()?;
     interrupt::install()?;
     let scene = Arc::new(load(args, global)?);
@@ -106,7 +111,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
     let gpu = args.gpu.open()?;
-    let options = args.options(planned.renewed);
+    let options = args.options(planned.renewed, goals.is_some());
     let mut renderer =
         Renderer::new(&gpu, &scene, &program, &planned.plan, &options).map_err(runtime)?;
     if planned.renewed {
@@ -117,7 +122,10 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         let planner = plan::planner(scene.clone(), program.clone(), profile.profile, POINTS);
         renderer.replan(Replanning::new(program.clone(), planner));
     }
-    let mut rendering = sample(&mut renderer, args, start, global)?;
+    let mut rendering = match &goals {
+        Some(goals) => sample_until(&mut renderer, goals, global)?,
+        None => sample(&mut renderer, args, start, global)?,
+    };
     rendering.report.compile_seconds += material_seconds;
     if rendering.report.paths == 0 {
         global.note("interrupted before the first sample: nothing is written");
@@ -126,11 +134,16 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     outputs.write(&rendering.film, &rendering.sums, args.exposure)?;
     write_report(&rendering.report, args)?;
     summarise(&rendering, args, &outputs, global);
+    let ending = goals.and_then(|goals| until::ending(&rendering.report, &goals));
+    ending.iter().for_each(|ending| global.note(ending));
     match is_complete(&rendering) {
         true => Ok(()),
         false => Err(Failure::Interrupted),
     }
 }
+
+/// Samples per pixel where nothing is said of them.
+const SAMPLES: u32 = 64;
 
 /// At how many points of surfaces materials are evaluated to see what they cost.
 const POINTS: usize = 1024;
@@ -183,9 +196,10 @@ impl RenderArgs {
         Ok(fixed(planned(&known)?))
     }
 
-    fn options(&self, count_hits: bool) -> RenderOptions {
+    fn options(&self, count_hits: bool, until: bool) -> RenderOptions {
+        let limit = if until { until::LIMIT } else { SAMPLES };
         RenderOptions {
-            samples: self.spp,
+            samples: self.spp.unwrap_or(limit),
             first_sample: self.samples_from,
             seed: self.seed,
             pool: self.pool,
@@ -250,14 +264,7 @@ fn sample(
 ) -> Result<Rendering, Failure> {
     global.detail("samples are taken; Ctrl-C ends rendering and keeps the picture");
     let bar = progress_bar(global);
-    let mut progress = |progress: &Progress| {
-        bar.set_length(progress.total);
-        bar.set_position(progress.paths);
-        match interrupt::requested() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
-    };
+    let mut progress = |progress: &Progress| tick(&bar, progress);
     let rendering = args
         .checkpoint
         .render(renderer, start, global, &mut progress);
@@ -265,9 +272,36 @@ fn sample(
     rendering
 }
 
-/// Was every sample taken that was asked for?
+/// Takes samples until a goal is reached, or Ctrl-C, and tells the error as it falls.
+fn sample_until(
+    renderer: &mut Renderer,
+    goals: &Goals,
+    global: &Global,
+) -> Result<Rendering, Failure> {
+    let bar = progress_bar(global);
+    let mut look = |check: &Check| bar.suspend(|| global.note(&until::line(check)));
+    let mut progress = |progress: &Progress| tick(&bar, progress);
+    let rendering = renderer.render_until(goals, &mut look, &mut progress);
+    bar.finish_and_clear();
+    rendering.map_err(runtime)
+}
+
+/// Shows how far a render is; breaks it after Ctrl-C.
+fn tick(bar: &ProgressBar, progress: &Progress) -> ControlFlow<()> {
+    bar.set_length(progress.total);
+    bar.set_position(progress.paths);
+    match interrupt::requested() {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    }
+}
+
+/// Was everything done that was asked for?
 fn is_complete(rendering: &Rendering) -> bool {
     let report = &rendering.report;
+    if let Some(ending) = report.ended_by {
+        return ending != Ending::Interrupt;
+    }
     let pixels = u64::from(report.width) * u64::from(report.height);
     report.paths >= pixels * u64::from(report.samples_per_pixel)
 }

@@ -16,3 +16,4 @@ mod plan;
 mod plans;
 mod rays;
 mod render;
+mod until;

@@ -8,6 +8,7 @@ mod iterate;
 mod observe;
 mod replan;
 mod selection;
+mod until;
 
 pub use build::identity;
 pub(crate) use build::{Makings, build_step};

@@ -172,7 +172,7 @@ impl Renderer<'_> {
         self.replanned = Some(change);
     }
 
-    fn ran<'r>(&'r self, ready: &'r Ready) -> Ran<'r> {
+    pub(super) fn ran<'r>(&'r self, ready: &'r Ready) -> Ran<'r> {
         Ran {
             layout: &ready.layout,
             kernels: &ready.kernels,

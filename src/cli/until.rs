@@ -1,0 +1,197 @@
+//! `render --until`: goals in words, and what is said of a render that pursues them.
+
+use std::time::Duration;
+
+use clap::Args;
+use impasto::runtime::report::Report;
+use impasto::runtime::until::{Check, Ending, Goals, LEAST_SAMPLES};
+
+use super::Failure;
+use super::outputs::Outputs;
+
+/// Samples a pixel after which a render ends that was given no limit.
+pub(super) const LIMIT: u32 = 1 << 20;
+/// The longest time that can be asked for: 30 days.
+const LONGEST: f64 = 30.0 * 86_400.0;
+
+#[derive(Args)]
+pub(super) struct UntilArgs {
+    /// Renders until an error is small enough or a time is over: `relmse=1e-3`, `rmse=0.01`, `time=60s`
+    /// (ms, s, min, h). May be given several times: what is reached first ends the render. Errors are
+    /// estimated while rendering, by two halves of the samples (see docs/until.md); --spp is the limit,
+    /// otherwise 1048576 samples
+    #[arg(long, value_name = "GOAL", value_parser = parse, conflicts_with = "checkpoint")]
+    until: Vec<Goal>,
+}
+
+/// One goal, as it is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Goal {
+    Relmse(f64),
+    Rmse(f64),
+    Time(Duration),
+}
+
+fn parse(text: &str) -> Result<Goal, String> {
+    let kinds = "expected relmse=ERROR, rmse=ERROR or time=TIME, such as relmse=1e-3 or time=60s";
+    let (kind, value) = text.split_once('=').ok_or(kinds)?;
+    match kind {
+        "relmse" => Ok(Goal::Relmse(parse_error(value)?)),
+        "rmse" => Ok(Goal::Rmse(parse_error(value)?)),
+        "time" => Ok(Goal::Time(parse_time(value)?)),
+        other => Err(format!("there is no measure `{other}`: {kinds}")),
+    }
+}
+
+fn parse_error(text: &str) -> Result<f64, String> {
+    let error = text.parse::<f64>().ok();
+    let error = error.filter(|error| error.is_finite() && *error > 0.0);
+    error.ok_or_else(|| {
+        format!("`{text}` is no error that can be reached: expected a number above 0")
+    })
+}
+
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E');
+    let (number, unit) = text.split_at(split.unwrap_or(text.len()));
+    let factor = match unit {
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        _ => {
+            return Err(format!(
+                "`{text}` has no unit of time: expected ms, s, min or h, as in 60s"
+            ));
+        }
+    };
+    let seconds = number.trim().parse::<f64>().map(|n| n * factor).ok();
+    let seconds = seconds.filter(|s| (1e-3..=LONGEST).contains(s));
+    let seconds = seconds.ok_or_else(|| format!("`{text}` is no time from 1ms to 720h"))?;
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+impl UntilArgs {
+    /// The goals, if there are any and `spp` and the files to be written go with them.
+    pub(super) fn goals(
+        &self,
+        spp: Option<u32>,
+        outputs: &Outputs,
+    ) -> Result<Option<Goals>, Failure> {
+        if self.until.is_empty() {
+            return Ok(None);
+        }
+        if spp.is_some_and(|spp| spp < LEAST_SAMPLES) {
+            return Err(Failure::Error(format!(
+                "--spp {} is too few to estimate an error by\n  hint: with --until it is the most that is \
+                 taken, and at least {LEAST_SAMPLES}",
+                spp.unwrap_or_default()
+            )));
+        }
+        if outputs.is_film() {
+            return Err(Failure::Error(
+                "a .film file is a part of a render by one seed, but --until takes samples by two\n  hint: \
+                 write a picture, or say how many samples to take with --spp"
+                    .into(),
+            ));
+        }
+        let mut goals = Goals::default();
+        for goal in &self.until {
+            let (name, before) = match goal {
+                Goal::Relmse(error) => ("relmse", goals.relmse.replace(*error).is_some()),
+                Goal::Rmse(error) => ("rmse", goals.rmse.replace(*error).is_some()),
+                Goal::Time(time) => ("time", goals.time.replace(*time).is_some()),
+            };
+            if before {
+                let message = format!("--until has more than one goal for {name}");
+                return Err(Failure::Error(message));
+            }
+        }
+        Ok(Some(goals))
+    }
+}
+
+/// A line for an estimate.
+pub(super) fn line(check: &Check) -> String {
+    format!(
+        "{:>9} samples, {:>9.3} s: relMSE {:.3e}, RMSE {:.3e}",
+        check.samples, check.seconds, check.relmse, check.rmse
+    )
+}
+
+/// How a render came to its end; a warning if it missed an error that was asked for.
+pub(super) fn ending(report: &Report, goals: &Goals) -> Option<String> {
+    let last = report.convergence.last();
+    let samples = report.samples_per_pixel;
+    let why = match report.ended_by? {
+        Ending::Relmse => return Some(format!("reached the relMSE after {samples} samples")),
+        Ending::Rmse => return Some(format!("reached the RMSE after {samples} samples")),
+        Ending::Interrupt => return None,
+        Ending::Time => "the time was over",
+        Ending::Samples => "all samples were taken",
+    };
+    let wanted = [("relMSE", goals.relmse), ("RMSE", goals.rmse)];
+    let missed = wanted.into_iter().filter_map(|(name, goal)| {
+        let is = last.map(|check| {
+            if name == "relMSE" {
+                check.relmse
+            } else {
+                check.rmse
+            }
+        });
+        let is = is.map_or("unknown".to_owned(), |error| format!("{error:.3e}"));
+        Some(format!("the {name} is {is}, not {:.3e}", goal?))
+    });
+    let missed: Vec<String> = missed.collect();
+    Some(match missed.is_empty() {
+        true => format!("{why} after {samples} samples"),
+        false => format!(
+            "warning: {why} after {samples} samples: {}",
+            missed.join(", and ")
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_are_read() {
+        assert_eq!(parse("relmse=1e-3"), Ok(Goal::Relmse(1e-3)));
+        assert_eq!(parse("rmse=0.5"), Ok(Goal::Rmse(0.5)));
+        for (text, seconds) in [
+            ("60s", 60.0),
+            ("250ms", 0.25),
+            ("1.5min", 90.0),
+            ("2h", 7200.0),
+            ("1e1s", 10.0),
+        ] {
+            let expected = Goal::Time(Duration::from_secs_f64(seconds));
+            assert_eq!(parse(&format!("time={text}")), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_goal_is_refused() {
+        for (text, reason) in [
+            ("relmse", "expected relmse=ERROR"),
+            ("psnr=40", "no measure `psnr`"),
+            ("relmse=0", "above 0"),
+            ("relmse=-1e-3", "above 0"),
+            ("rmse=nan", "above 0"),
+            ("rmse=inf", "above 0"),
+            ("rmse=", "above 0"),
+            ("time=60", "no unit of time"),
+            ("time=60days", "no unit of time"),
+            ("time=0s", "no time from 1ms"),
+            ("time=-5s", "no time from 1ms"),
+            ("time=nans", "no unit of time"),
+            ("time=s", "no time from 1ms"),
+            ("time=1e9h", "no time from 1ms"),
+        ] {
+            let error = parse(text).expect_err(text);
+            assert!(error.contains(reason), "{text}: {error}");
+        }
+    }
+}

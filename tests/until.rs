@@ -1,0 +1,76 @@
+//! The error that a render estimates of itself while it runs, against its true one.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use glam::Vec3;
+use impasto::converge::metrics::mean_squared;
+use impasto::runtime::render::Samples;
+use impasto::runtime::scene::FilmSettings;
+use impasto::runtime::technique::{Sampler, Technique};
+use impasto::runtime::until::Goals;
+use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
+
+/// Renders by many seeds: the estimates are the errors against a reference, on average, also where
+/// samples of a half depend on each other. Two ranges of one sequence instead of two seeds would fail this:
+/// they fill each other's gaps, so that their difference tells too much.
+#[test]
+fn the_estimated_error_is_the_true_one() {
+    const SEEDS: u32 = 16;
+    let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cornell/scene.toml");
+    let mut scene = impasto::load(&path).expect("the scene");
+    scene.film = FilmSettings {
+        width: 12,
+        height: 12,
+    };
+    // Without caustics and the lamp in the picture, whose few pixels would need far more seeds.
+    scene.camera.position = Vec3::new(0.0, 0.3, 0.5);
+    scene.camera.look_at = Vec3::new(0.0, 0.1, 0.0);
+    scene.camera.fov = 50.0;
+    for material in &mut scene.materials {
+        material.file = "../../materials/matte.impasto".into();
+        material.params.clear();
+    }
+    let program = impasto::compile(&scene).expect("materials");
+    let plan = impasto::plan(&program, Strategy::Mega);
+    for sampler in [Sampler::Independent, Sampler::Sobol, Sampler::Owen] {
+        let options = RenderOptions {
+            samples: 2048,
+            seed: 12_345,
+            technique: Technique {
+                sampler,
+                ..Technique::default()
+            },
+            ..RenderOptions::default()
+        };
+        let mut renderer =
+            Renderer::new(&gpu, &scene, &program, &plan, &options).expect("a renderer");
+        let mut go_on = |_: &_| ControlFlow::Continue(());
+        let reference = renderer.render(&mut go_on).expect("the reference").film;
+        let (mut estimated, mut errors) = ([0.0; 2], [0.0; 2]);
+        for seed in 0..SEEDS {
+            let samples = Samples {
+                seed,
+                first: 0,
+                count: 32,
+            };
+            renderer.select(&samples).expect("samples");
+            let rendering = renderer
+                .render_until(&Goals::default(), &mut |_| (), &mut go_on)
+                .expect("a render");
+            let last = rendering.report.convergence.last().expect("a check");
+            assert_eq!((last.samples, rendering.report.seed), (32, seed));
+            estimated[0] += last.rmse * last.rmse;
+            estimated[1] += last.relmse;
+            let true_errors = mean_squared(&rendering.film, &reference).expect("comparable");
+            errors = [0, 1].map(|i: usize| errors[i] + true_errors[i]);
+        }
+        let [mse, relmse] = [0, 1].map(|i: usize| estimated[i] / errors[i]);
+        assert!((0.85..1.15).contains(&mse), "{sampler:?}: MSE {mse}");
+        assert!(
+            (0.85..1.25).contains(&relmse),
+            "{sampler:?}: relMSE {relmse}"
+        );
+    }
+}
