@@ -87,5 +87,5 @@ fn only_mirrors_cast_no_shadow_rays() {
     );
     let shadow = both.report.kernels.iter().find(|k| k.name == "shadow");
     assert!(shadow.is_some_and(|k| k.items > 0));
-    assert_eq!(both.report.path_state_bytes, 144);
+    assert_eq!(both.report.path_state_bytes, 96);
 }

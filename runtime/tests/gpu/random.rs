@@ -37,7 +37,7 @@ fn draw(sampler: Sampler, seed: u32, questions: &[Question]) -> Vec<Row> {
 }
 
 /// One pixel's numbers of a draw for samples `first..first + count`.
-fn samples_of(sampler: Sampler, pixel: u32, draws: u32, first: u32, count: u32) -> Vec<Row> {
+pub fn samples_of(sampler: Sampler, pixel: u32, draws: u32, first: u32, count: u32) -> Vec<Row> {
     let question = |i: u32| [pixel, first.wrapping_add(i), draws];
     let questions: Vec<Question> = (0..count).map(question).collect();
     draw(sampler, 5, &questions)
@@ -221,7 +221,7 @@ fn all_ones_are_below_one() {
 }
 
 /// Numbers in all lanes of many pixels at one sample.
-fn over_pixels(sampler: Sampler, seed: u32, sample: u32, draw_index: u32) -> Vec<[f64; 4]> {
+pub fn over_pixels(sampler: Sampler, seed: u32, sample: u32, draw_index: u32) -> Vec<[f64; 4]> {
     let questions: Vec<Question> = (0..PIXELS).map(|p| [p, sample, draw_index]).collect();
     let rows = draw(sampler, seed, &questions);
     rows.iter()
@@ -232,7 +232,7 @@ fn over_pixels(sampler: Sampler, seed: u32, sample: u32, draw_index: u32) -> Vec
 const PIXELS: u32 = 1 << 14;
 
 /// The correlation of two lists of numbers that are uniform in [-0.5, 0.5).
-fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), (a, b)| {
         (sum + a * b, count + 1.0)
     });

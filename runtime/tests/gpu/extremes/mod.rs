@@ -3,6 +3,7 @@
 
 mod functions;
 mod limits;
+mod numbers;
 mod oracle;
 mod pictures;
 mod places;

@@ -301,3 +301,80 @@ material white { surface = diffuse(0.98); emission = uniform(color(0.02)); }
         1.0,
     );
 }
+
+/// White materials under an even sky give back what they get, within a hundredth.
+#[test]
+fn white_surfaces_vanish_in_an_even_sky() {
+    const WHITES: &str = "use std::bsdf::{dielectric, diffuse, generalized_schlick, metal};
+material rough_metal { surface = metal(reflectance: 1, edge: 1, roughness: 1); }
+material satin_metal { surface = metal(reflectance: 1, edge: 1, roughness: 0.5); }
+material rough_schlick { surface = generalized_schlick(color0: 1, color82: 1, color90: 1, roughness: 1); }
+material frosted { surface = dielectric(ior: 1.5, roughness: 0.5); }
+material chalk { surface = diffuse(1); }
+";
+    for name in [
+        "rough_metal",
+        "satin_metal",
+        "rough_schlick",
+        "frosted",
+        "chalk",
+    ] {
+        let toml = format!(
+            "film = {{ width = 16, height = 16 }}\n\
+             integrator = {{ max_depth = 64, roulette_start = 1000 }}\n\
+             camera = {{ position = [0.9, 0.8, 1.1], look_at = [0, 0, 0], fov = 24 }}\n\
+             environment = {{ color = 1, sample = true }}\n\
+             [[geometry]]\nobj = 'ball.obj'\n\
+             [materials.ball]\nfile = 'whites.impasto'\nmaterial = '{name}'\n",
+        );
+        let (scene, program) = load_with(&toml, &[("whites.impasto", WHITES)]);
+        let rendering = render(&scene, &program, "wavefront", &samples(spp(64, 8192)));
+        let (found, error) = mean(red(&rendering));
+        let good = Row {
+            table: "26",
+            subject: name,
+            what: "what a white ball in an even sky of 1 has more or less than 1",
+            worst: (found - 1.0).abs(),
+            bound: Bound::AtMost(0.01),
+            place: "whole renders",
+        }
+        .note();
+        assert!(good, "{name}: {found} +- {error}");
+    }
+}
+
+/// Row 16: on a coarse ball with smooth normals these face away from the view near the rim; what is
+/// seen there is not black.
+#[test]
+fn normals_that_face_away_leave_no_black_spots() {
+    const SHINY: &str = "use std::bsdf::{conductor, diffuse, smooth_conductor};
+material dull { surface = diffuse(0.8); }
+material glossy { surface = conductor(ior: color(0.2), extinction: color(4), roughness: 0.3); }
+material silver { surface = smooth_conductor(ior: color(0.2), extinction: color(4)); }
+";
+    let ball = super::places::smooth_ball();
+    for name in ["dull", "glossy", "silver"] {
+        let toml = format!(
+            "film = {{ width = 32, height = 32 }}\n\
+             integrator = {{ max_depth = 8, roulette_start = 1000 }}\n\
+             camera = {{ position = [0.9, 0.8, 1.1], look_at = [0, 0, 0], fov = 36 }}\n\
+             environment = {{ color = 1, sample = true }}\n\
+             [[geometry]]\nobj = 'smooth.obj'\n\
+             [materials.ball]\nfile = 'shiny.impasto'\nmaterial = '{name}'\n",
+        );
+        let (scene, program) = load_with(&toml, &[("shiny.impasto", SHINY), ("smooth.obj", &ball)]);
+        let rendering = render(&scene, &program, "wavefront", &samples(spp(32, 4096)));
+        let darkest = red(&rendering).fold(f64::INFINITY, f64::min);
+        let good = Row {
+            table: "16",
+            subject: name,
+            what: "darkest pixel of a coarse smooth ball in an even sky of 1",
+            worst: darkest,
+            bound: Bound::AtLeast(0.5),
+            place: "rim of the ball",
+        }
+        .note();
+        assert!(good, "{name}: {darkest}");
+        assert_eq!(rendering.report.nonfinite_samples, 0, "{name}");
+    }
+}

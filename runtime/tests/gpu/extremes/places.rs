@@ -79,7 +79,7 @@ fn material(name: &str, of: &str, more: &str) -> String {
 }
 
 /// A sphere of radius 0.5, coarse, with the normals of the sphere: the two differ by some degrees.
-fn smooth_ball() -> String {
+pub(super) fn smooth_ball() -> String {
     let n = 8usize;
     let mut text = String::from("usemtl ball\n");
     for (j, i) in (0..=n).flat_map(|j| (0..2 * n).map(move |i| (j, i))) {
