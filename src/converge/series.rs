@@ -92,6 +92,7 @@ impl Task<'_> {
             gpu_seconds: 0.0,
             timed: 0,
             compile_seconds: 0.0,
+            pool: 0,
             dropped: 0,
         }
     }
@@ -152,6 +153,7 @@ impl<'a> Bench<'a> {
         let report = &rendering.report;
         Record {
             compile_seconds: report.compile_seconds + self.task.stage.subject.material_seconds,
+            pool: report.pool_size,
             dropped: report.nonfinite_samples + report.clamped_samples,
             ..wanted.clone()
         }
@@ -199,4 +201,17 @@ impl<'a> Bench<'a> {
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_several_times_counts() {
+        assert_eq!(median(vec![9.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![5.0]), 5.0);
+        assert_eq!(median(vec![3.0, 1.0]), 3.0);
+        assert_eq!(median(Vec::new()), 0.0);
+    }
 }

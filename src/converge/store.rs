@@ -62,6 +62,8 @@ pub struct Record {
     pub timed: usize,
     /// Time to compile materials and build kernels, in seconds.
     pub compile_seconds: f64,
+    /// Paths in flight.
+    pub pool: u32,
     /// Samples that were no numbers, or negative, or too large for the film.
     pub dropped: u64,
 }
@@ -334,6 +336,7 @@ mod tests {
             gpu_seconds: 0.5,
             timed: 3,
             compile_seconds: 1.0,
+            pool: 9,
             dropped: 2,
         }
     }

@@ -433,6 +433,7 @@ mod tests {
             gpu_seconds: 0.0,
             timed: 1,
             compile_seconds: 0.0,
+            pool: 0,
             dropped: 0,
         };
         let taken = |all: &[u32]| Taken {

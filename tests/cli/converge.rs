@@ -292,6 +292,13 @@ fn a_single_point_and_a_black_scene_have_pages() {
     let at = folder.path();
     let scene = smooth(at, "environment.color = 0.0");
     study(&scene, at, "--max-spp 4 --seeds 2").exits(0);
+    // As many paths are in flight as in any render of so few samples.
+    for (samples, pool) in [(1, 144), (4, 576)] {
+        let record = format!("out/smooth/runs/own-sobol/{samples:07}-1.json");
+        let text = std::fs::read_to_string(at.join(record)).expect("a record");
+        let record: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(record["pool"], pool, "{text}");
+    }
     let found = &convergence(at).scenes[0];
     for point in &found.series[0].points {
         for run in &point.runs {
