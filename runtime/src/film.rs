@@ -100,7 +100,9 @@ impl Sums {
         let count = self.pixel_count();
         for pixel in 0..count {
             for channel in 0..3 {
-                let sum = self.sum(channel, pixel).saturating_sub(part.sum(channel, pixel));
+                let sum = self
+                    .sum(channel, pixel)
+                    .saturating_sub(part.sum(channel, pixel));
                 self.set(channel, pixel, sum);
             }
             let at = COUNT_PLANE * count + pixel;
@@ -194,7 +196,10 @@ mod tests {
 
     #[test]
     fn what_was_added_can_be_taken_away() {
-        let (a, b) = (pixel([1, (1 << 64) + 7, 9], 5), pixel([(1 << 40) - 1, 3, 0], 2));
+        let (a, b) = (
+            pixel([1, (1 << 64) + 7, 9], 5),
+            pixel([(1 << 40) - 1, 3, 0], 2),
+        );
         let mut sum = a.clone();
         sum.add(&b);
         sum.subtract(&b);

@@ -282,22 +282,23 @@ mod tests {
         assert_eq!(seen[4..8], [None, Some(7), None, None]);
     }
 
-    /// An object of which one placement is before a wall and twice as large as it was made, and one
-    /// behind it.
+    /// An object that is placed before a wall, half as large as it was made, and behind it, twice as large.
+    /// Distances are those of the world, not of the object.
     #[test]
     fn placements_are_seen_where_they_are() {
         let mut scene = scene(square(0.0, -1.0, 3));
+        let mut mesh = square(0.0, 0.0, 1);
+        mesh.positions.iter_mut().flatten().for_each(|p| *p *= 2.0);
         scene.objects = vec![Object {
             name: String::new(),
-            mesh: square(0.0, 0.0, 1),
+            mesh,
         }];
         let place = |scale: f32, z: f32, materials: [u32; 2]| Placement {
             object: 0,
             transform: Transform::new(Vec3::splat(scale), Vec3::ZERO, Vec3::new(0.0, 0.0, z)),
             materials: Arc::from(materials),
         };
-        // Two units from the axis at a depth of 5 would be past the picture's edge.
-        scene.placements = vec![place(1.0, 0.5, [0, 5]), place(4.0, -0.5, [0, 6])];
+        scene.placements = vec![place(0.5, 0.5, [0, 5]), place(2.0, -0.5, [0, 6])];
         let seen = materials(&scene);
         let expected = [
             [None, None, Some(6), Some(6)],
