@@ -30,6 +30,11 @@ const VALUES: [(&str, &str); 6] = [
     ("RADIANCE", "radiance"),
 ];
 
+/// What reports call the value of a code.
+pub(crate) fn value_name(code: u32) -> &'static str {
+    VALUES.get(code as usize).map_or("value", |(_, name)| name)
+}
+
 /// Words of each row.
 pub(crate) const ROW_WORDS: usize = ROW.len();
 
@@ -74,7 +79,7 @@ impl Row {
             return None;
         };
         let example = RowExample {
-            value: VALUES.get(value as usize).map_or("value", |(_, name)| name),
+            value: value_name(value),
             pixel,
             sample,
             vertex,

@@ -46,6 +46,7 @@ mod status;
 pub mod technique;
 mod text;
 pub mod texture;
+pub mod trace;
 pub mod until;
 mod wavefront;
 mod wgsl;

@@ -263,7 +263,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
 }
 
 /// The uniform `run`, member by member.
-fn run_words(options: &RenderOptions) -> [u32; RUN_MEMBERS.len()] {
+pub(crate) fn run_words(options: &RenderOptions) -> [u32; RUN_MEMBERS.len()] {
     RUN_MEMBERS.map(|member| match member {
         "seed" => random::hash_seed(options.seed),
         "first_sample" => options.first_sample,

@@ -33,6 +33,8 @@ mod rays;
 mod render;
 mod strategy;
 mod technique;
+mod trace;
+mod trace_text;
 mod until;
 
 /// A material language, and the wavefront path tracer its compiler feeds.
@@ -90,6 +92,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Measure how fast renders come near the truth: error against run time
     Converge(Box<converge::ConvergeArgs>),
+    /// Replay the path of one sample, and print every vertex
+    Trace(trace::TraceArgs),
     /// Time ray casts alone, by every technique
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
@@ -133,6 +137,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Plan(args) => plan::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
         Command::Render(args) => render::run(&args, &global),
+        Command::Trace(args) => trace::run(&args, &global),
         Command::Rays(args) => rays::run(&args, &global),
         Command::Merge(args) => merge::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),

@@ -76,12 +76,12 @@ impl TechniqueArgs {
     }
 }
 
-fn default_name<C: Choice + Default>() -> &'static str {
+pub(super) fn default_name<C: Choice + Default>() -> &'static str {
     C::default().name()
 }
 
 /// Takes the names of a choice, and shows what each means in the long help.
-fn named<C: Choice + Default + Send + Sync>() -> impl TypedValueParser<Value = C> {
+pub(super) fn named<C: Choice + Default + Send + Sync>() -> impl TypedValueParser<Value = C> {
     let values = C::ALL
         .iter()
         .map(|(_, name, what)| PossibleValue::new(*name).help(what.trim()));

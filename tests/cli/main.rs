@@ -16,4 +16,5 @@ mod plan;
 mod plans;
 mod rays;
 mod render;
+mod trace;
 mod until;

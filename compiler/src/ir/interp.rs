@@ -109,6 +109,11 @@ impl<'a, F: Real> Interpreter<'a, F> {
         self
     }
 
+    /// Lets it evaluate `fuel` more expressions, whatever it has evaluated so far.
+    pub fn refill(&mut self, fuel: u64) {
+        self.fuel = self.executed.saturating_add(fuel);
+    }
+
     /// Expressions evaluated so far, turns of loops included.
     pub fn executed(&self) -> u64 {
         self.executed

@@ -217,11 +217,7 @@ fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Worst<Measured> {
         .collect();
     let dense: Vec<(Vec<f64>, Measured)> = points
         .chunks(BATCH)
-        .flat_map(|b| {
-            b.iter()
-                .cloned()
-                .zip(measure(bsdf, space, &regions, b))
-        })
+        .flat_map(|b| b.iter().cloned().zip(measure(bsdf, space, &regions, b)))
         .collect();
     let shape = [effort(16, 64), effort(6, 16), 32];
     let goals = GOALS.iter().map(|goal| {

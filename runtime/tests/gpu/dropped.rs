@@ -6,6 +6,7 @@ use impasto_compiler::partition::Strategy;
 use impasto_runtime::dropped::Dropped;
 use impasto_runtime::render::{RenderOptions, Rendering};
 use impasto_runtime::technique::{Sampler, Technique};
+use impasto_runtime::trace::{End, MaterialCode, Replayer};
 
 /// One wall of each kind of wrong material, and what is wrong with it: the value, and whether that is
 /// below zero.
@@ -139,6 +140,46 @@ fn emission_that_is_no_number_is_the_materials() {
     let value = entry.example.as_ref().map(|e| e.value.as_str());
     assert_eq!(value, Some("emission"));
     assert_eq!(rendering.report.dropped.len(), 1, "the film got none of it");
+}
+
+/// Every example leads to the vertex and value that the render complained of.
+#[test]
+fn an_example_replays() {
+    let (room, surfaces) = room();
+    let world = room.world();
+    for sampler in [Sampler::Owen, Sampler::Independent] {
+        let technique = Technique {
+            sampler,
+            ..Technique::default()
+        };
+        let options = RenderOptions {
+            seed: 11,
+            first_sample: 7,
+            technique,
+            ..samples(2)
+        };
+        let rendering = rendered(Strategy::Own, &options);
+        let examples: Vec<_> = rendering
+            .report
+            .dropped
+            .iter()
+            .flat_map(|d| &d.example)
+            .collect();
+        assert_eq!(examples.len(), WRONG.len());
+        let replayer = Replayer::of_source(&world, &surfaces, sampler).expect("a kernel");
+        let code = replayer
+            .code::<f32>(MaterialCode::Wgsl)
+            .expect("known code");
+        let mut session = replayer.session(&code).expect("known buffers");
+        for example in examples {
+            let path = session
+                .path(example.pixel, example.sample, example.seed)
+                .expect("a path");
+            let vertex = &path.vertices[example.vertex as usize - 1];
+            assert_eq!(vertex.dropped, Some(example.value.as_str()), "{path:?}");
+            assert_eq!(path.end, End::Dropped, "{path:?}");
+        }
+    }
 }
 
 /// Radiance that is wrong when a path ends is counted by the kernel that fills the film, for no

@@ -24,7 +24,7 @@ struct Target {
     needs_adapter: bool,
 }
 
-const TARGETS: [Target; 3] = [
+const TARGETS: [Target; 4] = [
     Target {
         package: "impasto-compiler",
         target: "stdlib",
@@ -35,6 +35,12 @@ const TARGETS: [Target; 3] = [
         package: "impasto-compiler",
         target: "materials",
         filters: &[],
+        needs_adapter: false,
+    },
+    Target {
+        package: "impasto",
+        target: "trace",
+        filters: &["examples"],
         needs_adapter: false,
     },
     Target {

@@ -1,0 +1,51 @@
+//! Why a path could not be replayed.
+
+use crate::error::RuntimeError;
+
+/// An error of a replay.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// The pixel is not in the picture.
+    #[error("there is no pixel {x},{y}: the picture is {width} by {height} pixels\n  hint: columns are 0 to {}, rows 0 to {} from the top", width - 1, height - 1)]
+    NoPixel {
+        /// Column.
+        x: u32,
+        /// Row.
+        y: u32,
+        /// Columns of the picture.
+        width: u32,
+        /// Rows of the picture.
+        height: u32,
+    },
+    /// The path takes more steps than the limit.
+    #[error(
+        "the path does not end within {0} steps of the interpreter\n  hint: a material may loop for very long at a point of the path; `impasto cost` shows what it takes"
+    )]
+    Endless(u64),
+    /// The kernel uses what the interpreter does not know.
+    #[error(
+        "internal error: the interpreter of kernels knows no {what} (in the function `{function}`); please report this"
+    )]
+    Unsupported {
+        /// What.
+        what: String,
+        /// Where.
+        function: String,
+    },
+    /// The kernel reads or writes beyond the end of something.
+    #[error(
+        "internal error: the kernel's function `{function}` reached beyond the end of {what}; please report this"
+    )]
+    Bounds {
+        /// Of what.
+        what: String,
+        /// Where.
+        function: String,
+    },
+    /// The kernel cannot be made.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
+    /// No thread to replay in.
+    #[error("no thread to replay the path in: {0}")]
+    Thread(String),
+}

@@ -1,0 +1,239 @@
+//! Who answers what the kernel asks of materials: the compiler's own interpreter, which is the
+//! oracle that generated WGSL is held against, or that generated WGSL itself.
+
+use impasto_compiler::Program;
+use impasto_compiler::abi::{TextureRef, TextureSpace};
+use impasto_compiler::ir::interp::{Interpreter, TextureLookup};
+use impasto_compiler::ir::value::Value;
+use impasto_compiler::ir::{Function, Type};
+use impasto_compiler::ops::Op;
+
+use super::LIMIT;
+use super::error::TraceError;
+use super::float::Float;
+use super::signature::Signature;
+
+/// Which code of materials is run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MaterialCode {
+    /// The compiler's IR, by its own interpreter.
+    #[default]
+    Ir,
+    /// The WGSL that GPUs get, by the interpreter of kernels.
+    Wgsl,
+}
+
+/// Materials that answer.
+pub(super) enum Materials<'p, F> {
+    /// The kernel's own code does.
+    Wgsl,
+    /// The oracle does.
+    Ir(Oracle<'p, F>),
+}
+
+/// The compiler's interpreter, one an instance that was hit.
+pub(super) struct Oracle<'p, F> {
+    program: &'p Program,
+    texture: Option<&'p TextureLookup<'p>>,
+    instances: Vec<Option<Interpreter<'p, F>>>,
+}
+
+impl<'p, F: Float> Oracle<'p, F> {
+    pub(super) fn new(program: &'p Program, texture: Option<&'p TextureLookup<'p>>) -> Self {
+        let instances = program.instances().iter().map(|_| None).collect();
+        Self {
+            program,
+            texture,
+            instances,
+        }
+    }
+
+    fn run(
+        &mut self,
+        instance: usize,
+        function: &'p Function,
+        arguments: Vec<Value<F>>,
+    ) -> Result<Value<F>, TraceError> {
+        let program = self.program;
+        let Some(place) = self.instances.get_mut(instance) else {
+            return Err(unknown(instance));
+        };
+        let interpreter = place.get_or_insert_with(|| {
+            let uniforms = &program.instances()[instance].uniforms;
+            let run = Interpreter::new(program.ir(), 0).with_uniforms(uniforms);
+            match self.texture {
+                Some(texture) => run.with_texture(texture),
+                None => run,
+            }
+        });
+        interpreter.refill(LIMIT);
+        let value = interpreter.run(function, arguments);
+        value.map_err(|_| TraceError::Endless(LIMIT))
+    }
+
+    /// The arguments of a material's function that the kernel gives by name.
+    fn arguments(
+        &self,
+        function: &Function,
+        names: &[&str],
+        of: &Signature,
+        cells: &[u64],
+    ) -> Vec<Value<F>> {
+        let vector = |name: &str| {
+            let numbers: Vec<F> = of
+                .arguments
+                .numbers::<F>(name, cells)
+                .into_iter()
+                .map(F::of)
+                .collect();
+            Value::floats(&numbers)
+        };
+        let point = match function.params.first().map(|p| p.ty) {
+            Some(Type::Struct(id)) => {
+                let structs = &self.program.ir().structs;
+                let fields = structs[id.index()].fields.iter().map(|(name, ty)| {
+                    let value = vector(&format!("point.{name}"));
+                    match value.components().is_empty() {
+                        true => Value::zero(*ty, structs),
+                        false => value,
+                    }
+                });
+                Value::Struct(fields.collect())
+            }
+            _ => Value::float(0.0),
+        };
+        let others = names.iter().map(|name| vector(name));
+        std::iter::once(point).chain(others).collect()
+    }
+}
+
+fn unknown(instance: usize) -> TraceError {
+    TraceError::Unsupported {
+        what: format!("instance {instance} of materials"),
+        function: "evaluate_material".into(),
+    }
+}
+
+impl<F: Float> Materials<'_, F> {
+    /// What a material samples, and reflects of a light.
+    pub(super) fn evaluate(
+        &mut self,
+        of: &Signature,
+        cells: &[u64],
+        result: &mut Vec<u64>,
+    ) -> Result<(), TraceError> {
+        let Materials::Ir(oracle) = self else {
+            return Ok(());
+        };
+        let program = oracle.program;
+        let instance = of.arguments.word("instance", cells) as usize;
+        let info = program
+            .instances()
+            .get(instance)
+            .ok_or_else(|| unknown(instance))?;
+        let function = &program.compiled()[info.info.material].evaluate;
+        let arguments = oracle.arguments(function, &["wo", "wl", "u"], of, cells);
+        let sample = oracle.run(instance, function, arguments)?;
+        result.resize(of.result.cells().max(1), 0);
+        if let Type::Struct(id) = function.result {
+            let fields = &program.ir().structs[id.index()].fields;
+            for (i, (name, _)) in fields.iter().enumerate() {
+                if let Some(value) = sample.field(i) {
+                    of.result.put(name, value.components(), result);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What a material emits.
+    pub(super) fn emission(
+        &mut self,
+        of: &Signature,
+        cells: &[u64],
+        result: &mut Vec<u64>,
+    ) -> Result<(), TraceError> {
+        let Materials::Ir(oracle) = self else {
+            return Ok(());
+        };
+        let program = oracle.program;
+        let instance = of.arguments.word("instance", cells) as usize;
+        let info = program
+            .instances()
+            .get(instance)
+            .ok_or_else(|| unknown(instance))?;
+        result.resize(of.result.cells().max(1), 0);
+        if let Some(function) = &program.compiled()[info.info.material].emission {
+            let arguments = oracle.arguments(function, &["wo"], of, cells);
+            let value = oracle.run(instance, function, arguments)?;
+            of.result.put("", value.components(), result);
+        }
+        Ok(())
+    }
+}
+
+/// Looks textures up as `kernels/texture.wgsl` does, from the same words, in double precision.
+pub(super) struct Textures {
+    words: Vec<u32>,
+    /// The program's slots by texture of the IR, for colors and for data.
+    slots: Vec<[Option<usize>; 2]>,
+}
+
+impl Textures {
+    /// Those of a program, whose texels are in `words`.
+    pub(super) fn new(program: &Program, words: Vec<u32>) -> Self {
+        let slots: Vec<TextureRef> = program.textures();
+        let slot = |path: &String, space| {
+            slots
+                .iter()
+                .position(|slot| slot.path == *path && slot.space == space)
+        };
+        let textures = program.ir().textures.iter();
+        let slots = textures
+            .map(|path| [TextureSpace::Color, TextureSpace::Data].map(|space| slot(path, space)));
+        Self {
+            slots: slots.collect(),
+            words,
+        }
+    }
+
+    /// The texture `index` at (u, v).
+    pub(super) fn fetch(&self, index: usize, u: f64, v: f64, op: Op) -> [f64; 4] {
+        let data = usize::from(op != Op::Image);
+        let last = self.slots.len().saturating_sub(1);
+        let slot = self.slots.get(index.min(last)).and_then(|s| s[data]);
+        slot.and_then(|slot| self.filter(slot, u, v))
+            .unwrap_or_default()
+    }
+
+    fn filter(&self, slot: usize, u: f64, v: f64) -> Option<[f64; 4]> {
+        let [first, size] = [self.words.get(2 * slot)?, self.words.get(2 * slot + 1)?];
+        let size = [size & 0xffff, size >> 16];
+        let wrapped = [u - u.floor(), 1.0 - (v - v.floor())];
+        let mut cells = [[0u32; 2]; 2];
+        let mut weight = [0.0; 2];
+        for axis in 0..2 {
+            let p = wrapped[axis] * f64::from(size[axis]) - 0.5;
+            weight[axis] = p - p.floor();
+            let low = p.floor() as i64;
+            cells[axis] = [low, low + 1].map(|i| i.rem_euclid(i64::from(size[axis].max(1))) as u32);
+        }
+        let texel = |x: usize, y: usize| {
+            let index = first + cells[1][y] * size[0] + cells[0][x];
+            self.texel(index as usize)
+        };
+        let corners = [texel(0, 0)?, texel(1, 0)?, texel(0, 1)?, texel(1, 1)?];
+        Some([0, 1, 2, 3].map(|c| {
+            let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+            let top = mix(corners[0][c], corners[1][c], weight[0]);
+            let bottom = mix(corners[2][c], corners[3][c], weight[0]);
+            mix(top, bottom, weight[1])
+        }))
+    }
+
+    fn texel(&self, index: usize) -> Option<[f64; 4]> {
+        let [low, high] = [self.words.get(2 * index)?, self.words.get(2 * index + 1)?];
+        let half = |bits: u32| half::f16::from_bits(bits as u16).to_f64();
+        Some([half(*low), half(low >> 16), half(*high), half(high >> 16)])
+    }
+}

@@ -1,0 +1,317 @@
+//! Composes the megakernel of a world for one slot, without a GPU, and runs single paths in it.
+
+use std::marker::PhantomData;
+use std::time::Instant;
+
+use impasto_compiler::Program;
+use impasto_compiler::ir::interp::TextureLookup;
+use impasto_compiler::ops::Op;
+use impasto_compiler::partition::Strategy;
+use naga::valid::ModuleInfo;
+use wgpu::naga;
+
+use super::code::Code;
+use super::error::TraceError;
+use super::float::Float;
+use super::machine::Machine;
+use super::materials::{MaterialCode, Materials, Oracle, Textures};
+use super::path::Path;
+use super::record::{self, Names, Recorder};
+use super::{LIMIT, lower};
+use crate::film::{self, Sums};
+use crate::layout::Layout;
+use crate::modules::{Composer, Sizes};
+use crate::needs::Needs;
+use crate::queues::{Counters, Scalar};
+use crate::random::{self, Demand};
+use crate::render::RenderOptions;
+use crate::resources::run_words;
+use crate::settings;
+use crate::shader_part::BufferData;
+use crate::technique::{Regeneration, Sampler, Technique};
+use crate::world::{MaterialSource, World};
+
+/// Bytes of the stack that code is interpreted on: blocks within blocks are calls within calls.
+const STACK: usize = 256 << 20;
+
+/// Runs `f` on a thread with a stack that is large enough for any kernel.
+///
+/// # Errors
+/// If there is no such thread.
+pub fn with_room<R: Send>(f: impl FnOnce() -> R + Send) -> Result<R, TraceError> {
+    let thread = |e: &dyn std::fmt::Display| TraceError::Thread(e.to_string());
+    std::thread::scope(|scope| {
+        let builder = std::thread::Builder::new().stack_size(STACK);
+        let handle = builder.spawn_scoped(scope, f).map_err(|e| thread(&e))?;
+        handle.join().map_err(|_| thread(&"it broke off"))
+    })
+}
+
+type Texture = Box<dyn Fn(usize, f64, f64, Op) -> [f64; 4] + Send + Sync>;
+
+/// A world whose paths can be replayed.
+pub struct Replayer<'p> {
+    module: naga::Module,
+    info: ModuleInfo,
+    /// The buffers of the scene.
+    buffers: Vec<(&'static str, Vec<u32>)>,
+    counters: Counters,
+    width: u32,
+    height: u32,
+    max_depth: u32,
+    names: Names,
+    program: Option<&'p Program>,
+    texture: Option<Texture>,
+}
+
+/// The kernel as it is interpreted in one precision.
+pub struct KernelCode<F> {
+    code: Code,
+    materials: MaterialCode,
+    floats: PhantomData<F>,
+}
+
+/// What replays one path after another.
+pub struct Session<'s, F> {
+    replayer: &'s Replayer<'s>,
+    code: &'s Code,
+    machine: Machine<'s, F>,
+    materials: Materials<'s, F>,
+}
+
+impl<'p> Replayer<'p> {
+    /// Of the scene that `world` was made of, whose materials compiled to `program`.
+    ///
+    /// # Errors
+    /// If the world cannot be rendered.
+    pub fn new(world: &World, program: &'p Program, sampler: Sampler) -> Result<Self, TraceError> {
+        let mut replayer = Self::of_source(world, program, sampler)?;
+        let words = replayer
+            .buffers
+            .iter()
+            .find(|(name, _)| *name == "texture_data");
+        if let Some((_, words)) = words {
+            let textures = Textures::new(program, words.clone());
+            replayer.texture = Some(Box::new(move |i, u, v, op| textures.fetch(i, u, v, op)));
+        }
+        replayer.program = Some(program);
+        Ok(replayer)
+    }
+
+    /// Of any materials, whose WGSL is interpreted.
+    ///
+    /// # Errors
+    /// If the world cannot be rendered.
+    pub fn of_source(
+        world: &World,
+        source: &dyn MaterialSource,
+        sampler: Sampler,
+    ) -> Result<Self, TraceError> {
+        settings::check(world, &RenderOptions::default())?;
+        let (materials, instances) = (source.infos(), source.instances());
+        let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+        let plan = Strategy::Mega
+            .plan(&names)
+            .leaving_out(&world.parts.unbound);
+        let technique = Technique {
+            sampler,
+            regeneration: Regeneration::Never,
+            ..Technique::default()
+        };
+        let layout = Layout::new(world, &materials, &plan, &technique)?;
+        let demand = Demand::of(world, &materials, Needs::of(world, &materials).shadow_rays);
+        let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
+        let composer = Composer {
+            world,
+            source,
+            materials: &materials,
+            instances: &instances,
+            tables: &tables,
+            plan: &plan,
+            layout,
+            // One slot, one thread.
+            sizes: Sizes {
+                pool: 1,
+                workgroup: 1,
+                threads: 1,
+                fetch_limit: 1,
+                row_groups: 1,
+            },
+            technique,
+            queue_table: false,
+            subgroup_size: 1,
+            random: random::part(sampler, demand),
+        };
+        let kernels = composer.recipes().into_iter().enumerate();
+        let mega = kernels.filter(|(_, recipe)| recipe.form.is_some()).last();
+        let (index, recipe) = mega.ok_or_else(|| lower::unsupported("megakernel", "main"))?;
+        let kernel = composer.compose(index, recipe);
+        let (module, info) = crate::gpu::shader::validate(&kernel.recipe.name, &kernel.wgsl)?;
+        let words = |buffer: &BufferData| {
+            (
+                buffer.name,
+                bytemuck::pod_collect_to_vec(&whole_words(&buffer.bytes)),
+            )
+        };
+        let of = |material: usize| names.get(material).cloned().unwrap_or_default();
+        let instances = instances.iter().map(|i| (i.name.clone(), of(i.material)));
+        Ok(Self {
+            module,
+            info,
+            buffers: composer.scene_buffers().map(words).collect(),
+            counters: layout.counters,
+            width: world.width,
+            height: world.height,
+            max_depth: world.max_depth,
+            names: Names {
+                instances: instances.collect(),
+            },
+            program: None,
+            texture: None,
+        })
+    }
+
+    /// Columns and rows of the picture.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// The kernel in the precision of `F`. Without a program, its materials are WGSL in any case.
+    ///
+    /// # Errors
+    /// If it uses what the interpreter does not know.
+    pub fn code<F: Float>(&self, materials: MaterialCode) -> Result<KernelCode<F>, TraceError> {
+        let materials = match self.program {
+            Some(_) => materials,
+            None => MaterialCode::Wgsl,
+        };
+        let answered = match materials {
+            MaterialCode::Ir => record::answered(),
+            MaterialCode::Wgsl => Vec::new(),
+        };
+        let code = lower::lower::<F>(&self.module, &self.info, &record::names(), &answered)?;
+        Ok(KernelCode {
+            code,
+            materials,
+            floats: PhantomData,
+        })
+    }
+
+    /// Prepares to replay paths.
+    ///
+    /// # Errors
+    /// If the kernel binds a buffer that the interpreter does not know.
+    pub fn session<'s, F: Float>(
+        &'s self,
+        kernel: &'s KernelCode<F>,
+    ) -> Result<Session<'s, F>, TraceError> {
+        let buffers = kernel.code.buffers.iter().map(|name| self.buffer(name));
+        let buffers = buffers.collect::<Result<Vec<_>, _>>()?;
+        let texture = self.texture.as_deref().map(|f| f as &TextureLookup<'s>);
+        let materials = match (kernel.materials, self.program) {
+            (MaterialCode::Ir, Some(program)) => Materials::Ir(Oracle::new(program, texture)),
+            _ => Materials::Wgsl,
+        };
+        Ok(Session {
+            replayer: self,
+            code: &kernel.code,
+            machine: Machine::new(&kernel.code, buffers, LIMIT),
+            materials,
+        })
+    }
+
+    /// The words of a buffer before a path begins.
+    fn buffer(&self, name: &str) -> Result<Vec<u32>, TraceError> {
+        let pixels = self.width as usize * self.height as usize;
+        let of_scene = self.buffers.iter().find(|(buffer, _)| *buffer == name);
+        match (name, of_scene) {
+            ("run", _) => Ok(run_words(&RenderOptions::default()).to_vec()),
+            ("counters", _) => Ok(vec![0; self.counters.len()]),
+            ("film", _) => Ok(vec![0; pixels * film::PLANES]),
+            (_, Some((_, words))) => Ok(words.clone()),
+            _ => Err(lower::unsupported(&format!("buffer `{name}`"), "main")),
+        }
+    }
+}
+
+/// Bytes up to a multiple of four, of which there is at least one.
+fn whole_words(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    bytes.resize(bytes.len().next_multiple_of(4).max(16), 0);
+    bytes
+}
+
+impl<F: Float> Session<'_, F> {
+    /// The path of a sample of the pixel in a column and row.
+    ///
+    /// # Errors
+    /// If there is no such pixel or sample, or the path does not end within a limit.
+    pub fn path(&mut self, [x, y]: [u32; 2], sample: u32, seed: u32) -> Result<Path, TraceError> {
+        let Replayer { width, height, .. } = *self.replayer;
+        if x >= width || y >= height {
+            return Err(TraceError::NoPixel {
+                x,
+                y,
+                width,
+                height,
+            });
+        }
+        let options = RenderOptions {
+            samples: 1,
+            first_sample: sample,
+            seed,
+            ..RenderOptions::default()
+        };
+        settings::check_samples(&options)?;
+        let pixel = (y * width + x) as usize;
+        self.prepare(pixel, &options);
+        let names = &self.replayer.names;
+        let mut recorder = Recorder::new(
+            &self.code.signatures,
+            names,
+            &mut self.materials,
+            self.replayer.max_depth,
+        );
+        let begin = Instant::now();
+        self.machine.run(&mut recorder)?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let path = recorder.finish();
+        let mut path = path.ok_or_else(|| lower::unsupported("path without an end", "film_add"))?;
+        (path.pixel, path.sample, path.seed) = ([x, y], sample, seed);
+        (path.steps, path.seconds) = (self.machine.steps(), seconds);
+        path.added = self.film(pixel);
+        Ok(path)
+    }
+
+    /// Makes the kernel's only item of work this sample of this pixel.
+    fn prepare(&mut self, pixel: usize, options: &RenderOptions) {
+        let counters = self.replayer.counters;
+        let pixels = self.replayer.width as usize * self.replayer.height as usize;
+        for (name, words) in self.code.buffers.iter().zip(&mut self.machine.buffers) {
+            match name.as_str() {
+                "run" => words.copy_from_slice(&run_words(options)),
+                "counters" => {
+                    words.fill(0);
+                    words[counters.index(Scalar::WorkPixel)] = pixel as u32;
+                }
+                "film" => {
+                    let planes = words.chunks_exact_mut(pixels);
+                    planes.for_each(|plane| plane[pixel] = 0);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// What the film holds of a pixel.
+    fn film(&self, pixel: usize) -> [f32; 3] {
+        let pixels = self.replayer.width as usize * self.replayer.height as usize;
+        let mut buffers = self.code.buffers.iter().zip(&self.machine.buffers);
+        let film = buffers.find(|(name, _)| *name == "film");
+        let planes = film.into_iter();
+        let planes = planes.flat_map(|(_, words)| words.chunks_exact(pixels));
+        let words = planes.map(|plane| plane[pixel]).collect();
+        let sums = Sums::new(1, 1, words);
+        sums.map_or([0.0; 3], |sums| sums.picture().pixels[0])
+    }
+}

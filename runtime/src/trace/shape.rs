@@ -1,0 +1,199 @@
+//! How values of WGSL types lie in cells, and where in the words of a buffer.
+//!
+//! A value is flattened: each of its scalars is one cell, in the order of its parts. In a buffer the
+//! same scalars lie at the offsets of the WGSL specification, which naga computes.
+
+use naga::{ArraySize, Module, ScalarKind, TypeInner, VectorSize};
+use wgpu::naga;
+
+/// Where a part of a value begins within the whole.
+pub(super) struct Part {
+    /// In cells.
+    pub cell: u32,
+    /// In bytes of a buffer.
+    pub byte: u32,
+}
+
+/// How many of something that is indexed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Length {
+    Fixed(u32),
+    /// As many as the buffer has room for.
+    Open,
+}
+
+/// The elements of what is indexed.
+pub(super) struct Elements {
+    pub ty: TypeInner,
+    pub length: Length,
+    /// In cells.
+    pub cells: u32,
+    /// In bytes of a buffer.
+    pub bytes: u32,
+}
+
+/// Whether a scalar is a float, whose cell depends on the precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    Float,
+    Word,
+}
+
+/// A scalar of a value in a buffer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Words from the beginning of the value.
+    pub word: u32,
+    pub scalar: Scalar,
+}
+
+/// The types of a module.
+#[derive(Clone, Copy)]
+pub(super) struct Shapes<'m>(pub &'m Module);
+
+impl Shapes<'_> {
+    /// Cells that a value takes; `None` for what is no value, such as an array of open length.
+    pub(super) fn cells(self, ty: &TypeInner) -> Option<u32> {
+        match ty {
+            TypeInner::Scalar(_) | TypeInner::Atomic(_) => Some(1),
+            TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. } => Some(1),
+            TypeInner::Vector { size, .. } => Some(count(*size)),
+            TypeInner::Matrix { columns, rows, .. } => Some(count(*columns) * count(*rows)),
+            TypeInner::Array { .. } => {
+                let elements = self.elements(ty)?;
+                match elements.length {
+                    Length::Fixed(length) => length.checked_mul(elements.cells),
+                    Length::Open => None,
+                }
+            }
+            TypeInner::Struct { members, .. } => members.iter().try_fold(0u32, |sum, member| {
+                sum.checked_add(self.cells(self.inner(member.ty))?)
+            }),
+            _ => None,
+        }
+    }
+
+    pub(super) fn inner(&self, ty: naga::Handle<naga::Type>) -> &TypeInner {
+        &self.0.types[ty].inner
+    }
+
+    /// What a pointer points to; the type itself if it is none.
+    pub(super) fn behind(self, ty: &TypeInner) -> TypeInner {
+        match *ty {
+            TypeInner::Pointer { base, .. } => self.inner(base).clone(),
+            TypeInner::ValuePointer {
+                size: Some(size),
+                scalar,
+                ..
+            } => TypeInner::Vector { size, scalar },
+            TypeInner::ValuePointer { scalar, .. } => TypeInner::Scalar(scalar),
+            _ => ty.clone(),
+        }
+    }
+
+    /// The elements of a vector, matrix or array.
+    pub(super) fn elements(self, ty: &TypeInner) -> Option<Elements> {
+        match *ty {
+            TypeInner::Vector { size, scalar } => Some(Elements {
+                ty: TypeInner::Scalar(scalar),
+                length: Length::Fixed(count(size)),
+                cells: 1,
+                bytes: 4,
+            }),
+            TypeInner::Matrix {
+                columns,
+                rows,
+                scalar,
+            } => Some(Elements {
+                ty: TypeInner::Vector { size: rows, scalar },
+                length: Length::Fixed(count(columns)),
+                cells: count(rows),
+                bytes: if rows == VectorSize::Bi { 8 } else { 16 },
+            }),
+            TypeInner::Array { base, size, stride } => Some(Elements {
+                ty: self.inner(base).clone(),
+                length: match size {
+                    ArraySize::Constant(length) => Length::Fixed(length.get()),
+                    ArraySize::Dynamic => Length::Open,
+                    ArraySize::Pending(_) => return None,
+                },
+                cells: self.cells(self.inner(base))?,
+                bytes: stride,
+            }),
+            _ => None,
+        }
+    }
+
+    /// A member of a struct, or an element.
+    pub(super) fn part(self, ty: &TypeInner, index: u32) -> Option<Part> {
+        let TypeInner::Struct { members, .. } = ty else {
+            let elements = self.elements(ty)?;
+            return Some(Part {
+                cell: index.checked_mul(elements.cells)?,
+                byte: index.checked_mul(elements.bytes)?,
+            });
+        };
+        let at = index as usize;
+        let member = members.get(at)?;
+        let before = members[..at].iter().try_fold(0u32, |sum, member| {
+            sum.checked_add(self.cells(self.inner(member.ty))?)
+        });
+        Some(Part {
+            cell: before?,
+            byte: member.offset,
+        })
+    }
+
+    /// Where the scalars of a value lie in a buffer, in the order of its cells.
+    pub(super) fn places(self, ty: &TypeInner) -> Option<Vec<Place>> {
+        let mut out = Vec::new();
+        self.add_places(ty, 0, &mut out)?;
+        Some(out)
+    }
+
+    fn add_places(self, ty: &TypeInner, byte: u32, out: &mut Vec<Place>) -> Option<()> {
+        match ty {
+            TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => {
+                let kind = match (scalar.kind, scalar.width) {
+                    (ScalarKind::Float, 4) => Scalar::Float,
+                    (ScalarKind::Uint | ScalarKind::Sint, 4) => Scalar::Word,
+                    _ => return None,
+                };
+                out.push(Place {
+                    word: byte / 4,
+                    scalar: kind,
+                });
+                Some(())
+            }
+            TypeInner::Struct { members, .. } => members
+                .iter()
+                .try_for_each(|m| self.add_places(self.inner(m.ty), byte + m.offset, out)),
+            _ => {
+                let elements = self.elements(ty)?;
+                let Length::Fixed(length) = elements.length else {
+                    return None;
+                };
+                (0..length)
+                    .try_for_each(|i| self.add_places(&elements.ty, byte + i * elements.bytes, out))
+            }
+        }
+    }
+}
+
+/// The kind of a scalar's or vector's or matrix's numbers, and whether those are 32 bits (or bools).
+pub(super) fn kind(ty: &TypeInner) -> Option<ScalarKind> {
+    match ty {
+        TypeInner::Scalar(scalar)
+        | TypeInner::Vector { scalar, .. }
+        | TypeInner::Matrix { scalar, .. }
+        | TypeInner::Atomic(scalar) => {
+            (scalar.width == 4 || scalar.kind == ScalarKind::Bool).then_some(scalar.kind)
+        }
+        _ => None,
+    }
+}
+
+/// The components of a vector.
+pub(super) fn count(size: VectorSize) -> u32 {
+    size as u32
+}
