@@ -1,11 +1,14 @@
 //! Environment maps: where their texels are, and how often each is sampled.
 
+#[path = "../../compiler/tests/common/record.rs"]
+mod record;
 mod support;
 
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 use impasto_runtime::scene::{EnvironmentSource, Scene};
+use record::{Bound, Row, effort};
 use support::light_scenes::{map_scene, met, parts, sample, turned};
 
 #[test]
@@ -47,7 +50,7 @@ fn environment_texels_are_chosen_by_their_density() {
         let texels: &[[f32; 4]] = bytemuck::cast_slice(&buffer.expect("texels").bytes);
         let (width, height) = (map.width as usize, map.height as usize);
         let edge = |row: usize| (PI * row as f64 / height as f64).cos();
-        let count = 400_000;
+        let count = effort(400_000, 10_000_000);
         let mut seen = vec![0u32; 4 * width * height];
         for s in sample(&parts, Vec3::ZERO, count, 3) {
             let wi = s.wi.as_dvec3();
@@ -77,7 +80,16 @@ fn environment_texels_are_chosen_by_their_density() {
         // Wilson and Hilferty: the cube root of chi^2 / k is nearly normal.
         let k = f64::from(cells - 1);
         let z = ((chi2 / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-        assert!(z < 4.0, "{name}: chi^2 {chi2} with {k} degrees of freedom");
+        let good = Row {
+            table: "22",
+            subject: "environment map",
+            what: "chi-squared of sampled quarters of texels, as a normal deviate",
+            worst: z,
+            bound: Bound::AtMost(4.0),
+            place: name,
+        }
+        .note();
+        assert!(good, "{name}: chi^2 {chi2} with {k} degrees of freedom");
     }
 }
 
