@@ -116,8 +116,11 @@ fn html_block(block: &Block) -> String {
         }
         Block::Table(table) => html_table(table),
         Block::Figures(figures) => {
+            // Plots have letters, which must stay readable.
+            let plots = figures.iter().any(|f| f.file.ends_with(".svg"));
+            let class = if plots { "figures plots" } else { "figures" };
             let figures: String = figures.iter().map(html_figure).collect();
-            format!("<div class=\"figures\">\n{figures}</div>\n")
+            format!("<div class=\"{class}\">\n{figures}</div>\n")
         }
     }
 }
