@@ -8,8 +8,80 @@ use impasto::converge::metrics::mean_squared;
 use impasto::runtime::render::Samples;
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Sampler, Technique};
-use impasto::runtime::until::Goals;
-use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
+use impasto::runtime::until::{Ending, Goals, second_seed};
+use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Scene, Strategy};
+
+/// The box without caustics and without the lamp in the picture, whose few pixels would need far more
+/// seeds.
+fn scene(side: u32) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cornell/scene.toml");
+    let mut scene = impasto::load(&path).expect("the scene");
+    scene.film = FilmSettings {
+        width: side,
+        height: side,
+    };
+    scene.camera.position = Vec3::new(0.0, 0.3, 0.5);
+    scene.camera.look_at = Vec3::new(0.0, 0.1, 0.0);
+    scene.camera.fov = 50.0;
+    for material in &mut scene.materials {
+        material.file = "../../materials/matte.impasto".into();
+        material.params.clear();
+    }
+    scene
+}
+
+/// A render in halves is the two renders that it says it is made of.
+#[test]
+fn the_picture_is_that_of_both_halves() {
+    let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
+    let scene = scene(8);
+    let program = impasto::compile(&scene).expect("materials");
+    let plan = impasto::plan(&program, Strategy::Own);
+    let options = RenderOptions {
+        samples: 22,
+        first_sample: 5,
+        seed: 7,
+        ..RenderOptions::default()
+    };
+    let mut renderer = Renderer::new(&gpu, &scene, &program, &plan, &options).expect("a renderer");
+    let mut go_on = |_: &_| ControlFlow::Continue(());
+    let goals = Goals::default();
+    let whole = renderer
+        .render_until(&goals, &mut |_| (), &mut go_on)
+        .expect("a render");
+    assert_eq!(whole.report.ended_by, Some(Ending::Samples));
+    assert_eq!((whole.report.seed, whole.report.samples_per_pixel), (7, 22));
+    let mut half = |seed| {
+        let samples = Samples {
+            seed,
+            first: 5,
+            count: 11,
+        };
+        renderer.select(&samples).expect("samples");
+        renderer.render(&mut go_on).expect("a half")
+    };
+    let (a, b) = (half(7), half(second_seed(7)));
+    assert_ne!(a.film.pixels, b.film.pixels);
+    for ((whole, a), b) in whole
+        .film
+        .pixels
+        .iter()
+        .zip(&a.film.pixels)
+        .zip(&b.film.pixels)
+    {
+        for channel in 0..3 {
+            let mean = 0.5 * (f64::from(a[channel]) + f64::from(b[channel]));
+            let off = (f64::from(whole[channel]) - mean).abs();
+            assert!(
+                off <= 1e-6 * mean,
+                "{whole:?} is not between {a:?} and {b:?}"
+            );
+        }
+    }
+    // Samples by two seeds are no part of a render by one.
+    let mut merged = whole.sums.clone();
+    assert!(merged.merge(&a.sums).is_err());
+}
 
 /// Renders by many seeds: the estimates are the errors against a reference, on average, also where
 /// samples of a half depend on each other. Two ranges of one sequence instead of two seeds would fail this:
@@ -18,20 +90,7 @@ use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
 fn the_estimated_error_is_the_true_one() {
     const SEEDS: u32 = 16;
     let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cornell/scene.toml");
-    let mut scene = impasto::load(&path).expect("the scene");
-    scene.film = FilmSettings {
-        width: 12,
-        height: 12,
-    };
-    // Without caustics and the lamp in the picture, whose few pixels would need far more seeds.
-    scene.camera.position = Vec3::new(0.0, 0.3, 0.5);
-    scene.camera.look_at = Vec3::new(0.0, 0.1, 0.0);
-    scene.camera.fov = 50.0;
-    for material in &mut scene.materials {
-        material.file = "../../materials/matte.impasto".into();
-        material.params.clear();
-    }
+    let scene = scene(12);
     let program = impasto::compile(&scene).expect("materials");
     let plan = impasto::plan(&program, Strategy::Mega);
     for sampler in [Sampler::Independent, Sampler::Sobol, Sampler::Owen] {

@@ -88,8 +88,8 @@ impl Goals {
     }
 }
 
-/// The seed of the second half of a render by `seed`.
-pub(crate) fn second_seed(seed: u32) -> u32 {
+/// The seed of the second half of a render by `seed`: both halves can be rendered by themselves.
+pub fn second_seed(seed: u32) -> u32 {
     let other = hash_seed(hash_seed(seed));
     // Any other will do for a seed that is hashed to itself.
     if other == seed { !seed } else { other }

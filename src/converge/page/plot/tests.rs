@@ -98,6 +98,24 @@ fn dots_are_where_numbers_are() {
     }
 }
 
+/// Both series have the same numbers of samples; the second takes half as much time again.
+#[test]
+fn times_are_drawn_against_times() {
+    let scene = &example::convergence().scenes[0];
+    let first_dots = |against_time| -> Vec<f64> {
+        let svg = curves(scene, Metric::Rmse, against_time).expect("drawn");
+        let first = |color: &str| {
+            let mut circles = svg.split("<circle").filter(|c| c.contains(color));
+            let circle = circles.next().expect("a dot");
+            attributes(&format!("circle{circle}"), "circle", "cx")[0]
+        };
+        ["#0072B2", "#D55E00"].map(first).into()
+    };
+    let (times, samples) = (first_dots(true), first_dots(false));
+    assert!(times[1] > times[0] + 5.0, "{times:?}");
+    assert_eq!(samples[0], samples[1]);
+}
+
 #[test]
 fn what_is_not_there_is_not_drawn() {
     for svg in all(&example::black()) {
