@@ -7,6 +7,7 @@ mod cells;
 mod delta;
 mod emission;
 mod energy;
+mod extremes;
 mod fresnel;
 mod known;
 mod lanes;
@@ -28,6 +29,7 @@ mod space;
 mod statistics;
 mod subsurface;
 mod symmetry;
+mod tally;
 mod text;
 mod vectors;
 

@@ -6,10 +6,15 @@ use std::f64::consts::TAU;
 use super::cells::{self, Measures};
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case};
+use super::record::{Bound, effort};
 use super::statistics::{Numbers, chi_squared_tail, direction, sidak};
+use super::tally::Tally;
 
-/// Directions drawn for each case and view; a quarter decides on the cells.
-const SAMPLES: usize = 1 << 16;
+/// Directions drawn for each case and view; a quarter decides on the cells. At full effort that is
+/// over ten million for every BSDF.
+fn samples() -> usize {
+    effort(1 << 15, 1 << 18)
+}
 
 /// Significance of all chi-squared tests of a BSDF together.
 const SIGNIFICANCE: f64 = 0.01;
@@ -98,6 +103,34 @@ pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distrib
         sample: Box::new(sample),
         measure: Box::new(measure),
     }
+}
+
+/// Added to the seed where a fault is looked at again.
+const AGAIN: u64 = 1 << 32;
+
+/// Adds an outcome to what is kept of a BSDF or material.
+pub fn tell(tally: &Tally, name: &str, o: &Outcome, tests: usize, label: &str) {
+    let least = Bound::AtLeast(sidak(SIGNIFICANCE, tests));
+    let most = Bound::AtMost(1.0 + 2e-3);
+    let energy = o.energy.iter().fold(0.0f64, |a, &b| a.max(b));
+    tally.add(
+        ("chi-squared", name, "least probability"),
+        o.fit,
+        least,
+        label,
+    );
+    tally.add(
+        ("density", name, "integral of the density"),
+        o.total,
+        most,
+        label,
+    );
+    tally.add(
+        ("energy", name, "most that is reflected of 1, integrated"),
+        energy,
+        most,
+        label,
+    );
 }
 
 /// Samples and integrates. Panics on answers that no distribution gives.
@@ -230,17 +263,22 @@ fn samples_follow_the_density_and_keep_energy() {
         })
         .collect();
     let tests = work.len();
+    let tally = Tally::default();
     super::each_in_parallel(&work, |i, (bsdf, case, degrees)| {
         let wo = view(*degrees);
         let d = distribution(bsdf, case, wo);
         let found = |seed: u64| {
-            let outcome = examine(&d, SAMPLES, seed);
+            let outcome = examine(&d, samples(), seed);
             let mut faults = faults(&outcome, tests);
+            let good = faults.is_empty();
             // Rough lobes are sampled where they are bright: no weight is far above the albedo.
             if outcome.greatest_weight > 4.0 {
                 faults.push(format!("weight {}", outcome.greatest_weight));
             }
             faults.extend(albedo_fault(bsdf, case, wo, &outcome));
+            if good || seed >= AGAIN {
+                tell(&tally, &bsdf.name, &outcome, tests, &d.label);
+            }
             faults
         };
         // Among thousands of partitions into cells, one or two are integrated badly where a lobe is
@@ -249,7 +287,7 @@ fn samples_follow_the_density_and_keep_energy() {
         let faults = if first.is_empty() {
             first
         } else {
-            found(i as u64 + (1 << 32))
+            found(i as u64 + AGAIN)
         };
         (d.label, faults)
     });
@@ -308,7 +346,7 @@ fn the_test_sees_wrong_densities() {
             sample: Box::new(sample),
             measure: Box::new(density(scale, power)),
         };
-        examine(&d, SAMPLES, 1).fit
+        examine(&d, 1 << 16, 1).fit
     };
     assert!(fit(&cosine, 2.0, 1) > 1e-4);
     assert!(fit(&cosine, 1.94, 1) < 1e-6);
