@@ -1,15 +1,21 @@
 //! Whole materials as distributions: the function that kernels call samples what it says it
 //! samples, under bumped normals and through layers.
 
+use impasto_compiler::ir::value::Real;
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, diag};
 
 use super::cells::Measures;
 use super::lanes::{self, Lanes};
-use super::sampling::{Distribution, examine, faults, view};
-use super::statistics::Numbers;
+use super::record::{Bound, effort};
+use super::sampling::{Distribution, Outcome, examine, faults, tell, view};
+use super::search::errors;
+use super::statistics::{Numbers, direction};
+use super::tally::Tally;
 
 /// Directions drawn for each material and view.
-const SAMPLES: usize = 1 << 16;
+fn samples() -> usize {
+    effort(1 << 14, 1 << 18)
+}
 
 /// Angles of `wo` to the geometric normal.
 const VIEWS: [f64; 5] = [20.0, 60.0, 80.0, 88.0, 140.0];
@@ -22,7 +28,16 @@ const LIGHT_PDF: usize = 7;
 const LIGHT_THROUGHPUT: usize = 8;
 
 fn program(file: &str, loader: &mut dyn Loader) -> Program {
-    let compiled = compile(&[MaterialRequest::new("m", file)], loader);
+    program_with(file, Vec::new(), loader)
+}
+
+/// The program of a file's material with values for its parameters.
+fn program_with(file: &str, params: Vec<(String, String)>, loader: &mut dyn Loader) -> Program {
+    let request = MaterialRequest {
+        params,
+        ..MaterialRequest::new("m", file)
+    };
+    let compiled = compile(&[request], loader);
     let problems = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
     compiled
         .program
@@ -107,14 +122,18 @@ fn reflected(program: &Program, at: &[f64], wo: [f64; 3], samples: usize) -> [f6
     })
 }
 
-/// Faults of a material, except gain of energy where radiance grows by leaving a dense medium.
-fn examined(d: &Distribution<'_>, tests: usize, seed: usize) -> Vec<String> {
-    let outcome = examine(d, SAMPLES, seed as u64);
-    let gain = |f: &String| f.starts_with("reflects") && !f.contains("by");
-    faults(&outcome, tests)
-        .into_iter()
-        .filter(|f| !gain(f))
-        .collect()
+/// Samples, integrates, and finds faults of a material; gain of energy is none from inside, where
+/// radiance grows by leaving a dense medium.
+fn examined(
+    d: &Distribution<'_>,
+    inside: bool,
+    tests: usize,
+    seed: usize,
+) -> (Outcome, Vec<String>) {
+    let outcome = examine(d, samples(), seed as u64);
+    let gain = |f: &String| inside && f.starts_with("reflects") && !f.contains("by");
+    let faults = faults(&outcome, tests);
+    (outcome, faults.into_iter().filter(|f| !gain(f)).collect())
 }
 
 /// A BSDF of each kind under normals that are tilted, look away from the viewer, or are none.
@@ -157,7 +176,7 @@ fn bumped_surfaces_are_sampled_as_they_are_evaluated() {
     super::each_in_parallel(&work, |i, (label, program, degrees)| {
         let wo = view(*degrees);
         let d = distribution(format!("{label} from {degrees} degrees"), program, &at, wo);
-        let mut faults = examined(&d, work.len(), i);
+        let (_, mut faults) = examined(&d, *degrees > 90.0, work.len(), i);
         let seen = reflected(program, &at, wo, 4096);
         if seen.iter().any(|s| *s < 0.01) {
             faults.push(format!("black: reflects {seen:?}"));
@@ -174,8 +193,21 @@ impl Loader for Files {
     }
 }
 
-#[test]
-fn every_material_is_sampled_as_it_is_evaluated() {
+/// Angles of `wo` to the geometric normal from which materials are seen.
+const SEEN: [f64; 6] = [0.0, 30.0, 60.0, 80.0, 89.0, 130.0];
+
+/// What a material reflects may exceed 1 by this much of sampling's error.
+const SAMPLED: f64 = 0.02;
+
+/// A material of `materials/` with some values of its parameters.
+struct Variant {
+    name: String,
+    label: String,
+    program: Program,
+}
+
+/// Every material, with its defaults and with parameters drawn from their ranges.
+fn variants() -> Vec<Variant> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../materials");
     let paths = std::fs::read_dir(folder)
         .expect("materials/")
@@ -187,25 +219,181 @@ fn every_material_is_sampled_as_it_is_evaluated() {
         .collect();
     paths.sort();
     assert!(paths.len() >= 5, "only {} materials", paths.len());
-    let programs: Vec<(&str, Program)> = paths
-        .iter()
-        .map(|p| (p.rsplit('/').next().unwrap_or(""), program(p, &mut Files)))
-        .filter(|(_, p)| !p.infos()[0].delta_only)
-        .collect();
-    let at: Vec<Vec<f64>> = vec![
-        point([0.013, 0.024, 0.5], [0.3, 0.7]),
-        point([1.37, -2.61, 0.4], [2.6, 0.1]),
-    ];
-    let mut work = Vec::new();
-    for (name, program) in &programs {
-        for at in &at {
-            work.extend([20.0, 75.0].map(|v| (*name, program, at, v)));
+    let mut variants = Vec::new();
+    for path in paths {
+        let text = std::fs::read_to_string(&path).expect("a text");
+        let file = path.rsplit('/').next().unwrap_or("");
+        let name = file.trim_end_matches(".impasto").to_owned();
+        for seed in 0..=effort(1, 6) as u64 {
+            let params = if seed == 0 {
+                Vec::new()
+            } else {
+                drawn(&text, seed)
+            };
+            let label = format!("{name} {params:?}");
+            let program = program_with(&path, params, &mut Files);
+            variants.push(Variant {
+                name: name.clone(),
+                label,
+                program,
+            });
         }
     }
-    super::each_in_parallel(&work, |i, (name, program, at, degrees)| {
-        let label = format!("{name} from {degrees} degrees at {:?}", &at[..3]);
-        let d = distribution(label, program, at, view(*degrees));
-        let faults = examined(&d, work.len(), i);
-        (d.label, faults)
+    variants
+}
+
+/// Values for the parameters that a text declares: colors, and ends of ranges or what lies between.
+/// Lengths stay: a pattern of a tenth of a millimetre a metre from its origin has few digits left.
+fn drawn(text: &str, seed: u64) -> Vec<(String, String)> {
+    let mut n = Numbers::new(seed);
+    let declared = text.lines().filter_map(|l| l.trim().strip_prefix("param "));
+    let values = declared.filter_map(|line| {
+        let (name, rest) = line.trim_end_matches(';').split_once(':')?;
+        let (ty, value) = rest.split_once('=')?;
+        let value = match (ty.trim(), value.split_once(" in ")) {
+            ("color", _) => format!("color({}, {}, {})", n.unit(), n.unit(), n.unit()),
+            ("float", Some((_, range))) => {
+                let (low, high) = range.split_once("..")?;
+                let between = low
+                    .trim()
+                    .parse::<f64>()
+                    .ok()
+                    .zip(high.trim().parse::<f64>().ok());
+                match (n.unit(), between) {
+                    (u, _) if u < 0.2 => low.trim().to_owned(),
+                    (u, _) if u < 0.4 => high.trim().to_owned(),
+                    (_, Some((low, high))) => n.between(low, high).to_string(),
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        };
+        Some((name.trim().to_owned(), value))
+    });
+    values.collect()
+}
+
+/// Points at which materials are asked.
+fn points() -> [Vec<f64>; 2] {
+    [
+        point([0.013, 0.024, 0.5], [0.3, 0.7]),
+        point([1.37, -2.61, 0.4], [2.6, 0.1]),
+    ]
+}
+
+#[test]
+fn every_material_is_sampled_as_it_is_evaluated() {
+    let variants = variants();
+    let at = points();
+    let mut work = Vec::new();
+    for (i, variant) in variants.iter().enumerate() {
+        let which = effort(1, 2);
+        for at in at.iter().cycle().skip(i).take(which) {
+            work.extend(SEEN.map(|v| (variant, at, v)));
+        }
+    }
+    let tally = Tally::default();
+    super::each_in_parallel(&work, |i, (variant, at, degrees)| {
+        let label = format!("{} from {degrees} degrees at {:?}", variant.label, &at[..3]);
+        let (name, wo) = (variant.name.as_str(), view(*degrees));
+        let mut faults = Vec::new();
+        // Discrete directions and others together; radiance grows on the way out of glass.
+        if *degrees < 90.0 {
+            let all = reflected(&variant.program, at, wo, effort(2048, 1 << 15));
+            let most = all.iter().fold(0.0f64, |a, &b| a.max(b));
+            let key = ("energy", name, "most that is reflected of 1, sampled");
+            tally.add(key, most, Bound::AtMost(1.0 + SAMPLED), &label);
+            if !(most <= 1.0 + SAMPLED) {
+                faults.push(format!("reflects {all:?}"));
+            }
+        }
+        if !variant.program.infos()[0].delta_only {
+            let d = distribution(label.clone(), &variant.program, at, wo);
+            let (outcome, found) = examined(&d, *degrees > 90.0, work.len(), i);
+            if *degrees < 90.0 {
+                tell(&tally, name, &outcome, work.len(), &label);
+            }
+            faults.extend(found);
+        }
+        (label, faults)
+    });
+}
+
+/// Answers of a material in one precision toward many light directions, sampled by many numbers.
+fn answers<F: Real>(
+    program: &Program,
+    at: &[f64],
+    wo: [f64; 3],
+    wl: &[[f64; 3]],
+    u: &[[f64; 4]],
+) -> Lanes<F> {
+    let args = vec![
+        lanes::uniform(at),
+        lanes::uniform(&wo),
+        lanes::vectors(wl),
+        lanes::vectors(u),
+    ];
+    lanes::run(program.ir(), &program.compiled()[0].evaluate, args)
+}
+
+/// The share of directions that may be further from double precision than `NEAR`: next to edges of
+/// regions that BSDFs state.
+const FEW: f64 = 0.01;
+
+/// The relative error of all other directions.
+const NEAR: f64 = 1e-3;
+
+#[test]
+fn every_material_is_near_double_precision_and_finite() {
+    let variants = variants();
+    let tally = Tally::default();
+    super::each_in_parallel(&variants, |i, variant| {
+        let mut n = Numbers::new(i as u64);
+        let (mut far, mut count, mut unsound) = (0usize, 0usize, 0usize);
+        for at in points() {
+            for _ in 0..effort(8, 128) {
+                let wo = direction(n.between(-1.0, 1.0), n.between(0.0, 6.28))
+                    .map(|x| f64::from(x as f32));
+                let wl: Vec<[f64; 3]> = (0..64)
+                    .map(|_| n.direction().map(|x| f64::from(x as f32)))
+                    .collect();
+                let u: Vec<[f64; 4]> = wl.iter().map(|_| n.four()).collect();
+                let exact = answers::<f64>(&variant.program, &at, wo, &wl, &u);
+                let found = answers::<f32>(&variant.program, &at, wo, &wl, &u);
+                for l in 0..wl.len() {
+                    let four = |v: &dyn Fn(usize) -> f64| [0, 1, 2, 3].map(|c| v(LIGHT_PDF + c));
+                    let a = four(&|c| lanes::float_at(&exact, c, l));
+                    let b = four(&|c| lanes::float_at(&found, c, l));
+                    let [pdf, value, _] = errors(&a, &b, true);
+                    far += usize::from(pdf.max(value) > NEAR);
+                    count += 1;
+                    let all = (PDF..LIGHT_THROUGHPUT + 3).flat_map(|c| {
+                        [lanes::float_at(&exact, c, l), lanes::float_at(&found, c, l)]
+                    });
+                    unsound += all.filter(|x| !(x.is_finite() && *x >= 0.0)).count();
+                }
+            }
+        }
+        let share = far as f64 / count as f64;
+        let (name, label) = (variant.name.as_str(), variant.label.as_str());
+        let what = "share of directions further than 1e-3 from double";
+        tally.add(("precision", name, what), share, Bound::AtMost(FEW), label);
+        let what = "answers that are not finite or negative";
+        tally.add(
+            ("finite", name, what),
+            unsound as f64,
+            Bound::AtMost(0.0),
+            label,
+        );
+        let mut faults = Vec::new();
+        if share > FEW {
+            faults.push(format!(
+                "{share} of all directions are far from double precision"
+            ));
+        }
+        if unsound > 0 {
+            faults.push(format!("{unsound} answers are not finite or negative"));
+        }
+        (label.to_owned(), faults)
     });
 }

@@ -145,6 +145,9 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
             .into_iter()
             .filter(|w| *w != [0.0; 3])
             .collect();
+        if wi.is_empty() {
+            continue;
+        }
         for (w, m) in wi.iter().zip((d.measure)(&wi)) {
             let length = w.iter().map(|x| x * x).sum::<f64>().sqrt();
             assert!(

@@ -46,8 +46,14 @@ const TARGETS: [Target; 4] = [
     Target {
         package: "impasto-runtime",
         target: "gpu",
-        filters: &["extremes"],
+        filters: &["extremes", "media::"],
         needs_adapter: true,
+    },
+    Target {
+        package: "impasto-runtime",
+        target: "environment",
+        filters: &[],
+        needs_adapter: false,
     },
 ];
 
