@@ -1,6 +1,9 @@
 //! The extremes that break shading elsewhere, each by its number in the table of docs/stability.md,
 //! on what the library's functions and BSDFs are made of. Each notes what it measured.
 
+use impasto_compiler::{MaterialRequest, MemoryLoader, compile, diag};
+
+use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case, bsdf_with};
 use super::record::{Bound, Row};
 use super::sampling::{albedo, distribution, view};
@@ -509,5 +512,86 @@ fn white_surfaces_of_roughness_1_keep_their_light() {
         "26",
         "single facets",
         "difference from 1 - ln 2 seen from above",
+    );
+}
+
+/// What a surface written in Impasto reflects in each channel, and how many lobes it has.
+fn seen(uses: &str, surface: &str, wo: [f64; 3]) -> Result<([f64; 4], usize), String> {
+    let mut files = MemoryLoader::default();
+    let text = format!("use std::bsdf::{{{uses}}};\nmaterial m {{ surface = {surface}; }}");
+    files.add("m.impasto", text);
+    let compiled = compile(&[MaterialRequest::new("m", "m.impasto")], &mut files);
+    let Some(program) = compiled.program else {
+        return Err(diag::render::text(
+            &compiled.sources,
+            &compiled.diagnostics,
+            false,
+        ));
+    };
+    let at = [
+        0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.4, 0.6, 1.0,
+    ];
+    let wl = single(direction(0.6, 2.1));
+    let numbers = [wo.as_slice(), &wl, &[0.3, 0.6, 0.2, 0.8]];
+    let mut args = vec![lanes::uniform(&at)];
+    args.extend(numbers.map(lanes::uniform));
+    let out: Lanes = lanes::run(program.ir(), &program.compiled()[0].evaluate, args);
+    // `light_pdf` and `light_throughput` of `MaterialSample`, flattened.
+    let light = std::array::from_fn(|c| lanes::float_at(&out, 7 + c, 0));
+    Ok((light, program.infos()[0].lobes))
+}
+
+#[test]
+fn weights_of_exactly_0_and_1_leave_a_lobe_out() {
+    let uses = "diffuse, metal, mirror";
+    let mut worst = Worst::none();
+    for (with, without) in [
+        ("mix(diffuse(0.5), metal(), 0.0)", "diffuse(0.5)"),
+        ("mix(diffuse(0.5), metal(), 1.0)", "metal()"),
+        ("layer(0.0 * metal(), diffuse(0.5))", "diffuse(0.5)"),
+        ("layer(0.0 * mirror(), diffuse(0.5))", "diffuse(0.5)"),
+        ("1.0 * metal()", "metal()"),
+    ] {
+        for degrees in [0.0, 60.0, 89.0] {
+            let wo = single(view(degrees));
+            let (a, _) = seen(uses, with, wo).expect("compiles");
+            let (b, _) = seen(uses, without, wo).expect("compiles");
+            let apart = (0..4).map(|c| (a[c] - b[c]).abs() / b[c].abs().max(1e-3));
+            worst.add(apart.fold(0.0, f64::max), || {
+                format!("{with} from {degrees}")
+            });
+        }
+    }
+    worst.at_most(
+        1e-12,
+        "27",
+        "mix, layer, weights",
+        "difference to the same without the lobe",
+    );
+}
+
+#[test]
+fn deep_nests_of_layers_are_answered_or_refused() {
+    let mut worst = Worst::none();
+    for depth in [1usize, 2, 4, 8, 16, 32, 64, 65, 200] {
+        let open: String = (0..depth - 1).map(|_| "layer(0.1 * metal(), ").collect();
+        let surface = format!("{open}diffuse(0.5){}", ")".repeat(depth - 1));
+        let answer = seen("diffuse, metal", &surface, single(view(30.0)));
+        let good = match &answer {
+            Ok((light, lobes)) => {
+                *lobes == depth && light.iter().all(|x| x.is_finite() && *x > 0.0)
+            }
+            // A limit is an error that says so.
+            Err(text) => depth > 16 && text.contains("error[E"),
+        };
+        worst.add(f64::from(u8::from(!good)), || {
+            format!("{depth} layers: {answer:?}")
+        });
+    }
+    worst.at_most(
+        0.0,
+        "30",
+        "layer",
+        "nests that are neither answered nor refused",
     );
 }
