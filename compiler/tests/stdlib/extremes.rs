@@ -37,7 +37,7 @@ impl Worst {
     }
 
     fn add(&mut self, x: f64, place: impl FnOnce() -> String) {
-        if !(x <= self.0) {
+        if x > self.0 || x.is_nan() {
             *self = Self(if x.is_finite() { x } else { f64::INFINITY }, place());
         }
     }
@@ -84,7 +84,7 @@ fn ggx_keeps_its_precision_down_to_the_least_alpha() {
             let a = single([alpha, (alpha * stretch).max(1e-4)]);
             for tan in [0.0, 0.3, 1.0, 2.0, 10.0] {
                 let m = single(direction(
-                    1.0 / (1.0 + (tan * alpha) * (tan * alpha) as f64).sqrt(),
+                    1.0 / (1.0 + (tan * alpha) * (tan * alpha)).sqrt(),
                     0.4,
                 ));
                 // The facet's tangent from x and y: its cosine has no digits left for it.
@@ -406,7 +406,10 @@ fn shading_normals_that_look_away_are_of_use_all_the_same() {
     let mut worst = Worst::none();
     for i in 0..2000 {
         let shading = if i == 0 { [0.0; 3] } else { n.direction() };
-        let wo = single(direction(n.between(1e-3, 1.0), n.between(0.0, 6.28)));
+        let wo = single(direction(
+            n.between(1e-3, 1.0),
+            n.between(0.0, std::f64::consts::TAU),
+        ));
         let used = text.call::<f32>("useful", &[&shading, &up, &wo]);
         // Seen from the front, and what it mirrors leaves the surface: else it would be black.
         let seen = dot(&used, &wo) > 0.0 && reflect(&wo, &used)[2] > 0.0;
@@ -435,7 +438,7 @@ fn noise_far_from_the_origin_is_still_noise() {
         for _ in 0..count {
             let p = [0.0; 3].map(|_: f64| far * n.between(0.5, 1.0));
             let x = text.call::<f32>(name, &[&p])[0];
-            outside += usize::from(!(x.abs() <= 4.0));
+            outside += usize::from(x.abs() > 4.0 || x.is_nan());
             (sum, squares) = (sum + x, squares + x * x);
         }
         let mean = sum / f64::from(count);

@@ -303,7 +303,7 @@ fn every_material_is_sampled_as_it_is_evaluated() {
             let most = all.iter().fold(0.0f64, |a, &b| a.max(b));
             let key = ("energy", name, "most that is reflected of 1, sampled");
             tally.add(key, most, Bound::AtMost(1.0 + SAMPLED), &label);
-            if !(most <= 1.0 + SAMPLED) {
+            if most > 1.0 + SAMPLED {
                 faults.push(format!("reflects {all:?}"));
             }
         }
@@ -352,7 +352,7 @@ fn every_material_is_near_double_precision_and_finite() {
         let (mut far, mut count, mut unsound) = (0usize, 0usize, 0usize);
         for at in points() {
             for _ in 0..effort(8, 128) {
-                let wo = direction(n.between(-1.0, 1.0), n.between(0.0, 6.28))
+                let wo = direction(n.between(-1.0, 1.0), n.between(0.0, std::f64::consts::TAU))
                     .map(|x| f64::from(x as f32));
                 let wl: Vec<[f64; 3]> = (0..64)
                     .map(|_| n.direction().map(|x| f64::from(x as f32)))

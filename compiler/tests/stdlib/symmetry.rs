@@ -60,7 +60,13 @@ fn continuous_bsdfs_are_reciprocal() {
         let u: Vec<[f64; 3]> = wo.iter().map(|_| [n.unit(), n.unit(), n.unit()]).collect();
         let sampled = call(bsdf, case, Method::Sample, &wo, &u);
         let drawn = |l: usize| std::array::from_fn(|c| lanes::float_at(&sampled, c, l));
-        let toward = |l: usize| if l % 2 == 0 { drawn(l) } else { n.direction() };
+        let toward = |l: usize| {
+            if l.is_multiple_of(2) {
+                drawn(l)
+            } else {
+                n.direction()
+            }
+        };
         let wi: Vec<[f64; 3]> = (0..wo.len()).map(toward).collect();
         let there = symmetric(bsdf, case, &wo, &wi);
         let back = symmetric(bsdf, case, &wi, &wo);

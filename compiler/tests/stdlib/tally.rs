@@ -22,8 +22,8 @@ impl Tally {
         let entry = worst.entry((table, subject.to_owned(), what));
         let kept = entry.or_insert_with(|| (x, bound, place.to_owned()));
         let worse = match bound {
-            Bound::AtMost(_) => !(x <= kept.0),
-            Bound::AtLeast(_) => !(x >= kept.0),
+            Bound::AtMost(_) => x > kept.0 || x.is_nan(),
+            Bound::AtLeast(_) => x < kept.0 || x.is_nan(),
         };
         if worse {
             *kept = (x, bound, place.to_owned());
