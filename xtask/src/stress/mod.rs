@@ -24,7 +24,7 @@ struct Target {
     needs_adapter: bool,
 }
 
-const TARGETS: [Target; 4] = [
+const TARGETS: &[Target] = &[
     Target {
         package: "impasto-compiler",
         target: "stdlib",
@@ -65,6 +65,9 @@ pub(crate) struct StressArgs {
     /// Leave out what needs an adapter
     #[arg(long)]
     no_gpu: bool,
+    /// Only test targets of this name (can be given several times)
+    #[arg(long)]
+    only: Vec<String>,
     /// Where the page is written
     #[arg(long, default_value = "docs/stability.md")]
     out: std::path::PathBuf,
@@ -84,11 +87,13 @@ pub(crate) fn run(args: &StressArgs) -> Result {
     if !args.no_gpu {
         adapter::prepare()?;
     }
-    let targets = TARGETS.iter().filter(|t| !(args.no_gpu && t.needs_adapter));
+    let wanted = |t: &&Target| args.only.is_empty() || args.only.iter().any(|o| o == t.target);
+    let targets = TARGETS.iter().filter(wanted);
+    let targets = targets.filter(|t| !(args.no_gpu && t.needs_adapter));
     let ended: Vec<Ended> = targets.map(|t| tested(t, args, &folder)).collect();
 
     let rows = rows::read(&folder)?;
-    let text = page::page(&rows, &ended, args.fast, args.no_gpu);
+    let text = page::page(&rows, &ended, &command(args));
     let out = shell::root().join(&args.out);
     std::fs::write(&out, text).map_err(|e| format!("{} cannot be written: {e}", out.display()))?;
     eprintln!("{} rows in {}", rows.len(), out.display());
@@ -109,6 +114,17 @@ pub(crate) fn run(args: &StressArgs) -> Result {
             out.display()
         )),
     }
+}
+
+/// The command as it was given.
+fn command(args: &StressArgs) -> String {
+    let mut command = "cargo xtask stress".to_owned();
+    command += if args.fast { " --fast" } else { "" };
+    command += if args.no_gpu { " --no-gpu" } else { "" };
+    args.only
+        .iter()
+        .for_each(|o| command += &format!(" --only {o}"));
+    command
 }
 
 /// Runs one target. A failure is kept, not returned: the others' rows are wanted all the same.

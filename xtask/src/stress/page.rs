@@ -52,8 +52,8 @@ const TOPICS: [(&str, &str); 40] = [
 ];
 
 /// The page.
-pub(super) fn page(rows: &[Row], ended: &[Ended], fast: bool, no_gpu: bool) -> String {
-    let mut text = head(ended, fast, no_gpu);
+pub(super) fn page(rows: &[Row], ended: &[Ended], command: &str) -> String {
+    let mut text = head(ended, command);
     topics(&mut text, rows);
     for table in [
         "precision",
@@ -69,10 +69,7 @@ pub(super) fn page(rows: &[Row], ended: &[Ended], fast: bool, no_gpu: bool) -> S
     text
 }
 
-fn head(ended: &[Ended], fast: bool, no_gpu: bool) -> String {
-    let mut command = "cargo xtask stress".to_owned();
-    command += if fast { " --fast" } else { "" };
-    command += if no_gpu { " --no-gpu" } else { "" };
+fn head(ended: &[Ended], command: &str) -> String {
     let mut text = format!(
         "# Numerical stability\n\nWritten by `{command}` on {}.\n\n{INTRODUCTION}\n",
         machine()
@@ -269,7 +266,7 @@ mod tests {
             row("precision", "glass", 9e-5, true),
             row("precision", "metal", 2e-4, false),
         ];
-        let text = page(&rows, &[], true, true);
+        let text = page(&rows, &[], "cargo xtask stress --fast --no-gpu");
         assert!(
             text.contains("`cargo xtask stress --fast --no-gpu`"),
             "{text}"
@@ -280,6 +277,6 @@ mod tests {
         );
         assert!(text.contains("| metal | relative error | 2.0e-4 | 1.0e-4 | `metal(roughness: 0.1234) / 1e0` | **bad** |"), "{text}");
         assert!(text.contains("## Bad verdicts"), "{text}");
-        assert!(page(&rows[..2], &[], true, true).contains("No verdict is bad."));
+        assert!(page(&rows[..2], &[], "").contains("No verdict is bad."));
     }
 }
