@@ -115,9 +115,11 @@ fn same(a: [f32; 3], b: [f32; 3]) -> bool {
 fn compare(gpu: &[Vec<[f32; 3]>], paths: &[Vec<Path>]) -> (usize, f64) {
     let pairs = || gpu.iter().flatten().zip(paths.iter().flatten());
     let different = pairs().filter(|(a, path)| !same(**a, path.added)).count();
-    let mean = |of: &dyn Fn((&[f32; 3], &Path)) -> f64| pairs().map(of).sum::<f64>();
-    let rendered = mean(&|(a, _)| a.iter().map(|x| f64::from(*x)).sum());
-    let replayed = mean(&|(_, path)| path.radiance.iter().sum());
+    let light = |rgb: &[f32; 3]| rgb.iter().map(|x| f64::from(*x)).sum::<f64>();
+    let rendered: f64 = pairs().map(|(a, _)| light(a)).sum();
+    let replayed: f64 = pairs()
+        .map(|(_, path)| path.radiance.iter().sum::<f64>())
+        .sum();
     (
         different,
         (rendered - replayed).abs() / rendered.max(replayed),
@@ -205,8 +207,8 @@ fn vertices_add_up() {
                 continue;
             };
             let survival = vertex.roulette.as_ref().map_or(1.0, |r| r.probability);
-            for c in 0..3 {
-                assert!(close(vertex.arriving[c], carried[c]), "{vertex:?}");
+            for (c, carried) in carried.into_iter().enumerate() {
+                assert!(close(vertex.arriving[c], carried), "{vertex:?}");
                 let kept = vertex.arriving[c] / survival;
                 assert!(
                     close(vertex.throughput[c], kept * sample.weight[c]),

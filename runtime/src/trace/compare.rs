@@ -29,7 +29,7 @@ fn is_infinite(x: &f64) -> bool {
 /// Where two replays of the same sample part; `None` if they agree but for rounding.
 pub fn parting(a: &Path, b: &Path) -> Option<Parting> {
     for (v, w) in a.vertices.iter().zip(&b.vertices) {
-        let differs = |&(_, relative): &(&str, f64)| !(relative <= TOLERANCE);
+        let differs = |&(_, relative): &(&str, f64)| relative > TOLERANCE;
         if let Some((what, relative)) = differences(v, w).into_iter().find(differs) {
             let vertex = v.number;
             return Some(Parting {

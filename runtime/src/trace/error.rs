@@ -17,6 +17,16 @@ pub enum TraceError {
         /// Rows of the picture.
         height: u32,
     },
+    /// The picture is too large.
+    #[error(
+        "paths of a picture of {pixels} pixels cannot be replayed: at most {most} are possible"
+    )]
+    TooLarge {
+        /// Its pixels.
+        pixels: u64,
+        /// How many are possible.
+        most: u64,
+    },
     /// The path takes more steps than the limit.
     #[error(
         "the path does not end within {0} steps of the interpreter\n  hint: a material may loop for very long at a point of the path; `impasto cost` shows what it takes"

@@ -422,7 +422,7 @@ mod tests {
         assert_eq!(two(Math::Pow, 2.0, 0.5), std::f32::consts::SQRT_2);
         assert_eq!(two(Math::Step, 1.0, 1.0), 1.0);
         assert_eq!(two(Math::Step, 1.0, 0.9), 0.0);
-        assert_eq!(two(Math::Max, f32::NAN, 1.0).is_nan(), true);
+        assert!(two(Math::Max, f32::NAN, 1.0).is_nan());
         assert_eq!(two(Math::Min, 2.0, 1.0), 1.0);
         let mix = math3::<f32>(Math::Mix, Kind::Float).expect("known");
         let mixed = mix(2f32.cell(), 4f32.cell(), 0.25f32.cell());

@@ -34,6 +34,9 @@ use crate::world::{MaterialSource, World};
 /// Bytes of the stack that code is interpreted on: blocks within blocks are calls within calls.
 const STACK: usize = 256 << 20;
 
+/// Pixels of the largest picture whose film fits the memory of most machines, though only one is used.
+const MAX_PIXELS: u64 = 1 << 26;
+
 /// Runs `f` on a thread with a stack that is large enough for any kernel.
 ///
 /// # Errors
@@ -108,6 +111,13 @@ impl<'p> Replayer<'p> {
         sampler: Sampler,
     ) -> Result<Self, TraceError> {
         settings::check(world, &RenderOptions::default())?;
+        let pixels = u64::from(world.width) * u64::from(world.height);
+        if pixels > MAX_PIXELS {
+            return Err(TraceError::TooLarge {
+                pixels,
+                most: MAX_PIXELS,
+            });
+        }
         let (materials, instances) = (source.infos(), source.instances());
         let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
         let plan = Strategy::Mega
@@ -143,7 +153,7 @@ impl<'p> Replayer<'p> {
             random: random::part(sampler, demand),
         };
         let kernels = composer.recipes().into_iter().enumerate();
-        let mega = kernels.filter(|(_, recipe)| recipe.form.is_some()).last();
+        let mega = kernels.rev().find(|(_, recipe)| recipe.form.is_some());
         let (index, recipe) = mega.ok_or_else(|| lower::unsupported("megakernel", "main"))?;
         let kernel = composer.compose(index, recipe);
         let (module, info) = crate::gpu::shader::validate(&kernel.recipe.name, &kernel.wgsl)?;
