@@ -99,7 +99,7 @@ fn reference(scene: &SceneConvergence) -> String {
 }
 
 fn series(scene: &SceneConvergence) -> Vec<Block> {
-    vec![
+    let mut blocks = vec![
         Block::Heading(3, "Series".into()),
         Block::Text(
             "Slopes are those of the error against samples in logarithms, with one standard error, before \
@@ -109,21 +109,30 @@ fn series(scene: &SceneConvergence) -> Vec<Block> {
                 .into(),
         ),
         Block::Table(slopes(&scene.series)),
+    ];
+    if scene.series.len() > 1 {
+        blocks.extend(comparisons(&scene.series));
+    }
+    blocks.push(Block::Heading(3, "Renders".into()));
+    blocks.push(Block::Table(renders(&scene.series)));
+    blocks
+}
+
+fn comparisons(series: &[Series]) -> Vec<Block> {
+    vec![
         Block::Heading(3, "Equal time".into()),
         Block::Text(
             "The error after the same GPU time, between renders by a power law; in parentheses how many \
              times smaller it is than that of the first series."
                 .into(),
         ),
-        Block::Table(compared(&scene.series, equal_time, "after", time, number)),
+        Block::Table(compared(series, equal_time, "after", time, number)),
         Block::Heading(3, "Equal error".into()),
         Block::Text(
             "The GPU time until the same error; in parentheses how many times faster than the first series."
                 .into(),
         ),
-        Block::Table(compared(&scene.series, equal_error, "of", number, time)),
-        Block::Heading(3, "Renders".into()),
-        Block::Table(renders(&scene.series)),
+        Block::Table(compared(series, equal_error, "of", number, time)),
     ]
 }
 

@@ -72,6 +72,10 @@ fn nothing_and_blackness_have_pages() {
     }
     assert!(markdown(&example::empty()).contains("There are no renders."));
     assert!(markdown(&example::black()).contains("equals the reference"));
+    assert!(
+        !markdown(&example::black()).contains("Equal time"),
+        "of one series"
+    );
 }
 
 #[test]
