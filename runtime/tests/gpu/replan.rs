@@ -12,6 +12,7 @@ use impasto_runtime::film_file::{FilmFile, Range};
 use impasto_runtime::passes::Keeping;
 use impasto_runtime::render::{Planner, Progress, RenderOptions, Renderer, Rendering, Replanning};
 use impasto_runtime::report::{KernelReport, Report};
+use impasto_runtime::until::Goals;
 
 use crate::plans::custom;
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
@@ -370,4 +371,59 @@ fn a_stopped_render_that_was_replanned_is_one_of_fewer_samples() {
     let same = render(&mut renderer(&options(count as u32)));
     assert_eq!(rendering.sums, same.sums);
     assert_eq!(rendering.report.paths, same.report.paths);
+}
+
+/// A render in halves whose plan is renewed in its midst: the bits of one by a single plan, every sample
+/// counted once, and examples of samples that were left out by the seed of their half.
+#[test]
+fn a_render_until_a_goal_goes_on_with_another_plan() {
+    let options = options(24);
+    let until = |renderer: &mut Renderer<'_>| {
+        let rendering = renderer.render_until(&Goals::default(), &mut |_| (), &mut go_on);
+        rendering.unwrap_or_else(|e| panic!("{e}"))
+    };
+    let whole = until(&mut renderer(&options));
+    let mut renewed = renderer(&options);
+    let next = custom(&[(Form::Mixed, &[0, 1]), (Form::Binned, &[2, 3])]);
+    renewed.replan(at_once(always(next)));
+    let renewed = until(&mut renewed);
+    assert!(
+        renewed
+            .report
+            .replanned
+            .as_ref()
+            .is_some_and(|change| change.kept.is_none())
+    );
+    assert_eq!(renewed.film, whole.film);
+    assert_eq!(renewed.report.paths, 8 * 8 * 24);
+    assert_eq!(
+        renewed.report.nonfinite_samples,
+        whole.report.nonfinite_samples
+    );
+    assert!(whole.report.nonfinite_samples > 0);
+    let courses = [&whole, &renewed].map(|rendering| {
+        let checks = rendering.report.convergence.iter();
+        checks
+            .map(|c| (c.samples, c.rmse, c.relmse))
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(courses[0], courses[1]);
+    let examples = whole.report.dropped.iter().flat_map(|d| &d.example);
+    let mut replayed = 0;
+    for example in examples {
+        let [x, y] = example.pixel;
+        let alone = RenderOptions {
+            seed: example.seed,
+            first_sample: example.sample,
+            pixels: Some(Arc::from([y * 8 + x])),
+            ..self::options(1)
+        };
+        assert_eq!(
+            render(&mut renderer(&alone)).report.nonfinite_samples,
+            1,
+            "{example:?}"
+        );
+        replayed += 1;
+    }
+    assert!(replayed > 0);
 }
