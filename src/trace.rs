@@ -72,7 +72,7 @@ pub struct Replay {
 }
 
 /// Replays the path of one sample of one pixel. For many paths, a
-/// [`Replayer`](path::Replayer) is kept.
+/// [`Replayer`] is kept.
 ///
 /// # Errors
 /// If there is no such pixel or sample, the scene cannot be rendered, or the path does not end.
