@@ -1,5 +1,30 @@
 //! The extremes that break shading elsewhere, each by its number in the table of docs/stability.md,
-//! on what the library's functions and BSDFs are made of. Each notes what it measured.
+//! on what the library's functions and BSDFs are made of. Each notes what it measured. What holds
+//! the rows that are the language's:
+//!
+//! | row | held here | and in |
+//! |---|---|---|
+//! | 1 sharp GGX | `ggx_keeps_its_precision...` | `search` |
+//! | 2 one alpha 0 | `roughness_of_0...` | `precision` |
+//! | 3 smooth to delta | `smooth_and_nearly_smooth...` | `microfacet` |
+//! | 4, 10 half vectors, cosines at the horizon | `half_vectors_and_cosines...` | `precision` |
+//! | 5, 6 indices of 1 and next to it | `equal_and_nearly_equal...` | `fresnel`, `search` |
+//! | 7 impossible indices | | `tests/diagnostics/parameter_value`, `precision` |
+//! | 8 total reflection | `total_reflection...` | `fresnel` |
+//! | 9 metals at their ends | `metals_reflect...` | `fresnel` |
+//! | 11 ends of random numbers | | `precision` |
+//! | 13 functions outside of their domain | `functions_are_defined...` | `compiler/tests/interpreter` |
+//! | 14, 15 frames, tangents | `frames_and_normals...` | `normals`, `bumps` |
+//! | 16 normals that face away | `shading_normals...` | `normals` |
+//! | 17 bumped normals sampled as evaluated | | `materials` |
+//! | 21 noise far away | `noise_far...` | `noise` |
+//! | 26 white surfaces | `white_surfaces...` | `energy` |
+//! | 27 weights of 0 and 1 | `weights_of_exactly...` | `compiler/tests/layering.rs` |
+//! | 30 deep nests | `deep_nests...` | `tests/diagnostics/lobes` |
+//!
+//! Over every BSDF: `sampling` (chi-squared, density, energy), `symmetry` (reciprocity), `energy`
+//! (energy, albedo and white furnaces, searched), `search` and `precision` (single against double);
+//! over every material: `materials`.
 
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile, diag};
 
