@@ -39,16 +39,18 @@ impl CameraFrame {
         }
     }
 
-    pub(crate) fn wgsl(&self, width: u32, height: u32) -> String {
-        let lens = self.lens_radius > 0.0;
+    /// Camera rays, from points of a lens if `lens` is set.
+    pub(crate) fn wgsl(&self, width: u32, height: u32, lens: bool) -> String {
         let mut out = constant_u32("WIDTH", width) + &constant_u32("HEIGHT", height);
         out += &constant_vec3("CAMERA_POSITION", self.position);
         out += &constant_vec3("CAMERA_FORWARD", self.forward);
         out += &constant_vec3("CAMERA_RIGHT", self.right);
         out += &constant_vec3("CAMERA_UP", self.up);
         if lens {
+            let pinhole = self.lens_radius <= 0.0;
+            let focus = if pinhole { 1.0 } else { self.focus_distance };
             out += &constant_f32("LENS_RADIUS", self.lens_radius);
-            out += &constant_f32("FOCUS_DISTANCE", self.focus_distance);
+            out += &constant_f32("FOCUS_DISTANCE", focus);
         }
         out + &preprocess(include_str!("kernels/camera.wgsl"), &[("lens", lens)])
     }

@@ -4,15 +4,15 @@
 //! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
 //! nothing else.
 
-use impasto_compiler::abi::{InputSet, MATERIAL_OF, MaterialInfo};
+use impasto_compiler::abi::MATERIAL_OF;
 
 use crate::fingerprint::Fingerprint;
 use crate::modules::{Composer, Kernel, Recipe};
-use crate::needs::Need;
+use crate::needs::{Need, Needs};
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::stages::{Part, StageId};
 use crate::state::{self, Storage};
-use crate::text::{mentions, predicate, preprocess, without_comments};
+use crate::text::{Flag, mentions, predicate, preprocess, reachable, without_comments};
 use crate::{film, profile, wgsl};
 
 /// A buffer as a kernel binds it, in group 0.
@@ -52,7 +52,8 @@ pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 13] = [
 ];
 
 /// Members of the uniform `run`, the settings that do not change a kernel's text.
-pub(crate) const RUN_MEMBERS: [&str; 4] = ["seed", "first_sample", "samples", "pixels"];
+/// `none` is 0, which compilers do not know.
+pub(crate) const RUN_MEMBERS: [&str; 5] = ["seed", "first_sample", "samples", "pixels", "none"];
 
 impl Composer<'_> {
     /// Writes the text of the kernel that comes `index`-th in an iteration.
@@ -89,6 +90,7 @@ impl Composer<'_> {
         if self.technique.profile {
             text = profile::instrument(&text) + &self.profile_constants(index);
         }
+        let text = reachable(&text);
         let (declarations, bindings) = self.declarations(&text);
         Kernel {
             recipe,
@@ -98,29 +100,17 @@ impl Composer<'_> {
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> [(&'static str, bool); 12] {
+    fn flags(&self, stage: StageId, members: &[usize]) -> Vec<Flag> {
         let needs = match stage {
             StageId::Material => self.needs_of(members),
             _ => self.layout.needs,
         };
-        let has = |holds: fn(&MaterialInfo) -> bool| self.infos(members).into_iter().any(holds);
-        [
-            ("shadow_rays", needs.shadow_rays),
-            ("slot_shadows", needs.met(Need::SlotShadows)),
-            ("own_shadow_origins", needs.met(Need::OwnShadowOrigins)),
-            ("media", needs.media),
-            ("changes_medium", needs.media && has(|m| m.transmissive)),
-            (
-                "exterior_ior",
-                needs.media && has(|m| m.inputs.exterior_ior),
-            ),
-            ("absorption", needs.absorption),
-            ("overlap", needs.overlap),
-            ("requests", needs.requests),
+        let derived = [
+            ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
+            ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
             ("fetched", self.fetches(stage)),
-            ("varying_emission", needs.varying_emission),
-            ("some_pixels", needs.some_pixels),
-        ]
+        ];
+        needs.flags().chain(derived).collect()
     }
 
     fn constants(&self) -> String {
@@ -135,7 +125,7 @@ impl Composer<'_> {
             ("NOTHING", u32::MAX),
             ("FILM_COUNT_PLANE", film::COUNT_PLANE as u32),
         ]);
-        if self.layout.needs.media {
+        if self.layout.needs.has(Need::Media) {
             let [a, b, c, d] = world.parts.media.camera;
             out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
         }
@@ -154,7 +144,10 @@ impl Composer<'_> {
         let parts = &world.parts;
         match part {
             Part::Random => self.random.wgsl.clone(),
-            Part::Camera => world.camera.wgsl(world.width, world.height),
+            Part::Camera => {
+                let lens = self.layout.needs.has(Need::Lens);
+                world.camera.wgsl(world.width, world.height, lens)
+            }
             Part::Film => include_str!("kernels/film.wgsl").to_string(),
             Part::Numbers => include_str!("kernels/numbers.wgsl").to_string(),
             Part::Geometry => parts.geometry.wgsl.clone(),
@@ -178,8 +171,11 @@ impl Composer<'_> {
         let textures = self.world.parts.texture.as_ref().filter(|_| textured);
         let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
         out += &self.source.wgsl(members);
-        let moved = self.world.parts.moved;
-        out += &surface_point(infos.iter().map(|m| m.inputs), moved);
+        let needs = self.needs_of(members);
+        if needs.has(Need::VaryingEmission) && infos.iter().all(|m| !m.varying_emission) {
+            out += NO_EMISSION;
+        }
+        out += &surface_point(needs);
         out + &dropped_row(members)
     }
 
@@ -237,7 +233,12 @@ impl Composer<'_> {
         for number in [world.max_depth, world.roulette_start] {
             fingerprint.add(&number.to_le_bytes());
         }
-        fingerprint.add(world.camera.wgsl(world.width, world.height).as_bytes());
+        fingerprint.add(
+            world
+                .camera
+                .wgsl(world.width, world.height, world.camera.lens_radius > 0.0)
+                .as_bytes(),
+        );
         fingerprint.add(self.source.wgsl(&all).as_bytes());
         fingerprint.add(self.source.lookup_wgsl().as_bytes());
         for part in self.parts() {
@@ -275,26 +276,22 @@ fn dropped_row(members: &[usize]) -> String {
     format!("fn dropped_row(instance: u32) -> u32 {{ return {row}; }}\n")
 }
 
+/// The emission of materials of which none has any that varies, where it is asked for nevertheless.
+const NO_EMISSION: &str = "fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32> {\n    \
+                           return vec3<f32>(0.0);\n}\n";
+
 /// The function that fills a material's inputs, those that some member reads; the others get
-/// what is at hand. Coordinates of a scene that is `moved` are not those of the world.
-fn surface_point(inputs: impl Iterator<Item = InputSet>, moved: bool) -> String {
-    let all = inputs.fold(InputSet::default(), |a, b| InputSet {
-        position: a.position || b.position,
-        normal: a.normal || b.normal,
-        geometric_normal: a.geometric_normal || b.geometric_normal,
-        tangent: a.tangent || b.tangent,
-        uv: a.uv || b.uv,
-        exterior_ior: a.exterior_ior || b.exterior_ior,
-    });
+/// what is at hand.
+fn surface_point(needs: Needs) -> String {
     let geometric = "hit_geometric_normal(hit.primitive)";
-    let pick = |used, value, other| if used { value } else { other };
+    let pick = |need, value, other| if needs.has(need) { value } else { other };
     format!(
         "fn surface_point(hit: PathHit, exterior_ior: f32) -> SurfacePoint {{\n    \
          let barycentrics = vec2<f32>(hit.u, hit.v);\n    \
          return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior);\n}}\n",
         pick(
-            all.position,
-            if moved {
+            Need::Position,
+            if needs.has(Need::Moved) {
                 "in_world(hit_position(hit.primitive, barycentrics))"
             } else {
                 "hit_position(hit.primitive, barycentrics)"
@@ -302,13 +299,17 @@ fn surface_point(inputs: impl Iterator<Item = InputSet>, moved: bool) -> String 
             "vec3<f32>(0.0)"
         ),
         pick(
-            all.normal,
+            Need::Normals,
             "hit_normal(hit.primitive, barycentrics)",
             geometric
         ),
-        pick(all.tangent, "hit_tangent(hit.primitive)", "vec3<f32>(0.0)"),
         pick(
-            all.uv,
+            Need::Tangents,
+            "hit_tangent(hit.primitive)",
+            "vec3<f32>(0.0)"
+        ),
+        pick(
+            Need::Uvs,
             "hit_uv(hit.primitive, barycentrics)",
             "vec2<f32>(0.0)"
         ),

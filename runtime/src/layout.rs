@@ -5,10 +5,10 @@ use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::{Organisation, Plan};
 
 use crate::error::RuntimeError;
-use crate::needs::Needs;
+use crate::needs::{Facts, Need, Needs};
 use crate::queues::{Counters, Queues};
 use crate::state;
-use crate::technique::{RayData, RayOrder, Technique};
+use crate::technique::{RayData, Technique};
 use crate::world::World;
 
 /// The buffers of rays and of their results in the order of requests: the name, bytes a path, and
@@ -25,6 +25,8 @@ pub(crate) const RAY_BUFFERS: [(&str, u64, bool); 4] = [
 pub(crate) struct Layout {
     /// What must exist.
     pub needs: Needs,
+    /// What of it the scene could be without.
+    pub forced: Needs,
     /// The queues of a wavefront.
     pub queues: Queues,
     /// The buffer of counters.
@@ -40,18 +42,40 @@ impl Layout {
         plan: &Plan,
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
+        let facts = Facts {
+            world,
+            materials,
+            technique,
+            wavefront: plan.organisation == Organisation::Wavefront,
+        };
+        let natural = Needs::of(&facts, Needs::default());
+        let forced = technique.features.forced(natural);
+        Self::with_forced(world, materials, plan, technique, forced)
+    }
+
+    /// The same with rows of the table of needs forced, whatever the technique says.
+    pub(crate) fn with_forced(
+        world: &World,
+        materials: &[MaterialInfo],
+        plan: &Plan,
+        technique: &Technique,
+        forced: Needs,
+    ) -> Result<Self, RuntimeError> {
         check_plan(plan, materials, &world.parts.unbound)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
-        let mut needs = Needs::of(world, materials);
-        needs.order = wavefront && technique.ray_order != RayOrder::Queue;
-        // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
-        needs.requests =
-            wavefront && technique.ray_data == RayData::Requests && !needs.order && !needs.overlap;
+        let facts = Facts {
+            world,
+            materials,
+            technique,
+            wavefront,
+        };
+        let natural = Needs::of(&facts, Needs::default());
+        let needs = Needs::of(&facts, forced);
         let of_kernels = Queues::of_kernels(plan);
         let queues = Queues {
             materials: of_kernels.iter().map(|queues| queues.len()).sum(),
-            shadow_rays: needs.shadow_rays,
-            ordered: needs.order,
+            shadow_rays: needs.has(Need::ShadowRays),
+            ordered: needs.has(Need::Order),
         };
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
@@ -62,6 +86,7 @@ impl Layout {
         };
         Ok(Self {
             needs,
+            forced: needs.minus(natural),
             queues,
             counters,
             wavefront,
@@ -70,7 +95,7 @@ impl Layout {
 
     /// The technique as this layout has it: not every scene allows for each.
     pub(crate) fn technique(&self, asked: Technique) -> Technique {
-        let ray_data = match self.needs.requests {
+        let ray_data = match self.needs.has(Need::Requests) {
             true => RayData::Requests,
             false => RayData::Slots,
         };
@@ -87,8 +112,9 @@ impl Layout {
 
     /// Bytes of the buffers of rays and their results for a path, by the buffer's name.
     pub(crate) fn ray_bytes(&self, buffer: &str) -> u64 {
-        let exists =
-            |of_shadows: bool| self.needs.requests && (!of_shadows || self.needs.shadow_rays);
+        let exists = |of_shadows: bool| {
+            self.needs.has(Need::Requests) && (!of_shadows || self.needs.has(Need::ShadowRays))
+        };
         let found = RAY_BUFFERS.iter().find(|(name, ..)| *name == buffer);
         found.map_or(0, |(_, bytes, of_shadows)| {
             u64::from(exists(*of_shadows)) * bytes

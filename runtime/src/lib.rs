@@ -22,7 +22,7 @@ mod layout;
 pub mod lights;
 pub mod media;
 mod modules;
-mod needs;
+pub mod needs;
 mod order;
 pub mod output;
 mod parallel;

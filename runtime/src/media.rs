@@ -11,7 +11,6 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Medium};
 
 use crate::scene::SceneError;
 use crate::shader_part::{BufferData, ShaderPart};
-use crate::text::preprocess;
 use crate::wgsl::constant_u32;
 
 /// How many media a path can be in at once; a state field holds as many words.
@@ -67,13 +66,18 @@ impl Media {
         }
         let words = instances.iter().map(|i| table.word(i.medium));
         Ok(Media {
-            part: Some(table.part(absorb, overlap)),
+            part: Some(table.part()),
             of_instance: words.collect(),
             camera,
             absorb,
             overlap,
         })
     }
+}
+
+/// The functions of a stack for a scene that has empty space only.
+pub(crate) fn of_empty_space() -> ShaderPart {
+    Table::new(std::iter::empty()).part()
 }
 
 /// Every medium once.
@@ -113,18 +117,14 @@ impl Table {
     }
 
     /// The functions of a stack, and a row a medium; row 0 is empty space.
-    fn part(&self, absorb: bool, overlap: bool) -> ShaderPart {
+    fn part(&self) -> ShaderPart {
         let row = |m: &Medium| [m.absorption[0], m.absorption[1], m.absorption[2], m.ior];
         let vacuum = [0.0, 0.0, 0.0, 1.0];
         let rows = self.media.iter().map(row);
         let rows: Vec<[f32; 4]> = std::iter::once(vacuum).chain(rows).collect();
-        let flags = [("absorption", absorb), ("overlap", overlap)];
-        let mut wgsl = preprocess(include_str!("kernels/media.wgsl"), &flags);
-        if overlap {
-            wgsl += &constant_u32("MAX_FALSE_BOUNDARIES", MAX_FALSE_BOUNDARIES);
-        }
         ShaderPart {
-            wgsl,
+            wgsl: constant_u32("MAX_FALSE_BOUNDARIES", MAX_FALSE_BOUNDARIES)
+                + include_str!("kernels/media.wgsl"),
             buffers: vec![BufferData::new("medium_table", "array<vec4<f32>>", &rows)],
         }
     }

@@ -11,7 +11,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::bvh;
 use crate::compose::Binding;
 use crate::layout::Layout;
-use crate::needs::Needs;
+use crate::needs::{self, Facts, Need, Needs};
 use crate::queues::Queues;
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::shells::SUBGROUP;
@@ -164,21 +164,25 @@ impl Composer<'_> {
 
     /// The needs of a kernel that evaluates `members` only.
     pub(crate) fn needs_of(&self, members: &[usize]) -> Needs {
-        let infos = self.infos(members);
+        let materials: Vec<MaterialInfo> = self.infos(members).into_iter().cloned().collect();
+        let facts = Facts {
+            world: self.world,
+            materials: &materials,
+            technique: &self.technique,
+            wavefront: self.layout.wavefront,
+        };
         let all = self.layout.needs;
-        let has = |holds: fn(&&&MaterialInfo) -> bool| infos.iter().find(holds).is_some();
-        let shadow_rays = all.shadow_rays && has(|m| !m.delta_only);
-        let absorption = all.absorption && shadow_rays;
-        Needs {
-            shadow_rays,
-            crossing_shadows: all.crossing_shadows,
-            media: all.media && (absorption || has(|m| m.transmissive || m.inputs.exterior_ior)),
-            absorption,
-            overlap: false,
-            order: false,
-            some_pixels: false,
-            requests: all.requests,
-            varying_emission: has(|m| m.varying_emission),
+        let own = Needs::of(&facts, Needs::default()).or(self.layout.forced);
+        let needs = all.minus(needs::OF_MATERIALS.minus(own));
+        let lit = needs.has(Need::ShadowRays);
+        let needs = if lit {
+            needs
+        } else {
+            needs.without(Need::Absorption)
+        };
+        match needs.any(&[Need::Absorption, Need::MediumChanges, Need::ExteriorIor]) {
+            true => needs,
+            false => needs.without(Need::Media),
         }
     }
 
@@ -196,7 +200,7 @@ impl Composer<'_> {
             ("work", hands_out),
             ("regenerates", self.regenerates()),
             ("fetched", fetched),
-            ("some_pixels", self.layout.needs.some_pixels),
+            ("some_pixels", self.layout.needs.has(Need::SomePixels)),
         ];
         let text = self.layout.queues.constants()
             + &wgsl::constants_u32(&[
@@ -212,7 +216,7 @@ impl Composer<'_> {
     /// All stages in one kernel.
     fn mega(&self) -> Recipe {
         let flags = [
-            ("shadow_rays", self.layout.needs.shadow_rays),
+            ("shadow_rays", self.layout.needs.has(Need::ShadowRays)),
             ("regenerates", self.regenerates()),
             ("walk_lane", bvh::asks_for_lane(&self.world.parts.bvh)),
         ];

@@ -7,6 +7,7 @@ use crate::gpu::Gpu;
 use crate::layout::Layout;
 use crate::layout::RAY_BUFFERS;
 use crate::modules::{Composer, Kernel};
+use crate::needs::Need;
 use crate::queues::Scalar;
 use crate::render::RenderOptions;
 use crate::{order, random};
@@ -246,14 +247,14 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         "run" => 4 * RUN_MEMBERS.len() as u64,
         "state" => pool * layout.path_bytes(),
         "queues" => 4 * pool * layout.queue_words(),
-        "bins" if layout.needs.order => order::bytes(composer.technique.ray_order),
+        "bins" if layout.needs.has(Need::Order) => order::bytes(composer.technique.ray_order),
         "bins" => 0,
         "counters" => 4 * layout.counters.len() as u64,
         "arguments" => 12 * queues,
         "queue_table" if composer.queue_table => 4 * composer.materials.len() as u64,
         "queue_table" => 0,
         // Any choice of pixels fits.
-        "pixel_list" if layout.needs.some_pixels => 4 * pixels,
+        "pixel_list" if layout.needs.has(Need::SomePixels) => 4 * pixels,
         "pixel_list" => 0,
         name if RAY_BUFFERS.iter().any(|(buffer, ..)| *buffer == name) => {
             pool * layout.ray_bytes(name)
@@ -289,7 +290,10 @@ mod tests {
             pixels: Some([3, 9].into()),
             ..RenderOptions::default()
         };
-        assert_eq!(run_words(&options), [random::hash_seed(4), 5, 6, 2]);
-        assert_eq!(RUN_MEMBERS, ["seed", "first_sample", "samples", "pixels"]);
+        assert_eq!(run_words(&options), [random::hash_seed(4), 5, 6, 2, 0]);
+        assert_eq!(
+            RUN_MEMBERS,
+            ["seed", "first_sample", "samples", "pixels", "none"]
+        );
     }
 }

@@ -36,6 +36,16 @@ impl BufferData {
     }
 }
 
+impl BufferData {
+    /// The same without its contents.
+    pub(crate) fn text(&self) -> Self {
+        Self {
+            bytes: Vec::new(),
+            ..*self
+        }
+    }
+}
+
 impl From<&Table> for BufferData {
     fn from(table: &Table) -> Self {
         Self::new(table.name, table.wgsl_type, &table.words)
@@ -45,13 +55,9 @@ impl From<&Table> for BufferData {
 impl ShaderPart {
     /// The same without the contents of buffers, for composing kernels that read what is uploaded.
     pub(crate) fn text(&self) -> Self {
-        let empty = |buffer: &BufferData| BufferData {
-            bytes: Vec::new(),
-            ..*buffer
-        };
         Self {
             wgsl: self.wgsl.clone(),
-            buffers: self.buffers.iter().map(empty).collect(),
+            buffers: self.buffers.iter().map(BufferData::text).collect(),
         }
     }
 }

@@ -8,6 +8,7 @@ use impasto_compiler::partition::workload::BLOCK;
 
 use crate::bvh;
 use crate::modules::Composer;
+use crate::needs::Need;
 use crate::queues::Queues;
 use crate::technique::{Append, Leaves};
 use crate::text::{case_labels, preprocess};
@@ -154,7 +155,7 @@ impl Composer<'_> {
     /// Constants, request functions and entry point of a kernel whose threads work on one item each.
     pub(crate) fn shell(&self, shell: &Shell) -> String {
         let pushes = shell.sorts || shell.casts;
-        let requests = self.layout.needs.requests;
+        let requests = self.layout.needs.has(Need::Requests);
         let entry = EntryPoint {
             queued: shell.consumes.is_some(),
             binned: shell.binned.is_some(),
@@ -201,7 +202,7 @@ impl Composer<'_> {
         let rays = queues.extension();
         let first = if shell.sorts { Queues::NEW_PATH } else { rays };
         let end = if shell.casts { queues.count() } else { rays };
-        let requests = self.layout.needs.requests;
+        let requests = self.layout.needs.has(Need::Requests);
         let keeps = shell.casts && requests;
         let flags = [
             ("sorts", shell.sorts),
@@ -233,7 +234,7 @@ impl Composer<'_> {
             queue: consumed.queue as u32,
             counter: "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE",
             limit: self.sizes.fetch_limit,
-            slots: !self.layout.needs.requests,
+            slots: !self.layout.needs.has(Need::Requests),
             together: self.technique.leaves == Leaves::Together,
             walk_lane: bvh::asks_for_lane(&self.world.parts.bvh),
         };

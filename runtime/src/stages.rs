@@ -6,9 +6,12 @@
 //! from the table (which text a kernel is composed of, which queues there are) is derived in
 //! `modules`, `wavefront` and `queues`. A new stage is one file in `kernels/` and one row here.
 
-use crate::needs::Need::{
-    self, Absorption, Always, Media, Order, Overlap, ShadowOrder, ShadowRays,
-};
+use crate::needs::{ALWAYS, Need, When, when};
+
+const ABSORPTION: When = when(&[Need::Absorption]);
+const MEDIA: When = when(&[Need::Media]);
+const MIS: When = when(&[Need::Mis]);
+const OVERLAP: When = when(&[Need::Overlap]);
 
 /// The stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,9 +71,9 @@ pub(crate) struct Stage {
     /// The WGSL function.
     pub body: &'static str,
     /// The texts it needs, each with what must exist for it.
-    pub parts: &'static [(Part, Need)],
+    pub parts: &'static [(Part, When)],
     /// When it exists.
-    pub need: Need,
+    pub need: When,
 }
 
 /// Every stage, in the order of an iteration. Shadow rays come before extension rays because
@@ -81,71 +84,71 @@ pub(crate) const STAGES: [Stage; 7] = [
         name: "logic",
         body: include_str!("kernels/logic.wgsl"),
         parts: &[
-            (Part::Random, Always),
-            (Part::Numbers, Always),
-            (Part::Film, Always),
-            (Part::Geometry, Always),
-            (Part::Surface, Always),
-            (Part::Mis, Always),
-            (Part::Lights, Always),
-            (Part::Media, Absorption),
+            (Part::Random, ALWAYS),
+            (Part::Numbers, ALWAYS),
+            (Part::Film, ALWAYS),
+            (Part::Geometry, ALWAYS),
+            (Part::Surface, ALWAYS),
+            (Part::Mis, MIS),
+            (Part::Lights, ALWAYS),
+            (Part::Media, ABSORPTION),
         ],
-        need: Always,
+        need: ALWAYS,
     },
     Stage {
         id: StageId::NewPath,
         name: "new_path",
         body: include_str!("kernels/new_path.wgsl"),
-        parts: &[(Part::Random, Always), (Part::Camera, Always)],
-        need: Always,
+        parts: &[(Part::Random, ALWAYS), (Part::Camera, ALWAYS)],
+        need: ALWAYS,
     },
     Stage {
         id: StageId::Material,
         name: "material",
         body: include_str!("kernels/material.wgsl"),
         parts: &[
-            (Part::Random, Always),
-            (Part::Numbers, Always),
-            (Part::Geometry, Always),
-            (Part::Surface, Always),
-            (Part::Mis, ShadowRays),
-            (Part::Media, Media),
-            (Part::Materials, Always),
+            (Part::Random, ALWAYS),
+            (Part::Numbers, ALWAYS),
+            (Part::Geometry, ALWAYS),
+            (Part::Surface, ALWAYS),
+            (Part::Mis, MIS),
+            (Part::Media, MEDIA),
+            (Part::Materials, ALWAYS),
         ],
-        need: Always,
+        need: ALWAYS,
     },
     Stage {
         id: StageId::BinShadow,
         name: "bin_shadow",
         body: include_str!("kernels/bin_shadow.wgsl"),
-        parts: &[(Part::Order, Always)],
-        need: ShadowOrder,
+        parts: &[(Part::Order, ALWAYS)],
+        need: when(&[Need::Order, Need::ShadowRays]),
     },
     Stage {
         id: StageId::Shadow,
         name: "shadow",
         body: include_str!("kernels/shadow.wgsl"),
-        parts: &[(Part::Geometry, Always), (Part::Traversal, Always)],
-        need: ShadowRays,
+        parts: &[(Part::Geometry, ALWAYS), (Part::Traversal, ALWAYS)],
+        need: when(&[Need::ShadowRays]),
     },
     Stage {
         id: StageId::BinExtension,
         name: "bin_extension",
         body: include_str!("kernels/bin_extension.wgsl"),
-        parts: &[(Part::Order, Always)],
-        need: Order,
+        parts: &[(Part::Order, ALWAYS)],
+        need: when(&[Need::Order]),
     },
     Stage {
         id: StageId::Extension,
         name: "extension",
         body: include_str!("kernels/extension.wgsl"),
         parts: &[
-            (Part::Geometry, Always),
-            (Part::Traversal, Always),
-            (Part::Surface, Overlap),
-            (Part::Media, Overlap),
+            (Part::Geometry, ALWAYS),
+            (Part::Traversal, ALWAYS),
+            (Part::Surface, OVERLAP),
+            (Part::Media, OVERLAP),
         ],
-        need: Always,
+        need: ALWAYS,
     },
 ];
 

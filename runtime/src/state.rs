@@ -9,7 +9,7 @@
 
 use std::fmt::Write;
 
-use crate::needs::{Need, Needs};
+use crate::needs::{ALWAYS, Need, Needs, When, when};
 use crate::stages::StageId::{
     self, BinExtension, BinShadow, Extension, Logic, Material, NewPath, Shadow,
 };
@@ -72,14 +72,31 @@ pub(crate) struct Use {
     /// Its components, four words in all.
     pub components: &'static [(&'static str, Type)],
     /// When it exists.
-    pub need: Need,
+    pub need: When,
     /// The stages that may load it.
     pub readers: &'static [StageId],
     /// The stages that may store it.
     pub writers: &'static [StageId],
 }
 
-use Need::{Always, Media, OwnShadowOrigins, Requests, ShadowRays, SharedOrigins, SlotShadows};
+/// Shadow rays, where they are part of the path's state.
+pub(crate) const SLOT_SHADOWS: When = When {
+    all: &[Need::ShadowRays],
+    none: &[Need::Requests],
+};
+/// Those that may begin on another side of a surface than extension rays.
+pub(crate) const OWN_SHADOW_ORIGINS: When = When {
+    all: &[Need::ShadowRays, Need::CrossingShadows],
+    none: &[Need::Requests],
+};
+/// Those that do not.
+const SHARED_ORIGINS: When = When {
+    all: &[Need::ShadowRays],
+    none: &[Need::Requests, Need::CrossingShadows],
+};
+/// Shadow rays, wherever they are.
+const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
+
 use Type::{F32, U32, Vec3, Words};
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
@@ -91,7 +108,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "ray_origin",
                 components: &[("origin", Vec3), ("pixel", U32)],
-                need: Always,
+                need: ALWAYS,
                 readers: &[Logic, Material, BinExtension, Extension],
                 writers: &[NewPath, Material],
             },
@@ -100,7 +117,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "light_direction",
                 components: &[("direction", Vec3), ("pixel", U32)],
-                need: ShadowRays,
+                need: SHADOW_RAYS,
                 readers: &[Material],
                 writers: &[Logic],
             },
@@ -108,7 +125,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "shadow_origin",
                 components: &[("origin", Vec3), ("pixel", U32)],
-                need: SharedOrigins,
+                need: SHARED_ORIGINS,
                 readers: &[BinShadow, Shadow],
                 writers: &[Material],
             },
@@ -118,7 +135,7 @@ pub(crate) const FIELDS: [Field; 9] = [
         uses: &[Use {
             name: "ray_direction",
             components: &[("direction", Vec3), ("sample", U32)],
-            need: Always,
+            need: ALWAYS,
             readers: &[Logic, Material, BinExtension, Extension],
             writers: &[NewPath, Material],
         }],
@@ -130,7 +147,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "hit",
                 components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
-                need: Always,
+                need: ALWAYS,
                 readers: &[Logic, Material, Extension],
                 writers: &[NewPath, Logic, Extension],
             },
@@ -138,7 +155,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "shadow_direction",
                 components: &[("direction", Vec3), ("primitive", U32)],
-                need: SlotShadows,
+                need: SLOT_SHADOWS,
                 readers: &[BinShadow, Shadow],
                 writers: &[Material],
             },
@@ -151,7 +168,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "throughput",
                 components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
-                need: Always,
+                need: ALWAYS,
                 readers: &[Logic, Material, Extension],
                 writers: &[NewPath, Logic, Material, Extension],
             },
@@ -160,7 +177,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "carried",
                 components: &[("throughput", Vec3), ("light_pdf", F32)],
-                need: ShadowRays,
+                need: SHADOW_RAYS,
                 readers: &[Material],
                 writers: &[Logic],
             },
@@ -171,7 +188,7 @@ pub(crate) const FIELDS: [Field; 9] = [
         uses: &[Use {
             name: "radiance",
             components: &[("radiance", Vec3), ("flags", U32)],
-            need: Always,
+            need: ALWAYS,
             readers: &[Logic, Material],
             writers: &[NewPath, Logic, Material],
         }],
@@ -182,7 +199,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "light",
                 components: &[("radiance", Vec3), ("distance", F32)],
-                need: ShadowRays,
+                need: SHADOW_RAYS,
                 readers: &[Material],
                 writers: &[Logic],
             },
@@ -191,7 +208,7 @@ pub(crate) const FIELDS: [Field; 9] = [
             Use {
                 name: "contribution",
                 components: &[("radiance", Vec3), ("distance", F32)],
-                need: ShadowRays,
+                need: SHADOW_RAYS,
                 readers: &[Logic, Shadow],
                 writers: &[Material, Shadow],
             },
@@ -202,7 +219,7 @@ pub(crate) const FIELDS: [Field; 9] = [
         uses: &[Use {
             name: "shadow_origin",
             components: &[("origin", Vec3), ("pixel", U32)],
-            need: OwnShadowOrigins,
+            need: OWN_SHADOW_ORIGINS,
             readers: &[BinShadow, Shadow],
             writers: &[Material],
         }],
@@ -217,7 +234,7 @@ pub(crate) const FIELDS: [Field; 9] = [
                 ("unused0", U32),
                 ("unused1", U32),
             ],
-            need: Requests,
+            need: when(&[Need::Requests]),
             readers: &[Logic],
             writers: &[NewPath, Material],
         }],
@@ -227,7 +244,7 @@ pub(crate) const FIELDS: [Field; 9] = [
         uses: &[Use {
             name: "media",
             components: &[("stack", Words)],
-            need: Media,
+            need: when(&[Need::Media]),
             readers: &[Logic, Material, Extension],
             writers: &[NewPath, Material, Extension],
         }],
@@ -400,17 +417,14 @@ mod tests {
     use super::*;
     use wgpu::naga;
 
-    const EVERYTHING: Needs = Needs {
-        shadow_rays: true,
-        crossing_shadows: true,
-        requests: false,
-        media: true,
-        absorption: true,
-        overlap: true,
-        varying_emission: true,
-        order: true,
-        some_pixels: true,
-    };
+    const EVERYTHING: Needs = Needs::of_rows(&[
+        Need::ShadowRays,
+        Need::CrossingShadows,
+        Need::Media,
+        Need::Absorption,
+        Need::Overlap,
+        Need::Order,
+    ]);
     const EVERY_STAGE: [StageId; 7] = [
         Logic,
         NewPath,
@@ -424,14 +438,8 @@ mod tests {
     /// naga lays a field's structure out on exactly the words that the accessors pack.
     #[test]
     fn fields_fill_four_words_as_naga_lays_them_out() {
-        let requests = Needs {
-            requests: true,
-            ..EVERYTHING
-        };
-        let shared = Needs {
-            crossing_shadows: false,
-            ..EVERYTHING
-        };
+        let requests = EVERYTHING.with(Need::Requests);
+        let shared = EVERYTHING.without(Need::CrossingShadows);
         for needs in [EVERYTHING, requests, shared] {
             let text = format!(
                 "const POOL_SIZE: u32 = 1u;\n\
@@ -490,10 +498,7 @@ mod tests {
     #[test]
     fn a_scene_without_sampled_lights_stores_no_shadow_rays() {
         assert_eq!(path_bytes(Needs::default()), 80);
-        let lit = Needs {
-            shadow_rays: true,
-            ..Needs::default()
-        };
+        let lit = Needs::of_rows(&[Need::ShadowRays]);
         assert_eq!(path_bytes(lit), 96);
         assert_eq!(path_bytes(EVERYTHING), 128);
         let text = accessors(

@@ -8,6 +8,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::gpu::Gpu;
+use crate::needs::Needs;
 
 /// A choice between techniques, each with a name on the command line.
 pub trait Choice: Copy + PartialEq + 'static {
@@ -159,6 +160,14 @@ choices! {
         Requests = "requests",
     }
 
+    /// What kernels can do that the scene may not ask for.
+    Features {
+        /// What the scene needs, and nothing else
+        Scene = "scene",
+        /// Everything that can be on without need: the same picture, to measure what leaving out saves
+        All = "all",
+    }
+
     /// In which order rays are cast.
     RayOrder {
         /// As they were asked for
@@ -202,6 +211,18 @@ pub struct Technique {
     pub ray_data: RayData,
     /// In which order rays are cast.
     pub ray_order: RayOrder,
+    /// What kernels can do beside what the scene asks for.
+    pub features: Features,
+}
+
+impl Features {
+    /// The rows that are on for a scene that needs `natural` by itself.
+    pub(crate) fn forced(self, natural: Needs) -> Needs {
+        match self {
+            Features::Scene => Needs::default(),
+            Features::All => Needs::everything(natural),
+        }
+    }
 }
 
 impl Technique {
@@ -250,5 +271,6 @@ mod tests {
         check_names::<Copies>();
         check_names::<RayData>();
         check_names::<RayOrder>();
+        check_names::<Features>();
     }
 }

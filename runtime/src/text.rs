@@ -3,6 +3,11 @@
 //! A line `#if NAME`, `#else` or `#endif` in a kernel file keeps or drops the lines between,
 //! so that what a scene does not need is absent from its kernels.
 
+use std::collections::BTreeMap;
+
+/// A name of `#if` lines, and whether it is set.
+pub(crate) type Flag = (&'static str, bool);
+
 /// `text` with conditional lines resolved by `flags`. A name that is no flag counts as unset;
 /// the lines that then miss make validation fail.
 pub(crate) fn preprocess(text: &str, flags: &[(&str, bool)]) -> String {
@@ -23,6 +28,99 @@ pub(crate) fn preprocess(text: &str, flags: &[(&str, bool)]) -> String {
         }
     }
     out
+}
+
+/// `text` without what its entry point does not come to: functions, structures, constants and variables,
+/// each with the comment above it, and headings of what is left out whole. Items begin at the
+/// start of a line, as all of ours do.
+pub(crate) fn reachable(text: &str) -> String {
+    let pieces = pieces(text);
+    let named: BTreeMap<&str, usize> = pieces
+        .iter()
+        .enumerate()
+        .filter_map(|(at, piece)| Some((piece.name?, at)))
+        .collect();
+    let mut kept = vec![false; pieces.len()];
+    let entries = pieces.iter().enumerate().filter(|(_, p)| p.is_entry);
+    let mut left: Vec<usize> = entries.map(|(at, _)| at).collect();
+    while let Some(at) = left.pop() {
+        if !std::mem::replace(&mut kept[at], true) {
+            let code = without_comments(&pieces[at].text);
+            left.extend(identifiers(&code).filter_map(|name| named.get(name)));
+        }
+    }
+    for at in 0..pieces.len() {
+        let of_heading = pieces[at + 1..].iter().zip(&kept[at + 1..]);
+        let of_heading = of_heading.take_while(|(piece, _)| !piece.is_heading);
+        kept[at] |= pieces[at].is_heading && of_heading.into_iter().any(|(_, kept)| *kept);
+    }
+    let kept = pieces.iter().zip(kept).filter(|(_, kept)| *kept);
+    kept.map(|(piece, _)| piece.text.as_str()).collect()
+}
+
+/// Lines that stay or go together: an item with the comment above it, or a heading, which is a comment
+/// with nothing below.
+struct Piece<'a> {
+    text: String,
+    name: Option<&'a str>,
+    is_heading: bool,
+    is_entry: bool,
+}
+
+fn pieces(text: &str) -> Vec<Piece<'_>> {
+    let mut pieces = Vec::new();
+    let mut piece = Piece::empty();
+    let mut open = 0i32;
+    for line in text.lines() {
+        let code = line.split("//").next().unwrap_or("").trim_end();
+        piece.text += line;
+        piece.text.push('\n');
+        if open == 0 {
+            piece.name = piece.name.or_else(|| declared(code));
+            piece.is_entry |= code.starts_with("@compute");
+        }
+        let opened = code.matches(['{', '(', '[']).count() as i32;
+        open += opened - code.matches(['}', ')', ']']).count() as i32;
+        let ends = open == 0 && piece.name.is_some() && code.ends_with(['}', ';']);
+        let is_gap = open == 0 && line.is_empty() && piece.name.is_none();
+        if ends || is_gap {
+            piece.is_heading = is_gap && !piece.text.trim().is_empty();
+            pieces.push(std::mem::replace(&mut piece, Piece::empty()));
+        }
+    }
+    pieces.push(piece);
+    pieces
+}
+
+impl Piece<'_> {
+    fn empty() -> Self {
+        Self {
+            text: String::new(),
+            name: None,
+            is_heading: false,
+            is_entry: false,
+        }
+    }
+}
+
+/// The name that a line at module scope declares.
+fn declared(code: &str) -> Option<&str> {
+    let keywords = [
+        "fn ",
+        "const ",
+        "struct ",
+        "alias ",
+        "var<private> ",
+        "var<workgroup> ",
+    ];
+    let rest = keywords.iter().find_map(|k| code.strip_prefix(k))?;
+    identifiers(rest).next()
+}
+
+/// The words of code that may be names.
+fn identifiers(code: &str) -> impl Iterator<Item = &str> {
+    let words = code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+    words.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_'))
 }
 
 /// Whether the identifier `name` occurs in `text`.
@@ -84,6 +182,23 @@ mod tests {
         assert_eq!(all, "fn p(instance: u32) -> bool { return true; }\n");
         let some = predicate("p", &[0, 1, 2], |i| i != 1);
         assert!(some.contains("switch material_of(instance) { case 0u, 2u: { return true; }"));
+    }
+
+    #[test]
+    fn what_the_entry_point_does_not_come_to_goes_with_its_comments() {
+        let text = "// Heading of what stays.\n\nconst A: u32 = 1u;\n// B and its end.\nconst B: u32 = 2u;\n\
+                    // Heading of what goes.\n\n// Gone.\nfn gone(x: u32) -> u32 {\n    return B;\n}\n\
+                    // Kept.\nstruct S { x: u32 }\nfn used(s: S) -> u32 { return A + s.x; }\n\
+                    @compute @workgroup_size(1)\nfn main(\n    @builtin(workgroup_id) id: vec3<u32>\n) {\n\
+                    \n    _ = used(S(id.x)); // B\n}\n";
+        let expected = "// Heading of what stays.\n\nconst A: u32 = 1u;\n// Heading of what goes.\n\n\
+                        // Kept.\nstruct S { x: u32 }\n\
+                        fn used(s: S) -> u32 { return A + s.x; }\n@compute @workgroup_size(1)\nfn main(\n    \
+                        @builtin(workgroup_id) id: vec3<u32>\n) {\n\n    _ = used(S(id.x)); // B\n}\n";
+        assert_eq!(reachable(text), expected);
+        let short =
+            "// Of this nothing is left.\n\nfn f() {}\n// The end.\n\n@compute\nfn main() {}\n";
+        assert_eq!(reachable(short), "// The end.\n\n@compute\nfn main() {}\n");
     }
 
     #[test]

@@ -26,7 +26,7 @@ impl Composer<'_> {
         ];
         recipes.extend(self.material_kernels());
         recipes.push(self.prepare("prepare_rays", rays..queues.count(), false));
-        if self.layout.needs.met(Need::ShadowRays) {
+        if self.layout.needs.has(Need::ShadowRays) {
             recipes.extend(self.order(StageId::BinShadow, queues.shadow()));
             recipes.push(self.stage(StageId::Shadow, queues.shadow()));
         }
@@ -51,7 +51,7 @@ impl Composer<'_> {
             run,
             sorts: true,
             casts: !members.is_empty(),
-            casts_shadows: self.needs_of(&members).shadow_rays,
+            casts_shadows: self.needs_of(&members).has(Need::ShadowRays),
             counts_hits: self.layout.counters.hits > 0,
             ..Shell::default()
         });
@@ -81,7 +81,7 @@ impl Composer<'_> {
                 consumes: Some(Consumed::unordered(first)),
                 binned: (count > 1).then_some(count),
                 casts: true,
-                casts_shadows: self.needs_of(&planned.materials).shadow_rays,
+                casts_shadows: self.needs_of(&planned.materials).has(Need::ShadowRays),
                 ..Shell::default()
             });
             Recipe {
@@ -130,10 +130,12 @@ impl Composer<'_> {
     /// A queue as a stage finds it: rays may have been put in order.
     fn consumed(&self, stage: StageId, queue: usize) -> Consumed {
         match stage {
-            StageId::Shadow | StageId::Extension if self.layout.needs.order => Consumed {
-                queue,
-                region: self.layout.queues.region_ordered(),
-            },
+            StageId::Shadow | StageId::Extension if self.layout.needs.has(Need::Order) => {
+                Consumed {
+                    queue,
+                    region: self.layout.queues.region_ordered(),
+                }
+            }
             _ => Consumed::unordered(queue),
         }
     }
@@ -143,7 +145,7 @@ impl Composer<'_> {
     pub(crate) fn fetches(&self, id: StageId) -> bool {
         let possible = match id {
             StageId::Shadow => true,
-            StageId::Extension => !self.layout.needs.overlap,
+            StageId::Extension => !self.layout.needs.has(Need::Overlap),
             _ => false,
         };
         possible

@@ -7,7 +7,7 @@ use impasto_compiler::partition::{Hits, Workload};
 
 use crate::layout::Layout;
 use crate::modules::Kernel;
-use crate::needs::Needs;
+use crate::needs::{Need, Needs};
 use crate::stages::StageId;
 use crate::state;
 use crate::status::Status;
@@ -46,10 +46,9 @@ pub(crate) fn before_rendering(
 /// Bytes of state that a hit of a material loads and stores: none is asked for a light sample where light
 /// cannot be sampled.
 fn traffic(needs: Needs, material: &MaterialInfo) -> [u64; 2] {
-    let lit = needs.shadow_rays && !material.delta_only;
-    let needs = Needs {
-        shadow_rays: lit,
-        ..needs
+    let needs = match material.delta_only {
+        true => needs.without(Need::ShadowRays),
+        false => needs,
     };
     state::traffic(needs, StageId::Material)
 }

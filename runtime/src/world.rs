@@ -11,7 +11,8 @@ use impasto_compiler::partition::{Plan, Strategy};
 use crate::camera::CameraFrame;
 use crate::lights;
 use crate::media::Media;
-use crate::scene::{Scene, SceneError, SceneParts};
+use crate::needs::{Facts, Needs};
+use crate::scene::{Scene, SceneError, SceneParts, Sources};
 use crate::shader_part::ShaderPart;
 use crate::technique::Technique;
 
@@ -68,18 +69,38 @@ impl World {
     ) -> Result<Self, SceneError> {
         lights::check(scene, instances)?;
         let (width, height) = (scene.film.width, scene.film.height);
-        Ok(Self {
+        let world = Self {
             width,
             height,
             camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
             parts: SceneParts::build(scene, materials, instances, textures, technique)?,
-        })
+        };
+        let needs = world.needs(materials, technique);
+        Ok(world.specialised(needs))
     }
 }
 
 impl World {
+    /// What it needs in a wavefront, and what the technique adds to that.
+    fn needs(&self, materials: &[MaterialInfo], technique: &Technique) -> Needs {
+        let facts = Facts {
+            world: self,
+            materials,
+            technique,
+            wavefront: true,
+        };
+        let natural = Needs::of(&facts, Needs::default());
+        Needs::of(&facts, technique.features.forced(natural))
+    }
+
+    /// The world with the texts that some needs ask for.
+    pub(crate) fn specialised(mut self, needs: Needs) -> Self {
+        self.parts.specialise(needs);
+        self
+    }
+
     /// All that kernels are composed of, without the contents of buffers.
     pub(crate) fn texts(&self) -> World {
         let parts = &self.parts;
@@ -96,6 +117,8 @@ impl World {
                 },
                 texture: parts.texture.as_ref().map(ShaderPart::text),
                 unbound: parts.unbound.clone(),
+                facts: parts.facts.clone(),
+                sources: parts.sources.as_ref().map(Sources::text),
                 ..*parts
             },
             ..*self

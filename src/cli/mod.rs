@@ -26,6 +26,7 @@ mod explain;
 mod info;
 mod interrupt;
 mod merge;
+mod needs;
 mod outputs;
 mod plan;
 mod profile;

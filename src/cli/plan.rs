@@ -19,6 +19,10 @@ use super::{Failure, Global, Outcome, compiled_scene, print, read_text};
 pub(super) struct PlanCommandArgs {
     /// The scene, a TOML file
     scene: PathBuf,
+    /// Says what the scene needs and why, and what leaving out the rest saves, in place of a plan
+    /// (docs/needs.md); needs no GPU
+    #[arg(long)]
+    needs: bool,
     #[command(flatten)]
     wanted: PlanArgs,
     /// How paths hit materials, from a file that `--save-workload` wrote; otherwise a few iterations are
@@ -61,6 +65,9 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
         files::check_writable(path)?;
     }
     let (scene, program) = compiled_scene(&args.scene, global)?;
+    if args.needs {
+        return super::needs::run(&args.scene, &scene, &program, global);
+    }
     let facts = Facts::of_scene(&scene, &program, args.samples as usize)
         .map_err(|_| "the materials take too long to evaluate; try fewer `--samples`".to_owned())?;
     // What is wrong with the plan is said before anything is rendered.

@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Copies, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler, Stack,
-    StateLayout, Technique, Traversal,
+    Append, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
+    Stack, StateLayout, Technique, Traversal,
 };
 
 /// Every choice of [`Technique`].
@@ -44,6 +44,9 @@ pub(super) struct TechniqueArgs {
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
+    /// What kernels can do that the scene may not ask for
+    #[arg(long, value_name = "NAME", default_value = default_name::<Features>(), value_parser = named::<Features>())]
+    features: Features,
     /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
@@ -72,6 +75,7 @@ impl TechniqueArgs {
             copies: self.copies,
             ray_data: self.ray_data,
             ray_order: self.ray_order,
+            features: self.features,
         }
     }
 }

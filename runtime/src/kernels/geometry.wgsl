@@ -33,13 +33,11 @@ fn primitive_instance(primitive: u32) -> u32 {
 fn primitive_light(primitive: u32) -> u32 {
     return triangles[3u * primitive + 1u].w;
 }
-#if media
 
 // The medium that the primitive bounds; 0 for what is thin-walled or opaque.
 fn primitive_medium(primitive: u32) -> u32 {
     return triangles[3u * primitive + 2u].w;
 }
-#endif
 #endif
 
 // The vector area b - a cross c - a, scaled to unit length. Scaling the edges first keeps the

@@ -81,10 +81,8 @@ fn primitive_instance(primitive: u32) -> u32 {
 fn primitive_light(primitive: u32) -> u32 {
     return triangles[3u * place_of(primitive).triangle + 1u].w;
 }
-#if media
 
 // The medium that the primitive bounds; 0 for what is thin-walled or opaque.
 fn primitive_medium(primitive: u32) -> u32 {
     return placement_materials[material_row(place_of(primitive))].y;
 }
-#endif

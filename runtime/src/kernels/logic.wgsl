@@ -41,38 +41,51 @@ fn logic(slot: u32) {
         store_throughput(slot, carried);
 #endif
 #endif
-        if hit.primitive == NOTHING {
-            path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
-        } else {
+        if hit.primitive != NOTHING {
+#if hit_lights
             path.radiance += carried.throughput
                 * light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
+#endif
             instance = primitive_instance(hit.primitive);
         }
+#if escape_lights
+        if hit.primitive == NOTHING {
+            path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
+        }
+#endif
     }
+#if varying_emission
     if instance != NOTHING && vertex >= MAX_DEPTH && !needs_last_evaluation(instance) {
         instance = NOTHING;
     }
-#if shadow_rays
-    let draws = instance != NOTHING;
 #else
-    let draws = instance != NOTHING && vertex >= ROULETTE_START;
+    if vertex >= MAX_DEPTH {
+        instance = NOTHING;
+    }
 #endif
+#if shadow_rays
     var bits = vec4<u32>(0u);
-    if draws {
+    if instance != NOTHING {
         bits = random_bits(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC));
     }
+#endif
+#if roulette
     if instance != NOTHING && vertex >= ROULETTE_START {
+#if shadow_rays
         let survival = survival_probability(carried.throughput);
         if unit_numbers(bits).w < survival {
             carried.throughput /= survival;
-#if shadow_rays
 #else
+        let survival = survival_probability(carried.throughput);
+        if random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC)).w < survival {
+            carried.throughput /= survival;
             store_throughput(slot, carried);
 #endif
         } else {
             instance = NOTHING;
         }
     }
+#endif
     if instance == NOTHING {
         film_add(vec3<u32>(pixel, ray.sample, vertex), path.radiance);
         request_new_path();
@@ -82,7 +95,16 @@ fn logic(slot: u32) {
     path.flags = (path.flags & ~PATH_LIT) + 1u;
 #if shadow_rays
     var light_pdf = 0.0;
-    if vertex < MAX_DEPTH && scatters_sampled_light(instance) {
+#if varying_emission
+    let goes_on = vertex < MAX_DEPTH;
+#else
+    let goes_on = true;
+#endif
+#if unlit_materials
+    if goes_on && scatters_sampled_light(instance) {
+#else
+    if goes_on {
+#endif
         let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
         let light = sample_light(position, bits);
         if any(light.radiance > vec3<f32>(0.0)) {

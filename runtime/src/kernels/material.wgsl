@@ -73,8 +73,12 @@ fn material(slot: u32, instance: u32) {
 #endif
         let start = leave_surface(position, side, wl);
         let way = aim(wl, light.distance, start - position);
+#if mis
         let share = light_share(carried.light_pdf, scattered.light_pdf);
         store_contribution(slot, PathContribution(reach * light.radiance * share, way.distance));
+#else
+        store_contribution(slot, PathContribution(reach * light.radiance, way.distance));
+#endif
         if any(reach > vec3<f32>(0.0)) {
 #if slot_shadows
             store_shadow_direction(slot, PathShadowDirection(way.direction, hit.primitive));
@@ -136,7 +140,7 @@ fn checked_emission(emission: vec3<f32>, instance: u32, place: vec3<u32>) -> vec
 }
 
 #endif
-#if shadow_rays
+#if mis
 // The weight of a light sample. Scattering cannot hit a discrete light (density 0), so its sample
 // counts fully.
 fn light_share(light_pdf: f32, bsdf_pdf: f32) -> f32 {
@@ -145,17 +149,23 @@ fn light_share(light_pdf: f32, bsdf_pdf: f32) -> f32 {
     }
     return 1.0;
 }
+#endif
+#if shadow_rays
 
 // A shadow ray's direction and length.
 struct Way { direction: vec3<f32>, distance: f32 }
 
 // The ray from the moved origin to the point that was sampled. Its end is off the light already, which must
-// not occlude itself; a few units in the last place make up for rounding here. Discrete lights far
-// away stay in their direction.
+// not occlude itself; a few units in the last place make up for rounding here.
+#if far_lights
+// Lights far away stay in their direction.
+#endif
 fn aim(direction: vec3<f32>, distance: f32, moved: vec3<f32>) -> Way {
+#if far_lights
     if distance > 1e18 {
         return Way(direction, distance);
     }
+#endif
     let to_light = direction * distance - moved;
     let left = length(to_light);
     return Way(to_light / max(left, 1e-30), left * 0.999999);

@@ -54,19 +54,15 @@ fn cross_boundary(stack: vec4<u32>, medium: u32, inside: bool) -> vec4<u32> {
 fn exterior_index(stack: vec4<u32>, medium: u32, inside: bool) -> f32 {
     return medium_table[active_medium(media_outside(stack, medium, inside)) & 0xffffu].w;
 }
-#if overlap
 
 // Is the boundary within a medium that counts more on both of its sides? Then there is none.
 fn is_false_boundary(stack: vec4<u32>, medium: u32, inside: bool) -> bool {
     let other = active_medium(media_outside(stack, medium, inside));
     return medium != 0u && (other >> 16u) > (medium >> 16u);
 }
-#endif
-#if absorption
 
 // What is left of light over a distance in the medium that counts: Beer and Lambert.
 fn transmittance(stack: vec4<u32>, distance: f32) -> vec3<f32> {
     let absorption = medium_table[active_medium(stack) & 0xffffu].xyz;
     return exp(-absorption * min(distance, 1e18));
 }
-#endif

@@ -133,7 +133,7 @@ impl<'a> Lab<'a> {
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;
-        let mut makings = Makings::new(gpu, world, source, render.technique);
+        let mut makings = Makings::new(gpu.subgroup_size(), world, source, render.technique);
         let own = world.own_plan(&makings.materials);
         // No plan has more queues or counters: buffers of this layout do for all.
         let mut layout = makings.layout(&own)?;

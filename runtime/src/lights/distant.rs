@@ -2,7 +2,10 @@
 
 use std::f64::consts::PI;
 
+use glam::Vec3;
+
 use super::{Context, Kind, Sampled, luminance};
+use crate::needs::Need;
 use crate::scene::{DistantLight, Light};
 use crate::wgsl;
 
@@ -15,20 +18,49 @@ pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
     let sampled = lights.iter().map(|light| Sampled {
         power: luminance(light.irradiance) * context.cross_section(),
         by_chance: !light.sample,
+        is_discrete: light.angle <= 0.0,
         ..Sampled::default()
     });
+    let row = |need, what: &str, holds: fn(&DistantLight) -> bool| {
+        let found = lights.iter().any(|light| holds(light));
+        found.then(|| (need, format!("`[[lights]]` has a distant one {what}")))
+    };
+    let rows = [
+        row(Need::DirectionalLights, "without an angle", |l| {
+            l.angle <= 0.0
+        }),
+        row(Need::DiscLights, "with an angle", |l| l.angle > 0.0),
+    ];
+    let is_disc = lights.iter().any(|l| l.angle > 0.0);
     (!lights.is_empty()).then(|| Kind {
+        rows: rows.into_iter().flatten().collect(),
         lights: sampled.collect(),
         wgsl: text(&lights, first),
+        ..empty(is_disc)
+    })
+}
+
+/// The kind without a light; its code has one that is black, and not in the table. What is no disc, but a single
+/// direction, is never met by chance.
+pub(super) fn empty(is_disc: bool) -> Kind {
+    let black = DistantLight {
+        to_light: Vec3::Y,
+        irradiance: Vec3::ZERO,
+        angle: 1.0,
+        sample: true,
+    };
+    Kind {
+        serves: &[Need::DirectionalLights, Need::DiscLights],
+        idle: false,
+        rows: Vec::new(),
+        lights: Vec::new(),
+        wgsl: text(&[&black], 0),
         buffers: Vec::new(),
         sample: "sample_distant_light",
         hit: None,
-        // A single direction is never met by chance.
-        escape: lights
-            .iter()
-            .any(|l| l.angle > 0.0)
-            .then_some("distant_light_escape"),
-    })
+        escape: is_disc.then_some("distant_light_escape"),
+        chooses: false,
+    }
 }
 
 fn text(lights: &[&DistantLight], first: u32) -> String {

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::alias::PackedAlias;
 use super::{Context, Kind, Sampled, luminance};
+use crate::needs::Need;
 use crate::scene::{Environment, EnvironmentMap, EnvironmentSource};
 use crate::shader_part::BufferData;
 use crate::wgsl;
@@ -20,19 +21,65 @@ pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
     }
 }
 
-/// The kind with its one light, if sampled, of `irradiance` W/m^2 summed over all directions.
-fn environment_kind(context: &Context, irradiance: Option<f64>, wgsl: String) -> Kind {
-    let sampled = irradiance.map(|irradiance| Sampled {
-        power: irradiance * context.cross_section(),
-        ..Sampled::default()
-    });
+/// A kind without lights.
+fn without_lights(serves: &'static [Need], wgsl: String) -> Kind {
     Kind {
-        lights: sampled.into_iter().collect(),
+        serves,
+        idle: false,
+        rows: Vec::new(),
+        lights: Vec::new(),
         wgsl,
         buffers: Vec::new(),
         sample: "sample_environment",
         hit: None,
         escape: Some("environment_escape"),
+        chooses: false,
+    }
+}
+
+/// The kind with its one light, if sampled, of `irradiance` W/m^2 summed over all directions.
+fn environment_kind(
+    context: &Context,
+    (need, what): (&'static [Need; 1], &str),
+    irradiance: Option<f64>,
+    wgsl: String,
+) -> Kind {
+    let sampled = irradiance.map(|irradiance| Sampled {
+        power: irradiance * context.cross_section(),
+        ..Sampled::default()
+    });
+    Kind {
+        rows: vec![(need[0], what.to_owned())],
+        lights: sampled.into_iter().collect(),
+        ..without_lights(need, wgsl)
+    }
+}
+
+const UNIFORM: (&[Need; 1], &str) = (
+    &[Need::UniformEnvironment],
+    "`[environment]` has the same color everywhere",
+);
+const MAP: (&[Need; 1], &str) = (&[Need::EnvironmentMap], "`[environment]` names a picture");
+
+/// The kind of a black environment that is not in the table of lights.
+pub(super) fn empty_uniform() -> Kind {
+    without_lights(UNIFORM.0, uniform_text(Vec3::ZERO, 0))
+}
+
+/// The same with a picture of one texel.
+pub(super) fn empty_map() -> Kind {
+    let map = EnvironmentMap {
+        width: 1,
+        height: 1,
+        texels: vec![Vec3::ZERO],
+    };
+    let table = Importance::new(&map);
+    let text = map_text(&map, 0.0)
+        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", 0)
+        + include_str!("../kernels/lights/environment_map_sampled.wgsl");
+    Kind {
+        buffers: map_buffers(&map, &table),
+        ..without_lights(MAP.0, text)
     }
 }
 
@@ -45,16 +92,20 @@ fn uniform(
     if luminance(radiance) <= 0.0 {
         return None;
     }
-    let constants = wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance);
     if !environment.sample {
-        let text = constants + include_str!("../kernels/lights/environment_uniform.wgsl");
-        return Some(environment_kind(context, None, text));
+        let text = wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
+            + include_str!("../kernels/lights/environment_uniform.wgsl");
+        return Some(environment_kind(context, UNIFORM, None, text));
     }
-    let text = constants
-        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", first)
-        + include_str!("../kernels/lights/environment_uniform_sampled.wgsl");
+    let text = uniform_text(radiance, first);
     let irradiance = 4.0 * PI * luminance(radiance);
-    Some(environment_kind(context, Some(irradiance), text))
+    Some(environment_kind(context, UNIFORM, Some(irradiance), text))
+}
+
+fn uniform_text(radiance: Vec3, light: u32) -> String {
+    wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
+        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", light)
+        + include_str!("../kernels/lights/environment_uniform_sampled.wgsl")
 }
 
 fn mapped(
@@ -67,24 +118,35 @@ fn mapped(
     if table.irradiance <= 0.0 {
         return None;
     }
-    let (sine, cosine) = f64::from(environment.rotate).to_radians().sin_cos();
-    let mut text = wgsl::constant_u32("ENVIRONMENT_WIDTH", map.width)
-        + &wgsl::constant_u32("ENVIRONMENT_HEIGHT", map.height)
-        + &wgsl::constant_f32("ENVIRONMENT_SINE", sine as f32)
-        + &wgsl::constant_f32("ENVIRONMENT_COSINE", cosine as f32)
-        + include_str!("../kernels/lights/environment_map.wgsl");
+    let mut text = map_text(map, environment.rotate);
     if !environment.sample {
         text += include_str!("../kernels/lights/environment_map_unsampled.wgsl");
-        let mut kind = environment_kind(context, None, text);
+        let mut kind = environment_kind(context, MAP, None, text);
         kind.buffers = vec![texel_buffer(map, &[])];
         return Some(kind);
     }
     text += &wgsl::constant_u32("ENVIRONMENT_LIGHT", first);
     text += include_str!("../kernels/lights/environment_map_sampled.wgsl");
-    let mut kind = environment_kind(context, Some(table.irradiance), text);
+    Some(Kind {
+        buffers: map_buffers(map, &table),
+        chooses: true,
+        ..environment_kind(context, MAP, Some(table.irradiance), text)
+    })
+}
+
+/// What samples of a map and rays that escape have in common; it is turned by `rotate` degrees.
+fn map_text(map: &EnvironmentMap, rotate: f32) -> String {
+    let (sine, cosine) = f64::from(rotate).to_radians().sin_cos();
+    wgsl::constant_u32("ENVIRONMENT_WIDTH", map.width)
+        + &wgsl::constant_u32("ENVIRONMENT_HEIGHT", map.height)
+        + &wgsl::constant_f32("ENVIRONMENT_SINE", sine as f32)
+        + &wgsl::constant_f32("ENVIRONMENT_COSINE", cosine as f32)
+        + include_str!("../kernels/lights/environment_map.wgsl")
+}
+
+fn map_buffers(map: &EnvironmentMap, table: &Importance) -> Vec<BufferData> {
     let alias = BufferData::new("environment_alias", "array<u32>", &table.alias);
-    kind.buffers = vec![texel_buffer(map, &table.densities), alias];
-    Some(kind)
+    vec![texel_buffer(map, &table.densities), alias]
 }
 
 fn texel_buffer(map: &EnvironmentMap, densities: &[f32]) -> BufferData {

@@ -4,6 +4,7 @@ use glam::Vec3;
 use impasto_compiler::abi::Emission;
 
 use super::{Context, Kind, Sampled, area, luminance};
+use crate::needs::Need;
 
 pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
     let mesh = context.mesh;
@@ -27,12 +28,31 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
             })
         })
         .collect();
+    let named = |light: &Sampled| {
+        let material = mesh.materials[light.triangles[0] as usize] as usize;
+        let name = context.instances.get(material).map_or("", |i| &i.name);
+        format!("`{name}` emits the same light everywhere on its front")
+    };
+    let rows = lights.first().map(|light| (Need::MeshLights, named(light)));
     (!lights.is_empty()).then(|| Kind {
+        rows: rows.into_iter().collect(),
         lights,
+        ..empty()
+    })
+}
+
+/// The kind without a light.
+pub(super) fn empty() -> Kind {
+    Kind {
+        serves: &[Need::MeshLights],
+        idle: false,
+        rows: Vec::new(),
+        lights: Vec::new(),
         wgsl: include_str!("../kernels/lights/mesh.wgsl").to_owned(),
         buffers: Vec::new(),
         sample: "sample_mesh_light",
         hit: Some("mesh_light_hit"),
         escape: None,
-    })
+        chooses: false,
+    }
 }

@@ -8,8 +8,11 @@ use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 
 use crate::media::Media;
+use crate::needs::facts::SceneFacts;
+use crate::needs::{Need, Needs};
 use crate::scene::{Mesh, Scene, SceneError};
 use crate::shader_part::{BufferData, ShaderPart};
+use crate::text::{Flag, preprocess};
 use crate::wgsl;
 
 mod alias;
@@ -36,6 +39,8 @@ pub struct Lights {
     pub of_triangle: Vec<u32>,
     /// Can any light be sampled?
     pub has_sampled: bool,
+    /// What the part is made of.
+    pub(crate) kinds: Kinds,
 }
 
 impl Lights {
@@ -51,22 +56,21 @@ impl Lights {
         media: &Media,
     ) -> Lights {
         let context = Context::new(scene, mesh, bounds, order, instances, media);
-        let mut kinds = Vec::new();
-        let mut count = 0;
+        let mut kinds = Kinds::default();
         for kind in KINDS {
-            kinds.extend(kind(&context, count));
-            count = kinds.iter().map(|k| k.lights.len() as u32).sum();
+            kinds.0.extend(kind(&context, kinds.count()));
         }
         let mut of_triangle = vec![NO_LIGHT; mesh.len()];
-        for (index, light) in kinds.iter().flat_map(|k| &k.lights).enumerate() {
+        for (index, light) in kinds.0.iter().flat_map(|k| &k.lights).enumerate() {
             for &triangle in &light.triangles {
                 of_triangle[triangle as usize] = index as u32;
             }
         }
         Lights {
-            part: part(&kinds, count),
+            part: kinds.part(kinds.possible_needs()),
             of_triangle,
-            has_sampled: is_any_sampled(&kinds),
+            has_sampled: kinds.is_any_sampled(),
+            kinds,
         }
     }
 }
@@ -134,10 +138,17 @@ impl<'a> Context<'a> {
 }
 
 /// One kind of light as a scene has it.
+#[derive(Clone, Debug)]
 struct Kind {
+    /// The rows of the table of needs that its code is for.
+    serves: &'static [Need],
+    /// Is its code there in vain?
+    idle: bool,
+    /// The rows that its lights are, and which of them they are.
+    rows: Vec<(Need, String)>,
     /// Those of the light table.
     lights: Vec<Sampled>,
-    /// The kind's functions and constants.
+    /// The kind's functions and constants, with `#if` lines.
     wgsl: String,
     buffers: Vec<BufferData>,
     /// `fn NAME(pick: LightPick, position: vec3<f32>) -> LightSample`
@@ -147,10 +158,12 @@ struct Kind {
     hit: Option<&'static str>,
     /// `fn NAME(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`, for lights at infinity.
     escape: Option<&'static str>,
+    /// Is there more to choose in one of its lights?
+    chooses: bool,
 }
 
 /// A row of the light table.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 struct Sampled {
     /// Emitted power in W (by luminance), more than 0.
     power: f64,
@@ -160,29 +173,114 @@ struct Sampled {
     primitive: u32,
     /// Is it found by scattering alone?
     by_chance: bool,
+    /// Is it seen in a single direction, where scattering cannot find it?
+    is_discrete: bool,
     /// The kind's own use.
     flag: u32,
     /// Triangles of the mesh that belong to it.
     triangles: Vec<u32>,
 }
 
-fn part(kinds: &[Kind], count: u32) -> ShaderPart {
+/// The kinds of lights that a scene has, from which its shader part is made.
+#[derive(Clone, Debug, Default)]
+pub struct Kinds(Vec<Kind>);
+
+impl Kinds {
+    /// How many lights there are.
+    fn count(&self) -> u32 {
+        self.0.iter().map(|k| k.lights.len() as u32).sum()
+    }
+
+    fn sampled(&self) -> impl Iterator<Item = (&Kind, &Sampled)> {
+        let all = self
+            .0
+            .iter()
+            .flat_map(|k| k.lights.iter().map(move |l| (k, l)));
+        all.filter(|(_, light)| !light.by_chance)
+    }
+
+    fn is_any_sampled(&self) -> bool {
+        self.sampled().next().is_some()
+    }
+
+    /// What the table of needs has to know.
+    pub(crate) fn facts(&self) -> SceneFacts {
+        let chooses = self.sampled().any(|(kind, _)| kind.chooses);
+        SceneFacts {
+            lights: self.0.iter().flat_map(|k| k.rows.clone()).collect(),
+            weighted: self.sampled().any(|(_, light)| !light.is_discrete),
+            far: self.sampled().any(|(kind, _)| kind.hit.is_none()),
+            choice: self.count() > 1 || chooses,
+            hit: self.0.iter().any(|k| k.hit.is_some()),
+            escape: self.0.iter().any(|k| k.escape.is_some()),
+            ..SceneFacts::default()
+        }
+    }
+
+    /// The rows that these lights may need, whatever the materials.
+    fn possible_needs(&self) -> Needs {
+        let rows = self.0.iter().flat_map(|k| &k.rows);
+        let of_kinds = rows.fold(Needs::default(), |needs, (row, _)| needs.with(*row));
+        of_kinds.or(Needs::of_rows(&[
+            Need::Mis,
+            Need::LightChoice,
+            Need::HitLights,
+            Need::EscapeLights,
+        ]))
+    }
+
+    /// The part with the functions that `needs` asks for. Kinds that it asks for in vain have their code and
+    /// no light.
+    pub(crate) fn part(&self, needs: Needs) -> ShaderPart {
+        let has = |kind: &Kind| self.0.iter().any(|k| k.sample == kind.sample);
+        let idle = empty_kinds(needs).into_iter();
+        let idle = idle.filter(|k| needs.any(k.serves) && !has(k));
+        let idle = idle.map(|kind| Kind { idle: true, ..kind });
+        let kinds: Vec<Kind> = self.0.iter().cloned().chain(idle).collect();
+        part(&kinds, self.count(), needs)
+    }
+
+    /// The same without the contents of buffers.
+    pub(crate) fn text(&self) -> Self {
+        let text = |kind: &Kind| Kind {
+            buffers: kind.buffers.iter().map(BufferData::text).collect(),
+            ..kind.clone()
+        };
+        Self(self.0.iter().map(text).collect())
+    }
+}
+
+/// Every kind without a light, as `needs` asks for it.
+fn empty_kinds(needs: Needs) -> [Kind; 5] {
+    [
+        mesh::empty(),
+        quad::empty(),
+        distant::empty(needs.has(Need::DiscLights)),
+        environment::empty_map(),
+        environment::empty_uniform(),
+    ]
+}
+
+/// The part of some kinds, which have `count` lights.
+fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
+    let flags: Vec<Flag> = needs.flags().collect();
+    let text = |text: &str| preprocess(text, &flags);
     let mut part = ShaderPart {
-        wgsl: include_str!("../kernels/lights/common.wgsl").to_owned(),
+        wgsl: text(include_str!("../kernels/lights/common.wgsl")),
         buffers: Vec::new(),
     };
-    let sampled = is_any_sampled(kinds);
+    let sampled = kinds.iter().flat_map(|k| &k.lights).any(|l| !l.by_chance);
     part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {sampled};\n");
-    if count > 0 {
-        part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count);
-        part.wgsl += include_str!("../kernels/lights/select.wgsl");
+    if count > 0 || kinds.iter().any(|k| k.idle) {
+        part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count.max(1));
+        part.wgsl += &text(include_str!("../kernels/lights/select.wgsl"));
         part.buffers.push(light_table(kinds));
     }
     if kinds.iter().any(|k| k.hit.is_some()) {
-        part.wgsl += include_str!("../kernels/lights/area.wgsl");
+        part.wgsl += &text(include_str!("../kernels/lights/area.wgsl"));
     }
     for kind in kinds {
-        part.wgsl += &kind.wgsl;
+        part.wgsl += &text(&kind.wgsl);
         part.buffers.extend(kind.buffers.iter().cloned());
     }
     part.wgsl += &sample_function(kinds);
@@ -191,14 +289,11 @@ fn part(kinds: &[Kind], count: u32) -> ShaderPart {
     part
 }
 
-/// Bytes of a light in the table.
-pub(crate) const LIGHT_ROW_BYTES: usize = 32;
-
 /// Two rows of words a light; see `kernels/lights/select.wgsl`.
 fn light_table(kinds: &[Kind]) -> BufferData {
     let weights = selection_weights(kinds);
     let alias = WordAlias::new(&weights);
-    let rows: Vec<[[u32; 4]; 2]> = kinds
+    let mut rows: Vec<[[u32; 4]; 2]> = kinds
         .iter()
         .flat_map(|k| &k.lights)
         .enumerate()
@@ -212,12 +307,10 @@ fn light_table(kinds: &[Kind]) -> BufferData {
             ]
         })
         .collect();
+    if rows.is_empty() {
+        rows.push([[0; 4]; 2]);
+    }
     BufferData::new("light_table", "array<vec4<u32>>", &rows)
-}
-
-fn is_any_sampled(kinds: &[Kind]) -> bool {
-    let mut lights = kinds.iter().flat_map(|k| &k.lights);
-    lights.any(|light| !light.by_chance)
 }
 
 /// Half of the choice goes by power over all lights. The other half goes in equal parts to the
@@ -242,10 +335,16 @@ fn sample_function(kinds: &[Kind]) -> String {
     let mut text =
         String::from("fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {\n");
     let sampled: Vec<&Kind> = kinds.iter().filter(|k| !k.lights.is_empty()).collect();
+    let idle: Vec<&Kind> = kinds.iter().filter(|k| k.idle).collect();
+    if !(sampled.is_empty() && idle.is_empty()) {
+        text += "    let pick = pick_light(bits);\n";
+    }
+    for name in idle.iter().map(|k| k.sample) {
+        text += &format!("    if pick.light < {NONE} {{ return {name}(pick, position); }}\n");
+    }
     let Some((last, others)) = sampled.split_last() else {
         return text + "    return no_light_sample();\n}\n";
     };
-    text += "    let pick = pick_light(bits);\n";
     let mut end = 0;
     for kind in others {
         end += kind.lights.len();
@@ -254,6 +353,9 @@ fn sample_function(kinds: &[Kind]) -> String {
     }
     text + &format!("    return {}(pick, position);\n}}\n", last.sample)
 }
+
+/// A number of lights that is zero, and that compilers do not know to be.
+const NONE: &str = "run.none";
 
 fn hit_function(kinds: &[Kind]) -> String {
     let mut text = String::from(
@@ -267,7 +369,11 @@ fn hit_function(kinds: &[Kind]) -> String {
         end += kind.lights.len();
         if let Some(name) = kind.hit {
             let call = format!("{name}(light, primitive, t, direction, bsdf_pdf)");
-            text += &format!("    if light < {end}u {{ return {call}; }}\n");
+            let bound = match kind.idle {
+                true => NONE.to_owned(),
+                false => format!("{end}u"),
+            };
+            text += &format!("    if light < {bound} {{ return {call}; }}\n");
         }
     }
     text + "    return vec3<f32>(0.0);\n}\n"

@@ -1,6 +1,7 @@
 //! Parallelograms that emit and reflect nothing.
 
 use super::{Context, Kind, Sampled, luminance};
+use crate::needs::Need;
 use crate::scene::{Light, QuadLight};
 
 pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
@@ -11,14 +12,36 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
             _ => None,
         })
         .collect();
+    let count = lights.len();
+    let mut rows = vec![(
+        Need::QuadLights,
+        format!("`[[lights]]` has {count} of them"),
+    )];
+    if lights.iter().any(|light| light.flag != 0) {
+        let what = "`two_sided` is set for a quad of `[[lights]]`".to_owned();
+        rows.push((Need::TwoSidedLights, what));
+    }
     (!lights.is_empty()).then(|| Kind {
+        rows,
         lights,
+        ..empty()
+    })
+}
+
+/// The kind without a light.
+pub(super) fn empty() -> Kind {
+    Kind {
+        serves: &[Need::QuadLights, Need::TwoSidedLights],
+        idle: false,
+        rows: Vec::new(),
+        lights: Vec::new(),
         wgsl: include_str!("../kernels/lights/quad.wgsl").to_owned(),
         buffers: Vec::new(),
         sample: "sample_quad_light",
         hit: Some("quad_light_hit"),
         escape: None,
-    })
+        chooses: false,
+    }
 }
 
 fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
@@ -34,6 +57,7 @@ fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
         radiance: quad.radiance,
         primitive: context.primitives[first],
         flag: u32::from(quad.two_sided),
+        is_discrete: false,
         triangles: vec![first as u32, first as u32 + 1],
     })
 }

@@ -4,9 +4,7 @@
 //! A draw gives four words at once, as a function of (pixel, sample, draw, seed); the functions
 //! are `kernels/random.wgsl` and a file a sampler beside it.
 
-use impasto_compiler::abi::MaterialInfo;
-
-use crate::lights::LIGHT_ROW_BYTES;
+use crate::needs::{Need, Needs};
 use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Sampler;
 use crate::wgsl;
@@ -50,18 +48,14 @@ pub struct Demand {
 }
 
 impl Demand {
-    /// What a world asks of random numbers, if `lights` are sampled. One light leaves nothing to
-    /// choose, but an environment map chooses a row by what is left of the choice.
-    pub(crate) fn of(world: &World, materials: &[MaterialInfo], lights: bool) -> Self {
-        let buffers = &world.parts.lights.buffers;
-        let one_light =
-            |b: &BufferData| b.name == "light_table" && b.bytes.len() <= LIGHT_ROW_BYTES;
-        let has_map = buffers.iter().any(|b| b.name == "environment_alias");
+    /// What a world that needs `natural` by itself asks of random numbers: what is forced gets no
+    /// dimension, which would change the others'.
+    pub(crate) fn of(world: &World, natural: Needs) -> Self {
         Self {
-            lens: world.camera.lens_radius > 0.0,
-            lobes: materials.iter().any(|m| m.lobes > 1),
-            lights,
-            light_choice: has_map || !buffers.iter().any(one_light),
+            lens: natural.has(Need::Lens),
+            lobes: natural.has(Need::LobeChoice),
+            lights: natural.has(Need::ShadowRays),
+            light_choice: natural.has(Need::LightChoice),
             roulette_start: world.roulette_start,
             max_depth: world.max_depth,
         }

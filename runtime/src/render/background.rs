@@ -13,6 +13,7 @@ use super::build::{Makings, Ready, build_all, build_step};
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::modules::Kernel;
+use crate::needs::Need;
 use crate::schedule::{Schedule, Step};
 use crate::technique::Technique;
 use crate::world::{MaterialSource, World};
@@ -81,8 +82,13 @@ impl Job {
                 reason: "a megakernel cannot go on with paths that are under way".into(),
             });
         }
-        let mut makings = Makings::new(gpu, &self.world, &*self.source, self.technique);
-        makings.some_pixels = present.layout.needs.some_pixels;
+        let mut makings = Makings::new(
+            gpu.subgroup_size(),
+            &self.world,
+            &*self.source,
+            self.technique,
+        );
+        makings.some_pixels = present.layout.needs.has(Need::SomePixels);
         let layout = makings.layout(plan)?;
         let queues = 4 * u64::from(sizes.pool) * layout.queue_words();
         gpu.check_binding_size("the queues of the new plan", queues)?;

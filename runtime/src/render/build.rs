@@ -13,7 +13,7 @@ use crate::film_file::Identity;
 use crate::gpu::Gpu;
 use crate::layout::Layout;
 use crate::modules::{Composer, Feed, Kernel, Sizes};
-use crate::needs::Needs;
+use crate::needs::{Facts as NeedFacts, Need, Needs};
 use crate::pool;
 use crate::random::{self, Demand};
 use crate::report::MaterialReport;
@@ -76,7 +76,7 @@ impl<'g> Renderer<'g> {
         let mut options = options.clone();
         options.technique = options.technique.within(gpu);
         settings::check(world, &options)?;
-        let mut makings = Makings::new(gpu, world, source, options.technique);
+        let mut makings = Makings::new(gpu.subgroup_size(), world, source, options.technique);
         makings.some_pixels = options.pixels.is_some();
         let layout = makings.layout(plan)?;
         options.technique = layout.technique(options.technique);
@@ -131,7 +131,12 @@ pub fn identity(
     options: &RenderOptions,
 ) -> Result<Identity, RuntimeError> {
     settings::check(world, options)?;
-    let makings = Makings::new(gpu, world, source, options.technique.within(gpu));
+    let makings = Makings::new(
+        gpu.subgroup_size(),
+        world,
+        source,
+        options.technique.within(gpu),
+    );
     let plan = world.own_plan(&makings.materials);
     let layout = makings.layout(&plan)?;
     let sizes = pool::sizes(gpu, world, &layout, options)?;
@@ -141,13 +146,19 @@ pub fn identity(
 
 impl<'a> Makings<'a> {
     pub(crate) fn new(
-        gpu: &Gpu,
+        subgroup_size: u32,
         world: &'a World,
         source: &'a dyn MaterialSource,
         technique: Technique,
     ) -> Self {
         let materials = source.infos();
-        let demand = Demand::of(world, &materials, Needs::of(world, &materials).shadow_rays);
+        let facts = NeedFacts {
+            world,
+            materials: &materials,
+            technique: &technique,
+            wavefront: true,
+        };
+        let demand = Demand::of(world, Needs::of(&facts, Needs::default()));
         Self {
             world,
             source,
@@ -157,13 +168,15 @@ impl<'a> Makings<'a> {
             tables: source.tables().iter().map(BufferData::from).collect(),
             technique,
             some_pixels: false,
-            subgroup_size: gpu.subgroup_size(),
+            subgroup_size,
         }
     }
 
     pub(crate) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
         let mut layout = Layout::new(self.world, &self.materials, plan, &self.technique)?;
-        layout.needs.some_pixels = self.some_pixels;
+        if self.some_pixels {
+            layout.needs = layout.needs.with(Need::SomePixels);
+        }
         Ok(layout)
     }
 

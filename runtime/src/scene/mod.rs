@@ -29,7 +29,7 @@ mod transform;
 pub use error::SceneError;
 pub use load::load;
 pub use mesh::{Mesh, NO_MATERIAL};
-pub use parts::SceneParts;
+pub use parts::{SceneParts, Sources};
 pub use placed::Placed;
 pub use split::{GeometryCounts, Split};
 pub use transform::Transform;

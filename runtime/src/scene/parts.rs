@@ -12,13 +12,16 @@
 use glam::{DVec3, Vec3};
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 
-use super::surface::{geometry_part, surface_part};
+use super::surface::{geometry_part, offset_constants, surface_part};
 use super::{GeometryCounts, Placed, Scene, SceneError, Split};
 use crate::bvh::Bvh;
-use crate::lights::Lights;
-use crate::media::Media;
-use crate::shader_part::ShaderPart;
+use crate::lights::{Kinds, Lights};
+use crate::media::{self, Media};
+use crate::needs::facts::SceneFacts;
+use crate::needs::{Need, Needs};
+use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::{Stack, Technique};
+use crate::text::{Flag, preprocess};
 use crate::texture;
 use crate::wgsl;
 
@@ -51,6 +54,20 @@ pub struct SceneParts {
     pub counts: GeometryCounts,
     /// Indices of the materials that no triangle binds, ascending.
     pub unbound: Vec<usize>,
+    /// What the table of needs judges by.
+    pub facts: SceneFacts,
+    /// What the parts are made of that depend on needs; absent if they were written by hand.
+    pub sources: Option<Sources>,
+}
+
+/// What the texts are made of that depend on needs.
+#[derive(Clone, Debug)]
+pub struct Sources {
+    lights: Kinds,
+    /// The constants of `offset_origin`.
+    offsets: String,
+    /// `in_world`, of a scene that counts coordinates from elsewhere.
+    in_world: String,
 }
 
 impl SceneParts {
@@ -94,10 +111,22 @@ impl SceneParts {
                 lights,
             )
         };
-        if moved {
-            surface.wgsl += &in_world(scene.origin);
-        }
+        let in_world = match scene.origin == DVec3::ZERO {
+            true => String::new(),
+            false => in_world(scene.origin),
+        };
+        surface.wgsl += &in_world;
+        let mut facts = lights.kinds.facts();
+        facts.normals = has(&surface, NORMALS.0);
+        facts.uvs = has(&surface, UVS.0);
+        facts.placed = !split.placements.is_empty();
         Ok(SceneParts {
+            facts,
+            sources: Some(Sources {
+                lights: lights.kinds,
+                offsets: offset_constants(split.bounds),
+                in_world,
+            }),
             geometry,
             bvh,
             surface,
@@ -117,6 +146,82 @@ impl SceneParts {
 fn in_world(origin: DVec3) -> String {
     wgsl::constant_vec3("WORLD_ORIGIN", origin.as_vec3())
         + "\nfn in_world(position: vec3<f32>) -> vec3<f32> {\n    return position + WORLD_ORIGIN;\n}\n"
+}
+
+/// The buffers of what corners have: the name, its type, and bytes a triangle.
+const NORMALS: (&str, &str, usize) = ("vertex_normals", "array<vec4<u32>>", 16);
+const UVS: (&str, &str, usize) = ("vertex_uvs", "array<vec2<f32>>", 24);
+
+fn has(part: &ShaderPart, buffer: &str) -> bool {
+    part.buffers.iter().any(|b| b.name == buffer)
+}
+
+impl SceneParts {
+    /// Makes the texts anew for what is needed: what is not needed goes, and what is needed without being
+    /// there comes with black lights, corners without normals, empty space.
+    pub(crate) fn specialise(&mut self, needs: Needs) {
+        let Some(sources) = &self.sources else {
+            return;
+        };
+        self.lights = sources.lights.part(needs);
+        let corners = self.geometry.buffers.iter().find(|b| b.name == "triangles");
+        let triangles = corners.map_or(0, |b| b.bytes.len() / CORNERS_BYTES);
+        let mut flags: Vec<Flag> = needs.flags().collect();
+        flags.push(("placed", self.facts.placed));
+        let mut wgsl = sources.offsets.clone() + include_str!("../kernels/surface.wgsl");
+        if needs.has(Need::Moved) {
+            wgsl += &sources.in_world;
+        }
+        let mut buffers = std::mem::take(&mut self.surface.buffers);
+        let wants = |need: bool, buffer: (&'static str, &'static str, usize), text: &str| match need
+        {
+            false => {
+                buffers.retain(|b| b.name != buffer.0);
+                String::new()
+            }
+            true => {
+                if buffers.iter().all(|b| b.name != buffer.0) {
+                    let zeros = vec![0u8; buffer.2 * triangles];
+                    buffers.push(BufferData::new(buffer.0, buffer.1, &zeros));
+                }
+                preprocess(text, &flags)
+            }
+        };
+        let mut wants = wants;
+        let of_corners = [
+            (
+                needs.has(Need::Normals),
+                NORMALS,
+                include_str!("../kernels/surface_smooth.wgsl"),
+            ),
+            (
+                needs.any(&[Need::Uvs, Need::Tangents]),
+                UVS,
+                include_str!("../kernels/surface_uv.wgsl"),
+            ),
+        ];
+        for (need, buffer, text) in of_corners {
+            wgsl += &wants(need, buffer, text);
+        }
+        self.surface = ShaderPart { wgsl, buffers };
+        if needs.has(Need::Media) && self.media.part.is_none() {
+            self.media.part = Some(media::of_empty_space());
+        }
+    }
+}
+
+/// Bytes of a triangle's corners.
+const CORNERS_BYTES: usize = 48;
+
+impl Sources {
+    /// The same without the contents of buffers.
+    pub(crate) fn text(&self) -> Self {
+        Self {
+            lights: self.lights.text(),
+            offsets: self.offsets.clone(),
+            in_world: self.in_world.clone(),
+        }
+    }
 }
 
 /// A trail says where a ray is in one tree, not in two.

@@ -92,7 +92,7 @@ impl<'s> Placed<'s> {
     /// table of each triangle of the world, `media` the word of each instance's medium, or
     /// nothing where paths follow none.
     pub fn geometry_part(&self, lights: &[u32], media: &[u32]) -> ShaderPart {
-        let flags = [("media", !media.is_empty()), ("placed", true)];
+        let flags = [("placed", true)];
         let text = include_str!("../kernels/geometry.wgsl");
         let placed = include_str!("../kernels/geometry_placed.wgsl");
         let table = MaterialTable::new(&self.placements);

@@ -33,10 +33,9 @@ pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) 
             })
         })
         .collect();
-    let flags = [("media", !media.is_empty())];
     let triangles = BufferData::new("triangles", "array<vec4<u32>>", &rows);
     ShaderPart {
-        wgsl: preprocess(include_str!("../kernels/geometry.wgsl"), &flags),
+        wgsl: preprocess(include_str!("../kernels/geometry.wgsl"), &[]),
         buffers: vec![triangles],
     }
 }

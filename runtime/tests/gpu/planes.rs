@@ -6,6 +6,7 @@ use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Medi
 use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::media::Media;
+use impasto_runtime::needs::facts::SceneFacts;
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{Camera, GeometryCounts, SceneParts};
 use impasto_runtime::shader_part::{BufferData, ShaderPart};
@@ -291,6 +292,8 @@ impl Planes {
                 media,
                 texture: None,
                 has_sampled_lights: self.light != Light::None,
+                facts: SceneFacts::by_hand(true),
+                sources: None,
                 counts: GeometryCounts::default(),
                 unbound: Vec::new(),
             },
@@ -345,13 +348,15 @@ fn offset_origin(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> { return p
 const LIGHTS: &str = "
 const SKY_PDF: f32 = 0.07957747;
 
+fn balance_of_squares(a: f32, b: f32) -> f32 { let r = b / a; return 1.0 / (1.0 + r * r); }
+
 fn light_hit(primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> { return vec3<f32>(0.0); }
 
 fn sky(direction: vec3<f32>) -> vec3<f32> { return vec3<f32>(select(SKY_BACK, SKY_FRONT, direction.z > 0.0)); }
 
 fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
     var weight = 1.0;
-    if bsdf_pdf > 0.0 && LIGHT == 2u { weight = power_heuristic(bsdf_pdf, SKY_PDF); }
+    if bsdf_pdf > 0.0 && LIGHT == 2u { weight = balance_of_squares(bsdf_pdf, SKY_PDF); }
     return weight * sky(direction);
 }
 

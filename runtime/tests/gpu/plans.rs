@@ -519,7 +519,9 @@ fn settings_that_cannot_be_rendered_are_named() {
 #[test]
 fn invalid_material_code_is_an_error_with_its_place() {
     let mut world = room().world();
-    world.parts.surface.wgsl += "fn broken() -> u32 { return 1.5; }\n";
+    let begin = "fn hit_position(primitive: u32, uv: vec2<f32>) -> vec3<f32> {";
+    let broken = format!("{begin} let broken: u32 = 1.5;");
+    world.parts.surface.wgsl = world.parts.surface.wgsl.replace(begin, &broken);
     let surfaces = surfaces();
     let plan = plan(Strategy::Own, &surfaces);
     match Renderer::from_world(gpu(), &world, &surfaces, &plan, &samples(1)) {

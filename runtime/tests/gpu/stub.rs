@@ -10,6 +10,7 @@ use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::media::Media;
+use impasto_runtime::needs::facts::SceneFacts;
 use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
 use impasto_runtime::scene::{Camera, GeometryCounts, SceneParts};
 use impasto_runtime::shader_part::{BufferData, ShaderPart};
@@ -301,6 +302,8 @@ fn offset_origin(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> { return p
 ";
 
 const LIGHTS: &str = "
+fn balance_of_squares(a: f32, b: f32) -> f32 { let r = b / a; return 1.0 / (1.0 + r * r); }
+
 fn emits(primitive: u32) -> bool { return ((EMITTERS >> primitive) & 1u) == 1u; }
 
 // Density by solid angle of a point on an emitting wall, seen from a distance under a cosine.
@@ -313,14 +316,14 @@ fn light_hit(primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec
     if !emits(primitive) || cosine <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
     if bsdf_pdf > 0.0 && STRATEGIES == 1u { weight = 0.0; }
-    if bsdf_pdf > 0.0 && STRATEGIES == 2u { weight = power_heuristic(bsdf_pdf, wall_pdf(t, cosine)); }
+    if bsdf_pdf > 0.0 && STRATEGIES == 2u { weight = balance_of_squares(bsdf_pdf, wall_pdf(t, cosine)); }
     return vec3<f32>(weight * RADIANCE);
 }
 
 fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
     var weight = 1.0;
     if bsdf_pdf > 0.0 && STRATEGIES == 1u { weight = 0.0; }
-    if bsdf_pdf > 0.0 && STRATEGIES == 2u { weight = power_heuristic(bsdf_pdf, 1.0 / 12.566371); }
+    if bsdf_pdf > 0.0 && STRATEGIES == 2u { weight = balance_of_squares(bsdf_pdf, 1.0 / 12.566371); }
     return vec3<f32>(weight * SKY);
 }
 
@@ -412,6 +415,8 @@ impl Room {
                 media: Media::default(),
                 texture: None,
                 has_sampled_lights: self.strategies != Strategies::Scattering,
+                facts: SceneFacts::by_hand(self.strategies == Strategies::Both),
+                sources: None,
                 counts: GeometryCounts::default(),
                 unbound: self.unbound.clone(),
             },

@@ -29,8 +29,12 @@ fn area_hit(light: u32, t: f32, cosine: f32, area: f32, bsdf_pdf: f32) -> vec3<f
     if !(cosine > 0.0) {
         return vec3<f32>(0.0);
     }
+#if mis
     let pdf = light_probability(light) * area_density(t, cosine, area);
     return scattering_weight(bsdf_pdf, pdf) * light_radiance(light);
+#else
+    return light_radiance(light);
+#endif
 }
 
 // Density by solid angle; 0 behind the surface and where it would not be finite.

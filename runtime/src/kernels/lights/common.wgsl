@@ -14,9 +14,11 @@ fn no_light_sample() -> LightSample {
 
 // Distance to lights at infinity.
 const FAR_AWAY: f32 = 3e38;
+#if mis
 
 // The weight of a direction that scattering chose with density `bsdf_pdf` (0: a camera ray or a
 // discrete lobe, which light samples cannot replace) and that light samples have density `light_pdf` of.
 fn scattering_weight(bsdf_pdf: f32, light_pdf: f32) -> f32 {
     return select(1.0, power_heuristic(bsdf_pdf, light_pdf), bsdf_pdf > 0.0);
 }
+#endif

@@ -9,9 +9,12 @@ struct DistantLight {
 
 fn sample_distant_light(pick: LightPick, position: vec3<f32>) -> LightSample {
     let light = distant_light(pick.light - FIRST_DISTANT_LIGHT);
+#if disc_lights
+#if directional_lights
     if !(light.sine2 > 0.0) {
         return LightSample(light.axis, FAR_AWAY, light.value / pick.probability, 0.0);
     }
+#endif
     // h = (1 - cos theta) / 2 is uniform, and exact where the cosine is all but 1.
     let h = light.sine2 * pick.u.x;
     let sine = 2.0 * sqrt(h * (1.0 - h));
@@ -20,7 +23,11 @@ fn sample_distant_light(pick: LightPick, position: vec3<f32>) -> LightSample {
     let wi = (1.0 - 2.0 * h) * light.axis + sine * (cos(phi) * frame.x + sin(phi) * frame.y);
     let pdf = pick.probability * light.pdf;
     return LightSample(normalize(wi), FAR_AWAY, light.value / pdf, pdf);
+#else
+    return LightSample(light.axis, FAR_AWAY, light.value / pick.probability, 0.0);
+#endif
 }
+#if disc_lights
 
 fn distant_light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
@@ -29,9 +36,14 @@ fn distant_light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
         // The chord is 2 sin(theta / 2): no cosine that rounds to 1.
         let chord = direction - light.axis;
         if dot(chord, chord) < 4.0 * light.sine2 {
+#if mis
             let pdf = light_probability(FIRST_DISTANT_LIGHT + i) * light.pdf;
             sum += scattering_weight(bsdf_pdf, pdf) * light.value;
+#else
+            sum += light.value;
+#endif
         }
     }
     return sum;
 }
+#endif

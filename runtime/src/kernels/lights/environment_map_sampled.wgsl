@@ -56,8 +56,12 @@ fn renew(u: f32, threshold: f32) -> f32 {
 
 fn environment_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
     let uv = environment_uv(direction);
+#if mis
     let column = min(u32(uv.x * f32(ENVIRONMENT_WIDTH)), ENVIRONMENT_WIDTH - 1u);
     let row = min(u32(uv.y * f32(ENVIRONMENT_HEIGHT)), ENVIRONMENT_HEIGHT - 1u);
     let pdf = light_probability(ENVIRONMENT_LIGHT) * environment_texels[row * ENVIRONMENT_WIDTH + column].w;
     return scattering_weight(bsdf_pdf, pdf) * environment_radiance(uv);
+#else
+    return environment_radiance(uv);
+#endif
 }

@@ -12,6 +12,10 @@ fn sample_environment(pick: LightPick, position: vec3<f32>) -> LightSample {
 }
 
 fn environment_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {
+#if mis
     let pdf = light_probability(ENVIRONMENT_LIGHT) * ENVIRONMENT_PDF;
     return scattering_weight(bsdf_pdf, pdf) * ENVIRONMENT_RADIANCE;
+#else
+    return ENVIRONMENT_RADIANCE;
+#endif
 }

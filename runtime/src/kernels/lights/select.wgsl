@@ -12,12 +12,16 @@ struct LightPick {
 }
 
 fn pick_light(bits: vec4<u32>) -> LightPick {
+    let point = vec2<f32>(bits.yz >> vec2<u32>(8u)) * 0x1p-24;
+#if light_choice
     let place = light_place(bits);
     let choice = light_table[2u * place.x];
     let stays = place.y < choice.x;
     let light = select(choice.y, place.x, stays);
-    let point = vec2<f32>(bits.yz >> vec2<u32>(8u)) * 0x1p-24;
     return LightPick(light, light_probability(light), vec3<f32>(point, renew_word(place.y, choice.x)));
+#else
+    return LightPick(0u, light_probability(0u), vec3<f32>(point, 0.0));
+#endif
 }
 
 // A slot of the table, and a number in it as a fraction of 2^32. The number that decides has 56

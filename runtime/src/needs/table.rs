@@ -1,0 +1,277 @@
+//! The table of needs: a row for everything that a scene may do without.
+
+use super::{Facts, Needs};
+use crate::technique::{RayData, RayOrder};
+
+/// One row.
+#[derive(Debug)]
+pub(crate) struct Row {
+    /// Which.
+    pub need: Need,
+    /// What it is called.
+    pub name: &'static str,
+    /// The flag of `#if` lines in WGSL.
+    pub flag: &'static str,
+    /// When a scene has it, in words.
+    pub when: &'static str,
+    /// Why this scene has it; `None` if it has not. Rows before it are decided.
+    pub reason: fn(&Facts<'_>, Needs) -> Option<String>,
+    /// The rows that it cannot be without.
+    pub foundations: &'static [Need],
+    /// The random numbers that it draws.
+    pub draws: &'static str,
+    /// Whether it can be on without need.
+    pub forcing: Forcing,
+}
+
+/// Whether a row can be on in a scene that does not need it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Forcing {
+    /// Yes, and it is if everything is.
+    Whole,
+    /// Yes, where another row is off; only to measure it.
+    Unless(Need),
+    /// The same, and it is on if everything is.
+    WholeUnless(Need),
+    /// No, and why.
+    Never(&'static str),
+}
+
+impl Row {
+    /// Whether it is on if everything is.
+    pub(crate) fn is_in_everything(&self) -> bool {
+        matches!(self.forcing, Forcing::Whole | Forcing::WholeUnless(_))
+    }
+
+    /// Whether it can be forced beside what a scene needs by itself.
+    pub(crate) fn is_forceable_with(&self, natural: Needs) -> bool {
+        match self.forcing {
+            Forcing::Whole => true,
+            Forcing::Unless(other) | Forcing::WholeUnless(other) => !natural.has(other),
+            Forcing::Never(_) => false,
+        }
+    }
+}
+
+/// Declares the rows in their order, and the names that other tables have for them.
+macro_rules! rows {
+    ($($need:ident, $name:literal, $flag:literal, $when:literal,
+       on $foundations:expr, draws $draws:literal, $forcing:expr, $reason:expr;)+) => {
+        /// The rows.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[repr(u8)]
+        pub(crate) enum Need {
+            $(#[doc = $when] $need,)+
+        }
+
+        /// Every row, in the order in which they are decided.
+        pub(crate) const ROWS: [Row; [$(Need::$need),+].len()] = [$(Row {
+            need: Need::$need,
+            name: $name,
+            flag: $flag,
+            when: $when,
+            reason: $reason,
+            foundations: $foundations,
+            draws: $draws,
+            forcing: $forcing,
+        }),+];
+    };
+}
+
+use Forcing::{Never, Unless, Whole, WholeUnless};
+use Need::*;
+
+const ASKED: Forcing = Never("it is a technique that is asked for");
+
+rows! {
+    // ---- Lights ----
+    MeshLights, "mesh lights", "mesh_lights",
+        "a material on a surface emits the same light everywhere on its front",
+        on &[HitLights], draws "", Whole, |f, _| f.light(MeshLights);
+    QuadLights, "quad lights", "quad_lights",
+        "`[[lights]]` has a quad that shines",
+        on &[HitLights], draws "", Whole, |f, _| f.light(QuadLights);
+    TwoSidedLights, "two-sided quads", "two_sided_lights",
+        "a quad shines on both sides",
+        on &[QuadLights], draws "", Whole, |f, _| f.light(TwoSidedLights);
+    DirectionalLights, "distant lights in one direction", "directional_lights",
+        "a distant light has no angle",
+        on &[], draws "", Whole, |f, _| f.light(DirectionalLights);
+    DiscLights, "distant lights with an angle", "disc_lights",
+        "a distant light is a disc in the sky",
+        on &[EscapeLights], draws "", Whole, |f, _| f.light(DiscLights);
+    UniformEnvironment, "uniform environment", "uniform_environment",
+        "the environment is of one color",
+        on &[EscapeLights], draws "", Unless(EnvironmentMap), |f, _| f.light(UniformEnvironment);
+    EnvironmentMap, "environment map", "environment_map",
+        "the environment is a picture",
+        on &[EscapeLights], draws "", WholeUnless(UniformEnvironment), |f, _| f.light(EnvironmentMap);
+    HitLights, "lights that paths run into", "hit_lights",
+        "a light has a surface",
+        on &[], draws "", Whole, |f, _| {
+            f.world.parts.facts.hit.then(|| "a light has a surface".into())
+        };
+    EscapeLights, "light from infinity", "escape_lights",
+        "the environment or a disc in the sky is seen by paths that leave the scene",
+        on &[], draws "", Whole, |f, _| {
+            f.world.parts.facts.escape.then(|| "there is light beyond the scene".into())
+        };
+    // ---- Sampling lights ----
+    ShadowRays, "shadow rays", "shadow_rays",
+        "a light can be sampled, and paths scatter it by a material that is not discrete only",
+        on &[], draws "the point on a light", Whole, |f, _| {
+            let sampled = f.world.parts.has_sampled_lights && f.world.max_depth > 1;
+            sampled.then(|| f.material("scatters light that is sampled", |m| !m.delta_only))?
+        };
+    LightChoice, "choice of a light", "light_choice",
+        "lights are sampled, and there is more than one to choose from or a map to choose in",
+        on &[ShadowRays], draws "the choice of a light", Whole, |f, n| {
+            let choice = n.has(ShadowRays) && f.world.parts.facts.choice;
+            choice.then(|| "there is more than one light to choose from, or a map".into())
+        };
+    Mis, "multiple importance sampling", "mis",
+        "light that is sampled can be found by scattered rays as well",
+        on &[ShadowRays], draws "", Whole, |f, n| {
+            let weighted = n.has(ShadowRays) && f.world.parts.facts.weighted;
+            weighted.then(|| "scattered rays may hit a light that is sampled".into())
+        };
+    FarLights, "sampled light from infinity", "far_lights",
+        "a light at infinity is sampled",
+        on &[ShadowRays], draws "", Whole, |f, n| {
+            let far = n.has(ShadowRays) && f.world.parts.facts.far;
+            far.then(|| "a light at infinity is sampled".into())
+        };
+    UnlitMaterials, "hits without a light sample", "unlit_materials",
+        "lights are sampled, and some material scatters into discrete directions only",
+        on &[ShadowRays], draws "", Whole, |f, n| match n.has(ShadowRays) {
+            true => f.material("scatters into discrete directions only", |m| m.delta_only),
+            false => None,
+        };
+    CrossingShadows, "shadow origins", "crossing_shadows",
+        "lights are sampled at a surface that light can cross",
+        on &[ShadowRays], draws "", Whole, |f, n| match n.has(ShadowRays) {
+            true => f.material("lets light cross", |m| m.crosses && !m.delta_only),
+            false => None,
+        };
+    // ---- Media ----
+    Media, "media", "media",
+        "some result depends on the medium that a path is in",
+        on &[], draws "", Whole, |f, _| {
+            f.world.parts.media.part.is_some().then(|| "some result depends on what fills an object".into())
+        };
+    Absorption, "absorption", "absorption",
+        "a medium absorbs light",
+        on &[Media], draws "", Whole, |f, _| {
+            f.world.parts.media.absorb.then(|| "a medium absorbs light".into())
+        };
+    Overlap, "overlapping media", "overlap",
+        "media differ in priority",
+        on &[Media], draws "", Whole, |f, _| {
+            f.world.parts.media.overlap.then(|| "media differ in priority".into())
+        };
+    MediumChanges, "paths that change their medium", "changes_medium",
+        "paths follow media, and a material with an interior lets them cross",
+        on &[Media], draws "", Whole, |f, n| match n.has(Media) {
+            true => f.material("is crossed into its interior", |m| m.transmissive),
+            false => None,
+        };
+    ExteriorIor, "index outside of surfaces", "exterior_ior",
+        "paths follow media, and a material reads `exterior_ior`",
+        on &[Media], draws "", Whole, |f, n| match n.has(Media) {
+            true => f.reads("`exterior_ior`", |i| i.exterior_ior),
+            false => None,
+        };
+    // ---- Materials ----
+    VaryingEmission, "emission that varies", "varying_emission",
+        "a material's emission depends on the point or direction",
+        on &[], draws "", Whole, |f, _| {
+            f.material("emits what varies", |m| m.varying_emission)
+        };
+    Position, "positions", "reads_position",
+        "a material reads `position`",
+        on &[], draws "", Whole, |f, _| f.reads("`position`", |i| i.position);
+    Moved, "an origin of the scene's own", "moved",
+        "coordinates are counted from nearby, and a material reads `position`",
+        on &[Position], draws "", Never("the scene lies where it lies"), |f, n| {
+            let moved = f.world.parts.moved && n.has(Position);
+            moved.then(|| "coordinates are counted from nearby".into())
+        };
+    Normals, "vertex normals", "normals",
+        "corners have normals, and a material reads `normal`",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.world.parts.facts.normals;
+            any.then(|| f.reads("`normal`, and corners have some", |i| i.normal))?
+        };
+    Uvs, "texture coordinates", "uvs",
+        "corners have texture coordinates, and a material reads `uv`",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.world.parts.facts.uvs;
+            any.then(|| f.reads("`uv`, and corners have some", |i| i.uv))?
+        };
+    Tangents, "tangents", "tangents",
+        "corners have texture coordinates, and a material reads `tangent`",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.world.parts.facts.uvs;
+            any.then(|| f.reads("`tangent`, and corners have coordinates", |i| i.tangent))?
+        };
+    Textures, "textures", "textures",
+        "a material reads a texture",
+        on &[], draws "", Never("only the code of a material could read one"), |f, _| {
+            f.material("reads a texture", |m| !m.textures.is_empty())
+        };
+    LobeChoice, "choice of a lobe", "lobe_choice",
+        "a material has several lobes",
+        on &[], draws "the choice of a lobe", Never("the code of materials has it or not"), |f, _| {
+            f.material("has several lobes", |m| m.lobes > 1)
+        };
+    // ---- Paths ----
+    Roulette, "Russian roulette", "roulette",
+        "paths are long enough to be ended at random",
+        on &[], draws "whether a path goes on", Whole, |f, n| {
+            let last = f.world.max_depth + u32::from(n.has(VaryingEmission));
+            let start = f.world.roulette_start;
+            (start < last).then(|| format!("paths may end from segment {start} on"))
+        };
+    Lens, "lens", "lens",
+        "the camera has an aperture",
+        on &[], draws "the point on the lens", Whole, |f, _| {
+            (f.world.camera.lens_radius > 0.0).then(|| "the camera has an aperture".into())
+        };
+    Placements, "placed objects", "placements",
+        "objects are repeated often enough to be stored once",
+        on &[], draws "", Never("the scene's objects are repeated or not"), |f, _| {
+            f.world.parts.facts.placed.then(|| "objects are placed more than once".into())
+        };
+    // ---- Techniques ----
+    SomePixels, "some pixels only", "some_pixels",
+        "only some pixels are asked for",
+        on &[], draws "", Never("it is asked for by what looks at a part of the picture"), |_, _| None;
+    Order, "rays in an order of their own", "order",
+        "`--ray-order` asks for it",
+        on &[], draws "", ASKED, |f, _| {
+            let asked = f.wavefront && f.technique.ray_order != RayOrder::Queue;
+            asked.then(|| "`--ray-order` asks for it".into())
+        };
+    // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
+    Requests, "rays in buffers of their own", "requests",
+        "`--ray-data requests` asks for it, and rays neither have an order nor cross hidden boundaries",
+        on &[], draws "", ASKED, |f, n| {
+            let asked = f.wavefront && f.technique.ray_data == RayData::Requests;
+            let possible = !n.any(&[Order, Overlap]);
+            (asked && possible).then(|| "`--ray-data requests` asks for it".into())
+        };
+}
+
+/// The rows of materials, that a kernel has only if one of its own materials does.
+pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
+    ShadowRays,
+    MediumChanges,
+    ExteriorIor,
+    VaryingEmission,
+    Position,
+    Normals,
+    Uvs,
+    Tangents,
+    Textures,
+    LobeChoice,
+]);

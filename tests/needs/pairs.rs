@@ -1,0 +1,185 @@
+//! The pairs: what a row brings, and two scenes of which one needs it.
+
+use super::scenes::{
+    Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY,
+    TWO_SIDED, Text,
+};
+use impasto::runtime::technique::{RayData, RayOrder, Technique};
+
+/// Two scenes that differ in a row.
+pub struct Pair {
+    /// The row's name.
+    pub row: &'static str,
+    /// Rows that it cannot be without, or that cannot be without it.
+    pub also: &'static [&'static str],
+    /// What the kernels have more, and less.
+    pub items: &'static str,
+    pub without: fn() -> Text,
+    pub with: fn() -> Text,
+}
+
+/// Rows without a pair here, and where they are tested.
+pub const HELD_ELSEWHERE: [(&str, &str); 2] = [
+    (
+        "an origin of the scene's own",
+        "runtime/tests/gpu/extremes: scenes that are moved",
+    ),
+    (
+        "some pixels only",
+        "runtime/tests/gpu/pixels.rs: it is no property of a scene",
+    ),
+];
+
+const SHADE: &str = "surface = diffuse(color(0.3));";
+const MIRROR: &str = "surface = specular(color(0.9));";
+const PANE: &str = "surface = smooth_dielectric(ior: 1.5);";
+
+fn lit(lights: &[&'static str]) -> Text {
+    Text {
+        lights: lights.to_vec(),
+        ..Text::default()
+    }
+}
+
+fn thing(thing: &'static str) -> Text {
+    Text {
+        thing: Some(thing),
+        ..Text::default()
+    }
+}
+
+fn beside(thing: &'static str, other: &'static str) -> Text {
+    Text {
+        thing: Some(thing),
+        other: Some(other),
+        ..Text::default()
+    }
+}
+
+fn under(environment: &'static str, text: Text) -> Text {
+    Text {
+        environment,
+        ..text
+    }
+}
+
+fn with_uvs(text: Text) -> Text {
+    Text {
+        corners: Corners::Uvs,
+        ..text
+    }
+}
+
+macro_rules! pairs {
+    ($($row:literal, also $also:expr, $items:literal, $without:expr => $with:expr;)+) => {
+        pub const PAIRS: [Pair; [$($row),+].len()] = [$(Pair {
+            row: $row,
+            also: $also,
+            items: $items,
+            without: || $without,
+            with: || $with,
+        }),+];
+    };
+}
+
+pairs! {
+    "mesh lights", also &[], "functions +mesh_light_hit +sample_mesh_light",
+        Text { thing: Some(SHADE), ..lit(&[QUAD, SECOND_QUAD]) }
+        => Text {
+            thing: Some("surface = diffuse(color(0.3)); emission = uniform(color(4.0));"),
+            ..lit(&[QUAD, SECOND_QUAD])
+        };
+    "quad lights", also &[], "functions +quad_light_hit +sample_quad_light",
+        Text { thing: Some("surface = diffuse(color(0.3)); emission = uniform(color(4.0));"), ..lit(&[]) }
+        => Text { thing: Some("surface = diffuse(color(0.3)); emission = uniform(color(4.0));"), ..lit(&[QUAD]) };
+    "two-sided quads", also &[], "functions +is_two_sided", lit(&[QUAD]) => lit(&[TWO_SIDED]);
+    "distant lights in one direction", also &["sampled light from infinity"], "functions +distant_light +sample_distant_light",
+        lit(&[QUAD, SECOND_QUAD]) => lit(&[QUAD, DIRECTION]);
+    "distant lights with an angle", also &[], "functions +distant_light +distant_light_escape +sample_distant_light",
+        under(SKY, lit(&[QUAD])) => under(SKY, lit(&[QUAD, DISC]));
+    "uniform environment", also &[], "functions +environment_escape +sample_environment", lit(&[QUAD, DISC]) => under(SKY, lit(&[QUAD, DISC]));
+    "environment map", also &[], "bindings +environment_alias +environment_texels; functions +environment_escape \
+         +environment_radiance +environment_uv +pick_slot +pole_height +renew \
+         +sample_environment +turn_about_y", lit(&[QUAD, DISC]) => under(MAP, lit(&[QUAD, DISC]));
+    "lights that paths run into", also &["quad lights"], "functions +area_density +area_hit +light_hit +light_radiance +no_light_sample \
+         +primitive_light +quad_light_hit +sample_area +sample_quad_light +triangle_area",
+        under(SKY, lit(&[DISC])) => under(SKY, lit(&[DISC, QUAD]));
+    "light from infinity", also &["distant lights with an angle"], "functions +distant_light_escape +light_escape",
+        lit(&[QUAD, DIRECTION]) => lit(&[QUAD, DIRECTION, DISC]);
+    "shadow rays", also &["multiple importance sampling"], "+16 bytes; kernels +shadow; functions +aim +area_density +keep_shadow \
+         +light_contribution +light_probability +light_share +load_carried +load_contribution \
+         +load_light +load_light_direction +load_shadow_direction +load_shadow_origin \
+         +no_light_sample +pick_light +power_heuristic +request_shadow +sample_area \
+         +sample_light +sample_quad_light +scattering_weight +shadow_request +store_carried \
+         +store_contribution +store_light +store_light_direction +store_shadow_direction \
+         +store_shadow_origin",
+        lit(&[QUAD_BY_CHANCE]) => lit(&[QUAD]);
+    "choice of a light", also &[], "functions +light_place +multiply_high +renew_word", lit(&[QUAD]) => lit(&[QUAD, SECOND_QUAD]);
+    "multiple importance sampling", also &[], "functions +light_share +power_heuristic +scattering_weight",
+        lit(&[QUAD_BY_CHANCE, DIRECTION]) => lit(&[QUAD, DIRECTION]);
+    "sampled light from infinity", also &[], "",
+        lit(&[QUAD, DISC_BY_CHANCE]) => lit(&[QUAD, DISC]);
+    "hits without a light sample", also &[], "functions +scatters_sampled_light", thing(SHADE) => thing(MIRROR);
+    "shadow origins", also &[], "+16 bytes", thing(SHADE) => thing("surface = translucent(color(0.3));");
+    "media", also &["absorption", "paths that change their medium"], "+16 bytes; bindings +medium_table; functions +active_medium +cross_boundary \
+         +load_media +media_beyond +primitive_medium +store_media +transmittance \
+         +without_medium",
+        thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5);")
+        => thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));");
+    "absorption", also &[], "functions +transmittance",
+        thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5);")
+        => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
+    "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary",
+        beside(
+            "surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, priority: 2);",
+            "surface = smooth_dielectric(ior: 1.3 / exterior_ior); interior = medium(ior: 1.3, priority: 2);",
+        )
+        => beside(
+            "surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, priority: 2);",
+            "surface = smooth_dielectric(ior: 1.3 / exterior_ior); interior = medium(ior: 1.3, priority: 1);",
+        );
+    "paths that change their medium", also &[], "functions +cross_boundary",
+        beside("surface = diffuse(color(0.3)); interior = medium(ior: 1.5, absorption: color(3.0));", PANE)
+        => beside("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));", PANE);
+    "index outside of surfaces", also &[], "functions +exterior_index +media_outside",
+        thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
+        => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
+    "emission that varies", also &[], "functions +checked_emission +material_emission +needs_last_evaluation",
+        thing(SHADE) => thing("surface = diffuse(color(0.3)); emission = uniform(color(0.5 + 0.5 * normal.y));");
+    "positions", also &[], "", thing(SHADE) => thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x)));");
+    "vertex normals", also &[], "bindings +vertex_normals; functions +hit_normal +unpack_normal",
+        Text::default() => Text { corners: Corners::Normals, ..Text::default() };
+    "texture coordinates", also &[], "functions +hit_uv",
+        with_uvs(thing(SHADE)) => with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"));
+    "tangents", also &[], "bindings +vertex_uvs; functions +hit_tangent", Text::default() => with_uvs(Text::default());
+    "textures", also &[], "bindings +texture_data; functions +texel +texture_fetch +wrap_texel",
+        with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"))
+        => with_uvs(thing("surface = diffuse(image(picture, uv));"));
+    "choice of a lobe", also &[], "",
+        thing(SHADE) => thing("surface = layer(0.2 * blinn_phong(20.0), diffuse(color(0.3)));");
+    "Russian roulette", also &[], "functions +max_component +survival_probability",
+        Text::default() => Text { integrator: "max_depth = 4\nroulette_start = 2", ..Text::default() };
+    "lens", also &[], "",
+        Text::default() => Text { camera: "aperture = 0.1\nfocus = 3", ..Text::default() };
+    "placed objects", also &[], "bindings +placement_blocks +placement_materials +placements; functions \
+         +enter_placement +is_mirrored +material_row +place_of +place_point +placed_triangle \
+         +set_slabs +take_in_tree",
+        Text { shared: Some(false), ..Text::default() } => Text { shared: Some(true), ..Text::default() };
+    "rays in an order of their own", also &[], "kernels +bin_extension +bin_shadow +scan_extension +scan_shadow +scatter_extension \
+         +scatter_shadow; bindings +bins; functions +bin_extension +bin_ray +bin_shadow \
+         +ray_bin",
+        Text::default()
+        => Text {
+            technique: Technique { ray_order: RayOrder::Coarse, ..Technique::default() },
+            ..Text::default()
+        };
+    "rays in buffers of their own", also &[], "+16 bytes; bindings +extension_hits +extension_rays +shadow_rays +shadow_results; \
+         functions +is_ray_wanted +keep_requests +load_requests +requested_hit \
+         +store_requests -load_shadow_direction -load_shadow_origin -store_shadow_direction \
+         -store_shadow_origin",
+        Text::default()
+        => Text {
+            technique: Technique { ray_data: RayData::Requests, ..Technique::default() },
+            ..Text::default()
+        };
+}
