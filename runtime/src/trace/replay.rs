@@ -21,7 +21,6 @@ use super::{LIMIT, lower};
 use crate::film::{self, Sums};
 use crate::layout::Layout;
 use crate::modules::{Composer, Sizes};
-use crate::needs::Needs;
 use crate::queues::{Counters, Scalar};
 use crate::random::{self, Demand};
 use crate::render::RenderOptions;
@@ -129,7 +128,8 @@ impl<'p> Replayer<'p> {
             ..Technique::default()
         };
         let layout = Layout::new(world, &materials, &plan, &technique)?;
-        let demand = Demand::of(world, &materials, Needs::of(world, &materials).shadow_rays);
+        // Nothing is forced: what is needed is what numbers are drawn for.
+        let demand = Demand::of(world, layout.needs);
         let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
         let composer = Composer {
             world,
