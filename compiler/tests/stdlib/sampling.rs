@@ -13,7 +13,7 @@ use super::tally::Tally;
 /// Directions drawn for each case and view; a quarter decides on the cells. At full effort that is
 /// over ten million for every BSDF.
 fn samples() -> usize {
-    effort(1 << 15, 1 << 18)
+    effort(1 << 16, 1 << 18)
 }
 
 /// Significance of all chi-squared tests of a BSDF together.
