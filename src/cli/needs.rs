@@ -51,7 +51,7 @@ fn text(needs: &NeedsReport) -> String {
         );
     }
     let mut line = |name: &str, columns: [&str; 5]| {
-        let columns = columns.map(|c| format!("{c:>10}")).concat();
+        let columns = columns.map(|c| format!("{c:>11}")).concat();
         let _ = writeln!(out, "  {name:<width$}{columns}");
     };
     line("", ["bytes", "lines", "kernels", "bindings", "operations"]);

@@ -148,9 +148,11 @@ fn in_world(origin: DVec3) -> String {
         + "\nfn in_world(position: vec3<f32>) -> vec3<f32> {\n    return position + WORLD_ORIGIN;\n}\n"
 }
 
-/// The buffers of what corners have: the name, its type, and bytes a triangle.
-const NORMALS: (&str, &str, usize) = ("vertex_normals", "array<vec4<u32>>", 16);
-const UVS: (&str, &str, usize) = ("vertex_uvs", "array<vec2<f32>>", 24);
+/// A buffer of what corners have: the name, its type, and bytes a triangle.
+type CornerBuffer = (&'static str, &'static str, usize);
+
+const NORMALS: CornerBuffer = ("vertex_normals", "array<vec4<u32>>", 16);
+const UVS: CornerBuffer = ("vertex_uvs", "array<vec2<f32>>", 24);
 
 fn has(part: &ShaderPart, buffer: &str) -> bool {
     part.buffers.iter().any(|b| b.name == buffer)
@@ -173,21 +175,16 @@ impl SceneParts {
             wgsl += &sources.in_world;
         }
         let mut buffers = std::mem::take(&mut self.surface.buffers);
-        let wants = |need: bool, buffer: (&'static str, &'static str, usize), text: &str| match need
-        {
-            false => {
-                buffers.retain(|b| b.name != buffer.0);
-                String::new()
+        let mut corners_text = |need: bool, (name, ty, bytes): CornerBuffer, text: &str| {
+            if !need {
+                buffers.retain(|b| b.name != name);
+                return String::new();
             }
-            true => {
-                if buffers.iter().all(|b| b.name != buffer.0) {
-                    let zeros = vec![0u8; buffer.2 * triangles];
-                    buffers.push(BufferData::new(buffer.0, buffer.1, &zeros));
-                }
-                preprocess(text, &flags)
+            if buffers.iter().all(|b| b.name != name) {
+                buffers.push(BufferData::new(name, ty, &vec![0u8; bytes * triangles]));
             }
+            preprocess(text, &flags)
         };
-        let mut wants = wants;
         let of_corners = [
             (
                 needs.has(Need::Normals),
@@ -201,7 +198,7 @@ impl SceneParts {
             ),
         ];
         for (need, buffer, text) in of_corners {
-            wgsl += &wants(need, buffer, text);
+            wgsl += &corners_text(need, buffer, text);
         }
         self.surface = ShaderPart { wgsl, buffers };
         if needs.has(Need::Media) && self.media.part.is_none() {
