@@ -104,18 +104,26 @@ fn leave_surface(position: vec3<f32>, side: vec3<f32>, direction: vec3<f32>) -> 
 
 // A sample with a value that is no number or below zero is dropped whole, and counted for its material.
 fn checked_sample(sample: MaterialSample, instance: u32, place: vec3<u32>) -> MaterialSample {
+    // What is light is finite, so that most samples are through with one test a value.
     let densities = vec3<f32>(sample.pdf, sample.light_pdf, 0.0);
-    let light = vec4<bool>(
-        is_light(sample.throughput), is_light(densities), is_light(sample.light_throughput), true
-    );
-    let finite = vec4<bool>(
-        is_finite(sample.throughput), is_finite(densities), is_finite(sample.light_throughput),
-        is_finite(sample.wi)
-    );
-    if all(light & finite) {
+    if is_light(sample.throughput) && is_light(densities) && is_light(sample.light_throughput)
+        && is_finite(sample.wi) {
         return sample;
     }
-    let negative = all(finite);
+    count_wrong_sample(sample, densities, instance, place);
+    let none = vec3<f32>(0.0);
+    return MaterialSample(none, 0.0, none, 0.0, none, 0.0);
+}
+
+// Values that are no numbers come before those below zero, as what a row counts.
+fn count_wrong_sample(sample: MaterialSample, densities: vec3<f32>, instance: u32, place: vec3<u32>) {
+    let finite = vec3<bool>(
+        is_finite(sample.throughput), is_finite(densities), is_finite(sample.light_throughput)
+    );
+    let light = vec3<bool>(
+        is_light(sample.throughput), is_light(densities), is_light(sample.light_throughput)
+    );
+    let negative = all(finite) && is_finite(sample.wi);
     let right = select(finite, light, negative);
     var value = DROPPED_BY_DIRECTION;
     if !right.x {
@@ -126,8 +134,6 @@ fn checked_sample(sample: MaterialSample, instance: u32, place: vec3<u32>) -> Ma
         value = DROPPED_BY_LIGHT_THROUGHPUT;
     }
     count_dropped(dropped_row(instance), negative, value, place);
-    let none = vec3<f32>(0.0);
-    return MaterialSample(none, 0.0, none, 0.0, none, 0.0);
 }
 
 #if varying_emission
