@@ -161,12 +161,9 @@ impl Study<'_> {
         let best = self.largest_films(taken)?;
         let smallest = |truth: &Film| {
             let mut smallest = f64::INFINITY;
-            for films in &best {
-                let mut sum = 0.0;
-                for film in films {
-                    sum += mean_squared(film, truth)?;
-                }
-                smallest = smallest.min(sum / films.len().max(1) as f64);
+            // Of single renders: where bright samples are rare, a mean may be of those that met some.
+            for film in best.iter().flatten() {
+                smallest = smallest.min(mean_squared(film, truth)?);
             }
             Ok(smallest.sqrt())
         };

@@ -10,6 +10,11 @@ const REFERENCE_SHARE: f64 = 0.05;
 /// From this share of a tail's error on, the reference's own error explains the tail.
 const EXPLAINS: f64 = 0.3;
 
+/// An error that is so many times the least before it has risen.
+const RISE: f64 = 1.5;
+/// So many times as large as another is an error of the same number of samples that met what the other did not.
+const SPREAD: f64 = 4.0;
+
 /// All flags of a scene.
 pub(super) fn flags(scene: &SceneConvergence) -> Vec<String> {
     let mut flags: Vec<String> = of_reference(&scene.reference).into_iter().collect();
@@ -71,13 +76,20 @@ fn of_series(series: &Series, reference: &Reference) -> Vec<String> {
 /// Where an error stops falling, and what may be why.
 fn tail(series: &Series, metric: Metric, reference: &Reference) -> Option<String> {
     let from = series.fits.get(&metric)?.flat_from?;
-    let last = means(&series.points, metric).last()?.error;
+    let means = means(&series.points, metric);
+    let last = means.last()?.error;
+    let tail = means.iter().skip_while(|mean| mean.samples < from);
+    let least = tail.map(|mean| mean.error).fold(f64::INFINITY, f64::min);
     let own = reference.error.as_ref().map(|e| metric.of(e));
     let why = match own.map(|own| own / last) {
         Some(share) if share >= EXPLAINS => format!(
             "noise of the reference, whose own error is {} of it",
             percent(share)
         ),
+        // A bias is the same for all seeds, and lets no error rise.
+        _ if last > RISE * least || spread(series, metric, from) > SPREAD => {
+            "bright samples so rare that only some renders met one; more seeds tell more".into()
+        }
         Some(share) => format!(
             "bias, since the reference's own error is only {} of it",
             percent(share)
@@ -89,6 +101,18 @@ fn tail(series: &Series, metric: Metric, reference: &Reference) -> Option<String
         metric.name(),
         number(last)
     ))
+}
+
+/// How many times as large as the least the largest error of renders of one number of samples is, from some
+/// samples on.
+fn spread(series: &Series, metric: Metric, from: u32) -> f64 {
+    let tail = series.points.iter().filter(|point| point.samples >= from);
+    let ratios = tail.map(|point| {
+        let errors = point.runs.iter().map(|run| metric.of(&run.errors));
+        let [least, largest] = errors.fold([f64::INFINITY, 0.0], |[a, b], e| [e.min(a), e.max(b)]);
+        largest / least
+    });
+    ratios.filter(|ratio| ratio.is_finite()).fold(1.0, f64::max)
 }
 
 #[cfg(test)]
@@ -141,6 +165,24 @@ mod tests {
         );
         assert!(flat(Some(0.01 * last)).contains("at 16 samples, near 0.0156: bias, since"));
         assert!(flat(None).contains("bias, or noise of the reference"));
+    }
+
+    #[test]
+    fn rare_bright_samples_are_no_bias() {
+        let flags = flags_with(|s| {
+            let series = &mut s.series[0];
+            series
+                .fits
+                .get_mut(&Metric::Relmse)
+                .expect("a fit")
+                .flat_from = Some(16);
+            let last = series.points.last_mut().expect("a point");
+            last.runs[0].errors.relmse *= 100.0;
+        });
+        assert!(
+            flags.join("\n").contains("bright samples so rare"),
+            "{flags:?}"
+        );
     }
 
     #[test]
