@@ -111,7 +111,9 @@ pub(super) struct Recorder<'r, 'p, F> {
     media: Vec<u32>,
     /// What the last ray cast found: distance and primitive.
     found: Option<(f64, u32)>,
-    /// Whether that was looked at: nothing is cast for a path that carries nothing.
+    /// Whether a ray was cast since the last vertex: none is for a path that carries nothing.
+    cast: bool,
+    /// Whether what it found is the present vertex.
     met: bool,
     finished: bool,
 }
@@ -149,6 +151,7 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
             throughput: [1.0; 3],
             media: Vec::new(),
             found: None,
+            cast: false,
             met: false,
             finished: false,
         }
@@ -173,7 +176,9 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
     }
 
     fn begin_vertex(&mut self) {
-        self.met = false;
+        // Paths lost among hidden boundaries carry nothing on, though their ray was cast.
+        let carries = self.throughput.iter().any(|x| *x > 0.0);
+        self.met = std::mem::take(&mut self.cast) && carries;
         let [origin, direction] = self.ray;
         let hit = self.found.filter(|(_, primitive)| *primitive != NOTHING);
         let hit = hit.map(|(distance, primitive)| Hit {
@@ -271,6 +276,7 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
             }
             Hook::StoreDirection => self.ray[1] = given("value.direction"),
             Hook::TraceClosest => {
+                self.cast = true;
                 // Boundaries that are crossed begin the ray anew.
                 self.ray[0] = given("origin");
                 let primitive = of.result.word("primitive", result);
@@ -300,11 +306,9 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
                     vertex.arriving = [0, 1, 2].map(|i| vertex.arriving[i] * kept[i]);
                 }
             }
-            Hook::LightHit | Hook::LightEscape => {
-                self.met = true;
+            Hook::LightHit | Hook::LightEscape | Hook::MaterialEmission => {
                 self.add_emission(got(""));
             }
-            Hook::MaterialEmission => self.add_emission(got("")),
             Hook::PowerHeuristic => self.weigh(of.result.number::<F>("", result)),
             Hook::PrimitiveInstance => {
                 let instance = of.result.word("", result) as usize;

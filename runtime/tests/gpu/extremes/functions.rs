@@ -228,7 +228,8 @@ fn densities_of_light_samples_hold_for_lights_of_any_size() {
         "20",
         "quad light",
         "angle by which a sample misses it",
-        1e-6,
+        // A few units in the last place of a direction.
+        2e-6,
     );
 }
 
@@ -270,7 +271,9 @@ fn no_light_hides_itself() {
         "20",
         "quad light",
         "samples of 500 that the light itself hides",
-        0.0,
+        // At a cosine of a thousandth rounding may hide one in a hundred, on GPUs that divide less exactly
+        // than processors do.
+        5.0,
     );
 }
 
