@@ -26,6 +26,9 @@ const COLUMNS: usize = 12;
 const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
+/// Samples from which a cell is cut where they lie unevenly in it, before it is integrated.
+const UNEVEN: usize = 12;
+
 /// Samples below which a cell is left as it is.
 const FEW: usize = 4;
 
@@ -108,9 +111,16 @@ fn place(w: &[f64; 3]) -> [f64; 2] {
     [w[2].clamp(-1.0, 1.0), w[1].atan2(w[0]).rem_euclid(TAU)]
 }
 
+/// Cells, and what each is put together of for integration: finer where a sharp lobe lies in a
+/// corner of a cell.
+pub struct Partition {
+    pub cells: Vec<Cell>,
+    parts: Vec<(usize, Cell)>,
+}
+
 /// Cells over the whole sphere, none with more than `most` of the `samples`; halves of the
 /// sphere are never in one cell.
-pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
+pub fn partition(samples: &[[f64; 3]], most: usize) -> Partition {
     let mut open: Vec<(Cell, Vec<[f64; 2]>)> = Vec::new();
     for row in 0..2 * ROWS {
         for column in 0..COLUMNS {
@@ -124,10 +134,30 @@ pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
         let column = ((phi / TAU * COLUMNS as f64) as usize).min(COLUMNS - 1);
         open[row * COLUMNS + column].1.push([z, phi]);
     }
+    let done = divided(open, &|range, inside| halving(range, inside, most));
+    let mut parts = Vec::new();
+    for (i, (cell, inside)) in done.iter().enumerate() {
+        let finer = divided(vec![(*cell, inside.clone())], &gathered);
+        parts.extend(finer.into_iter().map(|(part, _)| (i, part)));
+    }
+    Partition {
+        cells: done.into_iter().map(|(cell, _)| cell).collect(),
+        parts,
+    }
+}
+
+/// A cell with the places of the samples in it.
+type Filled = (Cell, Vec<[f64; 2]>);
+
+/// Where to cut a side of a cell, by the sorted coordinates of its samples along it.
+type Rule<'a> = dyn Fn([f64; 2], &[f64]) -> Option<f64> + 'a;
+
+/// Cuts cells until the rule leaves them all.
+fn divided(mut open: Vec<Filled>, rule: &Rule<'_>) -> Vec<Filled> {
     let mut done = Vec::new();
-    while let Some((cell, mut inside)) = open.pop() {
-        let Some((tall, cut)) = cut(&cell, &mut inside, most) else {
-            done.push(cell);
+    while let Some((cell, inside)) = open.pop() {
+        let Some((tall, cut)) = cut(&cell, &inside, rule) else {
+            done.push((cell, inside));
             continue;
         };
         let axis = usize::from(!tall);
@@ -138,19 +168,36 @@ pub fn partition(samples: &[[f64; 3]], most: usize) -> Vec<Cell> {
     done
 }
 
+/// Halves a cell of more than `most` samples, and cuts off what is empty.
+fn halving(range: [f64; 2], inside: &[f64], most: usize) -> Option<f64> {
+    match inside {
+        few if few.len() < FEW => None,
+        many if many.len() > most => Some(many[many.len() / 2]),
+        [first, .., last] => flank(range, *first, *last),
+        _ => None,
+    }
+}
+
+/// Halves a cell whose samples gather in a part of it.
+fn gathered(range: [f64; 2], inside: &[f64]) -> Option<f64> {
+    if inside.len() < UNEVEN {
+        return halving(range, inside, UNEVEN);
+    }
+    let quarter = |k: usize| inside[k * inside.len() / 4];
+    let share = |x: f64| (x - range[0]) / (range[1] - range[0]);
+    let [a, b, c] = [1, 2, 3].map(|k| share(quarter(k)));
+    ((b - 0.5).abs() > 0.2 || c - a < 0.3).then(|| quarter(2))
+}
+
 /// Along which side to cut a cell, and where; nothing for a cell that is fine.
-fn cut(cell: &Cell, inside: &mut [[f64; 2]], most: usize) -> Option<(bool, f64)> {
+fn cut(cell: &Cell, inside: &[[f64; 2]], rule: &Rule<'_>) -> Option<(bool, f64)> {
     let tall = cell.is_tall();
     for tall in [tall, !tall] {
         let axis = usize::from(!tall);
         let range = if tall { cell.z } else { cell.phi };
-        inside.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let cut = match &*inside {
-            few if few.len() < FEW => None,
-            many if many.len() > most => Some(many[many.len() / 2][axis]),
-            [first, .., last] => flank(range, first[axis], last[axis]),
-            _ => None,
-        };
+        let mut along: Vec<f64> = inside.iter().map(|p| p[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        let cut = rule(range, &along);
         let fits = |c: &f64| range[0] + NARROWEST < *c && *c < range[1] - NARROWEST;
         if let Some(cut) = cut.filter(fits) {
             return Some((tall, cut));
@@ -194,17 +241,15 @@ pub fn counts(cells: &[Cell], samples: &[[f64; 3]]) -> Vec<usize> {
 }
 
 /// Integrals over each cell. `measure` answers many directions at once.
-pub fn integrate(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<Measures> {
-    let mut totals = vec![[0.0; 4]; cells.len()];
-    let mut open: Vec<(usize, Cell, Measures)> = Vec::new();
-    let first = rule(cells, measure);
-    open.extend(
-        cells
-            .iter()
-            .zip(first)
-            .enumerate()
-            .map(|(i, (c, m))| (i, *c, m)),
-    );
+pub fn integrate(
+    partition: &Partition,
+    measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>,
+) -> Vec<Measures> {
+    let mut totals = vec![[0.0; 4]; partition.cells.len()];
+    let parts: Vec<Cell> = partition.parts.iter().map(|(_, c)| *c).collect();
+    let first = rule(&parts, measure);
+    let open = partition.parts.iter().zip(first);
+    let mut open: Vec<(usize, Cell, Measures)> = open.map(|(&(i, c), m)| (i, c, m)).collect();
     for depth in 0..=DEEPEST {
         let quarters: Vec<Cell> = open.iter().flat_map(|(_, c, _)| c.quarters()).collect();
         let finer = rule(&quarters, measure);
@@ -254,15 +299,20 @@ fn cells_cover_the_sphere_once_and_integrate_it() {
     let lobe: Vec<[f64; 3]> = (0..4000)
         .map(|_| direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit()))
         .collect();
-    let cells = partition(&lobe, 50);
+    let partition = partition(&lobe, 50);
+    let cells = &partition.cells;
     assert!(cells.len() > 100);
-    let area: f64 = cells.iter().map(Cell::area).sum();
-    assert!((area - 2.0 * TAU).abs() < 1e-9);
-    assert_eq!(counts(&cells, &lobe).iter().sum::<usize>(), 4000);
+    for area in [
+        cells.iter().map(Cell::area).sum::<f64>(),
+        partition.parts.iter().map(|(_, c)| c.area()).sum(),
+    ] {
+        assert!((area - 2.0 * TAU).abs() < 1e-9);
+    }
+    assert_eq!(counts(cells, &lobe).iter().sum::<usize>(), 4000);
     // Integrals of 1, cos on the upper side, z^2, and a sharp lobe of known integral.
     let sharp = |w: &[f64; 3]| (1e5 * (w[2] - 1.0)).exp();
     let value = |w: &[f64; 3]| [1.0, w[2].max(0.0), w[2] * w[2], sharp(w)];
-    let sums = integrate(&cells, &|ws| ws.iter().map(value).collect());
+    let sums = integrate(&partition, &|ws| ws.iter().map(value).collect());
     let sum: Measures = std::array::from_fn(|c| sums.iter().map(|s| s[c]).sum());
     for (found, exact) in sum
         .iter()

@@ -9,7 +9,8 @@
 //! `ior`, and `Straight:`, which says that what passes is not refracted. Lines of their own are
 //! `Range: name = low .. high, ...`, between which a search draws parameters (colors and floats
 //! that are not told: 0 to 1), `Furnace: within 0.01 with name: value, ...`: with these arguments
-//! all light is kept, whatever the others are, and `Region: within 0.01 where condition`: a part
+//! all light is kept, whatever the others are, `Gain: within 0.04 with name: value, ...`: by how
+//! much more than all light is reflected with these, and `Region: within 0.01 where condition`: a part
 //! of the parameters and directions where single precision may be off by more (see `region`), and
 //! `Weights: at most 10`, of value over density.
 

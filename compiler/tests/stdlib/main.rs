@@ -67,6 +67,12 @@ fn each_in_parallel<T: Sync>(items: &[T], job: impl Fn(usize, &T) -> (String, Ve
     );
 }
 
+/// Does IMPASTO_ONLY, a list of names with commas, leave this one to be tested? Searches of one BSDF
+/// at full effort take seconds, of all many minutes.
+fn asked_for(name: &str) -> bool {
+    std::env::var("IMPASTO_ONLY").map_or(true, |only| only.split(',').any(|o| o == name))
+}
+
 /// Checks a text as a file of its own and returns the rendered diagnostics.
 fn problems(name: &str, text: &str) -> String {
     let mut files = MemoryLoader::default();

@@ -45,10 +45,22 @@ const NAMED: &str = "
     // The edge of total reflection for metals, seen from outside: where nothing is absorbed, they are dielectrics.
     fn edge_of_metal(wo: vector, wi: vector, ior: color, k: color) -> bool {
         let c = abs(dot(wo, half_vector(wo, wi)));
-        let q2 = conductor_q2(c, ior, k);
-        let far = abs(q2) + 2.0 * ior * k;
-        min(far.r, min(far.g, far.b)) < 1e-3
+        far_from_edge(c, ior, k) < 1e-3
     }
+    // The same at one of the three angles over which `average_conductor` takes its mean.
+    fn edge_of_metal_on_average(ior: color, k: color) -> bool {
+        let a = far_from_edge(0.335711, ior, k);
+        let b = far_from_edge(0.707107, ior, k);
+        let c = far_from_edge(0.941965, ior, k);
+        min(a, min(b, c)) < 2e-4
+    }
+    fn far_from_edge(c: float, ior: color, k: color) -> float {
+        let far = abs(conductor_q2(c, ior, k)) + 2.0 * ior * k;
+        min(far.r, min(far.g, far.b))
+    }
+    // The edge of total reflection for a smooth boundary, met at the cosine c with the index n.
+    fn edge_of_total(c: float, n: float) -> bool =
+        abs((n - 1.0) * (n + 1.0) + c * c) < 1e-3;
     fn least_alpha(ior: float, roughness: float, anisotropy: float) -> float {
         let a = boundary_alpha(contrasting(ior), roughness, anisotropy);
         min(a.x, a.y)

@@ -176,10 +176,10 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
         |c: usize| ((squares[c] / all - sampled_energy[c].powi(2)).max(0.0) / all).sqrt();
 
     let (pilot, tested) = drawn.split_at(drawn.len() / 4);
-    let cells = cells::partition(pilot, (pilot.len() / 128).max(16));
-    let integrals = cells::integrate(&cells, &*d.measure);
+    let partition = cells::partition(pilot, (pilot.len() / 128).max(16));
+    let integrals = cells::integrate(&partition, &*d.measure);
     let total: f64 = integrals.iter().map(|m| m[0]).sum();
-    let found = cells::counts(&cells, tested);
+    let found = cells::counts(&partition.cells, tested);
     // Failed samples are one more cell.
     let failed = 0.75 * all - tested.len() as f64;
     let expected = integrals
@@ -268,6 +268,9 @@ fn samples_follow_the_density_and_keep_energy() {
     let tests = work.len();
     let tally = Tally::default();
     super::each_in_parallel(&work, |i, (bsdf, case, degrees)| {
+        if !super::asked_for(&bsdf.name) {
+            return (case.label.clone(), Vec::new());
+        }
         let wo = view(*degrees);
         let d = distribution(bsdf, case, wo);
         let found = |seed: u64| {

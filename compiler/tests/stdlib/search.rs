@@ -255,6 +255,9 @@ fn nothing_is_found_that_is_worse_than_stated() {
     super::each_in_parallel(&all, |i, bsdf| {
         let space = Space::of(bsdf, bsdf.cases[0].args.clone(), "");
         let mut faults = Vec::new();
+        if !super::asked_for(&bsdf.name) {
+            return (bsdf.name.clone(), faults);
+        }
         for (goal, (score, x, at)) in GOALS.iter().zip(searched(bsdf, &space, i as u64)) {
             let (table, what, bound) = match goal.what {
                 "greatest" => ("weight", "greatest weight".to_owned(), most_weight(bsdf)),
