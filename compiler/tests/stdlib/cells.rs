@@ -26,8 +26,13 @@ const COLUMNS: usize = 12;
 const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
-/// Samples from which a cell is cut where they lie unevenly in it, before it is integrated.
-const UNEVEN: usize = 12;
+/// Samples beyond which a cell is cut before it is integrated, and from which it is cut where they
+/// gather: where as many as are in a window keep to less than this share of what they would take
+/// if they lay evenly.
+const SOME: usize = 24;
+const UNEVEN: usize = 8;
+const WINDOW: usize = 6;
+const DENSE: f64 = 0.2;
 
 /// Samples below which a cell is left as it is.
 const FEW: usize = 4;
@@ -178,15 +183,23 @@ fn halving(range: [f64; 2], inside: &[f64], most: usize) -> Option<f64> {
     }
 }
 
-/// Halves a cell whose samples gather in a part of it.
+/// Cuts cells until samples are few and lie evenly: at the edge of where they gather, or in half.
 fn gathered(range: [f64; 2], inside: &[f64]) -> Option<f64> {
-    if inside.len() < UNEVEN {
+    let count = inside.len();
+    if count < UNEVEN {
         return halving(range, inside, UNEVEN);
     }
-    let quarter = |k: usize| inside[k * inside.len() / 4];
-    let share = |x: f64| (x - range[0]) / (range[1] - range[0]);
-    let [a, b, c] = [1, 2, 3].map(|k| share(quarter(k)));
-    ((b - 0.5).abs() > 0.2 || c - a < 0.3).then(|| quarter(2))
+    let width = |w: &[f64]| w[WINDOW - 1] - w[0];
+    let dense = inside
+        .windows(WINDOW)
+        .min_by(|a, b| width(a).total_cmp(&width(b)))?;
+    let even = (range[1] - range[0]) * WINDOW as f64 / count as f64;
+    if width(dense) < DENSE * even {
+        // The edge from which more of the cell remains.
+        let below = dense[0] - range[0] > range[1] - dense[WINDOW - 1];
+        return Some(if below { dense[0] } else { dense[WINDOW - 1] });
+    }
+    (count > SOME).then(|| inside[count / 2])
 }
 
 /// Along which side to cut a cell, and where; nothing for a cell that is fine.
