@@ -141,7 +141,7 @@ pub fn documented(name: &str, text: &str, extremes: &[&str]) -> Documented {
         kind: def.kind,
         docs: item.docs.join(" "),
         types: def.params.iter().map(|p| p.ty.node.to_string()).collect(),
-        lines: item.docs.iter().map(|l| l.trim().to_owned()).collect(),
+        lines: whole_lines(&item.docs),
         calls: combinations(&tried),
     }
 }
@@ -308,6 +308,18 @@ pub fn promise(docs: &str, topic: &str) -> Option<f64> {
     }
     let number = rest.strip_prefix("within ")?.split(' ').next()?;
     number.trim_end_matches([',', '.', ';']).parse().ok()
+}
+
+/// The lines of a doc comment, where one that ends with a comma or `&&` goes on in the next.
+fn whole_lines(docs: &[String]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for line in docs.iter().map(|l| l.trim()) {
+        match lines.last_mut().filter(|l| l.ends_with([',', '&'])) {
+            Some(begun) => *begun = format!("{begun} {line}"),
+            None => lines.push(line.to_owned()),
+        }
+    }
+    lines
 }
 
 impl Bsdf {

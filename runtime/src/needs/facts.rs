@@ -16,7 +16,7 @@ pub(crate) struct Facts<'a> {
     pub wavefront: bool,
 }
 
-/// What a scene's own parts say of it, for [`Facts`].
+/// What a scene's own parts say of it, for `Facts`.
 #[derive(Clone, Debug, Default)]
 pub struct SceneFacts {
     /// Rows of the table that kinds of lights are, each with what it is in the scene.

@@ -1,7 +1,7 @@
 //! What must exist for a scene: one table of needs, of which everything else takes its conditions.
 //!
-//! A row of the [table](mod@table) is a feature: when a scene has it, and why. State fields, stages, parts
-//! of WGSL, their `#if` flags and random draws name rows ([`When`]) and decide nothing themselves; so a scene
+//! A row of the table is a feature: when a scene has it, and why. State fields, stages, parts
+//! of WGSL, their `#if` flags and random draws name rows (`When`) and decide nothing themselves; so a scene
 //! pays for what it uses. Rows can be forced, to measure what a scene saves by not having them
 //! ([`saved`](mod@saved)), and to test that they change no picture.
 
