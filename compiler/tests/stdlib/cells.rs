@@ -6,6 +6,7 @@
 
 use std::f64::consts::TAU;
 
+use super::record::effort;
 use super::statistics::direction;
 
 /// A rectangle in z and azimuth.
@@ -26,13 +27,16 @@ const COLUMNS: usize = 12;
 const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
-/// Samples beyond which a cell is cut before it is integrated, and from which it is cut where they
-/// gather: where as many as are in a window keep to less than this share of what they would take
-/// if they lay evenly.
-const SOME: usize = 24;
+/// Samples from which a cell is cut where they gather, before it is integrated: where as many as
+/// are in a window keep to less than this share of what they would take if they lay evenly.
 const UNEVEN: usize = 8;
 const WINDOW: usize = 6;
 const DENSE: f64 = 0.2;
+
+/// Samples beyond which a cell is cut before it is integrated in any case.
+fn some() -> usize {
+    effort(64, 24)
+}
 
 /// Samples below which a cell is left as it is.
 const FEW: usize = 4;
@@ -199,7 +203,7 @@ fn gathered(range: [f64; 2], inside: &[f64]) -> Option<f64> {
         let below = dense[0] - range[0] > range[1] - dense[WINDOW - 1];
         return Some(if below { dense[0] } else { dense[WINDOW - 1] });
     }
-    (count > SOME).then(|| inside[count / 2])
+    (count > some()).then(|| inside[count / 2])
 }
 
 /// Along which side to cut a cell, and where; nothing for a cell that is fine.
