@@ -68,6 +68,12 @@ pub(crate) struct StressArgs {
     /// Only test targets of this name (can be given several times)
     #[arg(long)]
     only: Vec<String>,
+    /// Run nothing, and make the page of rows that the tests kept on another machine, in this folder
+    #[arg(long, value_name = "DIR", requires = "machine")]
+    rows: Option<std::path::PathBuf>,
+    /// What that machine is called
+    #[arg(long, value_name = "NAME", requires = "rows")]
+    machine: Option<String>,
     /// Where the page is written
     #[arg(long, default_value = "docs/stability.md")]
     out: std::path::PathBuf,
@@ -82,18 +88,12 @@ struct Ended {
 
 /// Runs every target, writes the page of what was measured, and fails if anything is bad.
 pub(crate) fn run(args: &StressArgs) -> Result {
-    let folder = shell::root().join("target/stress");
-    rows::clear(&folder)?;
-    if !args.no_gpu {
-        adapter::prepare()?;
-    }
-    let wanted = |t: &&Target| args.only.is_empty() || args.only.iter().any(|o| o == t.target);
-    let targets = TARGETS.iter().filter(wanted);
-    let targets = targets.filter(|t| !(args.no_gpu && t.needs_adapter));
-    let ended: Vec<Ended> = targets.map(|t| tested(t, args, &folder)).collect();
-
+    let (folder, ended) = match &args.rows {
+        Some(folder) => (folder.clone(), Vec::new()),
+        None => tested_all(args)?,
+    };
     let rows = rows::read(&folder)?;
-    let text = page::page(&rows, &ended, &command(args));
+    let text = page::page(&rows, &ended, &command(args), args.machine.as_deref());
     let out = shell::root().join(&args.out);
     std::fs::write(&out, text).map_err(|e| format!("{} cannot be written: {e}", out.display()))?;
     eprintln!("{} rows in {}", rows.len(), out.display());
@@ -116,11 +116,30 @@ pub(crate) fn run(args: &StressArgs) -> Result {
     }
 }
 
+/// Runs the targets that are wanted; the folder of their rows.
+fn tested_all(args: &StressArgs) -> Result<(std::path::PathBuf, Vec<Ended>)> {
+    let folder = shell::root().join("target/stress");
+    rows::clear(&folder)?;
+    if !args.no_gpu {
+        adapter::prepare()?;
+    }
+    let wanted = |t: &&Target| args.only.is_empty() || args.only.iter().any(|o| o == t.target);
+    let targets = TARGETS.iter().filter(wanted);
+    let targets = targets.filter(|t| !(args.no_gpu && t.needs_adapter));
+    let ended = targets.map(|t| tested(t, args, &folder)).collect();
+    Ok((folder, ended))
+}
+
 /// The command as it was given.
 fn command(args: &StressArgs) -> String {
     let mut command = "cargo xtask stress".to_owned();
     command += if args.fast { " --fast" } else { "" };
     command += if args.no_gpu { " --no-gpu" } else { "" };
+    command += if args.rows.is_some() {
+        " --rows DIR"
+    } else {
+        ""
+    };
     args.only
         .iter()
         .for_each(|o| command += &format!(" --only {o}"));

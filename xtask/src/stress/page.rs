@@ -52,8 +52,8 @@ const TOPICS: [(&str, &str); 40] = [
 ];
 
 /// The page.
-pub(super) fn page(rows: &[Row], ended: &[Ended], command: &str) -> String {
-    let mut text = head(ended, command);
+pub(super) fn page(rows: &[Row], ended: &[Ended], command: &str, machine: Option<&str>) -> String {
+    let mut text = head(ended, command, machine);
     topics(&mut text, rows);
     for table in [
         "precision",
@@ -69,11 +69,13 @@ pub(super) fn page(rows: &[Row], ended: &[Ended], command: &str) -> String {
     text
 }
 
-fn head(ended: &[Ended], command: &str) -> String {
-    let mut text = format!(
-        "# Numerical stability\n\nWritten by `{command}` on {}.\n\n{INTRODUCTION}\n",
-        machine()
-    );
+fn head(ended: &[Ended], command: &str, on: Option<&str>) -> String {
+    let on = on.map_or_else(machine, str::to_owned);
+    let mut text =
+        format!("# Numerical stability\n\nWritten by `{command}` on {on}.\n\n{INTRODUCTION}\n");
+    if ended.is_empty() {
+        return text;
+    }
     text += "| tests | seconds | all passed |\n|---|---|---|\n";
     for e in ended {
         let passed = if e.failed { "**no**" } else { "yes" };
@@ -266,7 +268,7 @@ mod tests {
             row("precision", "glass", 9e-5, true),
             row("precision", "metal", 2e-4, false),
         ];
-        let text = page(&rows, &[], "cargo xtask stress --fast --no-gpu");
+        let text = page(&rows, &[], "cargo xtask stress --fast --no-gpu", None);
         assert!(
             text.contains("`cargo xtask stress --fast --no-gpu`"),
             "{text}"
@@ -277,6 +279,6 @@ mod tests {
         );
         assert!(text.contains("| metal | relative error | 2.0e-4 | 1.0e-4 | `metal(roughness: 0.1234) / 1e0` | **bad** |"), "{text}");
         assert!(text.contains("## Bad verdicts"), "{text}");
-        assert!(page(&rows[..2], &[], "").contains("No verdict is bad."));
+        assert!(page(&rows[..2], &[], "", Some("there")).contains("No verdict is bad."));
     }
 }
