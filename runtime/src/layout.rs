@@ -42,24 +42,18 @@ impl Layout {
         plan: &Plan,
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
-        let facts = Facts {
-            world,
-            materials,
-            technique,
-            wavefront: plan.organisation == Organisation::Wavefront,
-        };
-        let natural = Needs::of(&facts, Needs::default());
-        let forced = technique.features.forced(natural);
+        let forced = |natural| technique.features.forced(natural);
         Self::with_forced(world, materials, plan, technique, forced)
     }
 
-    /// The same with rows of the table of needs forced, whatever the technique says.
+    /// The same with rows of the table of needs `forced`, whatever the technique says; they may follow from
+    /// those that the scene needs by itself.
     pub(crate) fn with_forced(
         world: &World,
         materials: &[MaterialInfo],
         plan: &Plan,
         technique: &Technique,
-        forced: Needs,
+        forced: impl FnOnce(Needs) -> Needs,
     ) -> Result<Self, RuntimeError> {
         check_plan(plan, materials, &world.parts.unbound)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
@@ -70,7 +64,7 @@ impl Layout {
             wavefront,
         };
         let natural = Needs::of(&facts, Needs::default());
-        let needs = Needs::of(&facts, forced);
+        let needs = Needs::of(&facts, forced(natural));
         let of_kernels = Queues::of_kernels(plan);
         let queues = Queues {
             materials: of_kernels.iter().map(|queues| queues.len()).sum(),

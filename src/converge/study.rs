@@ -11,7 +11,7 @@ use impasto_runtime::gpu::Gpu;
 use impasto_runtime::output;
 use impasto_runtime::technique::{Choice, Sampler};
 
-use super::data::{Errors, MaterialShare, Point, Reference, Run, SceneConvergence, Series};
+use super::data::{Errors, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series};
 use super::pictures::{self, RenderPictures, ScenePictures};
 use super::reference::{Goal, Maker};
 use super::series::Task;
@@ -162,7 +162,7 @@ impl Study<'_> {
         let smallest = |truth: &Film| {
             let mut smallest = f64::INFINITY;
             // Of single renders: where bright samples are rare, a mean may be of those that met some.
-            for film in best.iter().flatten() {
+            for film in &best {
                 smallest = smallest.min(mean_squared(film, truth)?);
             }
             Ok(smallest.sqrt())
@@ -186,12 +186,9 @@ impl Study<'_> {
     }
 
     /// Of every series the pictures with the most samples, whose error is the smallest.
-    fn largest_films(&self, taken: &[Taken]) -> Result<Vec<Vec<Film>>, StudyError> {
-        let films = taken.iter().map(|taken| {
-            let largest = taken.largest();
-            largest.map(|record| self.store.film(record)).collect()
-        });
-        films.collect()
+    fn largest_films(&self, taken: &[Taken]) -> Result<Vec<Film>, StudyError> {
+        let largest = taken.iter().flat_map(Taken::largest);
+        largest.map(|record| self.store.film(record)).collect()
     }
 
     /// What all renders amount to against the truth.
@@ -349,16 +346,14 @@ fn read_reference(path: &Path, stage: &Stage<'_>) -> Result<Film, StudyError> {
 
 /// The RMSE of a reference relative to the smallest that is shown.
 fn relative(reference: &Reference, series: &[Series]) -> Option<f64> {
-    let own = reference.error?.mse;
-    let points = series.iter().flat_map(|s| &s.points);
-    let mean = |point: &Point| {
-        let sum: f64 = point.runs.iter().map(|run| run.errors.mse).sum();
-        sum / point.runs.len().max(1) as f64
-    };
-    let smallest = points.map(mean).min_by(f64::total_cmp)?;
+    let own = reference.error?.mse.sqrt();
+    let points = series
+        .iter()
+        .flat_map(|s| fit::means(&s.points, Metric::Rmse));
+    let smallest = points.map(|mean| mean.error).min_by(f64::total_cmp)?;
     match own > 0.0 {
         false => Some(0.0),
-        true => (smallest > 0.0).then(|| (own / smallest).sqrt()),
+        true => (smallest > 0.0).then(|| own / smallest),
     }
 }
 

@@ -261,16 +261,9 @@ pub(crate) fn compose(
     forced: Needs,
 ) -> Result<(Layout, Vec<Kernel>), RuntimeError> {
     let materials = source.infos();
-    let facts = Facts {
-        world,
-        materials: &materials,
-        technique: &technique,
-        wavefront: true,
-    };
-    let needs = Needs::of(&facts, forced);
-    let specialised = world.clone().specialised(needs);
     let plan = world.own_plan(&materials);
-    let layout = Layout::with_forced(world, &materials, &plan, &technique, forced)?;
+    let layout = Layout::with_forced(world, &materials, &plan, &technique, |_| forced)?;
+    let specialised = world.clone().specialised(layout.needs);
     let makings = Makings::new(SUBGROUP_SIZE, &specialised, source, technique);
     let kernels = makings.composer(&plan, layout, SIZES).kernels();
     Ok((layout, kernels))

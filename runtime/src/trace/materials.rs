@@ -1,12 +1,12 @@
 //! Who answers what the kernel asks of materials: the compiler's own interpreter, which is the
 //! oracle that generated WGSL is held against, or that generated WGSL itself.
 
-use impasto_compiler::Program;
 use impasto_compiler::abi::{TextureRef, TextureSpace};
 use impasto_compiler::ir::interp::{Interpreter, TextureLookup};
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Type};
 use impasto_compiler::ops::Op;
+use impasto_compiler::program::{CompiledMaterial, Program};
 
 use super::LIMIT;
 use super::error::TraceError;
@@ -107,6 +107,18 @@ impl<'p, F: Float> Oracle<'p, F> {
     }
 }
 
+/// The instance that a kernel asks for, and the code of its material.
+fn asked<'p>(
+    program: &'p Program,
+    of: &Signature,
+    cells: &[u64],
+) -> Result<(usize, &'p CompiledMaterial), TraceError> {
+    let instance = of.arguments.word("instance", cells) as usize;
+    let info = program.instances().get(instance);
+    let material = info.map(|info| &program.compiled()[info.info.material]);
+    Ok((instance, material.ok_or_else(|| unknown(instance))?))
+}
+
 fn unknown(instance: usize) -> TraceError {
     TraceError::Unsupported {
         what: format!("instance {instance} of materials"),
@@ -125,18 +137,13 @@ impl<F: Float> Materials<'_, F> {
         let Materials::Ir(oracle) = self else {
             return Ok(());
         };
-        let program = oracle.program;
-        let instance = of.arguments.word("instance", cells) as usize;
-        let info = program
-            .instances()
-            .get(instance)
-            .ok_or_else(|| unknown(instance))?;
-        let function = &program.compiled()[info.info.material].evaluate;
+        let (instance, material) = asked(oracle.program, of, cells)?;
+        let function = &material.evaluate;
         let arguments = oracle.arguments(function, &["wo", "wl", "u"], of, cells);
         let sample = oracle.run(instance, function, arguments)?;
         result.resize(of.result.cells().max(1), 0);
         if let Type::Struct(id) = function.result {
-            let fields = &program.ir().structs[id.index()].fields;
+            let fields = &oracle.program.ir().structs[id.index()].fields;
             for (i, (name, _)) in fields.iter().enumerate() {
                 if let Some(value) = sample.field(i) {
                     of.result.put(name, value.components(), result);
@@ -156,14 +163,9 @@ impl<F: Float> Materials<'_, F> {
         let Materials::Ir(oracle) = self else {
             return Ok(());
         };
-        let program = oracle.program;
-        let instance = of.arguments.word("instance", cells) as usize;
-        let info = program
-            .instances()
-            .get(instance)
-            .ok_or_else(|| unknown(instance))?;
+        let (instance, material) = asked(oracle.program, of, cells)?;
         result.resize(of.result.cells().max(1), 0);
-        if let Some(function) = &program.compiled()[info.info.material].emission {
+        if let Some(function) = &material.emission {
             let arguments = oracle.arguments(function, &["wo"], of, cells);
             let value = oracle.run(instance, function, arguments)?;
             of.result.put("", value.components(), result);
