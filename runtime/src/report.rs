@@ -150,6 +150,16 @@ pub struct AdapterReport {
     pub driver: String,
 }
 
+impl From<GpuInfo> for AdapterReport {
+    fn from(info: GpuInfo) -> Self {
+        Self {
+            name: info.name,
+            backend: info.backend,
+            driver: info.driver,
+        }
+    }
+}
+
 /// What one kernel did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KernelReport {
@@ -293,11 +303,7 @@ impl Inputs<'_> {
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),
             lost_paths: scalar(Scalar::LostPaths),
-            adapter: AdapterReport {
-                name: self.gpu.name,
-                backend: self.gpu.backend,
-                driver: self.gpu.driver,
-            },
+            adapter: self.gpu.into(),
         }
     }
 }

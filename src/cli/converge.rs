@@ -10,7 +10,6 @@ use impasto::converge::data::{Convergence, Metric, Reference, SceneConvergence};
 use impasto::converge::pictures::{Pictures, ScenePictures};
 use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
 use impasto::converge::{Progress, Settings, StudyError, Subject, page, study};
-use impasto::runtime::report::AdapterReport;
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Choice, Sampler};
 use impasto::{Gpu, files};
@@ -98,7 +97,7 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     let mut convergence = Convergence {
         command: command(),
         version: env!("CARGO_PKG_VERSION").into(),
-        adapter: adapter(&gpu),
+        adapter: gpu.info().into(),
         scenes: Vec::new(),
     };
     let mut pictures = Pictures::default();
@@ -270,15 +269,6 @@ fn command() -> String {
         .chain(quoted)
         .collect();
     words.join(" ")
-}
-
-fn adapter(gpu: &Gpu) -> AdapterReport {
-    let info = gpu.info();
-    AdapterReport {
-        name: info.name,
-        backend: info.backend,
-        driver: info.driver,
-    }
 }
 
 /// What came out, in a line a series.

@@ -4,7 +4,6 @@ use impasto_compiler::Program;
 use impasto_compiler::partition::{DeviceProfile, Known, Needs, Plan, Wanted};
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::render::{RenderOptions, identity};
-use impasto_runtime::report::AdapterReport;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Sampler, Technique};
 use impasto_runtime::world::World;
@@ -74,14 +73,9 @@ impl<'a> Stage<'a> {
     pub(super) fn key(&self) -> Result<Key, StudyError> {
         let options = self.options(Sampler::Owen, 1);
         let identity = identity(self.gpu, &self.world, self.subject.program, &options)?;
-        let info = self.gpu.info();
         Ok(Key {
             version: env!("CARGO_PKG_VERSION").into(),
-            adapter: AdapterReport {
-                name: info.name,
-                backend: info.backend,
-                driver: info.driver,
-            },
+            adapter: self.gpu.info().into(),
             size: (self.world.width, self.world.height),
             pool: self.pool,
             scene: format!("{:016x}", identity.scene),
