@@ -46,6 +46,8 @@ pub struct Item {
     pub docs: Vec<String>,
     /// Its name.
     pub name: Name,
+    /// Is it marked `private`, so that other files cannot import it?
+    pub private: bool,
     /// What it is.
     pub kind: ItemKind,
     /// The whole definition, without docs.
@@ -72,11 +74,12 @@ pub enum ItemKind {
 pub struct Material {
     /// `param` declarations.
     pub params: Vec<MaterialParam>,
-    /// Statements; an assignment to an output (`surface = ...;`) is a [`StmtKind::Assign`].
+    /// Statements; an assignment to an output (`surface = ...;`) or to all of them
+    /// (`material = ...;`, whose place is the name `material`) is a [`StmtKind::Assign`].
     pub body: Vec<Stmt>,
 }
 
-/// `/// docs` `param name: type = default in low .. high;`
+/// `/// docs` `param name: type = default in low .. high { key: value, ... };`
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialParam {
     /// Lines of the doc comment.
@@ -89,8 +92,21 @@ pub struct MaterialParam {
     pub default: Expr,
     /// Least and greatest allowed value, both included.
     pub range: Option<(Expr, Expr)>,
+    /// What a user interface may want to know of it, in source order.
+    pub metadata: Vec<Entry>,
     /// The whole declaration, without docs.
     pub span: Span,
+}
+
+/// An entry of a parameter's metadata: `label: "IOR"`, `soft: 1.2 .. 2.0` or `unit: mm`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// What is told.
+    pub key: Name,
+    /// The value, or the lower end of a range. A unit is a [`ExprKind::Name`].
+    pub value: Expr,
+    /// The upper end of a range.
+    pub high: Option<Expr>,
 }
 
 /// Which closure a definition makes.

@@ -84,7 +84,7 @@ macro_rules! tokens {
 tokens! {
     keywords {
         Material "material" Bsdf "bsdf" Delta "delta" Edf "edf" Fn "fn" Struct "struct"
-        Const "const" Use "use" As "as" Param "param" Let "let" Var "var" If "if" Else "else"
+        Const "const" Private "private" Use "use" As "as" Param "param" Let "let" Var "var" If "if" Else "else"
         For "for" In "in" While "while" Limit "limit" Break "break" Continue "continue"
         When "when" True "true" False "false"
     }

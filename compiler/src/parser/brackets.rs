@@ -102,7 +102,7 @@ impl<'t> Balancer<'t> {
         let (token, span) = self.tokens[index];
         self.lines.advance(span);
         self.close_by_indent(span);
-        if self.starts_definition(token) {
+        if self.starts_definition(index) {
             self.close_down_to(0, span, "before this definition");
         }
         if self.ends_list(index) {
@@ -155,12 +155,14 @@ impl<'t> Balancer<'t> {
     }
 
     /// Definitions do not nest: one at the start of a line closes all that is open.
-    fn starts_definition(&self, token: Token) -> bool {
+    fn starts_definition(&self, index: usize) -> bool {
         use Token::*;
-        let keyword = matches!(
-            token,
-            Material | Bsdf | Delta | Edf | Fn | Struct | Const | Use
-        );
+        let keyword = match self.tokens[index].0 {
+            // `material = ...;` is a statement.
+            Material => self.tokens.get(index + 1).is_none_or(|t| t.0 != Assign),
+            Private | Bsdf | Delta | Edf | Fn | Struct | Const | Use => true,
+            _ => false,
+        };
         keyword && !self.open.is_empty() && self.lines.is_first && self.lines.indent == 0
     }
 

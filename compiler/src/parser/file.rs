@@ -62,12 +62,18 @@ fn late_use(span: Span) -> Diagnostic {
 
 fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry> {
     let item = item(text, expression);
+    let private = just(Token::Private).or_not().map(|word| word.is_some());
     let item = docs(text)
-        .then(item.map_with(|(name, kind), e| (name, kind, e.span())))
-        .map(|(docs, (name, kind, span))| {
+        .then(
+            private
+                .then(item)
+                .map_with(|(private, item), e| (private, item, e.span())),
+        )
+        .map(|(docs, (private, (name, kind), span))| {
             Entry::Item(Box::new(Item {
                 docs,
                 name,
+                private,
                 kind,
                 span,
             }))
@@ -125,7 +131,7 @@ fn at_entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
         .unwrap_or("")
         .ends_with('\n');
     match first {
-        None | Some(Material | Fn | Struct | Const | Use | Delta) => true,
+        None | Some(Private | Material | Fn | Struct | Const | Use | Delta) => true,
         // These two are also types.
         Some(Bsdf | Edf) => line_starts || second == Some(Ident),
         Some(token) => line_starts && (matches!(token, Ident | DocOuter) || token.is_keyword()),

@@ -73,7 +73,7 @@ impl<'t> Slip<'_, 't> {
             return Some("no `;` follows a definition in braces; remove it".to_owned());
         }
         let keywords = [
-            "material", "bsdf", "delta", "edf", "fn", "struct", "const", "use",
+            "material", "bsdf", "delta", "edf", "fn", "struct", "const", "private", "use",
         ];
         let hint = match self.text() {
             "func" | "function" | "def" | "fun" | "shader" | "void" | "float" | "vec3" => {
@@ -84,13 +84,18 @@ impl<'t> Slip<'_, 't> {
             }
             "class" | "type" | "record" => "structs are written `struct Name { a: float, }`",
             "brdf" | "btdf" | "lobe" => "scattering functions are written `bsdf name(...) { ... }`",
-            "let" | "var" | "static" | "define" | "constexpr" => {
+            "let" | "var" | "define" | "constexpr" => {
                 "at the top level, values are written `const NAME: float = 1.0;`"
             }
             "param" | "surface" | "emission" | "if" | "for" | "while" => {
                 "statements belong in a material or function"
             }
-            "pub" | "export" | "public" => "everything in a file can be imported; leave it out",
+            "pub" | "export" | "public" => {
+                "everything in a file can be imported but what is `private`; leave it out"
+            }
+            "static" | "local" | "internal" | "hidden" => {
+                "a definition that only this file may use is marked `private`"
+            }
             other => {
                 let best = nearest(other, keywords)?;
                 return Some(format!("did you mean `{best}`?"));
@@ -278,7 +283,9 @@ impl<'t> Slip<'_, 't> {
         use Token::*;
         match self.found {
             Else => Some("`else` follows the closing brace of an `if`".to_owned()),
-            Material | Fn | Struct | Const | Use | Bsdf | Edf | Delta if self.expects(Let) => {
+            Private | Material | Fn | Struct | Const | Use | Bsdf | Edf | Delta
+                if self.expects(Let) =>
+            {
                 Some("definitions stand at the top level of a file".to_owned())
             }
             When => Some("`when` follows a value, as in `= value when condition;`".to_owned()),

@@ -7,7 +7,7 @@ use super::error::SyntaxError;
 use super::expr::required;
 use super::stmt::{self, Piece, piece, stray_docs};
 use crate::ast::{
-    Block, Body, ClosureDef, ClosureKind, Const, Expr, Field, Function, ItemKind, Material,
+    Block, Body, ClosureDef, ClosureKind, Const, Entry, Expr, Field, Function, ItemKind, Material,
     MaterialParam, Method, Name, Param, Stmt,
 };
 use crate::diag::{Code, Diagnostic};
@@ -82,7 +82,7 @@ fn lost_value(value: &Expr) -> Diagnostic {
     .hint("assign what it scatters, as in `surface = ...;`")
 }
 
-/// `param name: type = default in low .. high;`
+/// `param name: type = default in low .. high { key: value };`
 fn material_param<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, MaterialParam> {
     let range = just(Token::In)
         .ignore_then(expression.clone())
@@ -94,18 +94,36 @@ fn material_param<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'
         .then_ignore(just(Token::Colon))
         .then(type_name(text))
         .then_ignore(just(Token::Assign))
-        .then(required(expression))
+        .then(required(expression.clone()))
         .then(range)
+        .then(metadata(text, expression))
         .then_ignore(semicolon(text))
-        .map_with(|(((name, ty), default), range), e| MaterialParam {
-            docs: Vec::new(),
-            name,
-            ty,
-            default,
-            range,
-            span: e.span(),
-        })
+        .map_with(
+            |((((name, ty), default), range), metadata), e| MaterialParam {
+                docs: Vec::new(),
+                name,
+                ty,
+                default,
+                range,
+                metadata,
+                span: e.span(),
+            },
+        )
         .boxed()
+}
+
+/// `{ label: "IOR", soft: 1.2 .. 2.0 }`, or nothing.
+fn metadata<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Vec<Entry>> {
+    let high = just(Token::Range)
+        .ignore_then(required(expression.clone()))
+        .or_not();
+    let entry = name(text)
+        .then_ignore(just(Token::Colon))
+        .then(expression)
+        .then(high)
+        .map(|((key, value), high)| Entry { key, value, high });
+    let entries = list(Token::LeftBrace, entry, Token::RightBrace);
+    entries.or_not().map(Option::unwrap_or_default)
 }
 
 /// `(name: type = default, ...)`

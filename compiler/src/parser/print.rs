@@ -3,7 +3,7 @@
 //! A list is written on one line where that fits and with an entry a line where it does not.
 
 use crate::ast::{
-    Arg, Block, Body, ClosureDef, ClosureKind, Expr, ExprKind, IfExpr, Item, ItemKind,
+    Arg, Block, Body, ClosureDef, ClosureKind, Entry, Expr, ExprKind, IfExpr, Item, ItemKind,
     MaterialParam, Module, Name, Param, Stmt, StmtKind, UnaryOp, Use, UseName,
 };
 
@@ -112,7 +112,8 @@ fn imported(imported: &UseName) -> Tree {
 }
 
 fn item(item: &Item) -> Tree {
-    let head = [name(&item.name)].into_iter();
+    let private = item.private.then(|| word("private"));
+    let head = [name(&item.name)].into_iter().chain(private);
     let docs = docs(&item.docs);
     match &item.kind {
         ItemKind::Material(material) => {
@@ -164,8 +165,14 @@ fn material_param(param: &MaterialParam) -> Tree {
     let parts = [name(&param.name), name(&param.ty), expr(&param.default)];
     let range = param.range.as_ref();
     let range = range.map(|(low, high)| list("in", 0, [expr(low), expr(high)]));
-    let parts = parts.into_iter().chain(range).chain(docs(&param.docs));
-    list("param", 2, parts)
+    let metadata = param.metadata.iter().map(entry);
+    let parts = parts.into_iter().chain(range).chain(metadata);
+    list("param", 2, parts.chain(docs(&param.docs)))
+}
+
+fn entry(entry: &Entry) -> Tree {
+    let values = [&entry.value].into_iter().chain(&entry.high).map(expr);
+    list(&format!("{}:", entry.key.node), 0, values)
 }
 
 fn param(param: &Param) -> Tree {

@@ -260,7 +260,7 @@ fn words(expected: Expected) -> Vec<String> {
     let assign = Expected::tokens(&[Assign, AddAssign, SubAssign, MulAssign, DivAssign]);
     if rest.has(definition) {
         words.push("a definition, such as `material`, `bsdf` or `fn`".to_owned());
-        rest = rest.without(definition.with(Expected::token(Use)));
+        rest = rest.without(definition.with(Expected::tokens(&[Private, Use])));
     }
     if rest.has(statement) {
         words.push("a statement".to_owned());

@@ -4,7 +4,7 @@ use chumsky::prelude::*;
 
 use super::common::{
     Input, Parse, Rule, before, broken_statement, close, ends_statement, name, nothing, one,
-    rest_of_statement, semicolon, skip_docs, skip_one, type_name,
+    rest_of_statement, semicolon, skip_docs, skip_one, spell, type_name,
 };
 use super::error::{Expected, SyntaxError};
 use super::expr::{headed, if_expression, required};
@@ -104,7 +104,11 @@ pub(super) fn piece<'t>(
     choice((
         statement.boxed(),
         branch,
-        expression_piece(text, expression),
+        expression_piece(
+            text,
+            choice((whole_material(text), expression.clone())).boxed(),
+            expression,
+        ),
         stray_docs().to(Piece::Broken),
     ))
     .recover_with(via_parser(broken_statement().to(Piece::Broken)))
@@ -214,8 +218,37 @@ enum Tail {
     Broken,
 }
 
+/// The place of `material = value;`: the name of all outputs together. Fails, before it takes
+/// anything, where no assignment follows.
+fn whole_material<'t>(text: &'t str) -> impl Parse<'t, Expr> {
+    custom(move |inp: &mut Input<'t, '_>| {
+        let start = inp.save();
+        let word = inp.next();
+        let span = inp.span_since(start.cursor());
+        let assigned = matches!(inp.peek(), Some(t) if is_assignment(t));
+        if word == Some(Token::Material) && assigned {
+            let kind = ExprKind::Name(spell(text, span).node);
+            return Ok(Expr { kind, span });
+        }
+        inp.rewind(start);
+        Err(nothing(span))
+    })
+}
+
+fn is_assignment(token: Token) -> bool {
+    use Token::*;
+    matches!(
+        token,
+        Assign | AddAssign | SubAssign | MulAssign | DivAssign
+    )
+}
+
 /// `place = value;`, or the value of a block.
-fn expression_piece<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Piece> {
+fn expression_piece<'t>(
+    text: &'t str,
+    place: Rule<'t, Expr>,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, Piece> {
     let operator = choice((
         just(Token::Assign).to(None),
         just(Token::AddAssign).to(Some(BinaryOp::Add)),
@@ -224,7 +257,7 @@ fn expression_piece<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse
         just(Token::DivAssign).to(Some(BinaryOp::Div)),
     ));
     let assign = operator
-        .then(required(expression.clone()))
+        .then(required(expression))
         .then_ignore(semicolon(text))
         .map(|(op, value)| Tail::Assign(op, value));
     let brace = Expected::token(Token::RightBrace);
@@ -232,7 +265,7 @@ fn expression_piece<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse
     let unused = one(Expected::default(), |t| t == Token::Semicolon).to(Tail::Unused);
     let tail = choice((assign, value, unused))
         .recover_with(via_parser(rest_of_statement(text).to(Tail::Broken)));
-    expression.then(tail).map_with(|(value, tail), e| {
+    place.then(tail).map_with(|(value, tail), e| {
         let span: Span = e.span();
         match tail {
             Tail::Assign(op, new) => Piece::Stmt(Stmt {
