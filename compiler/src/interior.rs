@@ -8,7 +8,7 @@ use crate::ir::{Const, ExprId, Material, Module};
 use crate::passes;
 
 /// The medium inside an instance whose parameters are `values`; none if the material has no
-/// interior.
+/// interior, or these values leave it out.
 ///
 /// # Errors
 /// If it takes more operations than the host spends on an instance.
@@ -31,6 +31,11 @@ pub fn medium(
             .with_uniforms(values)
             .run(&f, args)
     };
+    if let Some(when) = interior.when
+        && !number(when)?.as_bool()
+    {
+        return Ok(None);
+    }
     let absorption = number(interior.absorption)?.to_f64();
     let channel = |c: usize| {
         absorption

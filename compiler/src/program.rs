@@ -459,7 +459,7 @@ impl ProgramBuilder {
             name,
             delta_only: lowered.delta_only,
             crosses: lowered.crosses,
-            transmissive: lowered.crosses && material.interior.is_some(),
+            transmissive: lowered.crosses && own.iter().any(|i| i.info.medium.is_some()),
             varying_emission: varying,
             inputs: codegen::inputs(&self.module.structs, &functions),
             textures,

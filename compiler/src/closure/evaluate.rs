@@ -261,16 +261,19 @@ impl View<'_> {
     /// 1 if the path changes its medium: there is one to change to, and `wi` is on the other side.
     fn transmitted(&mut self, wi: ExprId, results: &Results) -> ExprId {
         let zero = self.float(0.0);
-        if self.m.interior.is_none() {
+        let Some(interior) = self.m.interior else {
             return zero;
-        }
+        };
         let (wo, geometric) = (self.wo(), self.point("geometric_normal"));
         let (a, b) = (
             self.op(Op::Dot, &[wo, geometric]),
             self.op(Op::Dot, &[wi, geometric]),
         );
         let product = self.op(Op::Mul, &[a, b]);
-        let crossed = self.op(Op::Less, &[product, zero]);
+        let mut crossed = self.op(Op::Less, &[product, zero]);
+        if let Some(when) = interior.when {
+            crossed = self.op(Op::And, &[crossed, when]);
+        }
         let met = match results.met {
             Some(met) => self.b.load(met, self.span),
             None => self.float(1.0),

@@ -66,6 +66,7 @@ pub fn probe(module: &Module, core: &Core, m: &Material) -> Probe {
     }
     rest.extend(m.opacity.map(|id| ("opacity", id)));
     if let Some(medium) = &m.interior {
+        rest.extend(medium.when.map(|id| ("interior.when", id)));
         rest.push(("interior.absorption", medium.absorption));
         rest.push(("interior.ior", medium.ior));
         rest.push(("interior.priority", medium.priority));

@@ -387,6 +387,8 @@ pub struct MaterialParam {
 /// The medium inside an object. Its expressions depend on parameters only, not on the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interior {
+    /// Where there is a medium at all, a bool; always when absent.
+    pub when: Option<ExprId>,
     /// Light lost a metre, three floats from 0, in 1/m.
     pub absorption: ExprId,
     /// Index of refraction, a float from 0.1 to 10.

@@ -8,6 +8,7 @@ use crate::source::Span;
 
 use super::inline::Expansion;
 use super::modules::ModuleId;
+use super::outputs::OUTPUTS;
 use super::tree::TreeSize;
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
@@ -21,14 +22,19 @@ pub enum Operand {
     Closure(ClosureId, Ty),
     /// A medium of a material, by its position in [`Body::media`].
     Medium(usize),
+    /// A bsdf, edf or medium that is not there.
+    Nothing(Ty),
+    /// What a called material assigns, by its position in [`Body::called`].
+    Material(usize),
 }
 
 impl Operand {
     /// Its type.
     pub fn ty(self) -> Ty {
         match self {
-            Operand::Value(_, ty) | Operand::Closure(_, ty) => ty,
+            Operand::Value(_, ty) | Operand::Closure(_, ty) | Operand::Nothing(ty) => ty,
             Operand::Medium(_) => Ty::Medium,
+            Operand::Material(_) => Ty::Material,
         }
     }
 }
@@ -99,6 +105,10 @@ pub struct Body<'c, 'l> {
     pub media: Vec<ir::Interior>,
     /// The outputs of a material assigned so far: name, value, place.
     pub outputs: Vec<(&'static str, Operand, Span)>,
+    /// What called materials assign, in the order of [`OUTPUTS`].
+    pub called: Vec<[Option<Operand>; OUTPUTS.len()]>,
+    /// The ranges of a material's parameters, by their uniforms.
+    pub ranges: Vec<Option<(f64, f64)>>,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -119,6 +129,8 @@ impl<'c, 'l> Body<'c, 'l> {
             tree_sizes: Vec::new(),
             media: Vec::new(),
             outputs: Vec::new(),
+            called: Vec::new(),
+            ranges: Vec::new(),
         }
     }
 
@@ -247,6 +259,11 @@ impl<'c, 'l> Body<'c, 'l> {
                 wrong.hint("take a component, as in `.x`, or `luminance(...)` of a color")
             }
             (Ty::Float, Ty::Int) => wrong.hint("`int(...)` drops the fraction"),
+            (Ty::Material, _) => wrong
+                .hint("take an output of it: `.surface`, `.emission`, `.interior` or `.opacity`"),
+            (_, Ty::Material) => {
+                wrong.hint("only a call of a material assigns all outputs; assign `surface`")
+            }
             (Ty::Bsdf, t) if t.is_closure() => wrong.hint("assign a bsdf to `surface`"),
             (Ty::Edf, t) if t.is_closure() => wrong.hint("assign an edf to `emission`"),
             (Ty::Medium, t) if t.is_closure() => wrong.hint("assign a medium to `interior`"),
@@ -398,7 +415,7 @@ impl Body<'_, '_> {
         };
         match value {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) | Operand::Medium(_) => None,
+            _ => None,
         }
     }
 

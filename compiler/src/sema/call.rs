@@ -10,6 +10,16 @@ use super::body::{Body, Operand};
 use super::types::{NAMED, Ty};
 use super::{Checked, Param};
 
+/// Arguments by the parameters that they are for.
+pub struct Given {
+    /// Those that check.
+    pub operands: Vec<Option<Operand>>,
+    /// Which parameters have one.
+    pub filled: Vec<bool>,
+    /// Do all check?
+    pub ok: bool,
+}
+
 impl Body<'_, '_> {
     /// A call of anything.
     pub fn call(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
@@ -39,10 +49,10 @@ impl Body<'_, '_> {
                 Some(Checked::ClosureFunction(signature)) => {
                     self.inline(callee, item, &signature, args, span)
                 }
-                Some(Checked::Const(..)) => self.not_callable(callee, "a constant"),
-                _ if matches!(self.cx.item(item).kind, ItemKind::Material(_)) => {
-                    self.not_callable(callee, "a material")
+                Some(Checked::Material(declared)) => {
+                    self.call_material(callee, item, &declared, args, span)
                 }
+                Some(Checked::Const(..)) => self.not_callable(callee, "a constant"),
                 // What it calls is wrong and reported; check the arguments all the same.
                 _ => self.discard(args),
             };
@@ -66,7 +76,8 @@ impl Body<'_, '_> {
         }
     }
 
-    fn discard(&mut self, args: &[Arg]) -> Option<Operand> {
+    /// Checks the arguments of a call that means nothing, for their errors.
+    pub fn discard<T>(&mut self, args: &[Arg]) -> Option<T> {
         for arg in args {
             self.expr(&arg.value);
         }
@@ -90,7 +101,7 @@ impl Body<'_, '_> {
         let operands = self.arguments(callee, args, params)?;
         let value = |operand| match operand {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) | Operand::Medium(_) => None,
+            _ => None,
         };
         operands.into_iter().map(value).collect()
     }
@@ -102,9 +113,19 @@ impl Body<'_, '_> {
         args: &[Arg],
         params: &[Param],
     ) -> Option<Vec<Operand>> {
-        let mut given: Vec<Option<Operand>> = vec![None; params.len()];
-        let mut filled: Vec<bool> = vec![false; params.len()];
-        let mut ok = true;
+        let mut given = self.given_arguments(callee, args, params);
+        self.fill_defaults(callee, &mut given, params);
+        let complete: Option<Vec<Operand>> = given.operands.into_iter().collect();
+        complete.filter(|_| given.ok)
+    }
+
+    /// Matches arguments with parameters: by position, then by name.
+    pub fn given_arguments(&mut self, callee: &Name, args: &[Arg], params: &[Param]) -> Given {
+        let mut given = Given {
+            operands: vec![None; params.len()],
+            filled: vec![false; params.len()],
+            ok: true,
+        };
         for (position, arg) in args.iter().enumerate() {
             let index = match &arg.name {
                 Some(name) => match params.iter().position(|p| p.name == name.node) {
@@ -112,40 +133,35 @@ impl Body<'_, '_> {
                     None => {
                         self.unknown_argument(callee, name, params);
                         self.expr(&arg.value);
-                        ok = false;
+                        given.ok = false;
                         continue;
                     }
                 },
                 None => position,
             };
-            if index >= params.len() || filled[index] {
+            if index >= params.len() || given.filled[index] {
                 self.too_many(callee, arg, params);
-                ok = false;
+                given.ok = false;
                 continue;
             }
-            filled[index] = true;
+            given.filled[index] = true;
             let what = format!("`{}` of `{}`", params[index].name, callee.node);
-            given[index] = self.expr_as(&arg.value, params[index].ty, &what);
-            ok &= given[index].is_some();
+            given.operands[index] = self.expr_as(&arg.value, params[index].ty, &what);
+            given.ok &= given.operands[index].is_some();
         }
-        self.fill_defaults(callee, &mut given, &filled, params);
-        let complete: Option<Vec<Operand>> = given.into_iter().collect();
-        complete.filter(|_| ok)
+        given
     }
 
-    fn fill_defaults(
-        &mut self,
-        callee: &Name,
-        given: &mut [Option<Operand>],
-        filled: &[bool],
-        params: &[Param],
-    ) {
+    fn fill_defaults(&mut self, callee: &Name, given: &mut Given, params: &[Param]) {
         let mut missing = Vec::new();
-        for (i, param) in params.iter().enumerate().filter(|(i, _)| !filled[*i]) {
+        for (i, param) in params.iter().enumerate() {
+            if given.filled[i] {
+                continue;
+            }
             match &param.default {
                 Some(default) => {
                     let id = self.constant(default.clone(), callee.span);
-                    given[i] = Some(Operand::Value(id, param.ty));
+                    given.operands[i] = Some(Operand::Value(id, param.ty));
                 }
                 None => missing.push(param),
             }
@@ -205,7 +221,7 @@ impl Body<'_, '_> {
             }
             match self.expr(&arg.value) {
                 Some(Operand::Value(id, ty)) => values.push((id, ty, arg.value.span)),
-                Some(Operand::Closure(..) | Operand::Medium(_)) => {
+                Some(_) => {
                     let message = format!("`{callee}` does not work on closures");
                     let wrong = Diagnostic::new(Code::ClosureUse, arg.value.span, message)
                         .expected("a value")
@@ -302,7 +318,7 @@ impl Body<'_, '_> {
     }
 
     fn unknown_function<T>(&mut self, callee: &Name, args: &[Arg]) -> Option<T> {
-        self.discard(args);
+        self.discard::<()>(args);
         let mut names = self.cx.visible(self.module, |k| {
             !matches!(k, ItemKind::Const(_) | ItemKind::Material(_))
         });

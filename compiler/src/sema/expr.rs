@@ -14,6 +14,9 @@ use super::types::Ty;
 /// What a parameter's default is called; its texture is read only if no scene sets another.
 pub const DEFAULT_OF_PARAMETER: &str = "the default";
 
+/// The medium that is none, unless the name is that of something else.
+pub const NO_MEDIUM: &str = "none";
+
 /// Fields of `SurfacePoint` that a material sees as names.
 pub const INPUTS: [&str; 6] = [
     "position",
@@ -45,7 +48,7 @@ impl Body<'_, '_> {
     pub fn value_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<ExprId> {
         match self.expr_as(expr, ty, what)? {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) | Operand::Medium(_) => None,
+            _ => None,
         }
     }
 
@@ -148,7 +151,12 @@ impl Body<'_, '_> {
             return self.input(name, span);
         }
         let Some(item) = self.cx.lookup(self.module, name) else {
-            return self.unknown_name(name, span);
+            return match (name, self.place) {
+                (NO_MEDIUM, Place::Material | Place::Closures) => {
+                    Some(Operand::Nothing(Ty::Medium))
+                }
+                _ => self.unknown_name(name, span),
+            };
         };
         match self.cx.demand(item, Some(span))? {
             Checked::Const(value, ty) => Some(Operand::Value(self.constant(value, span), ty)),
@@ -163,7 +171,7 @@ impl Body<'_, '_> {
     }
 
     /// A field of the surface point, the only parameter of a material's body.
-    fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
+    pub fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
         let point = self.builder.param(0, span);
         let ir::Type::Struct(id) = self.builder.ty(point) else {
             return None;
@@ -202,6 +210,9 @@ impl Body<'_, '_> {
     }
 
     fn field(&mut self, base: Operand, part: &ast::Name, span: Span) -> Option<Operand> {
+        if let Operand::Material(material) = base {
+            return self.called_output(material, part, span);
+        }
         let Operand::Value(id, ty) = base else {
             let wrong = Diagnostic::new(Code::ClosureUse, span, "a closure has no fields")
                 .expected("a value");

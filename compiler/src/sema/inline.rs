@@ -34,8 +34,8 @@ pub struct Expansion {
     steps: u64,
 }
 
-/// What a called function's body does not see.
-struct Caller {
+/// What the body of a called definition does not see.
+pub struct Caller {
     via: Option<SiteId>,
     module: ModuleId,
     scopes: Vec<Vec<Entry>>,
@@ -77,6 +77,7 @@ impl Body<'_, '_> {
             Ty::Bsdf | Ty::Edf => Operand::Closure(ClosureId(u32::MAX), p.ty),
             Ty::Medium => {
                 let neutral = Interior {
+                    when: None,
                     absorption: self.constant(Const::Float(vec![0.0; 3]), span),
                     ior: self.builder.float(1.0, span),
                     priority: self.constant(Const::Int(0), span),
@@ -146,35 +147,42 @@ impl Body<'_, '_> {
         let ItemKind::Function(f) = &ast.items[item.index].kind else {
             return None;
         };
-        if self.expansion.depth == MAX_DEPTH {
-            let message = "calls of functions that return closures nest too deeply";
-            let deep = Diagnostic::new(Code::TooLarge, span, message)
-                .expected(format!("at most {MAX_DEPTH} calls within each other"));
-            return self.report(deep);
-        }
+        self.may_expand(span)?;
         let known = self.cx.diagnostics.len();
-        let caller = self.enter(item.module, span);
+        let caller = self.enter(item.module, Place::Closures, span);
         let value = self.closure_body(f, &operands, signature.result, span);
         self.leave(caller);
         self.found_in_call(known, span);
         value
     }
 
-    /// Starts on the body of a function of `module`, called at `span`, which sees nothing of its
-    /// caller.
-    fn enter(&mut self, module: ModuleId, span: Span) -> Caller {
+    /// Reports calls that nest too deeply.
+    pub fn may_expand(&mut self, span: Span) -> Option<()> {
+        if self.expansion.depth < MAX_DEPTH {
+            return Some(());
+        }
+        let message = "calls of materials and of functions that return closures nest too deeply";
+        let deep = Diagnostic::new(Code::TooLarge, span, message)
+            .expected(format!("at most {MAX_DEPTH} calls within each other"));
+        self.report(deep)
+    }
+
+    /// Starts on the body of a definition of `module`, called at `span`, which sees nothing of its
+    /// caller and may say what can be said in `place`.
+    pub fn enter(&mut self, module: ModuleId, place: Place, span: Span) -> Caller {
         self.expansion.depth += 1;
         Caller {
             via: self.builder.enter_call(span),
             module: std::mem::replace(&mut self.module, module),
             scopes: std::mem::replace(&mut self.scopes, vec![Vec::new()]),
             fixed_scopes: std::mem::take(&mut self.fixed_scopes),
-            place: std::mem::replace(&mut self.place, Place::Closures),
+            place: std::mem::replace(&mut self.place, place),
             loops: std::mem::take(&mut self.loops),
         }
     }
 
-    fn leave(&mut self, caller: Caller) {
+    /// Goes on where [`Body::enter`] was called.
+    pub fn leave(&mut self, caller: Caller) {
         self.expansion.depth -= 1;
         self.builder.set_via(caller.via);
         self.module = caller.module;
@@ -186,7 +194,7 @@ impl Body<'_, '_> {
 
     /// Keeps what only this call brought to light, from position `known` on: the rest was
     /// reported when the definition was checked.
-    fn found_in_call(&mut self, known: usize, call: Span) {
+    pub fn found_in_call(&mut self, known: usize, call: Span) {
         let found = self.cx.diagnostics.split_off(known);
         for new in found {
             let same = |old: &Diagnostic| {
@@ -218,7 +226,8 @@ impl Body<'_, '_> {
             return Some(());
         }
         if before {
-            let message = "calls of functions that return closures expand to too much";
+            let message =
+                "calls of materials and of functions that return closures expand to too much";
             let large = Diagnostic::new(Code::TooLarge, span, message)
                 .expected(format!(
                     "at most {MAX_STEPS} expressions a material, {MAX_STEPS_IN_ALL} in all"

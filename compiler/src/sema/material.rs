@@ -1,5 +1,7 @@
 //! Checking materials: parameters, patterns and outputs.
 
+use std::sync::Arc;
+
 use crate::ast::{self, Expr, ItemKind};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::{Builder, const_type};
@@ -8,9 +10,10 @@ use crate::parser;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
+use super::called::{self, Declared, MaterialSignature};
 use super::modules::{ItemRef, ModuleId, list};
 use super::types::{NAMED, Ty};
-use super::{Checker, expr};
+use super::{Checked, Checker, expr};
 
 impl Checker<'_> {
     /// The material called `name` in a file, or its only one.
@@ -48,22 +51,34 @@ impl Checker<'_> {
             .position(|i| i.name.node == wanted && is_material(&i))
     }
 
-    /// Checks the material at `index` of a file.
+    /// Checks the material at `index` of a file, once.
     pub fn material(&mut self, module: ModuleId, index: usize) -> Option<Material> {
+        let item = ItemRef { module, index };
+        if let Some(known) = self.materials.get(&item) {
+            return known.clone();
+        }
+        let Checked::Material(declared) = self.demand(item, None)? else {
+            return None;
+        };
+        self.enter_material(item, None)?;
+        let material = self.new_material(module, index, &declared);
+        self.leave_material();
+        self.materials.insert(item, material.clone());
+        material
+    }
+
+    fn new_material(
+        &mut self,
+        module: ModuleId,
+        index: usize,
+        declared: &MaterialSignature,
+    ) -> Option<Material> {
         let ast = self.ast(module);
         let item = &ast.items[index];
         let ItemKind::Material(material) = &item.kind else {
             return None;
         };
-        if self.broken.contains(&ItemRef { module, index }) {
-            return None;
-        }
         let point = self.core_struct("SurfacePoint")?;
-        let params: Vec<Option<MaterialParam>> = material
-            .params
-            .iter()
-            .map(|p| self.material_param(module, p))
-            .collect();
         let input = ir::Local {
             name: "point".into(),
             ty: Type::Struct(point),
@@ -74,7 +89,7 @@ impl Checker<'_> {
             Builder::new(item.name.node.as_str(), vec![input], item.span),
         );
         body.place = Place::Material;
-        body.bind_params(&material.params, &params);
+        body.bind_params(&material.params, declared);
         let ok = body.scoped(|cx| cx.statements(&material.body));
         let scope = body.scopes.pop().unwrap_or_default();
         body.report_unused(scope);
@@ -91,7 +106,7 @@ impl Checker<'_> {
         Some(Material {
             name: item.name.node.clone(),
             docs: item.docs.clone(),
-            params: params.into_iter().collect::<Option<Vec<_>>>()?,
+            params: called::settable(declared)?,
             body: function,
             closures,
             surface: outputs.surface,
@@ -102,11 +117,18 @@ impl Checker<'_> {
         })
     }
 
-    fn material_param(
+    /// The parameters of a material.
+    pub(super) fn material_signature(
         &mut self,
         module: ModuleId,
-        p: &ast::MaterialParam,
-    ) -> Option<MaterialParam> {
+        material: &ast::Material,
+    ) -> Checked {
+        let params = material.params.iter();
+        let declared = params.map(|p| self.material_param(module, p)).collect();
+        Checked::Material(Arc::new(declared))
+    }
+
+    fn material_param(&mut self, module: ModuleId, p: &ast::MaterialParam) -> Option<Declared> {
         let ty = self.type_name(module, &p.ty)?;
         let Some((surface_type, _)) = NAMED
             .iter()
@@ -121,6 +143,11 @@ impl Checker<'_> {
             self.report(wrong);
             return None;
         };
+        if let ast::ExprKind::Name(input) = &p.default.kind
+            && expr::INPUTS.contains(&input.as_str())
+        {
+            return self.connected_param(p, ty, input);
+        }
         let default = self.constant(module, &p.default, ty, expr::DEFAULT_OF_PARAMETER)?;
         let range = match &p.range {
             Some((low, high)) => Some(self.range(module, low, high, ty)?),
@@ -136,7 +163,23 @@ impl Checker<'_> {
             span: p.span,
         };
         self.in_range(&param, &param.default, p.default.span, "the default")
-            .then_some(param)
+            .then_some(Declared::Settable(param, ty))
+    }
+
+    /// A parameter whose default is an input of the surface.
+    fn connected_param(&mut self, p: &ast::MaterialParam, ty: Ty, input: &str) -> Option<Declared> {
+        if let Some((low, high)) = &p.range {
+            let message = format!("`{}` is an input by default and has no range", p.name.node);
+            let wrong = Diagnostic::new(Code::Unsupported, low.span.to(high.span), message)
+                .expected(format!("`param {}: {} = {input};`", p.name.node, p.ty.node));
+            self.report(wrong);
+            return None;
+        }
+        Some(Declared::Connected {
+            name: p.name.node.clone(),
+            ty,
+            input: input.to_owned(),
+        })
     }
 
     fn range(&mut self, module: ModuleId, low: &Expr, high: &Expr, ty: Ty) -> Option<(f64, f64)> {
@@ -160,7 +203,13 @@ impl Checker<'_> {
     }
 
     /// Is a value within a parameter's range? Reports it if not.
-    fn in_range(&mut self, param: &MaterialParam, value: &Const, span: Span, what: &str) -> bool {
+    pub(super) fn in_range(
+        &mut self,
+        param: &MaterialParam,
+        value: &Const,
+        span: Span,
+        what: &str,
+    ) -> bool {
         let Some((low, high)) = param.range else {
             return true;
         };
@@ -290,24 +339,31 @@ fn scalar_of(value: &Const) -> Option<f64> {
 }
 
 impl Body<'_, '_> {
-    fn bind_params(&mut self, declared: &[ast::MaterialParam], checked: &[Option<MaterialParam>]) {
-        for (index, (p, param)) in declared.iter().zip(checked).enumerate() {
+    fn bind_params(&mut self, params: &[ast::MaterialParam], declared: &MaterialSignature) {
+        for (p, declared) in params.iter().zip(declared.iter()) {
             if expr::INPUTS.contains(&p.name.node.as_str()) {
                 let message = format!("`{}` is an input of every material", p.name.node);
                 self.report::<()>(
                     Diagnostic::new(Code::Duplicate, p.name.span, message).expected("another name"),
                 );
             }
-            let binding = param.as_ref().and_then(|param| {
-                let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
-                let id = self
-                    .builder
-                    .add(ExprKind::Uniform(index as u32), param.ty, p.name.span);
+            let operand = declared.as_ref().and_then(|d| self.own_param(d, p));
+            let binding = operand.map_or(Binding::Broken, Binding::Fixed);
+            self.bind(&p.name, binding, operand.is_some());
+        }
+    }
+
+    /// What a parameter stands for where the material is checked on its own.
+    fn own_param(&mut self, declared: &Declared, p: &ast::MaterialParam) -> Option<Operand> {
+        match declared {
+            Declared::Settable(param, ty) => {
+                let uniform = ExprKind::Uniform(self.ranges.len() as u32);
+                self.ranges.push(param.range);
+                let id = self.builder.add(uniform, param.ty, p.name.span);
                 self.builder.name(id, &p.name.node);
-                Some(Binding::Fixed(Operand::Value(id, *ty)))
-            });
-            let watched = binding.is_some();
-            self.bind(&p.name, binding.unwrap_or(Binding::Broken), watched);
+                Some(Operand::Value(id, *ty))
+            }
+            Declared::Connected { ty, input, .. } => self.connected(input, *ty, p.default.span),
         }
     }
 }

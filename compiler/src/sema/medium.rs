@@ -47,6 +47,7 @@ impl Body<'_, '_> {
         let greatest = (0.0, f64::from(MAX_PRIORITY));
         let priority = self.limited(*priority, "priority", greatest, "")?;
         self.media.push(Interior {
+            when: None,
             absorption,
             ior,
             priority,
@@ -99,8 +100,17 @@ impl Body<'_, '_> {
     /// The medium of an `if`: the first where `cond` holds, else the second.
     pub fn choose_medium(&mut self, cond: ExprId, a: usize, b: usize, span: Span) -> Operand {
         let (a, b) = (self.media[a], self.media[b]);
+        let when = match (a.when, b.when) {
+            (None, None) => None,
+            (x, y) => {
+                let always = self.constant(Const::Bool(true), span);
+                let either = [cond, x.unwrap_or(always), y.unwrap_or(always)];
+                Some(self.builder.op(Op::Select, &either, span))
+            }
+        };
         let mut select = |x, y| self.builder.op(Op::Select, &[cond, x, y], span);
         let chosen = Interior {
+            when,
             absorption: select(a.absorption, b.absorption),
             ior: select(a.ior, b.ior),
             priority: select(a.priority, b.priority),
@@ -111,23 +121,43 @@ impl Body<'_, '_> {
     }
 }
 
+impl Body<'_, '_> {
+    /// The medium `m` where `cond` is `wanted`, and none elsewhere.
+    pub fn medium_when(&mut self, cond: ExprId, wanted: bool, m: usize, span: Span) -> Operand {
+        let mut medium = self.media[m];
+        let mut when = cond;
+        if !wanted {
+            when = self.builder.op(Op::Not, &[when], span);
+        }
+        if let Some(also) = medium.when {
+            when = self.builder.op(Op::And, &[when, also], span);
+        }
+        medium.when = Some(when);
+        self.media.push(medium);
+        Operand::Medium(self.media.len() - 1)
+    }
+}
+
 impl Checker<'_> {
     /// Reports what of the interior of a material with this `body` differs from point to point.
     pub(super) fn check_interior(&mut self, body: &Function, interior: &Interior) -> Option<()> {
         let parts = [
-            ("absorption", interior.absorption),
-            ("ior", interior.ior),
-            ("priority", interior.priority),
+            ("the absorption of the interior", Some(interior.absorption)),
+            ("the ior of the interior", Some(interior.ior)),
+            ("the priority of the interior", Some(interior.priority)),
+            ("whether there is an interior", interior.when),
         ];
         let causes = varying::causes(&self.ir, body);
         let mut ok = Some(());
         for (name, id) in parts {
-            let Some(cause) = causes.of(id) else { continue };
+            let Some(cause) = id.and_then(|id| causes.of(id)) else {
+                continue;
+            };
             let (span, what) = match cause {
                 Cause::Input(span, input) => (*span, format!("`{input}`")),
                 Cause::Texture(span) => (*span, "a texture".into()),
             };
-            let message = format!("the {name} of the interior depends on {what}");
+            let message = format!("{name} depends on {what}");
             let varies = Diagnostic::new(Code::VaryingMedium, span, message)
                 .expected("parameters and constants only")
                 .hint("a path crosses the inside between surfaces, where it is at no point of one; vary the surface instead")

@@ -15,6 +15,7 @@ use crate::source::{SourceMap, Span};
 
 mod body;
 mod call;
+mod called;
 mod closure;
 mod constant;
 mod convert;
@@ -30,6 +31,7 @@ mod tree;
 pub mod types;
 mod varying;
 
+use called::MaterialSignature;
 pub use modules::{ItemRef, ModuleId, std_path};
 use modules::{Loading, ModuleData};
 use types::Ty;
@@ -49,6 +51,10 @@ pub struct Checker<'a> {
     loading: BTreeMap<String, Loading>,
     core: BTreeMap<String, ItemRef>,
     checked: BTreeMap<ItemRef, Checked>,
+    /// Materials that were checked on their own.
+    materials: BTreeMap<ItemRef, Option<ir::Material>>,
+    /// Materials being checked, each called by the one before it.
+    expanding: Vec<ItemRef>,
     /// Definitions with errors of syntax, which are not checked.
     broken: BTreeSet<ItemRef>,
     /// Signatures of `ir.functions` that a call can name.
@@ -78,6 +84,8 @@ enum Checked {
     Closure(ClosureDefId, Ty),
     /// A function that returns a closure.
     ClosureFunction(Arc<Signature>),
+    /// A material, by its parameters.
+    Material(MaterialSignature),
     Const(Const, Ty),
 }
 
@@ -109,6 +117,8 @@ impl<'a> Checker<'a> {
             loading: BTreeMap::new(),
             core: BTreeMap::new(),
             checked: BTreeMap::new(),
+            materials: BTreeMap::new(),
+            expanding: Vec::new(),
             broken: BTreeSet::new(),
             signatures: BTreeMap::new(),
             fields: Vec::new(),
@@ -132,7 +142,7 @@ impl<'a> Checker<'a> {
         self.modules[module.0].ast.clone()
     }
 
-    /// Checks every definition of a file but its materials, used or not.
+    /// Checks every definition of a file, used or not; of its materials, the parameters only.
     pub fn check_items(&mut self, module: ModuleId) {
         for index in 0..self.ast(module).items.len() {
             if self.has_enough_errors() {
@@ -194,7 +204,8 @@ impl<'a> Checker<'a> {
         self.errors >= MAX_ERRORS
     }
 
-    /// Checks an item if that has not happened; `None` if it does not check or is a material.
+    /// Checks an item if that has not happened, of a material its parameters; `None` if it does
+    /// not check.
     fn demand(&mut self, item: ItemRef, asked: Option<Span>) -> Option<Checked> {
         if self.broken.contains(&item) {
             return None;
@@ -217,7 +228,7 @@ impl<'a> Checker<'a> {
             ItemKind::Struct(fields) => self.structure(item.module, definition, fields),
             ItemKind::Closure(c) => self.closure_def(item.module, definition, c),
             ItemKind::Const(c) => self.constant_item(item.module, c),
-            ItemKind::Material(_) => None,
+            ItemKind::Material(m) => Some(self.material_signature(item.module, m)),
         });
         self.checked
             .insert(item, checked.clone().unwrap_or(Checked::Failed));
@@ -326,6 +337,7 @@ impl<'a> Checker<'a> {
         match ty {
             Ty::Struct(id) => self.ir.structs[id.index()].name.clone(),
             Ty::Error => "unknown".into(),
+            Ty::Material => "material".into(),
             named => types::NAMED
                 .iter()
                 .find(|(_, t)| *t == named)

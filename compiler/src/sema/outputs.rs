@@ -2,16 +2,19 @@
 
 use crate::ast::{self, Expr, Name};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::{ClosureId, ExprId, Interior};
+use crate::ir::{ClosureId, Const, ExprId, Interior};
 use crate::ops::Op;
 use crate::source::Span;
 
-use super::body::{Binding, Body, Operand};
+use super::body::{Binding, Body, Operand, Place};
 use super::modules::list;
 use super::types::Ty;
 
+/// The name that stands for all outputs together. A keyword, so that nothing else has it.
+pub const WHOLE: &str = "material";
+
 /// The outputs of a material with their types.
-const OUTPUTS: [(&str, Ty); 4] = [
+pub const OUTPUTS: [(&str, Ty); 4] = [
     ("surface", Ty::Bsdf),
     ("emission", Ty::Edf),
     ("interior", Ty::Medium),
@@ -54,23 +57,9 @@ impl Body<'_, '_> {
             self.expr(value);
             return self.unknown_output(name, at);
         };
-        if op.is_some() || self.scopes.len() > 2 {
-            let wrong = Diagnostic::new(
-                Code::NotAssignable,
-                at,
-                format!("`{name}` is assigned once, outside branches and loops"),
-            )
-            .expected(format!("`{name} = ...;` directly in the material"))
-            .hint("choose between closures with `if c { a } else { b }` or `mix(a, b, t)`");
-            return self.report(wrong);
-        }
+        self.directly(name, at, op)?;
         let mut operand = self.expr_as(value, *ty, &format!("`{name}`"))?;
-        if let Some((_, _, first)) = self.outputs.iter().find(|o| o.0 == *name) {
-            let twice = Diagnostic::new(Code::Duplicate, at, format!("`{name}` is assigned twice"))
-                .expected("one assignment")
-                .label(*first, "first assigned here");
-            return self.report(twice);
-        }
+        self.first_time(name, at)?;
         if let Operand::Closure(root, _) = operand {
             self.check_tree(root, value.span)?;
         }
@@ -79,6 +68,61 @@ impl Body<'_, '_> {
         }
         self.outputs.push((name, operand, at));
         Some(())
+    }
+
+    /// `material = ...;`: all outputs of a material that is called.
+    pub fn whole(&mut self, at: Span, op: Option<ast::BinaryOp>, value: &Expr) -> Option<()> {
+        if self.place != Place::Material {
+            let message = "only a material assigns its outputs";
+            let wrong = Diagnostic::new(Code::NotAssignable, at, message)
+                .expected("`material = ...;` directly in a material")
+                .hint("end with the closure that the function returns");
+            return self.report(wrong);
+        }
+        self.directly(WHOLE, at, op)?;
+        let operand = self.expr_as(value, Ty::Material, "`material`")?;
+        let Operand::Material(called) = operand else {
+            return None;
+        };
+        for (index, (name, ty)) in OUTPUTS.iter().enumerate() {
+            self.first_time(name, at)?;
+            let operand = self.called[called][index].unwrap_or(Operand::Nothing(*ty));
+            self.outputs.push((name, operand, at));
+        }
+        Some(())
+    }
+
+    /// Outputs are assigned whole, where nothing decides whether or how often.
+    fn directly(&mut self, name: &str, at: Span, op: Option<ast::BinaryOp>) -> Option<()> {
+        if op.is_none() && self.scopes.len() <= 2 {
+            return Some(());
+        }
+        let message = format!("`{name}` is assigned once, outside branches and loops");
+        let wrong = Diagnostic::new(Code::NotAssignable, at, message)
+            .expected(format!("`{name} = ...;` directly in the material"))
+            .hint("choose between closures with `if c { a } else { b }` or `mix(a, b, t)`");
+        self.report(wrong)
+    }
+
+    /// Outputs are assigned once.
+    fn first_time(&mut self, name: &str, at: Span) -> Option<()> {
+        let Some((_, _, first)) = self.outputs.iter().find(|o| o.0 == name) else {
+            return Some(());
+        };
+        let mut twice = Diagnostic::new(Code::Duplicate, at, format!("`{name}` is assigned twice"))
+            .expected("one assignment")
+            .label(*first, "first assigned here");
+        let is_whole = |span: Span| {
+            let text = &self.cx.sources.file(span.file).text;
+            text.get(span.range()) == Some(WHOLE)
+        };
+        if is_whole(at) || is_whole(*first) {
+            twice = twice.hint(
+                "`material = ...;` assigns all outputs; to change one, name the call with `let m` \
+                 and write `surface = m.surface;` and so on",
+            );
+        }
+        self.report(twice)
     }
 
     fn unknown_output<T>(&mut self, name: &str, at: Span) -> Option<T> {
@@ -108,7 +152,7 @@ impl Body<'_, '_> {
                 _ => None,
             },
             opacity: match find("opacity") {
-                Some(Operand::Value(id, _)) => Some(id),
+                Some(Operand::Value(id, _)) if !self.is_one(id) => Some(id),
                 _ => None,
             },
         };
@@ -116,6 +160,11 @@ impl Body<'_, '_> {
             return self.no_output(name, &assigned);
         }
         Some(outputs)
+    }
+
+    /// Is a value the constant 1?
+    fn is_one(&self, id: ExprId) -> bool {
+        matches!(self.builder.function().constant(id), Some(Const::Float(v)) if v == &[1.0])
     }
 
     /// Nothing scatters or emits. An output that did not check has been reported already.

@@ -7,6 +7,7 @@ use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
+use super::outputs::WHOLE;
 use super::types::{Ty, arithmetic};
 
 /// Most turns that nested loops may take together.
@@ -70,17 +71,6 @@ impl Body<'_, '_> {
             None => operand,
         };
         match operand {
-            Operand::Closure(..) | Operand::Medium(_) if mutable => {
-                let wrong = Diagnostic::new(
-                    Code::ClosureUse,
-                    name.span,
-                    "a closure cannot be a variable",
-                )
-                .expected("`let`")
-                .hint("name it with `let`; choose between closures with `if` or `mix`");
-                self.report(wrong)
-            }
-            Operand::Closure(..) | Operand::Medium(_) => Some(Binding::Fixed(operand)),
             Operand::Value(id, ty) if mutable => {
                 let local = self.builder.local(&name.node, ty.ir()?);
                 self.builder.store(local, id);
@@ -90,6 +80,17 @@ impl Body<'_, '_> {
                 self.builder.name(id, &name.node);
                 Some(Binding::Fixed(operand))
             }
+            _ if mutable => {
+                let wrong = Diagnostic::new(
+                    Code::ClosureUse,
+                    name.span,
+                    "a closure cannot be a variable",
+                )
+                .expected("`let`")
+                .hint("name it with `let`; choose between closures with `if` or `mix`");
+                self.report(wrong)
+            }
+            _ => Some(Binding::Fixed(operand)),
         }
     }
 
@@ -101,6 +102,7 @@ impl Body<'_, '_> {
         span: Span,
     ) -> Option<()> {
         match &place.kind {
+            ExprKind::Name(name) if name == WHOLE => self.whole(place.span, op, value),
             ExprKind::Name(name) => {
                 if self.place == Place::Material && self.means_output(name) {
                     return self.output(name, place.span, op, value);
@@ -153,7 +155,7 @@ impl Body<'_, '_> {
         };
         match self.coerce(new, place_ty, value.span, "the value")? {
             Operand::Value(id, _) => Some(id),
-            Operand::Closure(..) | Operand::Medium(_) => None,
+            _ => None,
         }
     }
 

@@ -7,6 +7,7 @@ use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
+use super::expr::NO_MEDIUM;
 use super::types::Ty;
 
 /// Most lobes of a tree before those that cannot contribute are left out.
@@ -24,11 +25,23 @@ pub struct TreeSize {
 impl TreeSize {
     const ONE: TreeSize = TreeSize { lobes: 1, depth: 1 };
 }
+
+/// A closure to combine, if there is one, with its kind and place.
+type Part = (Option<ClosureId>, Ty, Span);
+
+fn closure_or_nothing(closure: Option<ClosureId>, ty: Ty) -> Operand {
+    closure.map_or(Operand::Nothing(ty), |id| Operand::Closure(id, ty))
+}
+
 impl Body<'_, '_> {
-    fn add_closure(&mut self, closure: Closure, ty: Ty) -> Operand {
+    fn add(&mut self, closure: Closure) -> ClosureId {
         self.tree_sizes.push(self.tree_size(&closure));
         self.closures.push(closure);
-        Operand::Closure(ClosureId(self.closures.len() as u32 - 1), ty)
+        ClosureId(self.closures.len() as u32 - 1)
+    }
+
+    fn add_closure(&mut self, closure: Closure, ty: Ty) -> Operand {
+        Operand::Closure(self.add(closure), ty)
     }
 
     fn tree_size(&self, closure: &Closure) -> TreeSize {
@@ -117,7 +130,7 @@ impl Body<'_, '_> {
     }
 
     /// Closures of arguments without names, all of one type.
-    fn closures_of(&mut self, what: &str, args: &[Arg]) -> Option<Vec<(ClosureId, Ty, Span)>> {
+    fn closures_of(&mut self, what: &str, args: &[Arg]) -> Option<Vec<Part>> {
         let mut all = Vec::new();
         let mut ok = true;
         for arg in args {
@@ -133,7 +146,8 @@ impl Body<'_, '_> {
                     self.report::<()>(named);
                     ok = false;
                 }
-                Some(Operand::Closure(id, ty)) => all.push((id, ty, at)),
+                Some(Operand::Closure(id, ty)) => all.push((Some(id), ty, at)),
+                Some(Operand::Nothing(ty)) if ty != Ty::Medium => all.push((None, ty, at)),
                 Some(other) => {
                     let found = self.cx.a_type(other.ty());
                     let message = format!("`{what}` combines bsdfs and edfs, and this is {found}");
@@ -142,6 +156,9 @@ impl Body<'_, '_> {
                     self.report::<()>(match other {
                         Operand::Value(..) => {
                             wrong.hint("a weight is multiplied: `w * diffuse(...)`")
+                        }
+                        Operand::Material(_) => {
+                            wrong.hint("take the surface of the material: `m.surface`")
                         }
                         _ => wrong.hint("a medium is assigned to `interior`"),
                     });
@@ -181,11 +198,14 @@ impl Body<'_, '_> {
         }
         let mut stack = bottom;
         for &(top, ..) in above.iter().rev() {
-            if let Operand::Closure(id, _) = self.add_closure(Closure::Layer(top, stack), ty) {
-                stack = id;
-            }
+            stack = match (top, stack) {
+                (Some(top), Some(under)) => Some(self.add(Closure::Layer(top, under))),
+                // What is black stays so under a coat, and the coat is what is seen.
+                (Some(top), None) if ty == Ty::Bsdf => Some(top),
+                (_, stack) => stack,
+            };
         }
-        Some(Operand::Closure(stack, ty))
+        Some(closure_or_nothing(stack, ty))
     }
 
     /// `mix(a, b, t)` of closures.
@@ -216,7 +236,16 @@ impl Body<'_, '_> {
         };
         self.same_kind(*xt, *yt, *at)?;
         let weight = self.builder.op(Op::Saturate, &[weight], t.value.span);
-        Some(self.add_closure(Closure::Mix(*x, *y, weight), *xt))
+        let mixed = match (*x, *y) {
+            (Some(x), Some(y)) => Some(self.add(Closure::Mix(x, y, weight))),
+            (Some(x), None) => {
+                let one = self.builder.float(1.0, span);
+                let rest = self.builder.op(Op::Sub, &[one, weight], span);
+                Some(self.add(Closure::Weight(rest, x)))
+            }
+            (None, y) => y.map(|y| self.add(Closure::Weight(weight, y))),
+        };
+        Some(closure_or_nothing(mixed, *xt))
     }
 
     fn require_closures(&mut self, what: &str, span: Span) -> Option<()> {
@@ -255,6 +284,23 @@ impl Body<'_, '_> {
             (BinaryOp::Mul, Operand::Value(w, wt), Operand::Closure(c, ty))
             | (BinaryOp::Mul, Operand::Closure(c, ty), Operand::Value(w, wt)) => {
                 self.weight(w, wt, c, ty, span)
+            }
+            (BinaryOp::Mul, Operand::Value(..), Operand::Nothing(ty))
+            | (BinaryOp::Mul, Operand::Nothing(ty), Operand::Value(..))
+                if ty != Ty::Medium =>
+            {
+                Some(Operand::Nothing(ty))
+            }
+            (
+                BinaryOp::Add,
+                Operand::Nothing(xt),
+                y @ (Operand::Closure(..) | Operand::Nothing(_)),
+            )
+            | (BinaryOp::Add, y @ Operand::Closure(..), Operand::Nothing(xt))
+                if xt != Ty::Medium =>
+            {
+                self.same_kind(y.ty(), xt, span)?;
+                Some(y)
             }
             (BinaryOp::Add, Operand::Closure(x, xt), Operand::Closure(y, yt)) => {
                 self.same_kind(xt, yt, span)?;
@@ -336,16 +382,9 @@ impl Body<'_, '_> {
         let b = self.scoped(|cx| cx.block_value(otherwise, span));
         self.fixed_scopes = outside;
         match (a?.0, b?) {
-            (Operand::Closure(x, xt), (Operand::Closure(y, yt), at)) => {
-                self.same_kind(xt, yt, at)?;
-                Some(self.add_closure(Closure::Select(cond, x, y), xt))
-            }
-            (Operand::Medium(x), (Operand::Medium(y), _)) => {
-                Some(self.choose_medium(cond, x, y, span))
-            }
             (a, (b, at)) if a.ty().is_closure() && b.ty().is_closure() => {
                 self.same_kind(a.ty(), b.ty(), at)?;
-                None
+                self.choose_closure(cond, a, b, span)
             }
             (_, (_, at)) => {
                 let wrong = Diagnostic::new(
@@ -358,6 +397,40 @@ impl Body<'_, '_> {
                 self.report(wrong)
             }
         }
+    }
+
+    /// The first of two closures of one kind where `cond` holds, else the second.
+    pub fn choose_closure(
+        &mut self,
+        cond: ExprId,
+        a: Operand,
+        b: Operand,
+        span: Span,
+    ) -> Option<Operand> {
+        use Operand::{Closure as C, Material, Medium, Nothing};
+        if let Some(Const::Bool(holds)) = self.builder.function().constant(cond)
+            && matches!((a, b), (Nothing(_), _) | (_, Nothing(_)) | (Medium(_), _))
+        {
+            return Some(if *holds { a } else { b });
+        }
+        Some(match (a, b) {
+            (C(x, ty), C(y, _)) => self.add_closure(Closure::Select(cond, x, y), ty),
+            (C(x, ty), Nothing(_)) | (Nothing(_), C(x, ty)) => {
+                let (one, zero) = (self.builder.float(1.0, span), self.builder.float(0.0, span));
+                let share = match a {
+                    Nothing(_) => [cond, zero, one],
+                    _ => [cond, one, zero],
+                };
+                let share = self.builder.op(Op::Select, &share, span);
+                self.add_closure(Closure::Weight(share, x), ty)
+            }
+            (Medium(x), Medium(y)) => self.choose_medium(cond, x, y, span),
+            (Medium(x), Nothing(_)) => self.medium_when(cond, true, x, span),
+            (Nothing(_), Medium(y)) => self.medium_when(cond, false, y, span),
+            (Material(x), Material(y)) => return self.choose_material(cond, x, y, span),
+            (nothing @ Nothing(_), _) => nothing,
+            _ => return None,
+        })
     }
 
     /// Does a block end in a closure? Seen from the syntax, before anything is checked.
@@ -381,15 +454,15 @@ impl Body<'_, '_> {
         match &expr.kind {
             ExprKind::Name(name) => {
                 let mut entries = self.scopes.iter().rev().flat_map(|s| s.iter().rev());
-                let entry = entries.find(|e| e.name == *name);
-                matches!(
-                    entry.map(|e| e.binding),
-                    Some(Binding::Fixed(Operand::Closure(..) | Operand::Medium(_)))
-                )
+                match entries.find(|e| e.name == *name).map(|e| e.binding) {
+                    Some(Binding::Fixed(operand)) => operand.ty().is_closure(),
+                    Some(_) => false,
+                    None => name == NO_MEDIUM && self.cx.lookup(self.module, name).is_none(),
+                }
             }
             ExprKind::Call { callee, args } => match self.cx.lookup(self.module, &callee.node) {
                 Some(item) => match &self.cx.item(item).kind {
-                    ItemKind::Closure(_) => true,
+                    ItemKind::Closure(_) | ItemKind::Material(_) => true,
                     ItemKind::Function(f) => returns_closure(f),
                     _ => false,
                 },
@@ -405,6 +478,7 @@ impl Body<'_, '_> {
                         .as_ref()
                         .is_some_and(|b| self.is_closure_block(b))
             }
+            ExprKind::Field(base, part) => part.node != "opacity" && self.is_closure(base),
             ExprKind::Block(block) => self.is_closure_block(block),
             _ => false,
         }

@@ -28,6 +28,8 @@ pub enum Ty {
     Bsdf,
     Edf,
     Medium,
+    /// What a called material assigns; no name means it.
+    Material,
     /// The type of what did not check; it fits everywhere, so that one mistake is reported once.
     Error,
 }
@@ -73,7 +75,7 @@ impl Ty {
             Ty::Vec4 => ir::Type::Vec4,
             Ty::Mat3 => ir::Type::Mat3,
             Ty::Struct(id) => ir::Type::Struct(id),
-            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Error => return None,
+            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => return None,
         })
     }
 
@@ -94,7 +96,7 @@ impl Ty {
 
     /// A type of what is combined and assigned to outputs, but is no value; closures for short.
     pub fn is_closure(self) -> bool {
-        matches!(self, Ty::Bsdf | Ty::Edf | Ty::Medium)
+        matches!(self, Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material)
     }
 
     /// Can a value of this type be given where `to` is needed?

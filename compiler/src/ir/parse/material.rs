@@ -159,7 +159,7 @@ impl Body<'_> {
         }
     }
 
-    /// `medium(absorption, ior, priority)`
+    /// `medium(absorption, ior, priority) when condition`
     fn medium(&mut self, start: Span) -> Result<Interior> {
         self.p.expect_word("medium")?;
         self.p.expect("(")?;
@@ -169,7 +169,12 @@ impl Body<'_> {
         self.p.expect(",")?;
         let priority = self.operand()?;
         self.p.expect(")")?;
+        let when = match self.p.eat_word("when") {
+            true => Some(self.operand()?),
+            false => None,
+        };
         Ok(Interior {
+            when,
             absorption,
             ior,
             priority,

@@ -30,7 +30,11 @@ pub(super) fn named(names: &Names<'_>, m: &Material) -> String {
     if let Some(medium) = &m.interior {
         let parts = [medium.absorption, medium.ior, medium.priority];
         let parts = parts.map(|id| printer.operand(id)).join(", ");
-        let _ = writeln!(out, "    interior = medium({parts})");
+        let when = medium
+            .when
+            .map(|id| format!(" when {}", printer.operand(id)));
+        let when = when.unwrap_or_default();
+        let _ = writeln!(out, "    interior = medium({parts}){when}");
     }
     if let Some(opacity) = m.opacity {
         let _ = writeln!(out, "    opacity = {}", printer.operand(opacity));

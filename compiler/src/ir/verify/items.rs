@@ -124,6 +124,9 @@ pub fn material(module: &Module, m: &Material) -> Result<(), Problem> {
         tree.operand(medium.absorption, &[Type::Vec3])?;
         tree.operand(medium.ior, &[Type::Float])?;
         tree.operand(medium.priority, &[Type::Int])?;
+        if let Some(when) = medium.when {
+            tree.operand(when, &[Type::Bool])?;
+        }
     }
     m.opacity
         .map_or(Ok(()), |id| tree.operand(id, &[Type::Float]))

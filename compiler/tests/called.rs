@@ -1,0 +1,213 @@
+//! Materials that call materials: a call means what the callee's statements mean in its place, an
+//! argument is what it was given, and what a caller leaves at its default costs nothing.
+
+mod common;
+
+use common::asked::{Asked, direction, near, point4};
+use impasto_compiler::abi::{Emission, Medium};
+use impasto_compiler::ir::{Expr, ExprKind};
+use impasto_compiler::ops::Op;
+use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag};
+
+/// A model with a coat, an inside and light of its own, in a file that others import it from.
+const MODEL: &str = "
+use std::bsdf::{diffuse, mirror, smooth_dielectric};
+use std::edf::uniform;
+/// Hides nothing.
+const DIM: float = 0.5;
+fn dimmed(c: color) -> color = DIM * c;
+material model {
+    param tint: color = color(0.8, 0.4, 0.2) in 0.0 .. 1.0;
+    param coat: float = 0.0 in 0.0 .. 1.0;
+    param cover: float = 1.0 in 0.0 .. 1.0;
+    param glow: float = 0.0;
+    param clear: bool = false;
+    param bent: normal = normal;
+    let under = dimmed(tint * (0.5 + 0.5 * uv.x));
+    surface = layer(coat * mirror(1.5, normal: bent), diffuse(under, normal: bent));
+    emission = glow * uniform(2.0);
+    opacity = cover;
+    interior = if clear { medium(absorption: tint, ior: 1.5) } else { none };
+}";
+
+fn compiled(user: &str, requests: &[MaterialRequest]) -> Program {
+    let mut loader = MemoryLoader::default();
+    loader.add("model.impasto", MODEL);
+    loader.add("user.impasto", user);
+    let compiled = compile(requests, &mut loader);
+    let text = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
+    compiled.program.unwrap_or_else(|| panic!("{text}"))
+}
+
+/// The only material of a text that may import the model.
+fn user(text: &str) -> Asked {
+    let text = format!("use model::model;\nuse std::bsdf::{{diffuse, mirror}};\n{text}");
+    let request = MaterialRequest {
+        material: Some("m".into()),
+        ..MaterialRequest::new("m", "user.impasto")
+    };
+    Asked {
+        program: compiled(&text, &[request]),
+    }
+}
+
+/// The model as a scene names it, with parameters set to constants.
+fn model(params: &[(&str, &str)]) -> Asked {
+    let params = params.iter().map(|(n, v)| (n.to_string(), v.to_string()));
+    let request = MaterialRequest {
+        params: params.collect(),
+        parameters: Parameters::Baked,
+        ..MaterialRequest::new("m", "model.impasto")
+    };
+    Asked {
+        program: compiled("", &[request]),
+    }
+}
+
+/// Both answer the same numbers everywhere.
+fn same(a: &Asked, b: &Asked) {
+    for i in 0..64 {
+        let u = point4(i);
+        let wo = direction(85.0 * u[0], 6.0 * u[1]);
+        let wl = direction(85.0 * u[2], 6.0 * u[3]);
+        let (x, y) = (a.ask(wo, wl, u), b.ask(wo, wl, u));
+        assert_eq!(format!("{x:?}"), format!("{y:?}"), "sample {i}");
+    }
+}
+
+#[test]
+fn a_call_is_the_material_with_these_arguments() {
+    let called = user("material m { material = model(coat: 0.5, tint: color(0.3), cover: 0.75); }");
+    let set = model(&[("coat", "0.5"), ("tint", "color(0.3)"), ("cover", "0.75")]);
+    same(&called, &set);
+    let positional = user("material m { material = model(color(0.3), 0.5, 0.75); }");
+    same(&positional, &set);
+}
+
+#[test]
+fn defaults_are_constants_that_leave_code_out() {
+    let called = user("material m { material = model(); }");
+    let lobes = |m: &Asked| m.program.compiled()[0].info.lobes;
+    assert_eq!(lobes(&called), 1, "the coat of weight zero is gone");
+    assert_eq!(called.program.instances()[0].info.emission, Emission::None);
+    assert_eq!(called.program.instances()[0].info.medium, None);
+    assert!(!called.program.compiled()[0].info.transmissive);
+    same(&called, &model(&[]));
+    let coated = user("material m { material = model(coat: 0.5); }");
+    assert_eq!(lobes(&coated), 2);
+}
+
+#[test]
+fn the_code_of_a_call_is_that_of_the_material() {
+    let called = user("material m { material = model(coat: 0.5); }").program;
+    let set = model(&[("coat", "0.5")]).program;
+    let count = |p: &Program| p.compiled()[0].evaluate.exprs.len();
+    assert_eq!(count(&called), count(&set));
+}
+
+#[test]
+fn arguments_vary_and_are_held_to_the_range() {
+    let beyond = user("material m { material = model(coat: 3.0 * uv.y); }");
+    let most = user("material m { material = model(coat: 1.0); }");
+    // The point has uv.y = 0.6.
+    same(&beyond, &most);
+    let below = user("material m { material = model(coat: -uv.y); }");
+    let none = user("material m { material = model(coat: 0.0 * uv.y); }");
+    same(&below, &none);
+    let inside = user("material m { material = model(coat: 0.5 * uv.y); }");
+    same(
+        &inside,
+        &user("material m { material = model(coat: 0.3); }"),
+    );
+}
+
+#[test]
+fn a_parameter_passed_on_is_clamped_where_it_can_leave_the_range_only() {
+    let clamps = |text: &str| {
+        let mut loader = MemoryLoader::default();
+        loader.add("model.impasto", MODEL);
+        loader.add("user.impasto", format!("use model::model;\n{text}"));
+        let checked = impasto_compiler::check("user.impasto", &mut loader);
+        let exprs = &checked.checked[0].body.exprs;
+        let clamp = |e: &&Expr| matches!(&e.kind, ExprKind::Op(Op::Clamp, _));
+        exprs.iter().filter(clamp).count()
+    };
+    let within = "material m { param c: float = 0.5 in 0.25 .. 1.0; material = model(coat: c); }";
+    let beyond = "material m { param c: float = 0.5 in 0.25 .. 2.0; material = model(coat: c); }";
+    assert_eq!(clamps(within), 0);
+    assert_eq!(clamps(beyond), 1);
+}
+
+#[test]
+fn outputs_are_fields() {
+    let parts = user(
+        "material m {
+            let a = model(tint: color(0.9), cover: 0.5);
+            let b = model(tint: color(0.1));
+            surface = mix(a.surface, b.surface, 0.25);
+            opacity = a.opacity * b.opacity;
+        }",
+    );
+    let whole = Asked::material(
+        "use std::bsdf::diffuse;
+        material m {
+            let share = 0.5 * (0.5 + 0.5 * uv.x);
+            surface = mix(diffuse(share * 0.9), diffuse(share * 0.1), 0.25);
+            opacity = 0.5;
+        }",
+    );
+    let (wo, wl) = (direction(40.0, 0.3), direction(20.0, 2.0));
+    let (a, b) = (parts.ask(wo, wl, point4(7)), whole.ask(wo, wl, point4(7)));
+    near(
+        a.light_throughput[1],
+        b.light_throughput[1],
+        1e-12,
+        "toward a light",
+    );
+}
+
+#[test]
+fn what_a_material_lacks_is_absent() {
+    let lacking = user(
+        "use std::edf::uniform;
+        private material lamp { emission = uniform(1.0); }
+        material m {
+            let l = lamp();
+            let black = mix(l.surface, l.surface, 0.5);
+            let half = mix(mirror(), if uv.x > 9.0 { mirror() } else { black }, 0.5);
+            surface = layer(half, 0.5 * l.surface) + black;
+            emission = l.emission;
+            interior = l.interior;
+            opacity = l.opacity;
+        }",
+    );
+    let plain = Asked::material(
+        "use std::bsdf::{diffuse, mirror};
+        use std::edf::uniform;
+        material m { surface = 0.5 * mirror(); emission = uniform(1.0); }",
+    );
+    same(&lacking, &plain);
+}
+
+#[test]
+fn an_input_by_default_is_replaced_by_callers() {
+    let bent = user("material m { material = model(bent: normalize(normal + 0.5 * tangent)); }");
+    let flat = user("material m { material = model(bent: normal); }");
+    same(&flat, &model(&[]));
+    let (wo, wl) = (direction(40.0, 0.3), direction(20.0, 2.0));
+    let (a, b) = (bent.ask(wo, wl, point4(3)), flat.ask(wo, wl, point4(3)));
+    assert!((a.light_throughput[0] - b.light_throughput[0]).abs() > 1e-3);
+}
+
+#[test]
+fn an_interior_is_there_where_its_condition_holds() {
+    let request = |clear: &str| MaterialRequest {
+        params: vec![("clear".into(), clear.into())],
+        parameters: Parameters::Table,
+        ..MaterialRequest::new(clear, "model.impasto")
+    };
+    let program = compiled("", &[request("true"), request("false")]);
+    let media: Vec<Option<Medium>> = program.instances().iter().map(|i| i.info.medium).collect();
+    assert!(media[0].is_some_and(|m| m.ior == 1.5), "{media:?}");
+    assert_eq!(media[1], None);
+}
