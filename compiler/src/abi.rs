@@ -2,7 +2,8 @@
 //! of a compiled material, and what a kernel must provide for it.
 //!
 //! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
-//! `stdlib/core/material.impasto`, and printed into every generated module.
+//! `stdlib/core/material.impasto`, and printed into every generated module. Fields that only
+//! `filter_width` needs are left out of modules that read none of them ([`InputSet::declares`]).
 //!
 //! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
 //! `evaluate_` or `emission_`; kernels must not define such names.
@@ -131,4 +132,20 @@ pub struct InputSet {
     pub tangent: bool,
     pub uv: bool,
     pub exterior_ior: bool,
+    /// How position varies over what a ray sees: `footprint_x` and `footprint_y`.
+    pub footprint: bool,
+    /// How texture coordinates do: `footprint_uv_x` and `footprint_uv_y`.
+    pub footprint_uv: bool,
+}
+
+impl InputSet {
+    /// Whether `SurfacePoint` has a field in generated code: all but those that only widths need
+    /// always are there.
+    pub fn declares(&self, field: &str) -> bool {
+        match field {
+            "footprint_x" | "footprint_y" => self.footprint,
+            "footprint_uv_x" | "footprint_uv_y" => self.footprint_uv,
+            _ => true,
+        }
+    }
 }

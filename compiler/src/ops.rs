@@ -1,16 +1,18 @@
 //! The op table: every operation of the language, declared once.
 //!
 //! A row gives an op's text, what operands it takes, what class of hardware cost it has, how it
-//! is written in WGSL, and how it is interpreted. Checking, printing, verifying, folding,
-//! interpretation, code generation and cost all read this table; a row that lacks a column does
-//! not compile.
+//! is written in WGSL, how it is interpreted, and how its result changes with its operands.
+//! Checking, printing, verifying, folding, interpretation, code generation, cost and
+//! differentiation all read this table; a row that lacks a column does not compile.
 
+mod derivative;
 mod meaning;
 
 use crate::ir::Type;
 use crate::ir::value::{Real, Value};
 use meaning::*;
 
+pub use derivative::{Rule, STEEPEST, Tangent};
 pub use meaning::{Kernel, Operands};
 
 /// What operands an op takes and what it gives.
@@ -91,7 +93,7 @@ pub struct OpInfo {
 }
 
 macro_rules! ops {
-    ($($name:ident $text:literal $call:ident $shape:expr, $class:expr, $wgsl:expr, $int:expr, $eval:expr;)*) => {
+    ($($name:ident $text:literal $call:ident $shape:expr, $class:expr, $wgsl:expr, $int:expr, $eval:expr, $derivative:ident;)*) => {
         /// An operation.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[allow(missing_docs)]
@@ -115,6 +117,13 @@ macro_rules! ops {
             }
         }
 
+        impl Op {
+            /// How its result changes with its operands; none if by steps only.
+            fn derivative(self) -> Option<fn(&mut Rule<'_>) -> Tangent> {
+                match self { $(Op::$name => ops!(@rule $derivative)),* }
+            }
+        }
+
         /// What `op` does to `width` components; 0 stands for ints and bools.
         pub fn kernel<F: Real>(op: Op, width: usize) -> Kernel<F> {
             match op {
@@ -131,6 +140,8 @@ macro_rules! ops {
     };
     (@function) => { true };
     (@operator) => { false };
+    (@rule zero) => { None };
+    (@rule $rule:ident) => { Some(derivative::$rule) };
 }
 
 /// The least normal f32: `log` and divisions clamp to it.
@@ -139,149 +150,152 @@ pub const TINY: f64 = f32::MIN_POSITIVE as f64;
 ops! {
     // Arithmetic
     Neg "neg" operator Number(1), Alu(1), Prefix("-"), None,
-        |a| number1(a, |x| -x, i32::wrapping_neg);
+        |a| number1(a, |x| -x, i32::wrapping_neg), neg;
     Add "add" operator Number(2), Alu(1), Infix("+"), None,
-        |a| number2(a, |x, y| x + y, i32::wrapping_add);
+        |a| number2(a, |x, y| x + y, i32::wrapping_add), add;
     Sub "sub" operator Number(2), Alu(1), Infix("-"), None,
-        |a| number2(a, |x, y| x - y, i32::wrapping_sub);
+        |a| number2(a, |x, y| x - y, i32::wrapping_sub), sub;
     Mul "mul" operator Number(2), Alu(1), Infix("*"), None,
-        |a| number2(a, |x, y| x * y, i32::wrapping_mul);
+        |a| number2(a, |x, y| x * y, i32::wrapping_mul), product;
     Div "div" operator Number(2), Special(1),
         Helper("safe_div", "(a: T, b: T) -> T { return select(a / select(b, T(1), b == T(0)), T(0), b == T(0)); }"),
         Some(Helper("safe_div_int", "(a: T, b: T) -> T { return select(a / select(b, T(1), b == T(0)), T(0), b == T(0)); }")),
-        |a| number2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x / y }, |x, y| if y == 0 { 0 } else { x.wrapping_div(y) });
+        |a| number2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x / y }, |x, y| if y == 0 { 0 } else { x.wrapping_div(y) }), div;
     Rem "rem" operator Number(2), Special(2),
         Helper("safe_rem", "(a: T, b: T) -> T { return select(a % select(b, T(1), b == T(0)), T(0), b == T(0)); }"),
         Some(Helper("safe_rem_int", "(a: T, b: T) -> T { return select(a % select(b, T(1), b == T(0)), T(0), b == T(0)); }")),
-        |a| number2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x % y }, |x, y| if y == 0 { 0 } else { x.wrapping_rem(y) });
+        |a| number2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x % y }, |x, y| if y == 0 { 0 } else { x.wrapping_rem(y) }), remainder;
     Mod "mod" function Float(2), Special(2),
         Helper("floor_mod", "(a: T, b: T) -> T { let d = select(b, T(1), b == T(0)); return select(a - d * floor(a / d), T(0), b == T(0)); }"), None,
-        |a| float2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x - y * (x / y).map(f64::floor) });
+        |a| float2(a, |x, y| if is_zero(y) { F::of(0.0) } else { x - y * (x / y).map(f64::floor) }), remainder;
     Min "min" function Number(2), Alu(1), Builtin("min"), None,
-        |a| number2(a, |x, y| if y < x { y } else { x }, i32::min);
+        |a| number2(a, |x, y| if y < x { y } else { x }, i32::min), min;
     Max "max" function Number(2), Alu(1), Builtin("max"), None,
-        |a| number2(a, |x, y| if x < y { y } else { x }, i32::max);
+        |a| number2(a, |x, y| if x < y { y } else { x }, i32::max), max;
     Clamp "clamp" function Number(3), Alu(2),
         Helper("clamp_to", "(x: T, low: T, high: T) -> T { return min(max(x, low), high); }"),
         Some(Helper("clamp_to_int", "(x: T, low: T, high: T) -> T { return min(max(x, low), high); }")),
-        |a| number3(a, |x, l, h| low_of(high_of(x, l), h), |x, l, h| x.max(l).min(h));
+        |a| number3(a, |x, l, h| low_of(high_of(x, l), h), |x, l, h| x.max(l).min(h)), clamp;
     Saturate "saturate" function Float(1), Alu(1), Builtin("saturate"), None,
-        |a| float1(a, |x| low_of(high_of(x, F::of(0.0)), F::of(1.0)));
+        |a| float1(a, |x| low_of(high_of(x, F::of(0.0)), F::of(1.0))), saturate;
     Mix "mix" function Float(3), Alu(2), Builtin("mix"), None,
-        |a| float3(a, |x, y, t| x * (F::of(1.0) - t) + y * t);
+        |a| float3(a, |x, y, t| x * (F::of(1.0) - t) + y * t), mix;
     Step "step" function Float(2), Alu(1), Builtin("step"), None,
-        |a| float2(a, |edge, x| unit(edge <= x));
+        |a| float2(a, |edge, x| unit(edge <= x)), zero;
     Smoothstep "smoothstep" function Float(3), Alu(6),
         Helper("smooth_ramp", "(low: T, high: T, x: T) -> T { let d = high - low; let t = saturate((x - low) / select(d, T(1), d == T(0))); return select(t * t * (T(3) - T(2) * t), step(low, x), d == T(0)); }"), None,
-        |a| float3(a, smoothstep);
+        |a| float3(a, smoothstep), smoothstep;
     Abs "abs" function Number(1), Alu(1), Builtin("abs"), None,
-        |a| number1(a, |x| x.map(f64::abs), i32::wrapping_abs);
+        |a| number1(a, |x| x.map(f64::abs), i32::wrapping_abs), abs;
     Sign "sign" function Float(1), Alu(1), Builtin("sign"), None,
-        |a| float1(a, |x| x.map(|v| if v > 0.0 { 1.0 } else if v < 0.0 { -1.0 } else { 0.0 }));
-    Floor "floor" function Float(1), Alu(1), Builtin("floor"), None, |a| float1(a, |x| x.map(f64::floor));
-    Ceil "ceil" function Float(1), Alu(1), Builtin("ceil"), None, |a| float1(a, |x| x.map(f64::ceil));
-    Round "round" function Float(1), Alu(1), Builtin("round"), None, |a| float1(a, |x| x.map(f64::round_ties_even));
+        |a| float1(a, |x| x.map(|v| if v > 0.0 { 1.0 } else if v < 0.0 { -1.0 } else { 0.0 })), zero;
+    Floor "floor" function Float(1), Alu(1), Builtin("floor"), None, |a| float1(a, |x| x.map(f64::floor)), zero;
+    Ceil "ceil" function Float(1), Alu(1), Builtin("ceil"), None, |a| float1(a, |x| x.map(f64::ceil)), zero;
+    Round "round" function Float(1), Alu(1), Builtin("round"), None, |a| float1(a, |x| x.map(f64::round_ties_even)), zero;
     Fract "fract" function Float(1), Alu(2),
         Helper("fraction", "(x: T) -> T { return min(x - floor(x), T(0.99999994)); }"), None,
-        |a| float1(a, |x| low_of(x - x.map(f64::floor), F::of(0.999_999_94)));
+        |a| float1(a, |x| low_of(x - x.map(f64::floor), F::of(0.999_999_94))), same;
     // Powers and transcendentals
     Sqrt "sqrt" function Float(1), Special(1),
         Helper("safe_sqrt", "(x: T) -> T { return sqrt(max(x, T(0))); }"), None,
-        |a| float1(a, |x| high_of(x, F::of(0.0)).sqrt());
+        |a| float1(a, |x| high_of(x, F::of(0.0)).sqrt()), sqrt;
     InverseSqrt "inverse_sqrt" function Float(1), Special(1),
         Helper("safe_inverse_sqrt", "(x: T) -> T { return select(T(0), inverseSqrt(max(x, T(1.1754944e-38))), x > T(0)); }"), None,
-        |a| float1(a, |x| if x > F::of(0.0) { F::of(1.0) / high_of(x, F::of(TINY)).sqrt() } else { F::of(0.0) });
+        |a| float1(a, |x| if x > F::of(0.0) { F::of(1.0) / high_of(x, F::of(TINY)).sqrt() } else { F::of(0.0) }), inverse_sqrt;
     Exp "exp" function Float(1), Special(1),
         Helper("safe_exp", "(x: T) -> T { return exp(min(x, T(88))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.min(88.0).exp()));
+        |a| float1(a, |x| x.map(|v| v.min(88.0).exp())), exp;
     Exp2 "exp2" function Float(1), Special(1),
         Helper("safe_exp2", "(x: T) -> T { return exp2(min(x, T(127))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.min(127.0).exp2()));
+        |a| float1(a, |x| x.map(|v| v.min(127.0).exp2())), exp2;
     Log "log" function Float(1), Special(1),
         Helper("safe_log", "(x: T) -> T { return log(max(x, T(1.1754944e-38))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.max(TINY).ln()));
+        |a| float1(a, |x| x.map(|v| v.max(TINY).ln())), log;
     Log2 "log2" function Float(1), Special(1),
         Helper("safe_log2", "(x: T) -> T { return log2(max(x, T(1.1754944e-38))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.max(TINY).log2()));
+        |a| float1(a, |x| x.map(|v| v.max(TINY).log2())), log2;
     Pow "pow" function Float(2), Special(2),
         Helper("safe_pow", "(x: T, y: T) -> T { let p = exp2(min(y * log2(max(x, T(1.1754944e-38))), T(127))); return select(select(T(0), p, x > T(0)), T(1), y == T(0)); }"), None,
-        |a| float2(a, |x, y| F::of(power(x.f64(), y.f64())));
-    Sin "sin" function Float(1), Special(1), Builtin("sin"), None, |a| float1(a, |x| x.map(f64::sin));
-    Cos "cos" function Float(1), Special(1), Builtin("cos"), None, |a| float1(a, |x| x.map(f64::cos));
-    Tan "tan" function Float(1), Special(2), Builtin("tan"), None, |a| float1(a, |x| x.map(f64::tan));
+        |a| float2(a, |x, y| F::of(power(x.f64(), y.f64()))), pow;
+    Sin "sin" function Float(1), Special(1), Builtin("sin"), None, |a| float1(a, |x| x.map(f64::sin)), sin;
+    Cos "cos" function Float(1), Special(1), Builtin("cos"), None, |a| float1(a, |x| x.map(f64::cos)), cos;
+    Tan "tan" function Float(1), Special(2), Builtin("tan"), None, |a| float1(a, |x| x.map(f64::tan)), tan;
     Asin "asin" function Float(1), Special(2),
         Helper("safe_asin", "(x: T) -> T { return asin(clamp(x, T(-1), T(1))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.clamp(-1.0, 1.0).asin()));
+        |a| float1(a, |x| x.map(|v| v.clamp(-1.0, 1.0).asin())), asin;
     Acos "acos" function Float(1), Special(2),
         Helper("safe_acos", "(x: T) -> T { return acos(clamp(x, T(-1), T(1))); }"), None,
-        |a| float1(a, |x| x.map(|v| v.clamp(-1.0, 1.0).acos()));
-    Atan "atan" function Float(1), Special(2), Builtin("atan"), None, |a| float1(a, |x| x.map(f64::atan));
+        |a| float1(a, |x| x.map(|v| v.clamp(-1.0, 1.0).acos())), acos;
+    Atan "atan" function Float(1), Special(2), Builtin("atan"), None, |a| float1(a, |x| x.map(f64::atan)), atan;
     Atan2 "atan2" function Float(2), Special(3),
         Helper("safe_atan2", "(y: T, x: T) -> T { let o = (x == T(0)) & (y == T(0)); return select(atan2(y, select(x, T(1), o)), T(0), o); }"), None,
-        |a| float2(a, |y, x| F::of(if is_zero(x) && is_zero(y) { 0.0 } else { y.f64().atan2(x.f64()) }));
+        |a| float2(a, |y, x| F::of(if is_zero(x) && is_zero(y) { 0.0 } else { y.f64().atan2(x.f64()) })), atan2;
     SrgbDecode "srgb_decode" operator Float(1), Special(2),
         Helper("srgb_decode", "(c: T) -> T { return select(pow((max(c, T(0)) + T(0.055)) / T(1.055), T(2.4)), c / T(12.92), c <= T(0.04045)); }"), None,
-        |a| float1(a, |x| x.map(srgb_decode));
+        |a| float1(a, |x| x.map(srgb_decode)), srgb_decode;
     // Geometry
     Dot "dot" function Reduce(2), Alu(2), Builtin("dot"), None,
-        |a| reduce2(a, |v, w| sum(&v, &w));
+        |a| reduce2(a, |v, w| sum(&v, &w)), product;
     Length "length" function Reduce(1), Special(2), Builtin("length"), None,
-        |a| reduce1(a, |v| sum(&v, &v).sqrt());
+        |a| reduce1(a, |v| sum(&v, &v).sqrt()), length;
     Distance "distance" function Reduce(2), Special(2), Builtin("distance"), None,
-        |a| reduce2(a, distance);
+        |a| reduce2(a, distance), distance;
     Normalize "normalize" function Vector(1), Special(2),
         Helper("safe_normalize", "(v: T) -> T { let d = dot(v, v); return select(T(0), v * inverseSqrt(max(d, 1.1754944e-38)), d > 1.1754944e-38); }"), None,
-        normalize;
+        normalize, normalize;
     Reflect "reflect" function Vector(2), Alu(3), Builtin("reflect"), None,
-        reflect;
-    Cross "cross" function Cross, Alu(3), Builtin("cross"), None, cross;
+        reflect, reflect;
+    Cross "cross" function Cross, Alu(3), Builtin("cross"), None, cross, product;
     MaxComponent "max_component" function Reduce(1), Alu(1),
         Helper("max_component", ""), None,
-        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MIN), high_of));
+        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MIN), high_of)), max_component;
     MinComponent "min_component" function Reduce(1), Alu(1),
         Helper("min_component", ""), None,
-        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MAX), low_of));
+        |a| reduce1(a, |v| v.into_iter().fold(F::of(f64::MAX), low_of)), min_component;
     Luminance "luminance" function Reduce(1), Alu(2),
         Helper("luminance", "(c: T) -> f32 { return dot(c, vec3<f32>(0.2126, 0.7152, 0.0722)); }"), None,
-        |a| reduce1(a, |v| sum(&v, &[F::of(0.2126), F::of(0.7152), F::of(0.0722)]));
-    MatVec "transform" operator MatVec, Alu(5), Infix("*"), None, mat_vec;
+        |a| reduce1(a, |v| sum(&v, &[F::of(0.2126), F::of(0.7152), F::of(0.0722)])), linear;
+    MatVec "transform" operator MatVec, Alu(5), Infix("*"), None, mat_vec, product;
+    // Differentiation: of what is left after `passes::widths`, nothing varies
+    FilterWidth "filter_width" operator Float(1), Alu(1), Helper("filter_width", "(x: T) -> T { return T(0); }"), None,
+        |a| all(a, 0.0), zero;
     // Choice
     Select "select" function Select, Alu(1), Builtin("select"), None,
-        choose;
-    Less "lt" operator Compare, Alu(1), Infix("<"), None, |a| test(a, |x, y| x < y, |x, y| x < y);
-    LessEqual "le" operator Compare, Alu(1), Infix("<="), None, |a| test(a, |x, y| x <= y, |x, y| x <= y);
-    Greater "gt" operator Compare, Alu(1), Infix(">"), None, |a| test(a, |x, y| x > y, |x, y| x > y);
-    GreaterEqual "ge" operator Compare, Alu(1), Infix(">="), None, |a| test(a, |x, y| x >= y, |x, y| x >= y);
-    Equal "eq" operator Equal, Alu(1), Infix("=="), None, |a| test(a, |x, y| x == y, |x, y| x == y);
-    NotEqual "ne" operator Equal, Alu(1), Infix("!="), None, |a| test(a, |x, y| x != y, |x, y| x != y);
-    And "and" operator Bool(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y);
-    Or "or" operator Bool(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y);
-    Not "not" operator Bool(1), Integer(1), Prefix("!"), None, |a| int1(a, |x| x ^ 1);
+        choose, select;
+    Less "lt" operator Compare, Alu(1), Infix("<"), None, |a| test(a, |x, y| x < y, |x, y| x < y), zero;
+    LessEqual "le" operator Compare, Alu(1), Infix("<="), None, |a| test(a, |x, y| x <= y, |x, y| x <= y), zero;
+    Greater "gt" operator Compare, Alu(1), Infix(">"), None, |a| test(a, |x, y| x > y, |x, y| x > y), zero;
+    GreaterEqual "ge" operator Compare, Alu(1), Infix(">="), None, |a| test(a, |x, y| x >= y, |x, y| x >= y), zero;
+    Equal "eq" operator Equal, Alu(1), Infix("=="), None, |a| test(a, |x, y| x == y, |x, y| x == y), zero;
+    NotEqual "ne" operator Equal, Alu(1), Infix("!="), None, |a| test(a, |x, y| x != y, |x, y| x != y), zero;
+    And "and" operator Bool(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y), zero;
+    Or "or" operator Bool(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y), zero;
+    Not "not" operator Bool(1), Integer(1), Prefix("!"), None, |a| int1(a, |x| x ^ 1), zero;
     // Integers
-    BitAnd "bit_and" operator Int(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y);
-    BitOr "bit_or" operator Int(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y);
-    BitXor "bit_xor" operator Int(2), Integer(1), Infix("^"), None, |a| int2(a, |x, y| x ^ y);
+    BitAnd "bit_and" operator Int(2), Integer(1), Infix("&"), None, |a| int2(a, |x, y| x & y), zero;
+    BitOr "bit_or" operator Int(2), Integer(1), Infix("|"), None, |a| int2(a, |x, y| x | y), zero;
+    BitXor "bit_xor" operator Int(2), Integer(1), Infix("^"), None, |a| int2(a, |x, y| x ^ y), zero;
     ShiftLeft "shift_left" operator Int(2), Integer(1), Helper("shift_left", "(a: T, b: T) -> T { return a << (u32(b) & 31u); }"), None,
-        |a| int2(a, |x, y| x.wrapping_shl(y as u32));
+        |a| int2(a, |x, y| x.wrapping_shl(y as u32)), zero;
     ShiftRight "shift_right" operator Int(2), Integer(1), Helper("shift_right", "(a: T, b: T) -> T { return a >> (u32(b) & 31u); }"), None,
-        |a| int2(a, |x, y| x.wrapping_shr(y as u32));
+        |a| int2(a, |x, y| x.wrapping_shr(y as u32)), zero;
     Hash1 "hash" function Int(1), Integer(8), Helper("hash", HASH1), None,
-        |a| hash(a, 1);
+        |a| hash(a, 1), zero;
     Hash2 "hash" function Int(2), Integer(16), Helper("hash2", HASH2), None,
-        |a| hash(a, 2);
+        |a| hash(a, 2), zero;
     Hash3 "hash" function Int(3), Integer(24), Helper("hash3", HASH3), None,
-        |a| hash(a, 3);
+        |a| hash(a, 3), zero;
     ToFloat "to_float" operator IntToFloat, Integer(1), Builtin("f32"), None,
-        |a| to_float(a, f64::from);
+        |a| to_float(a, f64::from), zero;
     ToInt "to_int" operator FloatToInt, Integer(1),
         Helper("to_int", "(x: T) -> i32 { return i32(clamp(x, -2147483648.0, 2147483520.0)); }"), None,
-        |a| to_int(a, |x| x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32);
+        |a| to_int(a, |x| x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32), zero;
     UnitFloat "unit_float" function IntToFloat, Integer(2),
         Helper("unit_float", "(i: T) -> f32 { return f32(bitcast<u32>(i) >> 8u) * 5.9604645e-8; }"), None,
-        |a| to_float(a, |i| f64::from(i as u32 >> 8) / 16_777_216.0);
+        |a| to_float(a, |i| f64::from(i as u32 >> 8) / 16_777_216.0), zero;
     // Textures: a texture is an index
-    Image "image" function Lookup(3), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5);
-    ImageData "image_data" function Lookup(4), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5);
+    Image "image" function Lookup(3), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5), lookup;
+    ImageData "image_data" function Lookup(4), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5), lookup;
 }
 
 const HASH1: &str = "(a: T) -> i32 { let s = bitcast<u32>(a) * 747796405u + 2891336453u; let w = ((s >> ((s >> 28u) + 4u)) ^ s) * 277803737u; return bitcast<i32>((w >> 22u) ^ w); }";

@@ -13,7 +13,7 @@ use crate::diag::{Code, Diagnostic};
 use crate::ir::{self, Const, ExprKind, Function, Module, Type, walk};
 use crate::ops::Op;
 use crate::parameters::Layout;
-use crate::passes::{self, Hoisted};
+use crate::passes::{self, Hoisted, Widths};
 use crate::sema::Checker;
 use crate::source::{SourceMap, Span};
 use crate::{closure, interior};
@@ -305,6 +305,14 @@ impl ProgramBuilder {
         self.optimise_functions(&checker.ir);
         passes::bake(&mut material.body, &agreed(settings));
         passes::fold_body(&self.module, &mut material.body);
+        match passes::widths(&self.module, &mut material.body) {
+            Widths::None => {}
+            Widths::Computed => passes::fold_body(&self.module, &mut material.body),
+            Widths::TooLarge(call) => {
+                checker.diagnostics.push(too_wide(material, call));
+                return None;
+            }
+        }
         passes::prune(&self.module, material);
         Some(())
     }
@@ -600,6 +608,17 @@ fn too_large(material: &ir::Material, size: u64) -> Diagnostic {
     Diagnostic::new(Code::TooLarge, material.span, message)
         .expected(format!("at most {MAX_SIZE}"))
         .hint("call functions in a loop instead of writing the calls out, or share results with `let`")
+}
+
+/// A material whose widths depend on too much.
+fn too_wide(material: &ir::Material, call: Span) -> Diagnostic {
+    let message = format!(
+        "what the widths of `{}` depend on grows too large",
+        material.name
+    );
+    Diagnostic::new(Code::TooLarge, call, message)
+        .expected("`filter_width` of what takes few operations")
+        .hint("ask for the width of the coordinate, and pass it to the function as an argument")
 }
 
 /// A material whose parameters take too long to work with.

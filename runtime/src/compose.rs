@@ -4,8 +4,9 @@
 //! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
 //! nothing else.
 
-use impasto_compiler::abi::MATERIAL_OF;
+use impasto_compiler::abi::{InputSet, MATERIAL_OF};
 
+use crate::cones;
 use crate::fingerprint::Fingerprint;
 use crate::modules::{Composer, Kernel, Recipe};
 use crate::needs::{Need, Needs};
@@ -129,6 +130,9 @@ impl Composer<'_> {
             let [a, b, c, d] = world.parts.media.camera;
             out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
         }
+        if self.layout.needs.has(Need::RayCones) {
+            out += &cones::constants(&world.camera, world.width, world.height);
+        }
         out + &self.layout.counters.constants() + &state::constants()
     }
 
@@ -175,7 +179,14 @@ impl Composer<'_> {
         if needs.has(Need::VaryingEmission) && infos.iter().all(|m| !m.varying_emission) {
             out += NO_EMISSION;
         }
-        out += &surface_point(needs);
+        let seen = infos
+            .iter()
+            .map(|m| m.inputs)
+            .fold(InputSet::default(), both);
+        if seen.footprint || seen.footprint_uv {
+            out += include_str!("kernels/footprint.wgsl");
+        }
+        out += &surface_point(needs, seen);
         out + &dropped_row(members)
     }
 
@@ -280,15 +291,29 @@ fn dropped_row(members: &[usize]) -> String {
 const NO_EMISSION: &str = "fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32> {\n    \
                            return vec3<f32>(0.0);\n}\n";
 
+/// The fields of footprints that code which reads either must be given.
+fn both(a: InputSet, b: InputSet) -> InputSet {
+    InputSet {
+        footprint: a.footprint || b.footprint,
+        footprint_uv: a.footprint_uv || b.footprint_uv,
+        ..a
+    }
+}
+
 /// The function that fills a material's inputs, those that some member reads; the others get
 /// what is at hand.
-fn surface_point(needs: Needs) -> String {
+fn surface_point(needs: Needs, seen: InputSet) -> String {
+    let cone = match needs.has(Need::RayCones) {
+        true => ", wo: vec3<f32>, width: f32",
+        false => "",
+    };
+    let (footprint, axes) = cones::footprint(needs, seen);
     let geometric = "hit_geometric_normal(hit.primitive)";
     let pick = |need, value, other| if needs.has(need) { value } else { other };
     format!(
-        "fn surface_point(hit: PathHit, exterior_ior: f32) -> SurfacePoint {{\n    \
-         let barycentrics = vec2<f32>(hit.u, hit.v);\n    \
-         return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior);\n}}\n",
+        "fn surface_point(hit: PathHit, exterior_ior: f32{cone}) -> SurfacePoint {{\n    \
+         let barycentrics = vec2<f32>(hit.u, hit.v);\n    {footprint}\
+         return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior{axes});\n}}\n",
         pick(
             Need::Position,
             if needs.has(Need::Moved) {

@@ -8,6 +8,7 @@
 pub mod bvh;
 pub mod camera;
 mod compose;
+mod cones;
 pub mod dropped;
 pub mod error;
 pub mod film;

@@ -97,11 +97,24 @@ const SHARED_ORIGINS: When = When {
 /// Shadow rays, wherever they are.
 const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
+/// Cones of rays that see what they meet.
+const CONES: When = When {
+    all: &[Need::RayCones],
+    none: &[Need::Overlap],
+};
+
 use Type::{F32, U32, Vec3, Words};
+
+const CONE: &[(&str, Type)] = &[
+    ("width", F32),
+    ("spread", F32),
+    ("unused0", U32),
+    ("unused1", U32),
+];
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 9] = [
+pub(crate) const FIELDS: [Field; 10] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -238,6 +251,26 @@ pub(crate) const FIELDS: [Field; 9] = [
             readers: &[Logic],
             writers: &[NewPath, Material],
         }],
+    },
+    Field {
+        // The cone that its ray stands for: how wide it is where the ray begins, in metres, and by how
+        // much a metre it widens; see docs/filtering.md. Boundaries that are not there widen it on the way.
+        uses: &[
+            Use {
+                name: "cone",
+                components: CONE,
+                need: CONES,
+                readers: &[Material],
+                writers: &[NewPath, Material],
+            },
+            Use {
+                name: "cone",
+                components: CONE,
+                need: when(&[Need::RayCones, Need::Overlap]),
+                readers: &[Material, Extension],
+                writers: &[NewPath, Material, Extension],
+            },
+        ],
     },
     Field {
         // The media it is in; see `kernels/media.wgsl`.
@@ -424,6 +457,7 @@ mod tests {
         Need::Absorption,
         Need::Overlap,
         Need::Order,
+        Need::RayCones,
     ]);
     const EVERY_STAGE: [StageId; 7] = [
         Logic,
@@ -500,7 +534,7 @@ mod tests {
         assert_eq!(path_bytes(Needs::default()), 80);
         let lit = Needs::of_rows(&[Need::ShadowRays]);
         assert_eq!(path_bytes(lit), 96);
-        assert_eq!(path_bytes(EVERYTHING), 128);
+        assert_eq!(path_bytes(EVERYTHING), 144);
         let text = accessors(
             Needs::default(),
             &EVERY_STAGE,
@@ -508,6 +542,7 @@ mod tests {
         );
         assert!(!text.contains("shadow"), "{text}");
         assert!(!text.contains("media"), "{text}");
+        assert!(!text.contains("cone"), "{text}");
     }
 
     /// A stage listed as a reader or writer that does not access the words would make kernels

@@ -6,6 +6,9 @@ use impasto_compiler::cost::Inputs;
 use impasto_compiler::inspect::At;
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 
+/// What a ray sees of a triangle, in its size: patterns that filter do so.
+const SEEN: f64 = 1e-2;
+
 /// The triangles of one material, by instance, each with the area up to its end.
 #[derive(Default)]
 pub(super) struct Surfaces {
@@ -63,6 +66,7 @@ fn on_triangle(mesh: &Mesh, triangle: usize, [s, t]: [f64; 2]) -> At {
     let mixed = |v: [DVec3; 3]| v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
     let corners = mesh.positions[triangle].map(|p| p.as_dvec3());
     let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let size = flat.length().sqrt();
     let flat = flat.normalize_or_zero();
     let smooth = mesh.normals.get(triangle).copied().flatten();
     let smooth = smooth.map(|n| mixed(n.map(|n| n.as_dvec3())).normalize_or(flat));
@@ -75,6 +79,7 @@ fn on_triangle(mesh: &Mesh, triangle: usize, [s, t]: [f64; 2]) -> At {
         geometric_normal: flat.to_array(),
         tangent: tangent(corners, uvs).to_array(),
         uv: uv.to_array(),
+        footprint: SEEN * size,
         ..At::default()
     }
 }

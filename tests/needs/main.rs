@@ -140,6 +140,9 @@ fn a_lambertian_box_under_a_quad_has_96_bytes_a_path_and_no_line_for_more() {
         "ray_bin",
         "false_boundary",
         "renew",
+        "cone",
+        "footprint",
+        "uv_change",
     ];
     // Every kernel of the wavefront asks for work.
     let asked = [
@@ -318,6 +321,7 @@ fn forcing_everything_forces_what_can_be() {
         "material_emission",
         "hit_uv",
         "hit_normal",
+        "scattered_spread",
     ] {
         assert!(all.contains(&format!("fn {function}(")), "{function}");
     }

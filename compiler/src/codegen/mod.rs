@@ -157,10 +157,13 @@ fn structs(program: &Program, functions: &BTreeSet<usize>, roots: &[Root<'_>], o
             .chain(f.params.iter().map(|p| p.ty));
         types.for_each(|ty| use_struct(program, ty, &mut used));
     }
+    let functions: Vec<&Function> = roots.iter().map(|r| r.function).collect();
+    let read = inputs(&program.module.structs, &functions);
     for id in used {
         let s = &program.module.structs[id.index()];
         let _ = writeln!(out, "struct {} {{", program.names.structure(id));
-        for (name, ty) in &s.fields {
+        let declared = |name: &str| id != program.core.surface_point || read.declares(name);
+        for (name, ty) in s.fields.iter().filter(|(name, _)| declared(name)) {
             let _ = writeln!(
                 out,
                 "    {}: {},",
@@ -216,6 +219,8 @@ pub fn inputs(
                 "geometric_normal" => set.geometric_normal = true,
                 "tangent" => set.tangent = true,
                 "uv" => set.uv = true,
+                "footprint_x" | "footprint_y" => set.footprint = true,
+                "footprint_uv_x" | "footprint_uv_y" => set.footprint_uv = true,
                 _ => set.exterior_ior = true,
             }
         }

@@ -8,6 +8,9 @@ use crate::random::SplitMix64;
 /// Half of the side of the cube in which [`Inputs::anywhere`] takes positions, in metres.
 const REACH: f64 = 2.0;
 
+/// What a ray sees there, in metres: about a pixel. Patterns that filter do so.
+const SEEN: f64 = 1e-3 * REACH;
+
 /// Inputs that look random and are the same in every run.
 #[derive(Clone, Debug)]
 pub struct Inputs {
@@ -61,6 +64,7 @@ impl Inputs {
             geometric_normal: normal,
             tangent: perpendicular(about, normal),
             uv: std::array::from_fn(|_| self.unit()),
+            footprint: SEEN,
             ..At::default()
         };
         self.lit(surface, false)

@@ -22,6 +22,9 @@ pub struct At {
     pub uv: [f64; 2],
     /// Index of refraction of the medium outside.
     pub exterior_ior: f64,
+    /// The diameter of what a ray sees, in metres, for `filter_width`. Along the tangent and across
+    /// it, u and v grow by as much.
+    pub footprint: f64,
     /// Toward the viewer.
     pub wo: [f64; 3],
     /// Toward the light.
@@ -39,6 +42,7 @@ impl Default for At {
             tangent: [1.0, 0.0, 0.0],
             uv: [0.25, 0.75],
             exterior_ior: 1.0,
+            footprint: 0.0,
             wo: [0.6, 0.0, 0.8],
             wi: [-0.48, 0.36, 0.8],
             u: [0.5; 4],
@@ -47,13 +51,14 @@ impl Default for At {
 }
 
 /// The keys in the order they are shown, each with how many numbers it takes.
-const KEYS: [(&str, usize); 9] = [
+const KEYS: [(&str, usize); 10] = [
     ("position", 3),
     ("normal", 3),
     ("geometric_normal", 3),
     ("tangent", 3),
     ("uv", 2),
     ("exterior_ior", 1),
+    ("footprint", 1),
     ("wo", 3),
     ("wi", 3),
     ("u", 4),
@@ -61,14 +66,15 @@ const KEYS: [(&str, usize); 9] = [
 
 impl At {
     /// Every key with its numbers.
-    pub fn entries(&self) -> [(&'static str, &[f64]); 9] {
-        let numbers: [&[f64]; 9] = [
+    pub fn entries(&self) -> [(&'static str, &[f64]); 10] {
+        let numbers: [&[f64]; 10] = [
             &self.position,
             &self.normal,
             &self.geometric_normal,
             &self.tangent,
             &self.uv,
             std::slice::from_ref(&self.exterior_ior),
+            std::slice::from_ref(&self.footprint),
             &self.wo,
             &self.wi,
             &self.u,
@@ -82,6 +88,19 @@ impl At {
         entries.find(|(k, _)| *k == key).map(|(_, numbers)| numbers)
     }
 
+    /// The numbers of a field of `SurfacePoint`.
+    pub(crate) fn field(&self, name: &str) -> Option<Vec<f64>> {
+        let d = self.footprint;
+        let [x, y] = perpendicular(self.geometric_normal, self.tangent);
+        Some(match name {
+            "footprint_x" => x.map(|c| d * c).to_vec(),
+            "footprint_y" => y.map(|c| d * c).to_vec(),
+            "footprint_uv_x" => vec![d, 0.0],
+            "footprint_uv_y" => vec![0.0, d],
+            _ => self.get(name)?.to_vec(),
+        })
+    }
+
     fn numbers(&mut self, key: &str) -> Option<&mut [f64]> {
         Some(match key {
             "position" => &mut self.position,
@@ -90,6 +109,7 @@ impl At {
             "tangent" => &mut self.tangent,
             "uv" => &mut self.uv,
             "exterior_ior" => std::slice::from_mut(&mut self.exterior_ior),
+            "footprint" => std::slice::from_mut(&mut self.footprint),
             "wo" => &mut self.wo,
             "wi" => &mut self.wi,
             "u" => &mut self.u,
@@ -118,6 +138,20 @@ impl At {
     }
 }
 
+/// Two unit vectors perpendicular to the unit vector `n` and each other, the first as near to `v` as
+/// can be.
+fn perpendicular(n: [f64; 3], v: [f64; 3]) -> [[f64; 3]; 2] {
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i]);
+    // Where v is no help, an axis far from n.
+    let axis = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]][usize::from(n[0].abs() > 0.7)];
+    let sides = [v, axis].map(|v| cross(n, v));
+    let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let y = sides.into_iter().find(|y| length(y) > 1e-6);
+    let y = y.map_or([0.0; 3], |y| y.map(|x| x / length(&y)));
+    [cross(y, n), y]
+}
+
 fn unknown(key: &str) -> String {
     let names = KEYS.map(|(name, _)| name);
     match nearest(key, names) {
@@ -138,6 +172,8 @@ fn check(key: &str, values: &mut [f64]) -> Result<(), String> {
         }
         "exterior_ior" if values.iter().all(|x| *x > 0.0) => Ok(()),
         "exterior_ior" => Err("`exterior_ior` must be above 0; air has 1".into()),
+        "footprint" if values.iter().all(|x| *x >= 0.0) => Ok(()),
+        "footprint" => Err("`footprint` is a diameter and cannot be below 0".into()),
         "position" | "uv" | "u" => Ok(()),
         _ => {
             let longest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -243,6 +279,7 @@ mod tests {
             ("position=(1e39,0,0)", "must be finite"),
             ("u=(0,0,0,1)", "[0, 1)"),
             ("exterior_ior=0", "above 0"),
+            ("footprint=-1", "below 0"),
             ("wo=(0,0,x)", "`x` in `wo` is not a number"),
             ("wo=(0,0,1", "not closed"),
             ("wo", "has no `=`"),
@@ -252,6 +289,25 @@ mod tests {
             let error = text.parse::<At>().expect_err(text);
             assert!(error.contains(said), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn a_footprint_lies_in_the_surface() {
+        let at: At = "normal=(0,1,0), tangent=(0,0,2), footprint=3"
+            .parse()
+            .expect("fine");
+        let field = |name| at.field(name).expect("a field");
+        assert_eq!(field("footprint_x"), [0.0, 0.0, 3.0]);
+        assert_eq!(field("footprint_y"), [3.0, 0.0, 0.0]);
+        assert_eq!(field("footprint_uv_y"), [0.0, 3.0]);
+        let steep: At = "normal=(1,0,0), tangent=(0,0,0), footprint=2"
+            .parse()
+            .expect("fine");
+        let across = steep.field("footprint_x").expect("a field");
+        assert_eq!(
+            (across[0], across.iter().map(|x| x * x).sum::<f64>()),
+            (0.0, 4.0)
+        );
     }
 
     #[test]

@@ -62,8 +62,8 @@ fn parameters(module: &Module, material: &Material, values: &[Const]) -> Vec<Nam
 
 /// The surface point.
 pub(crate) fn point<F: Real>(at: &At, point: &Struct) -> Value<F> {
-    let field = |(name, ty): &(String, Type)| match at.get(name) {
-        Some(numbers) => Value::vector(numbers),
+    let field = |(name, ty): &(String, Type)| match at.field(name) {
+        Some(numbers) => Value::vector(&numbers),
         None => Value::zero(*ty, &[]),
     };
     Value::Struct(point.fields.iter().map(field).collect())

@@ -121,6 +121,38 @@ impl Builder {
         id
     }
 
+    /// Takes an expression over as it is, not evaluated yet.
+    pub fn adopt(&mut self, expr: Expr) -> ExprId {
+        self.function.exprs.push(expr);
+        ExprId(self.function.exprs.len() as u32 - 1)
+    }
+
+    /// Lets an expression that is not evaluated yet compute something else of the same type.
+    pub fn redefine(&mut self, id: ExprId, kind: ExprKind) {
+        self.function.exprs[id.index()].kind = kind;
+    }
+
+    /// The zero of a type.
+    pub fn zero(&mut self, module: &Module, ty: Type, span: Span) -> ExprId {
+        match ty {
+            Type::Bool => self.constant(Const::Bool(false), span),
+            Type::Int => self.constant(Const::Int(0), span),
+            Type::Mat3 => {
+                let column = self.constant(Const::Float(vec![0.0; 3]), span);
+                self.add(ExprKind::Compose(vec![column; 3]), ty, span)
+            }
+            Type::Struct(id) => {
+                let fields = &module.structs[id.index()].fields;
+                let zeros: Vec<ExprId> = fields
+                    .iter()
+                    .map(|(_, ty)| self.zero(module, *ty, span))
+                    .collect();
+                self.make(id, &zeros, span)
+            }
+            _ => self.constant(Const::Float(vec![0.0; ty.width().unwrap_or(1)]), span),
+        }
+    }
+
     /// A constant.
     pub fn constant(&mut self, value: Const, span: Span) -> ExprId {
         let ty = const_type(&value);

@@ -1,7 +1,7 @@
 //! Going over what a function does: the blocks within statements, what is evaluated and called.
 //! Passes, code generation and analyses ask here, so that a new statement is taught to them once.
 
-use super::{Block, ExprId, ExprKind, Function, FunctionId, Stmt};
+use super::{Block, ExprId, ExprKind, Function, FunctionId, LocalId, Stmt};
 
 /// Most blocks within each other in the body of a function: with the body's, WGSL allows 127.
 pub const MAX_NESTING: usize = 126;
@@ -34,6 +34,54 @@ impl Stmt {
             Stmt::Eval(_) | Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
         }
         self
+    }
+}
+
+/// New numbers for the expressions and variables of statements that are copied elsewhere.
+pub trait Renumber {
+    /// The number of an expression in the copy.
+    fn expr(&self, id: ExprId) -> ExprId;
+    /// The number of a variable in the copy.
+    fn local(&self, id: LocalId) -> LocalId;
+
+    /// A copy of statements.
+    fn block(&self, block: &Block) -> Block {
+        block.iter().map(|s| self.stmt(s)).collect()
+    }
+
+    /// A copy of a statement.
+    fn stmt(&self, stmt: &Stmt) -> Stmt {
+        match stmt {
+            Stmt::Eval(id) => Stmt::Eval(self.expr(*id)),
+            Stmt::Store(local, part, value) => {
+                Stmt::Store(self.local(*local), *part, self.expr(*value))
+            }
+            Stmt::If(cond, a, b) => Stmt::If(self.expr(*cond), self.block(a), self.block(b)),
+            Stmt::For {
+                local,
+                low,
+                high,
+                body,
+            } => Stmt::For {
+                local: self.local(*local),
+                low: self.expr(*low),
+                high: self.expr(*high),
+                body: self.block(body),
+            },
+            Stmt::While {
+                head,
+                test,
+                limit,
+                body,
+            } => Stmt::While {
+                head: self.block(head),
+                test: self.expr(*test),
+                limit: *limit,
+                body: self.block(body),
+            },
+            Stmt::Break => Stmt::Break,
+            Stmt::Continue => Stmt::Continue,
+        }
     }
 }
 

@@ -17,6 +17,7 @@ mod licm;
 mod prune;
 mod rewrite;
 mod simplify;
+mod widths;
 
 use rewrite::Rules;
 
@@ -24,6 +25,7 @@ pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted, hoist};
 pub use prune::prune;
+pub use widths::{Widths, widths};
 
 /// A pass with its name. It must not change what a function computes.
 pub struct Pass {

@@ -68,6 +68,7 @@ impl Body<'_, '_> {
                 self.mix_closures(args, span)
             }
             "srgb" => self.srgb(args, span),
+            "filter_width" => self.filter_width(callee, args, span),
             name => match NAMED.iter().find(|(n, _)| *n == name) {
                 // `length(v)` is the function; lengths are made with units.
                 Some((_, ty)) if *ty != Ty::Length => self.convert(*ty, args, span),
@@ -329,7 +330,7 @@ impl Body<'_, '_> {
                 .map(|op| op.info().text.to_owned()),
         );
         names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
-        names.extend(["gradient", "layer", "medium", "srgb"].map(String::from));
+        names.extend(["filter_width", "gradient", "layer", "medium", "srgb"].map(String::from));
         let unknown = Diagnostic::new(
             Code::UnknownName,
             callee.span,
@@ -405,6 +406,7 @@ fn foreign_function(name: &str) -> Option<&'static str> {
         "texture" | "tex2D" | "textureSample" | "sample" => "image(texture, uv)",
         "rgb" => "color(r, g, b)",
         "noise" => "perlin(p), after `use std::noise::perlin;`",
+        "filterwidth" | "fwidth" => "filter_width(x)",
         _ => return None,
     })
 }

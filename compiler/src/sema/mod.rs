@@ -20,6 +20,7 @@ mod closure;
 mod constant;
 mod convert;
 mod expr;
+mod filter;
 mod gradient;
 mod inline;
 mod material;

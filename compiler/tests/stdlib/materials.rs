@@ -48,8 +48,10 @@ fn program_with(file: &str, params: Vec<(String, String)>, loader: &mut dyn Load
 fn point(position: [f64; 3], uv: [f64; 2]) -> Vec<f64> {
     let rest = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0];
     let exterior_ior = 1.0;
+    // What is asked for here is asked without filtering.
+    let footprint = [0.0; 10];
     let around = position.into_iter().chain(rest).chain(uv);
-    around.chain([exterior_ior]).collect()
+    around.chain([exterior_ior]).chain(footprint).collect()
 }
 
 fn columns<const N: usize>(values: &[[f64; N]]) -> Lanes {

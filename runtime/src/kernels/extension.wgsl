@@ -71,6 +71,11 @@ fn trace_to_boundary(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u
 #if absorption
         carried.throughput *= transmittance(media, hit.t);
 #endif
+#if ray_cones
+        let cone = load_cone(slot);
+        let width = cone.width + cone.spread * hit.t;
+        store_cone(slot, PathCone(width, cone.spread, 0u, 0u));
+#endif
         carried.bsdf_pdf = 0.0;
         store_throughput(slot, carried);
         media = cross_boundary(media, medium, inside);

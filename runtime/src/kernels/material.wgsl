@@ -21,9 +21,16 @@ fn material(slot: u32, instance: u32) {
     let inside = dot(side, wo) < 0.0;
 #endif
 #if exterior_ior
-    let point = surface_point(hit, exterior_index(media, medium, inside));
+    let exterior = exterior_index(media, medium, inside);
 #else
-    let point = surface_point(hit, 1.0);
+    let exterior = 1.0;
+#endif
+#if ray_cones
+    let cone = load_cone(slot);
+    let width = cone.width + cone.spread * hit.t;
+    let point = surface_point(hit, exterior, wo, width);
+#else
+    let point = surface_point(hit, exterior);
 #endif
     let vertex = (path.flags & DEPTH_MASK) - 1u;
     let place = vec3<u32>(pixel, arrived.sample, vertex);
@@ -54,6 +61,9 @@ fn material(slot: u32, instance: u32) {
         let start = leave_surface(position, side, scattered.wi);
         store_ray_origin(slot, PathRayOrigin(start, pixel));
         store_ray_direction(slot, PathRayDirection(scattered.wi, arrived.sample));
+#if ray_cones
+        store_cone(slot, PathCone(width, scattered_spread(cone.spread, scattered.pdf), 0u, 0u));
+#endif
         request_extension(start, scattered.wi, hit.primitive);
     }
 #if changes_medium
@@ -97,6 +107,19 @@ fn material(slot: u32, instance: u32) {
 #endif
 }
 
+#if ray_cones
+// How fast the cone of a scattered ray widens. A ray that was chosen with a density stands for the solid angle
+// around it that it would be alone in among CONE_RAYS others (Suykens and Willems, "Path Differentials
+// and Applications", 2001); discrete directions keep the cone. What adds up are squares, since the
+// places of rays in either are independent.
+fn scattered_spread(spread: f32, pdf: f32) -> f32 {
+    if !(pdf > 0.0) {
+        return spread;
+    }
+    return min(sqrt(spread * spread + 1.0 / (CONE_RAYS * pdf)), WIDEST_CONE);
+}
+
+#endif
 // A ray's origin, off the surface on the side the ray leaves to.
 fn leave_surface(position: vec3<f32>, side: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
     return offset_origin(position, select(-side, side, dot(side, direction) > 0.0));

@@ -214,6 +214,18 @@ rows! {
             let any = f.world.parts.facts.uvs;
             any.then(|| f.reads("`tangent`, and corners have coordinates", |i| i.tangent))?
         };
+    RayCones, "ray cones", "ray_cones",
+        "a material asks for the `filter_width` of what varies",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.world.parts.facts.uvs;
+            f.reads("how wide it is seen", |i| i.footprint || any && i.footprint_uv)
+        };
+    UvWidths, "widths of texture coordinates", "uv_widths",
+        "corners have texture coordinates, and a material asks for the `filter_width` of `uv`",
+        on &[RayCones], draws "", Whole, |f, _| {
+            let any = f.world.parts.facts.uvs;
+            any.then(|| f.reads("how wide it sees `uv`, and corners have some", |i| i.footprint_uv))?
+        };
     Textures, "textures", "textures",
         "a material reads a texture",
         on &[], draws "", Never("only the code of a material could read one"), |f, _| {
@@ -272,6 +284,7 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
     Normals,
     Uvs,
     Tangents,
+    UvWidths,
     Textures,
     LobeChoice,
 ]);

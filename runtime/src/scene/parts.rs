@@ -82,7 +82,11 @@ impl SceneParts {
     ) -> Result<SceneParts, SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
-        let reads_uv = materials.iter().any(|m| m.inputs.uv || m.inputs.tangent);
+        let reads_uv = |m: &MaterialInfo| {
+            let inputs = &m.inputs;
+            inputs.uv || inputs.tangent || inputs.footprint_uv
+        };
+        let reads_uv = materials.iter().any(reads_uv);
         let reads_position = materials.iter().any(|m| m.inputs.position);
         let moved = reads_position && scene.origin != DVec3::ZERO;
         let split = Split::new(scene, instances, technique.copies)?;
@@ -192,7 +196,7 @@ impl SceneParts {
                 include_str!("../kernels/surface_smooth.wgsl"),
             ),
             (
-                needs.any(&[Need::Uvs, Need::Tangents]),
+                needs.any(&[Need::Uvs, Need::Tangents, Need::UvWidths]),
                 UVS,
                 include_str!("../kernels/surface_uv.wgsl"),
             ),

@@ -21,6 +21,8 @@ use crate::ops::CostClass;
 mod decided;
 mod splice;
 
+pub(super) use splice::unset;
+
 /// Most expressions of a function that goes in line wherever it is called.
 const SMALL: u32 = 24;
 

@@ -1,5 +1,6 @@
 //! Copies the body of a function into its caller.
 
+use crate::ir::walk::Renumber;
 use crate::ir::{
     Block, CallSite, Const, Expr, ExprId, ExprKind, Function, FunctionId, LocalId, SiteId, Stmt,
     Type,
@@ -61,14 +62,6 @@ struct Shift {
 }
 
 impl Shift {
-    fn expr(&self, id: ExprId) -> ExprId {
-        ExprId(id.0 + self.exprs)
-    }
-
-    fn local(&self, id: LocalId) -> LocalId {
-        LocalId(id.0 + self.locals)
-    }
-
     fn via(&self, via: Option<SiteId>) -> Option<SiteId> {
         Some(SiteId(via.map_or(self.site, |id| self.site + 1 + id.0)))
     }
@@ -81,49 +74,21 @@ impl Shift {
             *operand = self.expr(*operand);
         }
     }
+}
 
-    fn block(&self, block: &Block) -> Block {
-        block.iter().map(|s| self.stmt(s)).collect()
+impl Renumber for Shift {
+    fn expr(&self, id: ExprId) -> ExprId {
+        ExprId(id.0 + self.exprs)
     }
 
-    fn stmt(&self, stmt: &Stmt) -> Stmt {
-        match stmt {
-            Stmt::Eval(id) => Stmt::Eval(self.expr(*id)),
-            Stmt::Store(local, part, value) => {
-                Stmt::Store(self.local(*local), *part, self.expr(*value))
-            }
-            Stmt::If(cond, a, b) => Stmt::If(self.expr(*cond), self.block(a), self.block(b)),
-            Stmt::For {
-                local,
-                low,
-                high,
-                body,
-            } => Stmt::For {
-                local: self.local(*local),
-                low: self.expr(*low),
-                high: self.expr(*high),
-                body: self.block(body),
-            },
-            Stmt::While {
-                head,
-                test,
-                limit,
-                body,
-            } => Stmt::While {
-                head: self.block(head),
-                test: self.expr(*test),
-                limit: *limit,
-                body: self.block(body),
-            },
-            Stmt::Break => Stmt::Break,
-            Stmt::Continue => Stmt::Continue,
-        }
+    fn local(&self, id: LocalId) -> LocalId {
+        LocalId(id.0 + self.locals)
     }
 }
 
 /// Variables that may be read before they are stored. They are zero at first, and must be so
 /// again each time when the callee now stands in a loop.
-fn unset(f: &Function) -> Vec<LocalId> {
+pub(in crate::passes) fn unset(f: &Function) -> Vec<LocalId> {
     let mut state = Unset {
         f,
         set: vec![false; f.locals.len()],

@@ -1,0 +1,392 @@
+//! Filter widths on the GPU: what a ray cone makes of pixels, distances, mirrors and scattering, against
+//! geometry worked out here; and what widths are for, a distant pattern without noise.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
+
+/// Pixels of a side; odd, so that one is in the middle.
+const SIZE: u32 = 9;
+/// Vertical field of view, in degrees.
+const FOV: f64 = 6.0;
+
+/// A square of one material in the plane y = 0 (or above it, seen from below), with u and v along x and z.
+struct Square {
+    material: &'static str,
+    half: f64,
+    y: f64,
+    /// What is said of the geometry beside its file.
+    placed: &'static str,
+}
+
+impl Square {
+    fn new(material: &'static str) -> Self {
+        Self {
+            material,
+            half: 50.0,
+            y: 0.0,
+            placed: "",
+        }
+    }
+
+    /// Facing up at the bottom, down above.
+    fn obj(&self, scale: f64, shift: f64) -> String {
+        let (h, y) = (self.half, self.y);
+        let mut corners = [[-h, h], [h, h], [h, -h], [-h, -h]];
+        if y > 0.0 {
+            corners.reverse();
+        }
+        let mut text = format!("usemtl {}\n", self.material);
+        for [x, z] in corners {
+            text += &format!("v {} {} {}\n", scale * x + shift, scale * y, scale * z);
+        }
+        for [x, z] in corners {
+            text += &format!("vt {x} {z}\n");
+        }
+        text + "f 1/1 2/2 3/3 4/4\n"
+    }
+}
+
+/// A scene as numbers.
+struct Case {
+    squares: Vec<Square>,
+    /// Statements of the materials, by name.
+    materials: Vec<(&'static str, String)>,
+    from: [f64; 3],
+    to: [f64; 3],
+    /// Everything is this many times as large, and moved along x.
+    scale: f64,
+    shift: f64,
+    camera: String,
+    depth: u32,
+    samples: u32,
+    seed: u32,
+    size: [u32; 2],
+    fov: f64,
+    strategy: Strategy,
+}
+
+impl Case {
+    /// A floor of a material, seen from a place.
+    fn floor(statements: impl Into<String>, from: [f64; 3]) -> Self {
+        Self {
+            squares: vec![Square::new("floor")],
+            materials: vec![("floor", statements.into())],
+            from,
+            to: [0.0; 3],
+            scale: 1.0,
+            shift: 0.0,
+            camera: String::new(),
+            depth: 1,
+            samples: 16,
+            seed: 0,
+            size: [SIZE; 2],
+            fov: FOV,
+            strategy: Strategy::Own,
+        }
+    }
+
+    fn write(&self, folder: &Path) {
+        let file = |name: &str, text: &str| {
+            std::fs::write(folder.join(name), text).expect("the file is written");
+        };
+        let place = |p: [f64; 3]| {
+            [
+                self.scale * p[0] + self.shift,
+                self.scale * p[1],
+                self.scale * p[2],
+            ]
+        };
+        let mut scene = format!(
+            "[camera]\nposition = {:?}\nlook_at = {:?}\nup = [0, 0, -1]\nfov = {}\n{}\n\
+             [film]\nwidth = {}\nheight = {}\n\
+             [integrator]\nmax_depth = {}\nroulette_start = 100\n",
+            place(self.from),
+            place(self.to),
+            self.fov,
+            self.camera,
+            self.size[0],
+            self.size[1],
+            self.depth
+        );
+        for (i, square) in self.squares.iter().enumerate() {
+            scene += &format!("[[geometry]]\nobj = \"{i}.obj\"\n{}\n", square.placed);
+            file(&format!("{i}.obj"), &square.obj(self.scale, self.shift));
+        }
+        for (name, statements) in &self.materials {
+            scene += &format!("[materials.{name}]\nfile = \"{name}.impasto\"\n");
+            let uses: String = [
+                ("bsdf", "diffuse"),
+                ("bsdf", "specular"),
+                ("edf", "uniform"),
+            ]
+            .iter()
+            .filter(|(_, item)| statements.contains(&format!("{item}(")))
+            .map(|(folder, item)| format!("use std::{folder}::{item};\n"))
+            .collect();
+            let (items, body) = statements.split_once("%%").unwrap_or(("", statements));
+            file(
+                &format!("{name}.impasto"),
+                &format!("{uses}{items}\nmaterial {name} {{ {body} }}\n"),
+            );
+        }
+        file("scene.toml", &scene);
+    }
+
+    /// The picture, row by row.
+    fn render(&self) -> Vec<[f64; 3]> {
+        let folder = tempfile::tempdir().expect("a folder");
+        self.write(folder.path());
+        let scene =
+            impasto::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+        let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let plan = impasto::plan(&program, self.strategy);
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let options = RenderOptions {
+            samples: self.samples,
+            seed: self.seed,
+            ..RenderOptions::default()
+        };
+        let renderer = Renderer::new(&gpu, &scene, &program, &plan, &options);
+        let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
+        let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(rendering.report.nonfinite_samples, 0);
+        let pixels = rendering.film.pixels.iter();
+        pixels.map(|p| p.map(f64::from)).collect()
+    }
+
+    /// The pixel in the middle.
+    fn middle(&self) -> [f64; 3] {
+        let [width, height] = self.size;
+        self.render()[(height / 2 * width + width / 2) as usize]
+    }
+
+    /// The angle from a pixel to the next in the middle of the picture.
+    fn pixel(&self) -> f64 {
+        2.0 * (0.5 * self.fov.to_radians()).tan() / f64::from(self.size[1])
+    }
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn assert_near(found: [f64; 3], expected: [f64; 3], tolerance: f64) {
+    let largest = expected.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    for (f, e) in found.iter().zip(expected) {
+        assert!(
+            (f - e).abs() <= tolerance * largest,
+            "{found:?}, expected {expected:?}"
+        );
+    }
+}
+
+const POSITION: &str = "emission = uniform(color(filter_width(position)));";
+const UV: &str = "emission = uniform(color(filter_width(vec3(uv.x, 0.0, uv.y))));";
+
+/// From straight above, and at 60 degrees from there: then twice as long along z.
+const VIEWS: [([f64; 3], f64); 2] = [([0.0, 20.0, 0.0], 1.0), ([0.0, 10.0, 17.320_508], 2.0)];
+
+#[test]
+fn a_width_is_the_footprint_of_a_pixel() {
+    for (from, stretch) in VIEWS {
+        for material in [POSITION, UV] {
+            let case = Case::floor(material, from);
+            let across = case.pixel() * length(from);
+            assert_near(case.middle(), [across, 0.0, stretch * across], 0.01);
+        }
+    }
+}
+
+/// Beside the middle, a pixel's cone has the area of the pixel, though not its shape.
+#[test]
+fn the_area_seen_is_that_of_a_pixel_everywhere() {
+    // The product of the diameters, from the sums of their squares along the diagonal of the picture, where x
+    // and z are alike.
+    let mut case = Case::floor(POSITION, [0.0, 20.0, 0.0]);
+    case.fov = 70.0;
+    let picture = case.render();
+    let area = (case.pixel() * 20.0).powi(2);
+    let half = (0.5 * case.fov.to_radians()).tan();
+    for i in 0..SIZE {
+        let [x, _, z] = picture[(i * SIZE + i) as usize];
+        let off = half * (2.0 * (f64::from(i) + 0.5) / f64::from(SIZE) - 1.0);
+        let cosine = 1.0 / (1.0 + 2.0 * off * off).sqrt();
+        // Of an ellipse of this area, cut from a cone at this angle.
+        let squares = area * (cosine + 1.0 / cosine);
+        let found = x * x + z * z;
+        assert!(
+            (found - squares).abs() < 0.02 * squares,
+            "pixel {i}: {found}, expected {squares}"
+        );
+    }
+}
+
+#[test]
+fn a_larger_scene_is_seen_alike() {
+    let (from, _) = VIEWS[1];
+    let picture = |material, scale| {
+        Case {
+            scale,
+            ..Case::floor(material, from)
+        }
+        .render()
+    };
+    let small = picture(POSITION, 1.0);
+    for power in [-20, 13] {
+        let scale = 2f64.powi(power);
+        let larger: Vec<[f64; 3]> = small.iter().map(|p| p.map(|x| scale * x)).collect();
+        // What is tiny is rounded by the film.
+        for (found, expected) in picture(POSITION, scale).into_iter().zip(&larger) {
+            assert_near(found, *expected, if power < 0 { 1e-3 } else { 0.0 });
+        }
+        assert_eq!(picture(UV, scale), picture(UV, 1.0));
+    }
+}
+
+#[test]
+fn placed_moved_and_blurred_floors_are_seen_alike() {
+    let (from, stretch) = VIEWS[1];
+    let placements = "share = true\nplacements = [{ rotate = [0, 90, 0], scale = 0.5 }, { translate = [0, -30, 0] }]";
+    for material in [POSITION, UV] {
+        let case = Case::floor(material, from);
+        let across = case.pixel() * length(from);
+        let moved = Case {
+            shift: 1e6,
+            ..Case::floor(material, from)
+        };
+        assert_near(moved.middle(), [across, 0.0, stretch * across], 0.01);
+        let blurred = Case {
+            camera: "aperture = 0.2\nfocus = 20".into(),
+            ..Case::floor(material, from)
+        };
+        assert_near(blurred.middle(), [across, 0.0, stretch * across], 0.02);
+        let mut placed = Case::floor(material, from);
+        placed.squares[0].placed = placements;
+        let expected = match material {
+            POSITION => [across, 0.0, stretch * across],
+            // Half as large, the coordinates grow twice as fast, and u along z.
+            _ => [2.0 * stretch * across, 0.0, 2.0 * across],
+        };
+        assert_near(placed.middle(), expected, 0.01);
+    }
+}
+
+#[test]
+fn every_organisation_carries_the_same_cones() {
+    let case = |strategy| {
+        let mut case = Case::floor(
+            format!("surface = diffuse(color(0.5)); {POSITION}"),
+            [0.0, 3.0, 4.0],
+        );
+        case.squares.push(Square {
+            y: 5.0,
+            ..Square::new("mirror")
+        });
+        case.materials
+            .push(("mirror", "surface = specular(color(0.9)); ".into()));
+        Case {
+            depth: 5,
+            strategy,
+            ..case
+        }
+        .render()
+    };
+    let own = case(Strategy::Own);
+    for strategy in [Strategy::Mixed, Strategy::Inline, Strategy::Mega] {
+        for (found, expected) in case(strategy).into_iter().zip(&own) {
+            assert_near(found, *expected, 1e-5);
+        }
+    }
+}
+
+/// A mirror keeps the cone: what it shows is as far as the way there and back.
+#[test]
+fn a_mirror_shows_widths_of_the_whole_way() {
+    let mut case = Case::floor(POSITION, [0.0, 2.0, 0.0]);
+    case.squares.push(Square {
+        y: 5.0,
+        ..Square::new("mirror")
+    });
+    case.materials
+        .push(("mirror", "surface = specular(color(1.0));".into()));
+    (case.to, case.depth) = ([0.0, 5.0, 0.0], 2);
+    let across = case.pixel() * 8.0;
+    assert_near(case.middle(), [across, 0.0, across], 0.02);
+}
+
+/// A diffuse ceiling shows the floor through the cones of rays of its density, cos / pi: integrated here.
+#[test]
+fn scattered_rays_stand_for_the_solid_angle_of_their_density() {
+    let seen = "emission = uniform(color(1.0 / (1.0 + length(filter_width(position)))));";
+    let mut case = Case::floor(seen, [0.0, 2.0, 0.0]);
+    case.squares[0].half = 3000.0;
+    case.squares.push(Square {
+        y: 5.0,
+        ..Square::new("ceiling")
+    });
+    case.materials
+        .push(("ceiling", "surface = diffuse(color(1.0));".into()));
+    (case.to, case.depth, case.samples) = ([0.0, 5.0, 0.0], 2, 256);
+    let (start, angle) = (case.pixel() * 3.0, case.pixel());
+    let steps = 20_000;
+    let seen = |i: i32| {
+        // The cosine of a diffuse ray is the root of a uniform number.
+        let cosine = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
+        let density = cosine / std::f64::consts::PI;
+        let spread = (angle * angle + 1.0 / (16.0 * density)).sqrt().min(1.0);
+        let width = start + spread * 5.0 / cosine;
+        let stretched = width / cosine.max(1.0 / 16.0);
+        1.0 / (1.0 + width.hypot(stretched))
+    };
+    let expected = (0..steps).map(seen).sum::<f64>() / f64::from(steps);
+    let pixels = case.render();
+    let found = pixels.iter().map(|p| p[0]).sum::<f64>() / pixels.len() as f64;
+    assert!(
+        (found - expected).abs() < 0.01 * expected,
+        "{found}, expected {expected}"
+    );
+}
+
+/// A checkerboard of squares of one metre, averaged over a width; see docs/filtering.md.
+fn checker(width: &str) -> String {
+    format!(
+        "fn tooth(x: vec2) -> vec2 = abs(2.0 * fract(0.5 * x) - 1.0);
+        fn board(p: vec2, width: vec2) -> float {{
+            let w = max(width, 1e-4);
+            let mean = (tooth(p - 0.5 * w) - tooth(p + 0.5 * w)) / w;
+            0.5 - 0.5 * mean.x * mean.y
+        }}
+        %% let p = vec2(position.x, position.z) / 1.0;
+        emission = uniform(color(board(p, {width})));"
+    )
+}
+
+#[test]
+fn a_distant_checkerboard_is_grey_without_noise() {
+    let view = |width: &str, samples, seed| {
+        let mut case = Case::floor(checker(width), [0.3, 3.0, 60.0]);
+        case.squares[0].half = 500.0;
+        (case.size, case.fov, case.samples, case.seed) = ([24, 8], 8.0, samples, seed);
+        case.to = [0.0, 0.0, 30.0];
+        let picture = case.render();
+        picture.into_iter().map(|p| p[0]).collect::<Vec<f64>>()
+    };
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let difference = |a: &[f64], b: &[f64]| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+        squares.sum::<f64>() / a.len() as f64
+    };
+    let noise = |width: &str| difference(&view(width, 2, 1), &view(width, 2, 2));
+    let (pointwise, filtered) = (noise("vec2(0.0)"), noise("filter_width(p)"));
+    assert!(pointwise > 1e-2, "{pointwise}");
+    assert!(filtered < 0.2 * pointwise, "{filtered} against {pointwise}");
+    let (reference, quick) = (view("vec2(0.0)", 1024, 3), view("filter_width(p)", 16, 4));
+    let (expected, found) = (mean(&reference), mean(&quick));
+    assert!(
+        (found - expected).abs() < 0.01,
+        "{found}, expected {expected}"
+    );
+}
