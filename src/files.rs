@@ -6,13 +6,16 @@ use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use impasto_compiler::Loader;
 use impasto_compiler::source::MAX_SOURCE_BYTES;
+use impasto_compiler::{Loader, library_text};
 
 /// The name by which standard input is asked for.
 pub const STDIN: &str = "-";
 
-/// Loads sources from files; relative paths are taken from `base`.
+/// How many entries of a folder are looked at for a hint.
+const MAX_BESIDE: usize = 4096;
+
+/// Loads sources from files; relative paths are taken from `base`, and `std::...` from the library.
 ///
 /// A source is read once, so that all of one compilation sees one version of it.
 #[derive(Debug, Default)]
@@ -41,11 +44,29 @@ impl FileLoader {
 
 impl Loader for FileLoader {
     fn load(&mut self, path: &str) -> Result<Vec<u8>, String> {
+        if let Some(text) = library_text(path) {
+            return Ok(text?.as_bytes().to_vec());
+        }
         if !self.loaded.contains_key(path) {
             let bytes = self.read(path).map_err(|error| reason(&error));
             self.loaded.insert(path.to_owned(), bytes);
         }
         self.loaded[path].clone()
+    }
+
+    fn beside(&mut self, path: &str) -> Vec<String> {
+        let folder = path.rfind('/').map_or("", |slash| &path[..=slash]);
+        let Ok(entries) = std::fs::read_dir(self.base.join(folder)) else {
+            return Vec::new();
+        };
+        let names = entries.flatten().take(MAX_BESIDE);
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut paths: Vec<String> = names
+            .filter(|name| name.ends_with(".impasto"))
+            .map(|name| format!("{folder}{name}"))
+            .collect();
+        paths.sort();
+        paths
     }
 }
 

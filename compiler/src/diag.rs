@@ -85,13 +85,13 @@ codes! {
     ImportCycle = "E0205", Error, "import cycle",
         "Modules may not import each other in a circle. Move what both need into a third module.";
     Duplicate = "E0206", Error, "defined twice",
-        "A name may be defined once in its scope. Inner blocks may shadow outer names.";
+        "A name may be defined once in its scope. Inner blocks may shadow outer names. Functions are not overloaded: two of one name are an error even if they take different arguments.";
     Recursion = "E0207", Error, "recursion",
-        "GPUs run without a call stack: functions may not call themselves, directly or through others. Use a bounded loop.";
+        "GPUs run without a call stack: functions and materials may not call themselves, directly or through others. Use a bounded loop.";
     UnknownField = "E0208", Error, "unknown field",
         "The value has no field or component of that name. Vectors have x, y, z, w; colors r, g, b; structs their fields.";
     UnknownOutput = "E0209", Error, "unknown output",
-        "A material assigns `surface` and, when it needs them, `emission`, `interior` and `opacity`.";
+        "A material assigns `surface` and, when it needs them, `emission`, `interior` and `opacity`; or all of them at once, with `material = ...;`.";
     UnknownArgument = "E0210", Error, "unknown argument",
         "The function has no parameter of that name.";
     MissingArgument = "E0211", Error, "missing argument",
@@ -102,6 +102,8 @@ codes! {
         "Lengths are written in nm, um, mm, cm, m or km, angles in deg or rad.";
     UnknownParameter = "E0214", Error, "unknown material parameter",
         "A scene sets a parameter that the material does not declare.";
+    PrivateItem = "E0215", Error, "private to its module",
+        "A definition that is marked `private` is for its own file only. Remove the mark there to import it.";
     // E03xx: types and values
     TypeMismatch = "E0301", Error, "wrong type",
         "The value has another type than this place needs. An int becomes a float, and a float a grey color, by itself; everything else is converted by calling the type: `color(v)`, `float(l)`.";
@@ -132,9 +134,11 @@ codes! {
     NotFinite = "E0314", Error, "not a finite number",
         "Parameters and constants must be finite numbers.";
     TooLarge = "E0315", Error, "material too large",
-        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way. Calls of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions a material; closures lie at most 256 levels within each other.";
+        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way. Calls of materials and of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions a material; closures lie at most 256 levels within each other.";
     VaryingMedium = "E0316", Error, "a medium that varies",
         "What fills an object is the same everywhere in it: `interior` depends on parameters and constants only, not on the point of the surface or on textures.";
+    Metadata = "E0317", Error, "metadata that does not fit",
+        "The block behind a parameter tells user interfaces its `label` and `group` (texts), its `soft` range (of a slider, within the range of the parameter, around the default) and its `unit` (of a length or an angle). Bools and textures have no ranges.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";

@@ -28,6 +28,7 @@ pub mod codegen;
 pub mod cost;
 pub mod diag;
 pub mod inspect;
+pub mod interface;
 mod interior;
 pub mod ir;
 pub mod lexer;
@@ -56,6 +57,35 @@ pub trait Loader {
     /// # Errors
     /// Why the file cannot be read, in words for people.
     fn load(&mut self, path: &str) -> Result<Vec<u8>, String>;
+
+    /// Paths of the sources in the folder of `path`, in the order of their names: for hints at what
+    /// a missing file may be. None where that is not known.
+    fn beside(&mut self, path: &str) -> Vec<String> {
+        let _ = path;
+        Vec::new()
+    }
+}
+
+/// The text of a module of the standard library by its path, such as `std::surface::open_pbr`;
+/// nothing if the path is that of a file. Materials are named by either.
+///
+/// # Errors
+/// There is no such module; in words for people.
+pub fn library_text(path: &str) -> Option<Result<&'static str, String>> {
+    let path = path.strip_prefix("std::")?;
+    let found = path
+        .split_once("::")
+        .and_then(|(folder, name)| impasto_stdlib::file(folder, name));
+    Some(found.map(|f| f.text).ok_or_else(|| {
+        let all: Vec<String> = impasto_stdlib::files()
+            .iter()
+            .map(|f| format!("{}::{}", f.folder, f.name))
+            .collect();
+        match diag::nearest(path, all.iter().map(String::as_str)) {
+            Some(near) => format!("no such module of the library; did you mean `std::{near}`?"),
+            None => "no such module of the library; write `std::folder::name`".into(),
+        }
+    }))
 }
 
 /// Files kept in memory, for tests and tools.
@@ -77,6 +107,12 @@ impl Loader for MemoryLoader {
             .get(path)
             .cloned()
             .ok_or_else(|| "no such file".into())
+    }
+
+    fn beside(&mut self, path: &str) -> Vec<String> {
+        let folder = |p: &str| p.rfind('/').map_or(0, |slash| slash + 1);
+        let here = |p: &&String| p[..folder(p)] == path[..folder(path)];
+        self.files.keys().filter(here).cloned().collect()
     }
 }
 
@@ -177,6 +213,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
                 checked.extend(checker.material(module, index));
             }
         }
+        checker.report_unused_items(module);
     }
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);

@@ -5,12 +5,13 @@ use std::path::Path;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use impasto::compiler::codegen::Target;
-use impasto::compiler::ir;
 use impasto::compiler::passes::{PIPELINE, run_until};
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
+use impasto::compiler::{interface, ir};
 use impasto::files;
 use impasto::{FileLoader, Program};
+use serde_json::json;
 
 use super::{Failure, Global, Outcome, print};
 
@@ -53,6 +54,8 @@ enum What {
     Ir,
     /// The generated WGSL
     Wgsl,
+    /// Its materials' parameters as JSON, for user interfaces (docs/params.md)
+    Params,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -107,6 +110,7 @@ fn emitted(args: &EmitArgs, global: &Global) -> Result<String, Failure> {
         (What::Tokens | What::Ast, None) => syntax(args, &bytes, global),
         (What::Ir, None) => ir(args, &mut loader, global),
         (What::Wgsl, None) => wgsl(args, &mut loader, global),
+        (What::Params, None) => params(args, &mut loader, global),
     }
 }
 
@@ -177,6 +181,29 @@ fn after(
 fn wgsl(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<String, Failure> {
     let program = compiled(args, loader, global)?;
     Ok(program.complete_wgsl(args.target.into()))
+}
+
+/// What user interfaces are told of one material, or of all that the file defines.
+fn params(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<String, Failure> {
+    let found = interface::interface(&args.file, loader);
+    global.report(&found.sources, &found.diagnostics);
+    if diag::has_errors(&found.diagnostics) {
+        return Err(Failure::Diagnostics);
+    }
+    let mut materials = found.materials;
+    if let Some(name) = &args.material {
+        materials.retain(|m| m.name == *name);
+    }
+    if materials.is_empty() {
+        // The compiler knows what to say of a material that is not there.
+        compiled(args, loader, global)?;
+    }
+    let shown = json!({
+        "version": interface::VERSION,
+        "file": args.file,
+        "materials": materials,
+    });
+    Ok(format!("{shown:#}\n"))
 }
 
 fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Program, Failure> {

@@ -11,7 +11,9 @@ use crate::ir::Module;
 use crate::ops::Counts;
 use crate::passes;
 use crate::source::{FileId, SourceMap};
-use crate::{Loader, MaterialRequest, MemoryLoader, Parameters, check, compile, lexer, parser};
+use crate::{
+    Loader, MaterialRequest, MemoryLoader, Parameters, check, compile, lexer, library_text, parser,
+};
 
 mod at;
 mod difference;
@@ -224,8 +226,8 @@ struct Source<'l> {
 
 impl<'l> Source<'l> {
     fn open(file: &str, inner: &'l mut dyn Loader) -> Result<Self, String> {
-        let bytes = match file.strip_prefix("std::") {
-            Some(path) => library(path)?.as_bytes().to_vec(),
+        let bytes = match library_text(file) {
+            Some(text) => text?.as_bytes().to_vec(),
             None => inner.load(file)?,
         };
         Ok(Self {
@@ -245,23 +247,6 @@ impl Loader for Source<'_> {
         }
         Ok(format!("{}{}", self.text, self.appended).into_bytes())
     }
-}
-
-/// The text of `folder::name` of the library.
-fn library(path: &str) -> Result<&'static str, String> {
-    let found = path
-        .split_once("::")
-        .and_then(|(folder, name)| impasto_stdlib::file(folder, name));
-    found.map(|f| f.text).ok_or_else(|| {
-        let all: Vec<String> = impasto_stdlib::files()
-            .iter()
-            .map(|f| format!("{}::{}", f.folder, f.name))
-            .collect();
-        match diag::nearest(path, all.iter().map(String::as_str)) {
-            Some(near) => format!("no such module of the library; did you mean `std::{near}`?"),
-            None => "no such module of the library; write `std::folder::name`".into(),
-        }
-    })
 }
 
 /// The items that a query asks for.

@@ -14,46 +14,49 @@ use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
-use super::modules::ItemRef;
+use super::metadata::Metadata;
+use super::modules::{ItemRef, ModuleId};
 use super::outputs::OUTPUTS;
 use super::types::Ty;
-use super::{Checker, Param};
+use super::{Checked, Checker, Param};
 
 /// How a value's range is looked for: operations within each other.
 const RANGE_DEPTH: usize = 8;
 
 /// A parameter of a material that checks.
 #[derive(Clone, Debug)]
-pub enum Declared {
-    /// One that scenes set and callers give.
-    Settable(MaterialParam, Ty),
-    /// One whose default is an input of the surface, which callers alone can replace.
-    Connected {
-        /// Its name.
-        name: String,
-        /// Its type.
-        ty: Ty,
-        /// The input.
-        input: String,
-    },
+pub struct Declared {
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    pub ty: Ty,
+    /// Where its value comes from.
+    pub origin: Origin,
+    /// What it says of itself.
+    pub metadata: Metadata,
+}
+
+/// Where the value of a material's parameter comes from.
+#[derive(Clone, Debug)]
+pub enum Origin {
+    /// Scenes set it and callers give it.
+    Settable(MaterialParam),
+    /// It is an input of the surface, which callers alone can replace.
+    Input(String),
 }
 
 /// The parameters of a material in order; nothing for those that do not check.
 pub type MaterialSignature = Arc<Vec<Option<Declared>>>;
 
 impl Declared {
-    /// The parameter as that of a function. A connected one has no default constant.
+    /// The parameter as that of a function. One that is an input has no default constant.
     fn param(&self) -> Param {
-        match self {
-            Declared::Settable(p, ty) => Param {
-                name: p.name.clone(),
-                ty: *ty,
-                default: Some(p.default.clone()),
-            },
-            Declared::Connected { name, ty, .. } => Param {
-                name: name.clone(),
-                ty: *ty,
-                default: None,
+        Param {
+            name: self.name.clone(),
+            ty: self.ty,
+            default: match &self.origin {
+                Origin::Settable(param) => Some(param.default.clone()),
+                Origin::Input(_) => None,
             },
         }
     }
@@ -86,6 +89,14 @@ impl Checker<'_> {
 
     pub(super) fn leave_material(&mut self) {
         self.expanding.pop();
+    }
+
+    /// The parameters of the material at `index` of a file.
+    pub fn declared(&mut self, module: ModuleId, index: usize) -> Option<MaterialSignature> {
+        match self.demand(ItemRef { module, index }, None)? {
+            Checked::Material(declared) => Some(declared),
+            _ => None,
+        }
     }
 
     /// Is a material of a user's file right by itself? The library's are known to be.
@@ -150,14 +161,14 @@ impl Body<'_, '_> {
 
     /// The default of a parameter in a call at `span`.
     fn default_of(&mut self, declared: &Declared, span: Span) -> Option<Operand> {
-        match declared {
-            Declared::Connected { ty, input, .. } => self.connected(input, *ty, span),
-            Declared::Settable(param, ty) => {
-                if let (Ty::Texture, Const::Int(texture)) = (ty, &param.default) {
+        match &declared.origin {
+            Origin::Input(input) => self.connected(input, declared.ty, span),
+            Origin::Settable(param) => {
+                if let (Ty::Texture, Const::Int(texture)) = (declared.ty, &param.default) {
                     self.cx.literal_textures.extend(usize::try_from(*texture));
                 }
                 let id = self.constant(param.default.clone(), span);
-                Some(Operand::Value(id, *ty))
+                Some(Operand::Value(id, declared.ty))
             }
         }
     }
@@ -171,7 +182,7 @@ impl Body<'_, '_> {
     /// An argument kept in the range of its parameter. A constant outside is an error; what is not
     /// known yet is clamped, unless it cannot leave the range.
     fn held(&mut self, operand: Operand, declared: &Declared) -> Option<Operand> {
-        let (Operand::Value(id, ty), Declared::Settable(param, _)) = (operand, declared) else {
+        let (Operand::Value(id, ty), Origin::Settable(param)) = (operand, &declared.origin) else {
             return Some(operand);
         };
         let Some((low, high)) = param.range else {
@@ -319,9 +330,9 @@ impl Body<'_, '_> {
 pub fn settable(declared: &MaterialSignature) -> Option<Vec<MaterialParam>> {
     let mut params = Vec::new();
     for param in declared.iter() {
-        match param.as_ref()? {
-            Declared::Settable(param, _) => params.push(param.clone()),
-            Declared::Connected { .. } => {}
+        match &param.as_ref()?.origin {
+            Origin::Settable(param) => params.push(param.clone()),
+            Origin::Input(_) => {}
         }
     }
     Some(params)

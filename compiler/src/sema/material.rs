@@ -1,19 +1,16 @@
 //! Checking materials: parameters, patterns and outputs.
 
-use std::sync::Arc;
-
 use crate::ast::{self, Expr, ItemKind};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::{Builder, const_type};
 use crate::ir::{self, Const, ExprKind, Material, MaterialParam, Type};
 use crate::parser;
-use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
-use super::called::{self, Declared, MaterialSignature};
+use super::called::{self, Declared, MaterialSignature, Origin};
 use super::modules::{ItemRef, ModuleId, list};
 use super::types::{NAMED, Ty};
-use super::{Checked, Checker, expr};
+use super::{Checker, expr};
 
 impl Checker<'_> {
     /// The material called `name` in a file, or its only one.
@@ -26,11 +23,14 @@ impl Checker<'_> {
             .filter(is_material)
             .map(|i| i.name.node.as_str())
             .collect();
+        let path = self.modules[module.0].path.clone();
+        let own = path.rsplit_once("::").map(|(_, last)| last);
         let wanted = match (name, names.as_slice()) {
             (Some(name), names) if names.contains(&name) => name,
             (None, [only]) => only,
+            // A module of the library is named for the material that it is about.
+            (None, names) if own.is_some_and(|own| names.contains(&own)) => own.unwrap_or(""),
             (asked, names) => {
-                let path = self.modules[module.0].path.clone();
                 let message = match asked {
                     Some(name) => format!("`{path}` has no material `{name}`"),
                     None if names.is_empty() => format!("`{path}` defines no material"),
@@ -57,9 +57,7 @@ impl Checker<'_> {
         if let Some(known) = self.materials.get(&item) {
             return known.clone();
         }
-        let Checked::Material(declared) = self.demand(item, None)? else {
-            return None;
-        };
+        let declared = self.declared(module, index)?;
         self.enter_material(item, None)?;
         let material = self.new_material(module, index, &declared);
         self.leave_material();
@@ -117,130 +115,6 @@ impl Checker<'_> {
         })
     }
 
-    /// The parameters of a material.
-    pub(super) fn material_signature(
-        &mut self,
-        module: ModuleId,
-        material: &ast::Material,
-    ) -> Checked {
-        let params = material.params.iter();
-        let declared = params.map(|p| self.material_param(module, p)).collect();
-        Checked::Material(Arc::new(declared))
-    }
-
-    fn material_param(&mut self, module: ModuleId, p: &ast::MaterialParam) -> Option<Declared> {
-        let ty = self.type_name(module, &p.ty)?;
-        let Some((surface_type, _)) = NAMED
-            .iter()
-            .find(|(_, t)| *t == ty && !ty.is_closure() && ty != Ty::Mat3)
-        else {
-            let wrong = Diagnostic::new(
-                Code::Unsupported,
-                p.ty.span,
-                format!("a parameter cannot be {}", self.a_type(ty)),
-            )
-            .expected("a bool, number, vector, color, length, angle or texture");
-            self.report(wrong);
-            return None;
-        };
-        if let ast::ExprKind::Name(input) = &p.default.kind
-            && expr::INPUTS.contains(&input.as_str())
-        {
-            return self.connected_param(p, ty, input);
-        }
-        let default = self.constant(module, &p.default, ty, expr::DEFAULT_OF_PARAMETER)?;
-        let range = match &p.range {
-            Some((low, high)) => Some(self.range(module, low, high, ty)?),
-            None => None,
-        };
-        let param = MaterialParam {
-            name: p.name.node.clone(),
-            docs: p.docs.clone(),
-            surface_type,
-            ty: ty.ir()?,
-            default,
-            range,
-            span: p.span,
-        };
-        self.in_range(&param, &param.default, p.default.span, "the default")
-            .then_some(Declared::Settable(param, ty))
-    }
-
-    /// A parameter whose default is an input of the surface.
-    fn connected_param(&mut self, p: &ast::MaterialParam, ty: Ty, input: &str) -> Option<Declared> {
-        if let Some((low, high)) = &p.range {
-            let message = format!("`{}` is an input by default and has no range", p.name.node);
-            let wrong = Diagnostic::new(Code::Unsupported, low.span.to(high.span), message)
-                .expected(format!("`param {}: {} = {input};`", p.name.node, p.ty.node));
-            self.report(wrong);
-            return None;
-        }
-        Some(Declared::Connected {
-            name: p.name.node.clone(),
-            ty,
-            input: input.to_owned(),
-        })
-    }
-
-    fn range(&mut self, module: ModuleId, low: &Expr, high: &Expr, ty: Ty) -> Option<(f64, f64)> {
-        // Colors and vectors are limited by component.
-        let scalar = if ty.is_vector() { Ty::Float } else { ty };
-        let low_value = scalar_of(&self.constant(module, low, scalar, "the lower limit")?);
-        let high_value = scalar_of(&self.constant(module, high, scalar, "the upper limit")?);
-        match (low_value, high_value) {
-            (Some(a), Some(b)) if a <= b => Some((a, b)),
-            _ => {
-                let wrong = Diagnostic::new(
-                    Code::OutOfRange,
-                    low.span.to(high.span),
-                    "the range is empty or not of numbers",
-                )
-                .expected("`in least .. greatest`");
-                self.report(wrong);
-                None
-            }
-        }
-    }
-
-    /// Is a value within a parameter's range? Reports it if not.
-    pub(super) fn in_range(
-        &mut self,
-        param: &MaterialParam,
-        value: &Const,
-        span: Span,
-        what: &str,
-    ) -> bool {
-        let Some((low, high)) = param.range else {
-            return true;
-        };
-        let components: Vec<f64> = match value {
-            Const::Float(v) => v.clone(),
-            Const::Int(i) => vec![f64::from(*i)],
-            Const::Bool(_) => return true,
-        };
-        let Some(&bad) = components.iter().find(|x| !(low..=high).contains(*x)) else {
-            return true;
-        };
-        let unit = match param.surface_type {
-            "length" => " m",
-            "angle" => " rad",
-            _ => "",
-        };
-        let message = format!(
-            "{what} of `{}` is {}{unit}, outside its range",
-            param.name, bad as f32
-        );
-        let outside = Diagnostic::new(Code::OutOfRange, span, message)
-            .expected(format!("{}{unit} to {}{unit}", low as f32, high as f32));
-        let outside = if span == param.span {
-            outside
-        } else {
-            outside.label(param.span, "declared here")
-        };
-        self.report(outside);
-        false
-    }
-
     /// The values of a material's parameters: defaults, and what a scene sets as source text.
     /// `origin` names the scene's setting in diagnostics.
     pub fn parameter_values(
@@ -254,6 +128,10 @@ impl Checker<'_> {
         let mut ok = true;
         for (name, text) in given {
             let Some(index) = material.params.iter().position(|p| p.name == *name) else {
+                if self.only_callers_give(module, material, name, origin) {
+                    ok = false;
+                    continue;
+                }
                 let names: Vec<&str> = material.params.iter().map(|p| p.name.as_str()).collect();
                 let message = format!(
                     "{origin}: material `{}` has no parameter `{name}`",
@@ -276,6 +154,33 @@ impl Checker<'_> {
             }
         }
         ok.then_some(values)
+    }
+
+    /// Reports a setting of a parameter that is an input, if `name` is one.
+    fn only_callers_give(
+        &mut self,
+        module: ModuleId,
+        material: &Material,
+        name: &str,
+        origin: &str,
+    ) -> bool {
+        let ast = self.ast(module);
+        let item = ast.items.iter().find(|i| i.span == material.span);
+        let Some(ItemKind::Material(declared)) = item.map(|i| &i.kind) else {
+            return false;
+        };
+        let Some(p) = declared.params.iter().find(|p| p.name.node == name) else {
+            return false;
+        };
+        let message = format!(
+            "{origin}: `{name}` of `{}` is an input of the surface, which a scene cannot set",
+            material.name
+        );
+        let wrong = Diagnostic::new(Code::UnknownParameter, p.span, message)
+            .expected("parameters whose default is a constant")
+            .hint("call the material from another one, with an argument for it");
+        self.report(wrong);
+        true
     }
 
     fn parameter_value(
@@ -330,14 +235,6 @@ fn retyped(mut expr: Expr, ty: &str) -> Expr {
     expr
 }
 
-fn scalar_of(value: &Const) -> Option<f64> {
-    match value {
-        Const::Float(v) if v.len() == 1 => Some(v[0]),
-        Const::Int(i) => Some(f64::from(*i)),
-        _ => None,
-    }
-}
-
 impl Body<'_, '_> {
     fn bind_params(&mut self, params: &[ast::MaterialParam], declared: &MaterialSignature) {
         for (p, declared) in params.iter().zip(declared.iter()) {
@@ -355,15 +252,15 @@ impl Body<'_, '_> {
 
     /// What a parameter stands for where the material is checked on its own.
     fn own_param(&mut self, declared: &Declared, p: &ast::MaterialParam) -> Option<Operand> {
-        match declared {
-            Declared::Settable(param, ty) => {
+        match &declared.origin {
+            Origin::Settable(param) => {
                 let uniform = ExprKind::Uniform(self.ranges.len() as u32);
                 self.ranges.push(param.range);
                 let id = self.builder.add(uniform, param.ty, p.name.span);
                 self.builder.name(id, &p.name.node);
-                Some(Operand::Value(id, *ty))
+                Some(Operand::Value(id, declared.ty))
             }
-            Declared::Connected { ty, input, .. } => self.connected(input, *ty, p.default.span),
+            Origin::Input(input) => self.connected(input, declared.ty, p.default.span),
         }
     }
 }

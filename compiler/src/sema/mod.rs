@@ -22,17 +22,22 @@ mod convert;
 mod expr;
 mod filter;
 mod gradient;
+mod imports;
 mod inline;
 mod material;
 mod medium;
+mod metadata;
 mod modules;
 mod outputs;
+mod params;
 mod stmt;
 mod tree;
 pub mod types;
 mod varying;
 
 use called::MaterialSignature;
+pub use called::{Declared, Origin};
+pub use metadata::Metadata;
 pub use modules::{ItemRef, ModuleId, std_path};
 use modules::{Loading, ModuleData};
 use types::Ty;
@@ -56,6 +61,10 @@ pub struct Checker<'a> {
     materials: BTreeMap<ItemRef, Option<ir::Material>>,
     /// Materials being checked, each called by the one before it.
     expanding: Vec<ItemRef>,
+    /// Files that are being loaded, each imported by the one before it.
+    importing: Vec<String>,
+    /// Private definitions that something of their file uses.
+    used: BTreeSet<ItemRef>,
     /// Definitions with errors of syntax, which are not checked.
     broken: BTreeSet<ItemRef>,
     /// Signatures of `ir.functions` that a call can name.
@@ -120,6 +129,8 @@ impl<'a> Checker<'a> {
             checked: BTreeMap::new(),
             materials: BTreeMap::new(),
             expanding: Vec::new(),
+            importing: Vec::new(),
+            used: BTreeSet::new(),
             broken: BTreeSet::new(),
             signatures: BTreeMap::new(),
             fields: Vec::new(),
@@ -150,6 +161,22 @@ impl<'a> Checker<'a> {
                 return;
             }
             self.demand(ItemRef { module, index }, None);
+        }
+    }
+
+    /// Warns of private definitions of a file that nothing uses, once all of the file is checked.
+    pub fn report_unused_items(&mut self, module: ModuleId) {
+        let ast = self.ast(module);
+        for (index, item) in ast.items.iter().enumerate() {
+            let used = self.used.contains(&ItemRef { module, index });
+            let name = &item.name;
+            if !item.private || used || name.node.starts_with('_') {
+                continue;
+            }
+            let message = format!("`{}` is private and never used", name.node);
+            let unused = Diagnostic::new(Code::Unused, name.span, message)
+                .hint(format!("remove it, or call it `_{}`", name.node));
+            self.report(unused);
         }
     }
 
@@ -208,6 +235,9 @@ impl<'a> Checker<'a> {
     /// Checks an item if that has not happened, of a material its parameters; `None` if it does
     /// not check.
     fn demand(&mut self, item: ItemRef, asked: Option<Span>) -> Option<Checked> {
+        if asked.is_some() {
+            self.used.insert(item);
+        }
         if self.broken.contains(&item) {
             return None;
         }

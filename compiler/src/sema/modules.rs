@@ -9,8 +9,10 @@ use std::sync::{Arc, OnceLock};
 use impasto_stdlib::StdFile;
 
 use super::Checker;
+use super::imports::folders;
 use crate::ast::{self, ItemKind, Name};
-use crate::diag::{self, Code, Diagnostic};
+use crate::diag::{Code, Diagnostic};
+use crate::library_text;
 use crate::parser;
 use crate::source::{FileId, Span};
 
@@ -57,28 +59,54 @@ impl Checker<'_> {
             Some(Loading::Done(id)) => return Some(*id),
             Some(Loading::Failed) => return None,
             Some(Loading::InProgress(_)) => {
-                if let Some(name) = asked {
-                    let message = format!("`{}` imports itself through other modules", name.node);
-                    let cycle = Diagnostic::new(Code::ImportCycle, name.span, message)
-                        .expected("modules that import each other in one direction only")
-                        .hint("move what both need into a third module");
-                    self.report(cycle);
-                }
+                self.import_cycle(path, asked);
                 return None;
             }
             None => {}
         }
+        self.importing.push(path.to_owned());
         let loaded = self
             .read(path, asked)
             .map(|text| self.add_module(path, &text));
+        self.importing.pop();
         if loaded.is_none() {
             self.loading.insert(path.to_owned(), Loading::Failed);
         }
         loaded
     }
 
+    /// Reports an import that leads back to the file at `path`.
+    fn import_cycle(&mut self, path: &str, asked: Option<&Name>) {
+        let Some(name) = asked else { return };
+        let first = self.importing.iter().position(|p| p == path).unwrap_or(0);
+        let chain = self.importing[first..].iter().map(String::as_str);
+        let names: Vec<&str> = chain
+            .chain([path])
+            .map(|p| p.strip_suffix(".impasto").unwrap_or(p))
+            .collect();
+        let cycle = match names.as_slice() {
+            [_, _] => {
+                let message = format!("`{}` imports itself", name.node);
+                Diagnostic::new(Code::ImportCycle, name.span, message)
+                    .expected("another module")
+                    .hint("what a file defines is in scope in it already")
+            }
+            names => {
+                let message = format!("modules import each other: {}", names.join(" -> "));
+                Diagnostic::new(Code::ImportCycle, name.span, message)
+                    .expected("modules that import each other in one direction only")
+                    .hint("move what both need into a third module")
+            }
+        };
+        self.report(cycle);
+    }
+
     fn read(&mut self, path: &str, asked: Option<&Name>) -> Option<String> {
-        let problem = match self.loader.load(path) {
+        let loaded = match (self.loader.load(path), library_text(path)) {
+            (Err(_), Some(text)) => text.map(|text| text.as_bytes().to_vec()),
+            (loaded, _) => loaded,
+        };
+        let problem = match loaded {
             Ok(bytes) => match crate::lexer::decode(path, &bytes) {
                 Ok(text) => return Some(text),
                 Err(diagnostic) => diagnostic,
@@ -89,22 +117,42 @@ impl Checker<'_> {
             }
         };
         let problem = match asked {
-            Some(name) => Diagnostic {
-                span: Some(name.span),
-                ..problem
+            Some(name) => {
+                let problem = Diagnostic {
+                    span: Some(name.span),
+                    ..problem
+                };
+                let expected =
+                    "a folder of the standard library (`std::...`) or a file beside this one";
+                self.suggest_module(problem.expected(expected), path, &name.node)
             }
-            .expected("a folder of the standard library (`std::...`) or a file beside this one"),
             None => problem,
         };
         self.report(problem);
         None
     }
 
+    /// Hints at the module that a name for one that is not there may mean.
+    fn suggest_module(&mut self, problem: Diagnostic, path: &str, name: &str) -> Diagnostic {
+        if folders().contains(&name) {
+            return problem.hint(format!("the library is in `std`: `use std::{name}::...;`"));
+        }
+        let beside = self.loader.beside(path);
+        let own = self.importing.iter().rev().nth(1);
+        let known = |p: &&String| own != Some(*p);
+        let names = beside.iter().filter(known).filter_map(|p| {
+            let file = p.rsplit('/').next().unwrap_or(p);
+            file.strip_suffix(".impasto")
+        });
+        problem.did_you_mean(name, names)
+    }
+
     /// Parses a text and resolves its imports.
     fn add_module(&mut self, path: &str, text: &str) -> ModuleId {
         let file = self.sources.add(path, text);
         let (ast, diagnostics) = parser::parse(file, text);
-        self.define_module(path, Arc::new(ast), diagnostics, false)
+        let is_std = path.starts_with("std::");
+        self.define_module(path, Arc::new(ast), diagnostics, is_std)
     }
 
     fn define_module(
@@ -157,132 +205,27 @@ impl Checker<'_> {
         }
     }
 
-    fn define(&mut self, module: ModuleId, name: &Name, item: ItemRef) {
+    pub(super) fn define(&mut self, module: ModuleId, name: &Name, item: ItemRef) {
         let names = &mut self.modules[module.0].names;
         match names.get(&name.node).copied() {
             Some(first) if first != item => {
-                let first = self.item(first).name.span;
+                let is_function = |i: ItemRef| matches!(self.item(i).kind, ItemKind::Function(_));
+                let functions =
+                    first.module == item.module && is_function(first) && is_function(item);
+                let first_span = self.item(first).name.span;
                 let message = format!("`{}` is defined twice", name.node);
                 let duplicate = Diagnostic::new(Code::Duplicate, name.span, message)
                     .expected("one definition a name")
-                    .label(first, "first defined here")
-                    .hint("rename one of them, or import it with `as`");
-                self.report(duplicate);
+                    .label(first_span, "first defined here");
+                self.report(match functions {
+                    true => duplicate.hint(
+                        "functions are not overloaded: give each a name of its own, or one of them defaults",
+                    ),
+                    false => duplicate.hint("rename one of them, or import it with `as`"),
+                });
             }
             _ => drop(names.insert(name.node.clone(), item)),
         }
-    }
-
-    fn import(&mut self, module: ModuleId, import: &ast::Use) {
-        let Some(first) = import.path.first() else {
-            return;
-        };
-        for wanted in &import.names {
-            let item = if first.node == "std" {
-                self.import_std(import, &wanted.name)
-            } else {
-                self.import_file(module, import, &wanted.name)
-            };
-            if let Some(item) = item {
-                self.define(module, wanted.alias.as_ref().unwrap_or(&wanted.name), item);
-            }
-        }
-    }
-
-    fn import_std(&mut self, import: &ast::Use, wanted: &Name) -> Option<ItemRef> {
-        let [_, folder] = import.path.as_slice() else {
-            self.unknown_std_folder(import.span, import.path.get(1).map_or("", |n| &n.node));
-            return None;
-        };
-        if !folders().contains(&folder.node.as_str()) {
-            self.unknown_std_folder(folder.span, &folder.node);
-            return None;
-        }
-        if let Some(item) = self.find_std(&folder.node, &wanted.node) {
-            return Some(item);
-        }
-        let names = self.std_names(&folder.node);
-        let message = format!("`std::{}` has no `{}`", folder.node, wanted.node);
-        let elsewhere = folders()
-            .into_iter()
-            .find(|f| self.std_names(f).contains(&wanted.node));
-        let unknown = Diagnostic::new(Code::UnknownImport, wanted.span, message)
-            .expected(format!("one of {}", list(names.iter().map(String::as_str))));
-        self.report(match elsewhere {
-            Some(other) => unknown.hint(format!("it is in `std::{other}`")),
-            None => unknown.did_you_mean(&wanted.node, names.iter().map(String::as_str)),
-        });
-        None
-    }
-
-    fn unknown_std_folder(&mut self, span: Span, name: &str) {
-        let folders = folders();
-        let message = format!("the standard library has no module `{name}`");
-        let unknown = Diagnostic::new(Code::UnknownModule, span, message)
-            .expected(format!("one of {}", list(folders.iter().copied())))
-            .did_you_mean(name, folders.iter().copied());
-        self.report(unknown);
-    }
-
-    fn import_file(
-        &mut self,
-        module: ModuleId,
-        import: &ast::Use,
-        wanted: &Name,
-    ) -> Option<ItemRef> {
-        let folder = parent(&self.modules[module.0].path);
-        let names: Vec<&str> = import.path.iter().map(|n| n.node.as_str()).collect();
-        let path = format!("{folder}{}.impasto", names.join("/"));
-        let from = self.load_module(&path, import.path.last())?;
-        let found = self.modules[from.0]
-            .ast
-            .items
-            .iter()
-            .position(|i| i.name.node == wanted.node);
-        if found.is_none() {
-            let ast = self.modules[from.0].ast.clone();
-            let names = ast.items.iter().map(|i| i.name.node.as_str());
-            let message = format!("`{path}` has no `{}`", wanted.node);
-            let unknown = Diagnostic::new(Code::UnknownImport, wanted.span, message)
-                .expected("a name that the module defines")
-                .did_you_mean(&wanted.node, names);
-            self.report(unknown);
-        }
-        found.map(|index| ItemRef {
-            module: from,
-            index,
-        })
-    }
-
-    /// The item called `name` in a folder of the standard library.
-    pub(super) fn find_std(&mut self, folder: &str, name: &str) -> Option<ItemRef> {
-        let files = impasto_stdlib::files()
-            .iter()
-            .filter(|f| f.folder == folder);
-        // By convention the file is named after what it defines; other files are the exception.
-        let (first, rest): (Vec<_>, Vec<_>) = files.partition(|f| f.name == name);
-        first.into_iter().chain(rest).find_map(|file| {
-            let module = self.std_module(file)?;
-            let items = &self.modules[module.0].ast.items;
-            let index = items.iter().position(|i| i.name.node == name)?;
-            Some(ItemRef { module, index })
-        })
-    }
-
-    fn std_names(&mut self, folder: &str) -> Vec<String> {
-        let files: Vec<_> = impasto_stdlib::files()
-            .iter()
-            .filter(|f| f.folder == folder)
-            .collect();
-        let mut names = Vec::new();
-        for file in files {
-            if let Some(module) = self.std_module(file) {
-                let items = self.modules[module.0].ast.items.iter();
-                names.extend(items.map(|i| i.name.node.clone()));
-            }
-        }
-        names.sort();
-        names
     }
 
     /// Loads a file of the standard library. One that is being loaded is visible already: its
@@ -314,7 +257,8 @@ impl Checker<'_> {
         {
             if let Some(module) = self.std_module(file) {
                 let items = self.modules[module.0].ast.clone();
-                for (index, item) in items.items.iter().enumerate() {
+                let public = items.items.iter().enumerate().filter(|(_, i)| !i.private);
+                for (index, item) in public {
                     self.core
                         .insert(item.name.node.clone(), ItemRef { module, index });
                 }
@@ -343,19 +287,6 @@ impl Checker<'_> {
         let wanted = all.filter(|(_, item)| wanted(&self.item(**item).kind));
         wanted.map(|(name, _)| name.clone()).collect()
     }
-
-    /// The `use` that brings the definition of the standard library whose name is `name`, or
-    /// near it.
-    pub(super) fn importable(&self, name: &str) -> Option<String> {
-        let files = || {
-            impasto_stdlib::files()
-                .iter()
-                .filter(|f| f.folder != "core")
-        };
-        let nearest = diag::nearest(name, files().map(|f| f.name))?;
-        let file = files().find(|f| f.name == nearest)?;
-        Some(format!("use std::{}::{};", file.folder, file.name))
-    }
 }
 
 /// The syntax tree of a standard library file with its errors: parsed at most once a process,
@@ -376,14 +307,6 @@ fn parsed_std(file: &StdFile) -> Option<(Arc<ast::Module>, Vec<Diagnostic>)> {
 /// The path of a standard library file in diagnostics.
 pub fn std_path(file: &StdFile) -> String {
     format!("std/{}/{}.impasto", file.folder, file.name)
-}
-
-/// Folders of the standard library that can be imported from.
-fn folders() -> Vec<&'static str> {
-    let mut folders: Vec<&str> = impasto_stdlib::files().iter().map(|f| f.folder).collect();
-    folders.dedup();
-    folders.retain(|f| *f != "core");
-    folders
 }
 
 /// `a`, `b` and `c`

@@ -314,9 +314,13 @@ impl Body<'_, '_> {
             _ => {
                 let message = format!("`{}` does not combine closures this way", op.symbol());
                 let wrong = Diagnostic::new(Code::ClosureUse, span, message)
-                    .expected("`weight * closure` or `closure + closure`")
-                    .hint("to take light away, multiply by a weight below one");
-                self.report(wrong)
+                    .expected("`weight * closure` or `closure + closure`");
+                self.report(match (a, b) {
+                    (Operand::Material(_), _) | (_, Operand::Material(_)) => {
+                        wrong.hint("take the surface of the material: `m.surface`")
+                    }
+                    _ => wrong.hint("to take light away, multiply by a weight below one"),
+                })
             }
         }
     }
