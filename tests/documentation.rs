@@ -18,14 +18,15 @@ fn examples_check() {
     }
 }
 
-/// README.md and the pages of `docs/`.
+/// README.md and the pages of `docs/` and `docs/library/`.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let docs = std::fs::read_dir(root.join("docs")).expect("docs/");
-    let docs = docs.map(|entry| entry.expect("an entry").path());
-    let mut pages: Vec<PathBuf> = docs
-        .filter(|p| p.extension().is_some_and(|e| e == "md"))
-        .collect();
+    let mut pages = Vec::new();
+    for folder in ["docs", "docs/library"] {
+        let entries = std::fs::read_dir(root.join(folder)).expect("a folder of pages");
+        let paths = entries.map(|entry| entry.expect("an entry").path());
+        pages.extend(paths.filter(|p| p.extension().is_some_and(|e| e == "md")));
+    }
     pages.sort();
     pages.push(root.join("README.md"));
     pages

@@ -13,6 +13,7 @@ use impasto::files;
 use impasto::{FileLoader, Program};
 use serde_json::json;
 
+use super::docs::docs;
 use super::{Failure, Global, Outcome, print};
 
 /// What gives passes their first function.
@@ -56,6 +57,8 @@ enum What {
     Wgsl,
     /// Its materials' parameters as JSON, for user interfaces (docs/params.md)
     Params,
+    /// Doc comments and signatures of all definitions, as JSON
+    Docs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -107,14 +110,14 @@ fn emitted(args: &EmitArgs, global: &Global) -> Result<String, Failure> {
     match (args.what, &args.after) {
         (What::Ir, Some(pass)) => after(args, pass, &mut loader, global),
         (_, Some(_)) => Err(Failure::Error("`--after` goes with `--what ir`".into())),
-        (What::Tokens | What::Ast, None) => syntax(args, &bytes, global),
+        (What::Tokens | What::Ast | What::Docs, None) => syntax(args, &bytes, global),
         (What::Ir, None) => ir(args, &mut loader, global),
         (What::Wgsl, None) => wgsl(args, &mut loader, global),
         (What::Params, None) => params(args, &mut loader, global),
     }
 }
 
-/// Tokens or tree, which need nothing but the text.
+/// Tokens, tree or docs, which need nothing but the text.
 fn syntax(args: &EmitArgs, bytes: &[u8], global: &Global) -> Result<String, Failure> {
     let mut sources = SourceMap::default();
     let text = match lexer::decode(&args.file, bytes) {
@@ -130,9 +133,13 @@ fn syntax(args: &EmitArgs, bytes: &[u8], global: &Global) -> Result<String, Fail
             let (tokens, diagnostics) = lexer::lex(file, &text);
             (lexer::listing(&text, &tokens), diagnostics)
         }
-        _ => {
+        what => {
             let (module, diagnostics) = parser::parse(file, &text);
-            (parser::print(&module), diagnostics)
+            let shown = match what {
+                What::Docs => docs(&module, &text),
+                _ => parser::print(&module),
+            };
+            (shown, diagnostics)
         }
     };
     global.report(&sources, &diagnostics);

@@ -18,6 +18,7 @@ mod checkpoint;
 mod completions;
 mod converge;
 mod cost;
+mod docs;
 mod dropped;
 mod emit;
 mod eval;

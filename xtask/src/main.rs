@@ -10,6 +10,7 @@ use clap::{Parser, Subcommand};
 mod adapter;
 mod bless;
 mod demo;
+mod gallery;
 mod paper;
 mod partition;
 mod scenes;
@@ -36,6 +37,8 @@ enum Command {
     Bless,
     /// Generate the geometry, environment maps and textures of the example scenes
     Scenes(scenes::ScenesArgs),
+    /// Render everything in the library, and write docs/library
+    Gallery(gallery::GalleryArgs),
     /// Measure the tables of the paper on this machine's GPU, and write docs/paper.md
     Paper(paper::PaperArgs),
     /// Measure partitions of materials into kernels, and hold the automatic one against the best
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         Command::Stress(args) => stress::run(&args),
         Command::Bless => bless::run(),
         Command::Scenes(args) => scenes::run(&args),
+        Command::Gallery(args) => gallery::run(&args),
         Command::Paper(args) => paper::run(&args),
         Command::Partition(args) => partition::run(&args),
     };

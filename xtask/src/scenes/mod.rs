@@ -6,21 +6,21 @@
 
 mod carpaint;
 #[cfg(test)]
-mod check;
+pub(crate) mod check;
 mod city;
 mod conference;
 mod cornell;
 mod crossover;
 mod forest;
 mod glasses;
-mod image_file;
-mod mesh;
+pub(crate) mod image_file;
+pub(crate) mod mesh;
 mod mixes;
-mod obj;
+pub(crate) mod obj;
 mod plants;
 mod preview;
 mod random;
-mod shapes;
+pub(crate) mod shapes;
 mod sky;
 mod swatches;
 #[cfg(test)]
