@@ -50,12 +50,27 @@ pub struct Table {
 /// What fills the inside of an object, the same everywhere in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Medium {
-    /// How much light is lost a metre (linear RGB, 1/m).
+    /// How much light is absorbed a metre (linear RGB, 1/m).
     pub absorption: [f32; 3],
     /// Index of refraction.
     pub ior: f32,
     /// Which medium counts where several overlap: the one with the highest.
     pub priority: u32,
+    /// How much light is scattered a metre (linear RGB, 1/m).
+    pub scattering: [f32; 3],
+    /// The mean cosine by which scattered light turns, from -0.99 (backward) to 0.99 (forward).
+    pub anisotropy: f32,
+}
+
+impl Medium {
+    /// A medium that does nothing to light: air.
+    pub const AIR: Medium = Medium {
+        absorption: [0.0; 3],
+        ior: 1.0,
+        priority: 0,
+        scattering: [0.0; 3],
+        anisotropy: 0.0,
+    };
 }
 
 /// What the runtime must know of one instance of a material.

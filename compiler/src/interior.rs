@@ -36,15 +36,17 @@ pub fn medium(
     {
         return Ok(None);
     }
-    let absorption = number(interior.absorption)?.to_f64();
-    let channel = |c: usize| {
-        absorption
-            .get(c)
-            .map_or(0.0, |&x| x.clamp(0.0, 1e30) as f32)
+    let [absorption, ior, priority, scattering, anisotropy] = interior.parts;
+    let rate = |id: ExprId| -> Result<[f32; 3], OutOfFuel> {
+        let channels = number(id)?.to_f64();
+        let channel = |c: usize| channels.get(c).map_or(0.0, |x| x.clamp(0.0, 1e30) as f32);
+        Ok(std::array::from_fn(channel))
     };
     Ok(Some(Medium {
-        absorption: std::array::from_fn(channel),
-        ior: number(interior.ior)?.as_float() as f32,
-        priority: u32::try_from(number(interior.priority)?.as_int()).unwrap_or(0),
+        absorption: rate(absorption)?,
+        ior: number(ior)?.as_float() as f32,
+        priority: u32::try_from(number(priority)?.as_int()).unwrap_or(0),
+        scattering: rate(scattering)?,
+        anisotropy: number(anisotropy)?.as_float() as f32,
     }))
 }

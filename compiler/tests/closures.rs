@@ -166,9 +166,9 @@ fn emission_and_media_come_from_functions_too() {
     let m = &checked.checked[0];
     assert!(m.surface.is_none() && m.emission.is_some());
     let medium = m.interior.expect("an interior");
-    assert_eq!(constant(m, medium.priority), Some(&Const::Int(7)));
-    assert_eq!(constant(m, medium.ior), Some(&Const::Float(vec![1.0])));
-    assert_eq!(constant(m, medium.absorption), None, "by the parameter");
+    assert_eq!(constant(m, medium.parts[2]), Some(&Const::Int(7)));
+    assert_eq!(constant(m, medium.parts[1]), Some(&Const::Float(vec![1.0])));
+    assert_eq!(constant(m, medium.parts[0]), None, "by the parameter");
 }
 
 fn constant(m: &Material, id: ExprId) -> Option<&Const> {
@@ -194,7 +194,7 @@ fn media_have_defaults_and_keep_to_their_ranges() {
     };
     let medium = plain.interior.expect("an interior");
     let given = Const::Float(vec![1.0, 2.0, 3.0]);
-    assert_eq!(constant(plain, medium.absorption), Some(&given));
+    assert_eq!(constant(plain, medium.parts[0]), Some(&given));
     let text = impasto_compiler::ir::print::material(&checked.ir, m);
     assert!(text.contains("clamp $0, 0.1, 10.0"), "{text}");
     assert!(text.contains("clamp $1, 0, 1000"), "{text}");
@@ -203,9 +203,11 @@ fn media_have_defaults_and_keep_to_their_ranges() {
         "{text}"
     );
     let medium = empty.interior.expect("an interior");
-    let parts = [medium.absorption, medium.ior, medium.priority].map(|id| constant(empty, id));
+    let parts = medium.parts.map(|id| constant(empty, id));
     let (zero, one) = (Const::Float(vec![0.0; 3]), Const::Float(vec![1.0]));
-    assert_eq!(parts, [Some(&zero), Some(&one), Some(&Const::Int(0))]);
+    let none_at_all = Const::Float(vec![0.0]);
+    let expected = [&zero, &one, &Const::Int(0), &zero, &none_at_all];
+    assert_eq!(parts, expected.map(Some));
     assert!(none.interior.is_none() && none.opacity.is_none());
 }
 

@@ -149,6 +149,7 @@ fn an_interior_is_numbers_for_each_instance() {
             absorption,
             ior,
             priority: 2,
+            ..Medium::AIR
         })
     };
     assert_eq!(

@@ -3,7 +3,8 @@
 //!
 //! A path carries a stack of the media it is in. Where objects overlap, the medium with the
 //! highest priority counts: Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced
-//! Images". `kernels/media.wgsl` is the other half of this file.
+//! Images". `kernels/media.wgsl` and, where light is scattered,
+//! `kernels/volume.wgsl` are the other half of this file.
 
 use std::collections::BTreeMap;
 
@@ -20,8 +21,13 @@ const MAX_MEDIA: usize = 0xffff;
 /// How many boundaries in a row that are none (of media overlapped by another of higher priority)
 /// a path crosses before it is given up.
 pub(crate) const MAX_FALSE_BOUNDARIES: u32 = 64;
-/// The strongest absorption that kernels get, in 1/m; times the greatest distance it is finite.
-const MAX_ABSORPTION: f32 = 1e18;
+/// The strongest absorption and scattering that kernels get, in 1/m; times the greatest distance
+/// both together are finite.
+const MAX_RATE: f32 = 1e18;
+/// The mean cosine that scattered light turns by is at most this, either way.
+const MAX_ANISOTROPY: f32 = 0.99;
+/// How often light is turned on its way from one surface to the next before it is given up.
+pub(crate) const MAX_TURNS: u32 = 4096;
 
 /// What paths have to know of media. Empty if nothing depends on the medium that a path is in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,8 +39,10 @@ pub struct Media {
     pub of_instance: Vec<u32>,
     /// The stack of a path that starts at the camera, innermost first.
     pub camera: [u32; MAX_NESTED],
-    /// Is light lost in any of them?
+    /// Is light lost on its way in any of them, absorbed or scattered?
     pub absorb: bool,
+    /// Does any of them scatter light?
+    pub scatter: bool,
     /// Do their priorities differ, so that one may hide the boundaries of another?
     pub overlap: bool,
 }
@@ -57,8 +65,11 @@ impl Media {
             return Err(SceneError::new(message).hint("at most 65534 are possible"));
         }
         let camera = camera(instances, around, &table)?;
-        let absorbs = |m: &Medium| m.absorption.iter().any(|a| *a > 0.0);
-        let absorb = table.media.iter().any(absorbs);
+        let scatter = table.scatters();
+        let absorb = table
+            .media
+            .iter()
+            .any(|m| any(m.absorption) || any(m.scattering));
         let overlap = table.ranks.len() > 1;
         let reads_ior = materials.iter().any(|m| m.inputs.exterior_ior);
         if table.media.is_empty() || !(absorb || overlap || reads_ior) {
@@ -70,6 +81,7 @@ impl Media {
             of_instance: words.collect(),
             camera,
             absorb,
+            scatter,
             overlap,
         })
     }
@@ -91,7 +103,7 @@ struct Table {
 }
 
 /// The bits of a medium.
-type Key = ([u32; 3], u32, u32);
+type Key = ([u32; 3], u32, u32, [u32; 3], u32);
 
 impl Table {
     fn new(all: impl Iterator<Item = Medium>) -> Table {
@@ -118,33 +130,70 @@ impl Table {
 
     /// The functions of a stack, and a row a medium; row 0 is empty space.
     fn part(&self) -> ShaderPart {
-        let row = |m: &Medium| [m.absorption[0], m.absorption[1], m.absorption[2], m.ior];
-        let vacuum = [0.0, 0.0, 0.0, 1.0];
-        let rows = self.media.iter().map(row);
-        let rows: Vec<[f32; 4]> = std::iter::once(vacuum).chain(rows).collect();
-        ShaderPart {
+        let extinction = |m: &Medium, c: usize| m.absorption[c] + m.scattering[c];
+        let row = |m: &Medium| {
+            let [r, g, b] = [0, 1, 2].map(|c| extinction(m, c));
+            [r, g, b, m.ior]
+        };
+        let mut part = ShaderPart {
             wgsl: constant_u32("MAX_FALSE_BOUNDARIES", MAX_FALSE_BOUNDARIES)
                 + include_str!("kernels/media.wgsl"),
-            buffers: vec![BufferData::new("medium_table", "array<vec4<f32>>", &rows)],
+            buffers: vec![self.buffer("medium_table", row)],
+        };
+        if self.scatters() {
+            part.wgsl += &constant_u32("MAX_TURNS", MAX_TURNS);
+            part.wgsl += include_str!("kernels/volume.wgsl");
+            let row = |m: &Medium| {
+                let [r, g, b] = m.scattering;
+                [r, g, b, m.anisotropy]
+            };
+            part.buffers.push(self.buffer("volume_table", row));
         }
+        part
+    }
+
+    /// A row for empty space and one a medium.
+    fn buffer(&self, name: &'static str, row: impl Fn(&Medium) -> [f32; 4]) -> BufferData {
+        let rows: Vec<[f32; 4]> = std::iter::once(&Medium::AIR)
+            .chain(&self.media)
+            .map(row)
+            .collect();
+        BufferData::new(name, "array<vec4<f32>>", &rows)
+    }
+
+    fn scatters(&self) -> bool {
+        self.media.iter().any(|m| any(m.scattering))
     }
 }
 
 fn key(medium: &Medium) -> Key {
-    let absorption = medium.absorption.map(f32::to_bits);
-    (absorption, medium.ior.to_bits(), medium.priority)
+    let bits = |rates: [f32; 3]| rates.map(f32::to_bits);
+    (
+        bits(medium.absorption),
+        medium.ior.to_bits(),
+        medium.priority,
+        bits(medium.scattering),
+        medium.anisotropy.to_bits(),
+    )
 }
 
-/// A medium with numbers that kernels can compute with: one that absorbs a negative amount, or an
-/// amount that is no number, does not absorb, and one without a positive index is as empty space.
+/// A medium with numbers that kernels can compute with: rates below zero, or that are no numbers, are
+/// zero, as is an anisotropy that is none, and what has no positive index is as empty space.
 fn finite(medium: Medium) -> Medium {
-    let absorption = |a: f32| if a > 0.0 { a.min(MAX_ABSORPTION) } else { 0.0 };
+    let rate = |a: f32| if a > 0.0 { a.min(MAX_RATE) } else { 0.0 };
     let has_index = medium.ior > 0.0 && medium.ior.is_finite();
+    let turns = medium.anisotropy.abs() <= MAX_ANISOTROPY;
     Medium {
-        absorption: medium.absorption.map(absorption),
+        absorption: medium.absorption.map(rate),
         ior: if has_index { medium.ior } else { 1.0 },
         priority: medium.priority,
+        scattering: medium.scattering.map(rate),
+        anisotropy: if turns { medium.anisotropy } else { 0.0 },
     }
+}
+
+fn any(rates: [f32; 3]) -> bool {
+    rates.iter().any(|r| *r > 0.0)
 }
 
 /// The places of priorities in their order.
@@ -185,6 +234,7 @@ mod tests {
             absorption: [absorption; 3],
             ior,
             priority,
+            ..Medium::AIR
         }
     }
 
@@ -201,7 +251,7 @@ mod tests {
         let expected = [
             medium(1.0, 1.5, 7),
             medium(0.0, 1.3, 90),
-            medium(MAX_ABSORPTION, 1.0, 0),
+            medium(MAX_RATE, 1.0, 0),
         ];
         assert_eq!(table.media, expected);
         let words = media.map(|m| table.word(Some(m)));

@@ -12,6 +12,7 @@ const ABSORPTION: When = when(&[Need::Absorption]);
 const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
+const SCATTERING: When = when(&[Need::Scattering]);
 
 /// The stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -147,6 +148,9 @@ pub(crate) const STAGES: [Stage; 7] = [
             (Part::Traversal, ALWAYS),
             (Part::Surface, OVERLAP),
             (Part::Media, OVERLAP),
+            (Part::Media, SCATTERING),
+            (Part::Random, SCATTERING),
+            (Part::Numbers, SCATTERING),
         ],
         need: ALWAYS,
     },

@@ -94,6 +94,13 @@ const SHARED_ORIGINS: When = When {
     all: &[Need::ShadowRays],
     none: &[Need::Requests, Need::CrossingShadows],
 };
+/// Where light may be turned on its way, which casting rays then tells.
+const TURNING: When = when(&[Need::Scattering]);
+/// Where it goes straight on.
+const STRAIGHT: When = When {
+    all: &[],
+    none: &[Need::Scattering],
+};
 /// Shadow rays, wherever they are.
 const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
@@ -145,13 +152,23 @@ pub(crate) const FIELDS: [Field; 10] = [
         ],
     },
     Field {
-        uses: &[Use {
-            name: "ray_direction",
-            components: &[("direction", Vec3), ("sample", U32)],
-            need: ALWAYS,
-            readers: &[Logic, Material, BinExtension, Extension],
-            writers: &[NewPath, Material],
-        }],
+        uses: &[
+            Use {
+                name: "ray_direction",
+                components: &[("direction", Vec3), ("sample", U32)],
+                need: STRAIGHT,
+                readers: &[Logic, Material, BinExtension, Extension],
+                writers: &[NewPath, Material],
+            },
+            // Until the ray is cast, the direction in which it begins; then that in which it arrives.
+            Use {
+                name: "ray_direction",
+                components: &[("direction", Vec3), ("sample", U32)],
+                need: TURNING,
+                readers: &[Logic, Material, BinExtension, Extension],
+                writers: &[NewPath, Material, Extension],
+            },
+        ],
     },
     Field {
         uses: &[
@@ -198,13 +215,23 @@ pub(crate) const FIELDS: [Field; 10] = [
     },
     Field {
         // Radiance gathered so far; the flags are declared in `constants`.
-        uses: &[Use {
-            name: "radiance",
-            components: &[("radiance", Vec3), ("flags", U32)],
-            need: ALWAYS,
-            readers: &[Logic, Material],
-            writers: &[NewPath, Logic, Material],
-        }],
+        uses: &[
+            Use {
+                name: "radiance",
+                components: &[("radiance", Vec3), ("flags", U32)],
+                need: STRAIGHT,
+                readers: &[Logic, Material],
+                writers: &[NewPath, Logic, Material],
+            },
+            // Turns have random numbers by the vertex at which the ray was cast.
+            Use {
+                name: "radiance",
+                components: &[("radiance", Vec3), ("flags", U32)],
+                need: TURNING,
+                readers: &[Logic, Material, Extension],
+                writers: &[NewPath, Logic, Material],
+            },
+        ],
     },
     Field {
         uses: &[

@@ -141,11 +141,11 @@ impl Composer<'_> {
     }
 
     /// Whether the threads of a stage stay, and take up one ray after another. Boundaries that are
-    /// crossed would have to be crossed in the midst of a cast.
+    /// crossed, and light that is turned, would have to be seen to in the midst of a cast.
     pub(crate) fn fetches(&self, id: StageId) -> bool {
         let possible = match id {
             StageId::Shadow => true,
-            StageId::Extension => !self.layout.needs.has(Need::Overlap),
+            StageId::Extension => !self.layout.needs.any(&[Need::Overlap, Need::Scattering]),
             _ => false,
         };
         possible

@@ -117,6 +117,7 @@ fn instances() -> Vec<InstanceInfo> {
             absorption: [0.0; 3],
             ior: 1.0 + material as f32,
             priority: 0,
+            ..Medium::AIR
         }),
     };
     (0..5).map(info).collect()

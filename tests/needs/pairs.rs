@@ -129,6 +129,9 @@ pairs! {
     "absorption", also &[], "functions +transmittance",
         thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5);")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
+    "media that scatter", also &[], "",
+        thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
+        => thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0), scattering: color(2.0));");
     "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary",
         beside(
             "surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, priority: 2);",

@@ -21,7 +21,7 @@ pub struct Probe {
     /// The lobes. Fields of a lobe: its arguments, albedo, weight, share of being chosen.
     pub lobes: Vec<ProbedLobe>,
     /// Names of the fields behind the lobes.
-    pub rest: Vec<&'static str>,
+    pub rest: Vec<String>,
 }
 
 /// A lobe of a probed material.
@@ -62,14 +62,13 @@ pub fn probe(module: &Module, core: &Core, m: &Material) -> Probe {
                 delta: def.delta,
             });
         }
-        rest.push(("albedo", albedo));
+        rest.push(("albedo".to_owned(), albedo));
     }
-    rest.extend(m.opacity.map(|id| ("opacity", id)));
+    rest.extend(m.opacity.map(|id| ("opacity".to_owned(), id)));
     if let Some(medium) = &m.interior {
-        rest.extend(medium.when.map(|id| ("interior.when", id)));
-        rest.push(("interior.absorption", medium.absorption));
-        rest.push(("interior.ior", medium.ior));
-        rest.push(("interior.priority", medium.priority));
+        rest.extend(medium.when.map(|id| ("interior.when".to_owned(), id)));
+        let parts = medium.named();
+        rest.extend(parts.map(|(name, _, id)| (format!("interior.{name}"), id)));
     }
     fields.extend(rest.iter().map(|(_, id)| *id));
     let mut module = module.clone();

@@ -389,14 +389,28 @@ pub struct MaterialParam {
 pub struct Interior {
     /// Where there is a medium at all, a bool; always when absent.
     pub when: Option<ExprId>,
-    /// Light lost a metre, three floats from 0, in 1/m.
-    pub absorption: ExprId,
-    /// Index of refraction, a float from 0.1 to 10.
-    pub ior: ExprId,
-    /// Where several media overlap, the one with the highest counts: an int from 0 to 1000.
-    pub priority: ExprId,
+    /// Its values, in the order of [`Interior::PARTS`].
+    pub parts: [ExprId; 5],
     /// Where it was written.
     pub span: Span,
+}
+
+impl Interior {
+    /// What a medium is told by: names and types, in the order in which they are written and
+    /// printed.
+    pub const PARTS: [(&'static str, Type); 5] = [
+        ("absorption", Type::Vec3),
+        ("ior", Type::Float),
+        ("priority", Type::Int),
+        ("scattering", Type::Vec3),
+        ("anisotropy", Type::Float),
+    ];
+
+    /// Its values with their names and types.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, Type, ExprId)> {
+        let parts = Self::PARTS.into_iter().zip(self.parts);
+        parts.map(|((name, ty), id)| (name, ty, id))
+    }
 }
 
 /// A checked material, before its closures are lowered.

@@ -10,10 +10,11 @@ use std::sync::Arc;
 use crate::ast::{self, Arg, ItemKind, Name};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::Builder;
-use crate::ir::{self, ClosureId, Const, Interior, SiteId};
+use crate::ir::{self, ClosureId, Interior, SiteId};
 use crate::source::Span;
 
 use super::body::{Binding, Body, Entry, Operand, Place};
+use super::medium::empty_space;
 use super::modules::{ItemRef, ModuleId};
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
@@ -76,14 +77,9 @@ impl Body<'_, '_> {
             // The tree is dropped, so the node is never looked at.
             Ty::Bsdf | Ty::Edf => Operand::Closure(ClosureId(u32::MAX), p.ty),
             Ty::Medium => {
-                let neutral = Interior {
-                    when: None,
-                    absorption: self.constant(Const::Float(vec![0.0; 3]), span),
-                    ior: self.builder.float(1.0, span),
-                    priority: self.constant(Const::Int(0), span),
-                    span,
-                };
-                self.media.push(neutral);
+                let parts = empty_space().map(|value| self.constant(value, span));
+                let when = None;
+                self.media.push(Interior { when, parts, span });
                 Operand::Medium(self.media.len() - 1)
             }
             ty => Operand::Value(self.builder.param(values.next().unwrap_or(0), span), ty),

@@ -5,7 +5,7 @@
 
 use crate::ast::{Arg, Name};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::{Const, ExprId, Function, Interior};
+use crate::ir::{Const, ExprId, Function, Interior, Type};
 use crate::ops::Op;
 use crate::source::Span;
 
@@ -20,50 +20,84 @@ const MAX_PRIORITY: i32 = 1000;
 /// precision; `sound_ior` of the library is the same range.
 const IOR: (f64, f64) = (0.1, 10.0);
 
+/// Turns light forward or backward by at most this mean cosine.
+const MAX_ANISOTROPY: f64 = 0.99;
+
+/// A value of a medium and what it may be.
+#[derive(Clone, Copy)]
+struct Limits {
+    name: &'static str,
+    range: (f64, f64),
+    unit: &'static str,
+}
+
+const fn limits(name: &'static str, range: (f64, f64), unit: &'static str) -> Limits {
+    Limits { name, range, unit }
+}
+
+/// The limits of [`Interior::PARTS`].
+const LIMITS: [Limits; Interior::PARTS.len()] = [
+    limits("absorption", (0.0, f64::INFINITY), " 1/m"),
+    limits("ior", IOR, ""),
+    limits("priority", (0.0, MAX_PRIORITY as f64), ""),
+    limits("scattering", (0.0, f64::INFINITY), " 1/m"),
+    limits("anisotropy", (-MAX_ANISOTROPY, MAX_ANISOTROPY), ""),
+];
+
+/// The values of a medium that does nothing, which are the defaults.
+pub(super) fn empty_space() -> [Const; Interior::PARTS.len()] {
+    let nothing = || Const::Float(vec![0.0; 3]);
+    let number = |x| Const::Float(vec![x]);
+    [
+        nothing(),
+        number(1.0),
+        Const::Int(0),
+        nothing(),
+        number(0.0),
+    ]
+}
+
+/// The parameters of `medium`.
+fn parameters() -> Vec<Param> {
+    let parts = Interior::PARTS.into_iter().zip(empty_space());
+    let param = |((name, ty), default): ((&str, Type), Const)| Param {
+        name: name.into(),
+        ty: match ty {
+            Type::Vec3 => Ty::Color,
+            Type::Int => Ty::Int,
+            _ => Ty::Float,
+        },
+        default: Some(default),
+    };
+    parts.map(param).collect()
+}
+
 impl Body<'_, '_> {
-    /// `medium(absorption: color = 0, ior: float = 1, priority: int = 0)`
+    /// `medium(absorption: color = 0, ior: float = 1, priority: int = 0, scattering: color = 0,
+    /// anisotropy: float = 0)`
     pub fn medium(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
         if self.place == Place::Values {
             let wrong = Diagnostic::new(Code::ClosureUse, span, "a medium is not a value")
                 .expected("`interior = medium(...);` in a material");
             return self.report(wrong);
         }
-        let param = |name: &str, ty, default| Param {
-            name: name.into(),
-            ty,
-            default: Some(default),
-        };
-        let params = [
-            param("absorption", Ty::Color, Const::Float(vec![0.0; 3])),
-            param("ior", Ty::Float, Const::Float(vec![1.0])),
-            param("priority", Ty::Int, Const::Int(0)),
-        ];
-        let values = self.value_arguments(callee, args, &params)?;
-        let [absorption, ior, priority] = values.as_slice() else {
-            return None;
-        };
-        let absorption = self.limited(*absorption, "absorption", (0.0, f64::INFINITY), " 1/m")?;
-        let ior = self.limited(*ior, "ior", IOR, "")?;
-        let greatest = (0.0, f64::from(MAX_PRIORITY));
-        let priority = self.limited(*priority, "priority", greatest, "")?;
-        self.media.push(Interior {
-            when: None,
-            absorption,
-            ior,
-            priority,
-            span,
-        });
+        let values = self.value_arguments(callee, args, &parameters())?;
+        let mut parts = [*values.first()?; Interior::PARTS.len()];
+        for (part, (value, limits)) in parts.iter_mut().zip(values.iter().zip(LIMITS)) {
+            *part = self.limited(*value, limits)?;
+        }
+        let when = None;
+        self.media.push(Interior { when, parts, span });
         Some(Operand::Medium(self.media.len() - 1))
     }
 
     /// `id` kept between `low` and `high`; a constant outside is an error.
-    fn limited(
-        &mut self,
-        id: ExprId,
-        name: &str,
-        (low, high): (f64, f64),
-        unit: &str,
-    ) -> Option<ExprId> {
+    fn limited(&mut self, id: ExprId, limits: Limits) -> Option<ExprId> {
+        let Limits {
+            name,
+            range: (low, high),
+            unit,
+        } = limits;
         let span = self.builder.function().expr(id).span;
         let components = match self.builder.function().constant(id) {
             Some(Const::Float(v)) => v.clone(),
@@ -83,7 +117,7 @@ impl Body<'_, '_> {
     }
 
     fn clamped(&mut self, id: ExprId, (low, high): (f64, f64), span: Span) -> ExprId {
-        let int = self.builder.ty(id) == crate::ir::Type::Int;
+        let int = self.builder.ty(id) == Type::Int;
         let mut limit = |x: f64| match int {
             true => self.constant(Const::Int(x as i32), span),
             false => self.builder.float(x, span),
@@ -108,15 +142,11 @@ impl Body<'_, '_> {
                 Some(self.builder.op(Op::Select, &either, span))
             }
         };
-        let mut select = |x, y| self.builder.op(Op::Select, &[cond, x, y], span);
-        let chosen = Interior {
-            when,
-            absorption: select(a.absorption, b.absorption),
-            ior: select(a.ior, b.ior),
-            priority: select(a.priority, b.priority),
-            span,
-        };
-        self.media.push(chosen);
+        let mut parts = a.parts;
+        for (part, other) in parts.iter_mut().zip(b.parts) {
+            *part = self.builder.op(Op::Select, &[cond, *part, other], span);
+        }
+        self.media.push(Interior { when, parts, span });
         Operand::Medium(self.media.len() - 1)
     }
 }
@@ -141,18 +171,14 @@ impl Body<'_, '_> {
 impl Checker<'_> {
     /// Reports what of the interior of a material with this `body` differs from point to point.
     pub(super) fn check_interior(&mut self, body: &Function, interior: &Interior) -> Option<()> {
-        let parts = [
-            ("the absorption of the interior", Some(interior.absorption)),
-            ("the ior of the interior", Some(interior.ior)),
-            ("the priority of the interior", Some(interior.priority)),
-            ("whether there is an interior", interior.when),
-        ];
+        let values = interior.named();
+        let values = values.map(|(name, _, id)| (format!("the {name} of the interior"), id));
+        let when = interior.when.into_iter();
+        let when = when.map(|id| ("whether there is an interior".to_owned(), id));
         let causes = varying::causes(&self.ir, body);
         let mut ok = Some(());
-        for (name, id) in parts {
-            let Some(cause) = id.and_then(|id| causes.of(id)) else {
-                continue;
-            };
+        for (name, id) in values.chain(when) {
+            let Some(cause) = causes.of(id) else { continue };
             let (span, what) = match cause {
                 Cause::Input(span, input) => (*span, format!("`{input}`")),
                 Cause::Texture(span) => (*span, "a texture".into()),

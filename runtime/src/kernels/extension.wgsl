@@ -43,8 +43,37 @@ fn extension(request: u32) {
 #if overlap
     keep_hit(request, trace_to_boundary(request, start, direction, ray[0].w));
 #else
+#if scattering
+    keep_hit(request, trace_to_surface(request, start, direction, ray[0].w));
+#else
     keep_hit(request, trace_closest(start, direction, 3.0e38, ray[0].w));
 #endif
+#endif
+}
+#endif
+#if scattering
+
+// A flight that begins where the path is, with the path's pixel, sample and vertex.
+fn path_of(slot: u32) -> vec3<u32> {
+    let vertex = load_radiance(slot).flags & DEPTH_MASK;
+    return vec3<u32>(load_ray_origin(slot).pixel, load_ray_direction(slot).sample, vertex);
+}
+
+fn keep_flight(slot: u32, sample: u32, flight: Flight) {
+    store_throughput(slot, flight.carried);
+    if flight.turns > 0u {
+        store_ray_direction(slot, PathRayDirection(flight.direction, sample));
+    }
+}
+
+// The nearest hit for light that may be turned on its way.
+fn trace_to_surface(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u32) -> Hit {
+    let path = path_of(slot);
+    let nowhere = Hit(0.0, 0.0, 0.0, NOTHING);
+    let begun = Flight(nowhere, origin, direction, load_throughput(slot), 0u);
+    let flight = fly(path, load_media(slot).stack, begun, skip);
+    keep_flight(slot, path.y, flight);
+    return flight.hit;
 }
 #endif
 #if overlap
@@ -53,21 +82,40 @@ fn extension(request: u32) {
 // are crossed: nothing happens there but that the path is in other media beyond. What lies beyond
 // is found by scattering only, since it is in their shadow: a density of 0 says so.
 fn trace_to_boundary(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u32) -> Hit {
-    var carried = load_throughput(slot);
     var media = load_media(slot).stack;
-    var start = origin;
     var crossed = skip;
+#if scattering
+    let path = path_of(slot);
+    let nowhere = Hit(0.0, 0.0, 0.0, NOTHING);
+    var flight = Flight(nowhere, origin, direction, load_throughput(slot), 0u);
+#else
+    var carried = load_throughput(slot);
+    var start = origin;
+#endif
     for (var count = 0u; count <= MAX_FALSE_BOUNDARIES; count++) {
+#if scattering
+        flight = fly(path, media, flight, crossed);
+        keep_flight(slot, path.y, flight);
+        let hit = flight.hit;
+        let way = flight.direction;
+#else
         let hit = trace_closest(start, direction, 3.0e38, crossed);
+        let way = direction;
+#endif
         if hit.primitive == NOTHING {
             return hit;
         }
         let medium = primitive_medium(hit.primitive);
         let side = hit_geometric_normal(hit.primitive);
-        let inside = dot(side, direction) > 0.0;
+        let inside = dot(side, way) > 0.0;
         if !is_false_boundary(media, medium, inside) {
             return hit;
         }
+#if scattering
+        flight.carried.throughput *= ray_transmittance(media, hit.t);
+        flight.carried.bsdf_pdf = 0.0;
+        store_throughput(slot, flight.carried);
+#else
 #if absorption
         carried.throughput *= transmittance(media, hit.t);
 #endif
@@ -78,10 +126,15 @@ fn trace_to_boundary(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u
 #endif
         carried.bsdf_pdf = 0.0;
         store_throughput(slot, carried);
+#endif
         media = cross_boundary(media, medium, inside);
         store_media(slot, PathMedia(media));
         let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
+#if scattering
+        flight.start = offset_origin(position, select(-side, side, inside));
+#else
         start = offset_origin(position, select(-side, side, inside));
+#endif
         crossed = hit.primitive;
     }
     atomicAdd(&counters[COUNTER_LOST_PATHS], 1u);

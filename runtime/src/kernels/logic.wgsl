@@ -35,7 +35,11 @@ fn logic(slot: u32) {
         hit = load_hit(slot);
 #endif
 #if absorption
+#if scattering
+        carried.throughput *= ray_transmittance(load_media(slot).stack, hit.t);
+#else
         carried.throughput *= transmittance(load_media(slot).stack, hit.t);
+#endif
 #if shadow_rays
 #else
         store_throughput(slot, carried);

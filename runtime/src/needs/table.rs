@@ -160,9 +160,15 @@ rows! {
             f.world.parts.media.part.is_some().then(|| "some result depends on what fills an object".into())
         };
     Absorption, "absorption", "absorption",
-        "a medium absorbs light",
+        "a medium absorbs or scatters light",
         on &[Media], draws "", Whole, |f, _| {
-            f.world.parts.media.absorb.then(|| "a medium absorbs light".into())
+            f.world.parts.media.absorb.then(|| "a medium absorbs or scatters light".into())
+        };
+    Scattering, "media that scatter", "scattering",
+        "a medium scatters light",
+        on &[Media, Absorption], draws "",
+        Never("it would need a table of media that scatter"), |f, _| {
+            f.world.parts.media.scatter.then(|| "a medium scatters light".into())
         };
     Overlap, "overlapping media", "overlap",
         "media differ in priority",
@@ -264,12 +270,12 @@ rows! {
             let asked = f.wavefront && f.technique.ray_order != RayOrder::Queue;
             asked.then(|| "`--ray-order` asks for it".into())
         };
-    // Rays that are ordered, or that cross hidden boundaries, belong to a slot.
+    // Rays that are ordered, cross hidden boundaries or scatter on their way belong to a slot.
     Requests, "rays in buffers of their own", "requests",
-        "`--ray-data requests` asks for it, and rays neither have an order nor cross hidden boundaries",
+        "`--ray-data requests` asks for it, and rays neither have an order nor cross hidden boundaries nor scatter on their way",
         on &[], draws "", ASKED, |f, n| {
             let asked = f.wavefront && f.technique.ray_data == RayData::Requests;
-            let possible = !n.any(&[Order, Overlap]);
+            let possible = !n.any(&[Order, Overlap, Scattering]);
             (asked && possible).then(|| "`--ray-data requests` asks for it".into())
         };
 }

@@ -34,4 +34,5 @@ mod stub;
 #[path = "../support/mod.rs"]
 mod support;
 mod techniques;
+mod volume;
 mod workload;

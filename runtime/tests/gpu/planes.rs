@@ -45,6 +45,7 @@ impl Solid {
                 absorption,
                 ior,
                 priority,
+                ..Medium::AIR
             }),
         }
     }

@@ -129,7 +129,7 @@ impl Body<'_> {
         }
     }
 
-    /// `surface = closure`, `interior = medium(absorption, ior, priority)`, `opacity = operand`
+    /// `surface = closure`, `interior = medium(...)`, `opacity = operand`
     fn output(&mut self, outputs: &mut Outputs) -> Result<()> {
         let at = self.p.here();
         let name = self.p.name("an output")?;
@@ -159,15 +159,15 @@ impl Body<'_> {
         }
     }
 
-    /// `medium(absorption, ior, priority) when condition`
+    /// `medium(absorption, ior, priority, scattering, anisotropy) when condition`
     fn medium(&mut self, start: Span) -> Result<Interior> {
         self.p.expect_word("medium")?;
         self.p.expect("(")?;
-        let absorption = self.operand()?;
-        self.p.expect(",")?;
-        let ior = self.operand()?;
-        self.p.expect(",")?;
-        let priority = self.operand()?;
+        let mut parts = [self.operand()?; Interior::PARTS.len()];
+        for part in &mut parts[1..] {
+            self.p.expect(",")?;
+            *part = self.operand()?;
+        }
         self.p.expect(")")?;
         let when = match self.p.eat_word("when") {
             true => Some(self.operand()?),
@@ -175,9 +175,7 @@ impl Body<'_> {
         };
         Ok(Interior {
             when,
-            absorption,
-            ior,
-            priority,
+            parts,
             span: self.p.since(start),
         })
     }

@@ -28,8 +28,7 @@ pub(super) fn named(names: &Names<'_>, m: &Material) -> String {
         }
     }
     if let Some(medium) = &m.interior {
-        let parts = [medium.absorption, medium.ior, medium.priority];
-        let parts = parts.map(|id| printer.operand(id)).join(", ");
+        let parts = medium.parts.map(|id| printer.operand(id)).join(", ");
         let when = medium
             .when
             .map(|id| format!(" when {}", printer.operand(id)));

@@ -121,9 +121,9 @@ pub fn material(module: &Module, m: &Material) -> Result<(), Problem> {
         tree.child(root, m.closures.len())?;
     }
     if let Some(medium) = &m.interior {
-        tree.operand(medium.absorption, &[Type::Vec3])?;
-        tree.operand(medium.ior, &[Type::Float])?;
-        tree.operand(medium.priority, &[Type::Int])?;
+        for (_, ty, id) in medium.named() {
+            tree.operand(id, &[ty])?;
+        }
         if let Some(when) = medium.when {
             tree.operand(when, &[Type::Bool])?;
         }
