@@ -129,7 +129,8 @@ pairs! {
     "absorption", also &[], "functions +transmittance",
         thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5);")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
-    "media that scatter", also &[], "",
+    "media that scatter", also &[], "bindings +volume_table; functions +chosen +ended +extension +fly +free_flight +keep_flight +max_component \
+         +path_of +ray_transmittance +scattered +scatters +trace +trace_closest +trace_to_surface +turn_bits",
         thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
         => thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0), scattering: color(2.0));");
     "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary",
