@@ -42,6 +42,7 @@ pub mod program;
 mod random;
 pub mod sema;
 pub mod source;
+pub mod stages;
 
 use diag::{Code, Diagnostic};
 use ir::Module;
@@ -49,6 +50,7 @@ pub use program::Program;
 use program::{ProgramBuilder, Setting};
 use sema::Checker;
 use source::SourceMap;
+use stages::{Progress, Stage};
 
 /// Reads files for the compiler.
 pub trait Loader {
@@ -186,7 +188,16 @@ pub struct Checked {
 /// its code; parameters on which they agree become constants of it, the others are read from a
 /// table. There is a program only if there is no error; warnings do not count.
 pub fn compile(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compilation {
-    let mut checker = Checker::new(loader);
+    compile_telling(requests, loader, Progress::silent())
+}
+
+/// [`compile`], telling which stage it is at.
+pub fn compile_telling<'a>(
+    requests: &[MaterialRequest],
+    loader: &'a mut dyn Loader,
+    progress: Progress<'a>,
+) -> Compilation {
+    let mut checker = Checker::telling(loader, progress);
     let program = compile_all(&mut checker, requests);
     let program = program.filter(|_| !diag::has_errors(&checker.diagnostics));
     drop_unsure(&mut checker.diagnostics);
@@ -354,8 +365,9 @@ const CHECKED_TOGETHER: usize = 50;
 fn validate(checker: &mut Checker, program: &Program) {
     let all: Vec<usize> = (0..program.materials.len()).collect();
     for members in all.chunks(CHECKED_TOGETHER) {
+        checker.progress.enter(Stage::Generate);
         let text = codegen::complete(program, members, codegen::Target::Native);
-        if let Err(problem) = codegen::validate(&text) {
+        if let Err(problem) = codegen::validate_telling(&text, &mut checker.progress) {
             let deep = program.nested_too_deep(members);
             let rejected = || Diagnostic::without_span(Code::InvalidWgsl, problem);
             return checker.diagnostics.push(deep.unwrap_or_else(rejected));

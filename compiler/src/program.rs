@@ -10,12 +10,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
 use crate::codegen::{self, Target};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::{self, Const, ExprKind, Function, Module, Type, walk};
+use crate::ir::{
+    self, ClosureDefId, Const, ExprKind, Function, FunctionId, Methods, Module, Type, walk,
+};
 use crate::ops::Op;
 use crate::parameters::Layout;
 use crate::passes::{self, Hoisted, Widths};
 use crate::sema::Checker;
 use crate::source::{SourceMap, Span};
+use crate::stages::{Progress, Stage};
 use crate::{closure, interior};
 
 /// Compiled materials and their instances.
@@ -32,6 +35,7 @@ pub struct Program {
     spaces: BTreeSet<TextureSpace>,
     /// Line of each span that generated code mentions, by file.
     sources: SourceMap,
+    effort: u64,
 }
 
 /// A material with its functions.
@@ -82,6 +86,12 @@ impl Program {
     /// The IR of the functions that materials call.
     pub fn ir(&self) -> &Module {
         &self.module
+    }
+
+    /// Statements that the passes walked to make the program: what it took to compile, in a
+    /// number that does not depend on the machine.
+    pub fn effort(&self) -> u64 {
+        self.effort
     }
 
     /// The textures to provide; a texture's position is its slot.
@@ -230,8 +240,10 @@ pub(crate) struct ProgramBuilder {
     core: closure::Core,
     /// The checker's module with its functions optimised, as far as materials needed them yet.
     module: Module,
-    /// Expressions of each function with its calls put in line.
-    sizes: Vec<u64>,
+    /// Expressions of each function with its calls put in line; none if it is as it was checked.
+    sizes: Vec<Option<u64>>,
+    /// Statements that passes walked.
+    effort: u64,
     materials: Vec<CompiledMaterial>,
     instances: Vec<Instance>,
     names: BTreeMap<String, u32>,
@@ -254,6 +266,7 @@ impl ProgramBuilder {
             core,
             module: Module::default(),
             sizes: Vec::new(),
+            effort: 0,
             materials: Vec::new(),
             instances: Vec::new(),
             names: BTreeMap::from([("material".to_owned(), 1)]),
@@ -276,7 +289,7 @@ impl ProgramBuilder {
         if self.prepare(checker, &mut material, settings).is_none() {
             return;
         }
-        let lowered = match self.lower(&material) {
+        let lowered = match self.lower(&material, &mut checker.progress) {
             Ok(lowered) => lowered,
             Err(problem) => return checker.diagnostics.push(problem),
         };
@@ -290,7 +303,7 @@ impl ProgramBuilder {
     }
 
     /// Makes of a material what is lowered: cut out by its opacity, with the values on which all
-    /// settings agree as constants.
+    /// settings agree as constants, without the closures that cannot show.
     fn prepare(
         &mut self,
         checker: &mut Checker,
@@ -302,7 +315,11 @@ impl ProgramBuilder {
             self.core.transparent = Some(transparent);
             closure::cut_out(material, transparent);
         }
-        self.optimise_functions(&checker.ir);
+        self.take_over(&checker.ir);
+        checker.progress.enter(Stage::Functions);
+        let called: Vec<FunctionId> = material.body.calls().collect();
+        self.optimise(called);
+        checker.progress.enter(Stage::Lower);
         passes::bake(&mut material.body, &agreed(settings));
         passes::fold_body(&self.module, &mut material.body);
         match passes::widths(&self.module, &mut material.body) {
@@ -313,8 +330,35 @@ impl ProgramBuilder {
                 return None;
             }
         }
+        // First what weights decide, so that the methods of lobes without weight stay untouched.
+        passes::prune_weights(&self.module, material);
+        checker.progress.enter(Stage::Functions);
+        self.optimise(self.methods(material, |m| match *m {
+            Methods::Bsdf { albedo, .. } => vec![albedo],
+            Methods::Edf { emit } => vec![emit],
+        }));
+        checker.progress.enter(Stage::Lower);
         passes::prune(&self.module, material);
+        checker.progress.enter(Stage::Functions);
+        self.optimise(self.core.functions().to_vec());
+        self.optimise(self.methods(material, Methods::functions));
+        checker.progress.enter(Stage::Lower);
         Some(())
+    }
+
+    /// Methods of the closures that a material's outputs are made of.
+    fn methods(
+        &self,
+        material: &ir::Material,
+        wanted: impl Fn(&Methods) -> Vec<FunctionId>,
+    ) -> Vec<FunctionId> {
+        let lobes = material.closures.iter().filter_map(|c| match c {
+            ir::Closure::Lobe(lobe) => Some(lobe.def),
+            _ => None,
+        });
+        let defs: BTreeSet<ClosureDefId> = lobes.collect();
+        let methods = |id: ClosureDefId| wanted(&self.module.closures[id.index()].methods);
+        defs.into_iter().flat_map(methods).collect()
     }
 
     /// A material's evaluate function as the passes get it, and the module that it calls into.
@@ -330,8 +374,8 @@ impl ProgramBuilder {
         Some((&self.module, f))
     }
 
-    /// Takes over the functions that were checked since the last material.
-    fn optimise_functions(&mut self, checked: &Module) {
+    /// Takes over what was checked since the last material.
+    fn take_over(&mut self, checked: &Module) {
         let extent = |m: &Module| {
             [
                 m.structs.len(),
@@ -346,11 +390,27 @@ impl ProgramBuilder {
         self.module.structs.clone_from(&checked.structs);
         self.module.closures.clone_from(&checked.closures);
         self.module.textures.clone_from(&checked.textures);
-        for f in &checked.functions[self.module.functions.len()..] {
-            let mut f = f.clone();
-            passes::run(&self.module, &mut f);
-            self.sizes.push(self.size(&f));
-            self.module.functions.push(f);
+        let known = self.module.functions.len();
+        let new = &checked.functions[known..];
+        self.module.functions.extend_from_slice(new);
+        self.sizes.resize(self.module.functions.len(), None);
+    }
+
+    /// Runs the passes over functions and all they call, unless that is done.
+    fn optimise(&mut self, wanted: Vec<FunctionId>) {
+        let mut pending = wanted;
+        let mut found = BTreeSet::new();
+        while let Some(id) = pending.pop() {
+            if self.sizes[id.index()].is_none() && found.insert(id) {
+                pending.extend(self.module.functions[id.index()].calls());
+            }
+        }
+        // Callees stand before their callers.
+        for id in found {
+            let mut f = self.module.functions[id.index()].clone();
+            self.effort += passes::run(&self.module, &mut f);
+            self.sizes[id.index()] = Some(self.size(&f));
+            self.module.functions[id.index()] = f;
         }
     }
 
@@ -358,7 +418,7 @@ impl ProgramBuilder {
     fn size(&self, f: &Function) -> u64 {
         f.evaluated().into_iter().fold(0u64, |n, id| {
             let inner = match f.expr(id).kind {
-                ExprKind::Call(callee, _) => self.sizes.get(callee.index()).copied().unwrap_or(0),
+                ExprKind::Call(callee, _) => self.sizes[callee.index()].unwrap_or(0),
                 _ => 1,
             };
             n.saturating_add(inner)
@@ -366,7 +426,11 @@ impl ProgramBuilder {
     }
 
     /// The functions of a material whose agreed parameters are constants.
-    fn lower(&mut self, material: &ir::Material) -> Result<Lowered, Diagnostic> {
+    fn lower(
+        &mut self,
+        material: &ir::Material,
+        progress: &mut Progress<'_>,
+    ) -> Result<Lowered, Diagnostic> {
         let module = &self.module;
         // Counted before they are listed: a tree that shares closures can have any number.
         let roots = material.surface.into_iter().chain(material.emission);
@@ -379,10 +443,11 @@ impl ProgramBuilder {
             .surface
             .map_or(Vec::new(), |root| closure::lobes(material, root));
         let mut evaluate = closure::evaluate(module, &self.core, material, &material.name, &lobes);
-        passes::run(module, &mut evaluate);
+        progress.enter(Stage::Passes);
+        self.effort += passes::run(module, &mut evaluate);
         let mut emission = closure::emission(module, &self.core, material, &material.name);
         if let Some(f) = &mut emission {
-            passes::run(module, f);
+            self.effort += passes::run(module, f);
         }
         let size = self.size(&evaluate);
         if size > MAX_SIZE {
@@ -493,7 +558,7 @@ impl ProgramBuilder {
     }
 
     pub(crate) fn finish(mut self, checker: &Checker) -> Program {
-        self.optimise_functions(&checker.ir);
+        self.take_over(&checker.ir);
         let mut row = 0;
         for instance in &mut self.instances {
             instance.row = row;
@@ -516,6 +581,7 @@ impl ProgramBuilder {
             textures: self.textures,
             spaces,
             sources: checker.sources.clone(),
+            effort: self.effort,
         };
         program.resolve_texture_slots();
         program

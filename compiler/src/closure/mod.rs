@@ -42,6 +42,19 @@ pub struct Core {
     pub transparent: Option<ClosureDefId>,
 }
 
+impl Core {
+    /// The functions.
+    pub fn functions(&self) -> [FunctionId; 5] {
+        [
+            self.valid_normal,
+            self.frame,
+            self.to_local,
+            self.to_world,
+            self.transport_valid,
+        ]
+    }
+}
+
 /// A lobe with the way to it from the root.
 #[derive(Clone, Debug)]
 pub struct Path<'a> {

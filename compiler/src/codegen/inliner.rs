@@ -18,6 +18,10 @@ struct Inliner<'a> {
     inline: Vec<bool>,
     size: Vec<u32>,
     loads: Vec<bool>,
+    /// The block, by its number from 1, in which a value could still move to a use right after
+    /// it; 0 for none.
+    movable: Vec<u32>,
+    blocks: u32,
 }
 
 impl<'a> Inliner<'a> {
@@ -29,11 +33,13 @@ impl<'a> Inliner<'a> {
             inline: vec![false; n],
             size: vec![1; n],
             loads: vec![false; n],
+            movable: vec![0; n],
+            blocks: 0,
         };
         this.count(&f.body);
         this.uses[f.value.index()] += 1;
-        let mut pending = this.block(&f.body);
-        this.consume(f.value, &mut pending);
+        let body = this.block(&f.body);
+        this.consume(f.value, body);
         this.inline
     }
 
@@ -73,56 +79,59 @@ impl<'a> Inliner<'a> {
         }
     }
 
-    /// Walks a block; gives the values that could still move to a use right after it.
-    fn block(&mut self, block: &Block) -> Vec<ExprId> {
-        let mut pending: Vec<ExprId> = Vec::new();
+    /// Walks a block; gives its number.
+    fn block(&mut self, block: &Block) -> u32 {
+        self.blocks += 1;
+        let own = self.blocks;
+        // Values that read variables, since the last change of any.
+        let mut reads: Vec<ExprId> = Vec::new();
         for stmt in block {
             match stmt {
                 Stmt::Eval(id) => {
                     for operand in self.f.expr(*id).kind.operands() {
-                        self.consume(*operand, &mut pending);
+                        self.consume(*operand, own);
                     }
                     self.measure(*id);
-                    pending.push(*id);
+                    self.movable[id.index()] = own;
+                    if self.loads[id.index()] {
+                        reads.push(*id);
+                    }
+                    continue;
                 }
-                Stmt::Store(_, _, value) => {
-                    self.consume(*value, &mut pending);
-                    pending.retain(|p| !self.loads[p.index()]);
-                }
+                Stmt::Store(_, _, value) => self.consume(*value, own),
                 Stmt::If(cond, a, b) => {
-                    self.consume(*cond, &mut pending);
+                    self.consume(*cond, own);
                     self.block(a);
                     self.block(b);
-                    pending.retain(|p| !self.loads[p.index()]);
                 }
                 Stmt::For { low, body, .. } => {
-                    self.consume(*low, &mut pending);
+                    self.consume(*low, own);
                     self.block(body);
-                    pending.retain(|p| !self.loads[p.index()]);
                 }
                 Stmt::While {
                     head, test, body, ..
                 } => {
-                    let mut inner = self.block(head);
-                    self.consume(*test, &mut inner);
+                    let head = self.block(head);
+                    self.consume(*test, head);
                     self.block(body);
-                    pending.retain(|p| !self.loads[p.index()]);
                 }
-                Stmt::Break | Stmt::Continue => {}
+                Stmt::Break | Stmt::Continue => continue,
+            }
+            for id in reads.drain(..) {
+                self.movable[id.index()] = 0;
             }
         }
-        pending
+        own
     }
 
-    fn consume(&mut self, id: ExprId, pending: &mut Vec<ExprId>) {
-        let movable = self.uses[id.index()] == 1
+    /// Notes a use in the block `own`.
+    fn consume(&mut self, id: ExprId, own: u32) {
+        let wanted = self.uses[id.index()] == 1
             && self.f.expr(id).name.is_none()
             && self.size[id.index()] <= MAX_INLINE;
-        if let Some(at) = pending.iter().position(|p| *p == id)
-            && movable
-        {
+        if wanted && self.movable[id.index()] == own {
             self.inline[id.index()] = true;
-            pending.remove(at);
+            self.movable[id.index()] = 0;
         }
     }
 

@@ -9,6 +9,7 @@ use std::fmt::Write;
 use crate::Program;
 use crate::ir::{ExprKind, Function, StructId, Type};
 use crate::parameters::Layout;
+use crate::stages::{Progress, Stage};
 
 mod dispatch;
 mod function;
@@ -190,7 +191,14 @@ fn use_struct(program: &Program, ty: Type, used: &mut BTreeSet<StructId>) {
 /// # Errors
 /// What naga says, with the place in the text.
 pub fn validate(wgsl: &str) -> Result<(), String> {
+    validate_telling(wgsl, &mut Progress::silent())
+}
+
+/// [`validate`], telling which stage it is at.
+pub(crate) fn validate_telling(wgsl: &str, progress: &mut Progress<'_>) -> Result<(), String> {
+    progress.enter(Stage::ReadBack);
     let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| e.emit_to_string(wgsl))?;
+    progress.enter(Stage::Validate);
     let flags = naga::valid::ValidationFlags::all();
     let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty());
     validator

@@ -331,6 +331,21 @@ pub enum Methods {
     },
 }
 
+impl Methods {
+    /// All of them.
+    pub fn functions(&self) -> Vec<FunctionId> {
+        match *self {
+            Methods::Bsdf {
+                sample,
+                eval,
+                pdf,
+                albedo,
+            } => vec![sample, eval, pdf, albedo],
+            Methods::Edf { emit } => vec![emit],
+        }
+    }
+}
+
 /// A node of a material's closure tree; expressions belong to the material's body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Closure {

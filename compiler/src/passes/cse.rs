@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::rewrite::{Rules, operands_mut};
-use crate::ir::{Const, ExprId, ExprKind, Function, Module, Type};
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, Module, Stmt, Type};
 use crate::ops::Op;
 
 /// Removes common subexpressions.
@@ -150,13 +150,7 @@ fn order(kind: &mut ExprKind) {
 /// A hash that is the same on every machine.
 fn hash(kind: &ExprKind, ty: Type) -> u64 {
     let mut h = Hash(0xcbf2_9ce4_8422_2325);
-    h.add(match ty {
-        Type::Bool => 0,
-        Type::Int => 1,
-        Type::Mat3 => 2,
-        Type::Struct(id) => 16 + u64::from(id.0),
-        _ => 2 + ty.width().unwrap_or(1) as u64,
-    });
+    h.add(type_number(ty));
     match kind {
         ExprKind::Const(Const::Bool(b)) => h.add(0x100 | u64::from(*b)),
         ExprKind::Const(Const::Int(i)) => h.all(0x200, [*i as u32 as u64]),
@@ -181,6 +175,26 @@ fn hash(kind: &ExprKind, ty: Type) -> u64 {
     h.0
 }
 
+/// A number that differs for functions of different code, but for a chance of 2^-64.
+pub(super) fn fingerprint(f: &Function) -> u64 {
+    let mut h = Hash(0xcbf2_9ce4_8422_2325);
+    h.all(1, f.exprs.iter().map(|e| hash(&e.kind, e.ty)));
+    h.all(2, f.locals.iter().map(|l| type_number(l.ty)));
+    h.block(&f.body);
+    h.all(3, [u64::from(f.value.0)]);
+    h.0
+}
+
+fn type_number(ty: Type) -> u64 {
+    match ty {
+        Type::Bool => 0,
+        Type::Int => 1,
+        Type::Mat3 => 2,
+        Type::Struct(id) => 16 + u64::from(id.0),
+        _ => 2 + ty.width().unwrap_or(1) as u64,
+    }
+}
+
 /// FNV-1a, a word at a time, with a final mix in every step.
 struct Hash(u64);
 
@@ -195,5 +209,29 @@ impl Hash {
         for value in values {
             self.add(value);
         }
+    }
+
+    fn block(&mut self, block: &Block) {
+        self.all(0x10, [block.len() as u64]);
+        block.iter().for_each(|s| self.stmt(s));
+    }
+
+    fn stmt(&mut self, stmt: &Stmt) {
+        let id = |id: &ExprId| u64::from(id.0);
+        match stmt {
+            Stmt::Eval(e) => self.all(0x20, [id(e)]),
+            Stmt::Store(local, part, value) => {
+                let part = part.map_or(0, |p| 1 + u64::from(p));
+                self.all(0x30, [u64::from(local.0), part, id(value)]);
+            }
+            Stmt::If(cond, ..) => self.all(0x40, [id(cond)]),
+            Stmt::For {
+                local, low, high, ..
+            } => self.all(0x50, [u64::from(local.0), id(low), id(high)]),
+            Stmt::While { test, limit, .. } => self.all(0x60, [id(test), u64::from(*limit)]),
+            Stmt::Break => self.add(0x70),
+            Stmt::Continue => self.add(0x80),
+        }
+        stmt.blocks().for_each(|b| self.block(b));
     }
 }

@@ -50,7 +50,8 @@ impl Live {
     /// Marks what live stores and control flow read; true if anything was new.
     fn block(&mut self, f: &Function, block: &Block) -> bool {
         let mut changed = false;
-        for stmt in block {
+        // From the end: what is read there says what matters before.
+        for stmt in block.iter().rev() {
             changed |= self.stmt(f, stmt);
         }
         changed
@@ -64,7 +65,7 @@ impl Live {
             Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
             Stmt::Store(_, _, value) => self.mark(f, *value),
             Stmt::If(cond, then, otherwise) => {
-                self.block(f, then) | self.block(f, otherwise) | self.mark(f, *cond)
+                self.block(f, otherwise) | self.block(f, then) | self.mark(f, *cond)
             }
             Stmt::For {
                 local,

@@ -24,7 +24,7 @@ use rewrite::Rules;
 pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted, hoist};
-pub use prune::prune;
+pub use prune::{prune, prune_weights};
 pub use widths::{Widths, widths};
 
 /// A pass with its name. It must not change what a function computes.
@@ -104,25 +104,33 @@ pub const PIPELINE: &[Pass] = &[
 /// Most times that the pipeline is run over a function.
 const MAX_ROUNDS: usize = 6;
 
-/// Runs all passes on a function until they change nothing.
+/// Runs all passes on a function until they change nothing. Gives how many statements they
+/// walked: what that took.
 ///
 /// The fewer expressions its callees have, the faster: run [`library`] on the module before.
 ///
 /// # Panics
 /// In debug builds, if a pass breaks the function: a defect of the pass.
-pub fn run(module: &Module, function: &mut Function) {
+pub fn run(module: &Module, function: &mut Function) -> u64 {
     verify(module, function, "lowering");
+    let mut walked = 0;
+    let mut before = cse::fingerprint(function);
     for _ in 0..MAX_ROUNDS {
-        let before = function.clone();
-        round(module, function);
-        if same(&before, function) {
+        walked += round(module, function);
+        let after = cse::fingerprint(function);
+        // Were two functions with one fingerprint, the second would only be left as it is.
+        if before == after {
             break;
         }
+        before = after;
     }
+    walked
 }
 
-/// Runs the pipeline once; passes that are walks and follow each other in one walk.
-fn round(module: &Module, f: &mut Function) {
+/// Runs the pipeline once; passes that are walks and follow each other in one walk. Gives the
+/// statements that were walked.
+fn round(module: &Module, f: &mut Function) -> u64 {
+    let mut walked = 0;
     let mut rest = PIPELINE;
     let mut changed = true;
     while let [first, ..] = rest {
@@ -133,14 +141,18 @@ fn round(module: &Module, f: &mut Function) {
         let rules: Vec<Rules> = walks.collect();
         let count = rules.len().max(1);
         match (rules.into_iter().reduce(Rules::and), &first.how) {
-            (Some(rules), _) => rewrite::run(module, f, rules),
+            (Some(rules), _) => walked += rewrite::run(module, f, rules),
             (None, How::Own(change)) => changed = change(f),
-            (None, _) if changed => first.run(module, f),
+            (None, How::Walk(rules) | How::Again(rules)) if changed => {
+                let rules = rules(module, f);
+                walked += rewrite::run(module, f, rules);
+            }
             (None, _) => {}
         }
         verify(module, f, rest[count - 1].name);
         rest = &rest[count..];
     }
+    walked
 }
 
 /// Runs the pipeline once, up to and including the pass `name`. False if there is no such pass.
@@ -178,19 +190,6 @@ pub fn fold_body(module: &Module, body: &mut Function) {
     };
     rewrite::run(module, body, rules);
     verify(module, body, "fold");
-}
-
-/// Are two functions the same code?
-fn same(a: &Function, b: &Function) -> bool {
-    let names = |f: &Function| f.locals.iter().map(|l| l.ty).collect::<Vec<_>>();
-    a.body == b.body
-        && a.value == b.value
-        && names(a) == names(b)
-        && a.exprs.len() == b.exprs.len()
-        && a.exprs
-            .iter()
-            .zip(&b.exprs)
-            .all(|(a, b)| a.kind == b.kind && a.ty == b.ty)
 }
 
 fn verify(module: &Module, function: &Function, after: &str) {

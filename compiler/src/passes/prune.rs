@@ -13,16 +13,28 @@ use std::collections::BTreeMap;
 
 use crate::closure::{MAX_LOBES, lobe_count};
 use crate::ir::build::Builder;
+use crate::ir::interp::Interpreter;
+use crate::ir::value::Value;
 use crate::ir::{
-    Closure, ClosureId, Const, Expr, ExprId, Lobe, Local, Material, Methods, Module, Type,
+    Closure, ClosureId, Const, Expr, ExprId, Function, Lobe, Local, Material, Methods, Module, Type,
 };
 use crate::ops::Op;
 
 /// Rewrites the closures of a material. An output of which nothing is left becomes `None`, and so
 /// does an opacity of 1.
 pub fn prune(module: &Module, material: &mut Material) {
+    run(module, material, true);
+}
+
+/// As [`prune`], by weights alone: no method of a closure is looked at.
+pub fn prune_weights(module: &Module, material: &mut Material) {
+    run(module, material, false);
+}
+
+fn run(module: &Module, material: &mut Material, albedos: bool) {
     let mut pruner = Pruner {
         module,
+        albedos,
         b: Builder::resume(material.body.clone()),
         closures: Vec::new(),
         nodes: Vec::new(),
@@ -58,6 +70,8 @@ struct Node {
 
 struct Pruner<'a> {
     module: &'a Module,
+    /// Are albedos asked for?
+    albedos: bool,
     /// The material's body, to which weights are added.
     b: Builder,
     closures: Vec<Closure>,
@@ -223,6 +237,9 @@ impl Pruner<'_> {
     /// A lobe's albedo or emission, where it is the same for all directions and for all values of
     /// the arguments that are not constant.
     fn value(&mut self, lobe: &Lobe) -> Option<[f64; 3]> {
+        if !self.albedos {
+            return None;
+        }
         let args: Vec<Option<Const>> = lobe
             .args
             .iter()
@@ -252,7 +269,7 @@ fn constant_value(module: &Module, lobe: &Lobe, args: &[Option<Const>]) -> Optio
         name: "wo".into(),
         ty: Type::Vec3,
     });
-    let mut b = Builder::new(def.name.as_str(), params, lobe.span);
+    let mut b = Builder::new(def.name.as_str(), params.clone(), lobe.span);
     let mut next = 0..;
     let mut value = |c: &Option<Const>| match c {
         Some(c) => b.constant(c.clone(), lobe.span),
@@ -262,11 +279,44 @@ fn constant_value(module: &Module, lobe: &Lobe, args: &[Option<Const>]) -> Optio
     values.push(value(&None));
     let value = b.call(module, method, &values, lobe.span);
     let mut f = b.finish(value);
+    if changes(module, &f, &params) {
+        return None;
+    }
     super::run(module, &mut f);
     match f.constant(f.value)? {
         Const::Float(v) => <[f64; 3]>::try_from(v.as_slice()).ok(),
         _ => None,
     }
+}
+
+/// Most expressions that are evaluated to see whether a value changes.
+const CHANGE_FUEL: u64 = 1 << 14;
+
+/// Does a function of `params` have different values for two sets of arguments? Then it is no
+/// constant, which is found sooner than by running the passes.
+fn changes(module: &Module, f: &Function, params: &[Local]) -> bool {
+    let value = |cosine: f64, x: f64| {
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let argument = |p: &Local| match p.ty {
+            // `wo` comes last, but any vector of length 1 will do for the others as well.
+            Type::Vec3 => Value::vector(&[sine * 0.6, sine * 0.8, cosine]),
+            Type::Float => Value::constant(&Const::Float(vec![x])),
+            Type::Bool => Value::constant(&Const::Bool(x > 0.5)),
+            _ => Value::constant(&Const::Int(0)),
+        };
+        let supported = |ty| matches!(ty, Type::Vec3 | Type::Float | Type::Bool | Type::Int);
+        if !params.iter().all(|p| supported(p.ty)) {
+            return None;
+        }
+        let args = params.iter().map(argument).collect();
+        let run = Interpreter::<f64>::new(module, CHANGE_FUEL).run(f, args);
+        run.ok().map(|v| v.to_f64())
+    };
+    let (Some(a), Some(b)) = (value(0.9, 0.3), value(0.4, 0.6)) else {
+        return false;
+    };
+    let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-6 * (1.0 + a.abs());
+    a.iter().zip(&b).any(far)
 }
 
 /// Is a constant `value` in all components?

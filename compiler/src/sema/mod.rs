@@ -12,6 +12,7 @@ use crate::ast::{self, ItemKind, TypeName};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
 use crate::source::{SourceMap, Span};
+use crate::stages::{Progress, Stage};
 
 mod body;
 mod call;
@@ -52,6 +53,8 @@ pub struct Checker<'a> {
     pub ir: ir::Module,
     /// Textures that sources name outside parameters.
     pub literal_textures: BTreeSet<usize>,
+    /// Tells which stage the compilation is at.
+    pub progress: Progress<'a>,
     loader: &'a mut dyn Loader,
     modules: Vec<ModuleData>,
     loading: BTreeMap<String, Loading>,
@@ -117,11 +120,17 @@ struct Signature {
 impl<'a> Checker<'a> {
     /// A checker that reads files through `loader`.
     pub fn new(loader: &'a mut dyn Loader) -> Self {
+        Self::telling(loader, Progress::silent())
+    }
+
+    /// A checker that reads files through `loader` and tells which stage it is at.
+    pub fn telling(loader: &'a mut dyn Loader, progress: Progress<'a>) -> Self {
         let mut checker = Self {
             sources: SourceMap::default(),
             diagnostics: Vec::new(),
             ir: ir::Module::default(),
             literal_textures: Default::default(),
+            progress,
             loader,
             modules: Vec::new(),
             loading: BTreeMap::new(),
@@ -141,6 +150,7 @@ impl<'a> Checker<'a> {
         };
         checker.add_std_sources();
         checker.load_core();
+        checker.progress.enter(Stage::Check);
         checker
     }
 

@@ -15,6 +15,7 @@ use crate::diag::{Code, Diagnostic};
 use crate::library_text;
 use crate::parser;
 use crate::source::{FileId, Span};
+use crate::stages::Stage;
 
 /// A loaded file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -150,7 +151,9 @@ impl Checker<'_> {
     /// Parses a text and resolves its imports.
     fn add_module(&mut self, path: &str, text: &str) -> ModuleId {
         let file = self.sources.add(path, text);
+        let before = self.progress.enter(Stage::Parse);
         let (ast, diagnostics) = parser::parse(file, text);
+        self.progress.enter(before);
         let is_std = path.starts_with("std::");
         self.define_module(path, Arc::new(ast), diagnostics, is_std)
     }
@@ -236,7 +239,10 @@ impl Checker<'_> {
             Some(Loading::Done(id) | Loading::InProgress(id)) => Some(*id),
             Some(Loading::Failed) => None,
             None => {
-                let (ast, diagnostics) = parsed_std(file)?;
+                let before = self.progress.enter(Stage::Parse);
+                let parsed = parsed_std(file);
+                self.progress.enter(before);
+                let (ast, diagnostics) = parsed?;
                 Some(self.define_module(&path, ast, diagnostics, true))
             }
         }

@@ -15,7 +15,7 @@
 //! parameters arrives small.
 
 use super::rewrite::{Rewriter, Rules};
-use crate::ir::{ExprId, ExprKind, Function, FunctionId, Methods, Module, walk};
+use crate::ir::{ExprId, ExprKind, Function, FunctionId, Module, walk};
 use crate::ops::CostClass;
 
 mod decided;
@@ -70,16 +70,7 @@ impl Policy {
             textures: vec![None; n],
         };
         for def in &module.closures {
-            let methods = match def.methods {
-                Methods::Bsdf {
-                    sample,
-                    eval,
-                    pdf,
-                    albedo,
-                } => vec![sample, eval, pdf, albedo],
-                Methods::Edf { emit } => vec![emit],
-            };
-            for id in methods {
+            for id in def.methods.functions() {
                 // A module that is being built lists closures before all their methods.
                 if let Some(method) = policy.method.get_mut(id.index()) {
                     *method = true;

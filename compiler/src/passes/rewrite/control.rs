@@ -12,6 +12,7 @@ impl Rewriter<'_> {
     }
 
     fn stmt(&mut self, stmt: Stmt) -> bool {
+        self.walked += 1;
         match stmt {
             Stmt::Eval(id) => self.eval(id),
             Stmt::Store(local, part, value) => {

@@ -79,10 +79,12 @@ pub(super) struct Rewriter<'a> {
     evaluated: Vec<ExprId>,
     /// The call that what is rewritten stands in place of, and so what is added for it.
     pub via: Option<SiteId>,
+    /// Statements met.
+    walked: u64,
 }
 
-/// Rewrites a function.
-pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) {
+/// Rewrites a function; gives how many statements were met on the way.
+pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) -> u64 {
     let body = std::mem::take(&mut f.body);
     let (exprs, locals) = (f.exprs.len(), f.locals.len());
     let mut walk = Rewriter {
@@ -98,11 +100,13 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) {
         available: vec![false; exprs],
         evaluated: Vec::new(),
         via: None,
+        walked: 0,
     };
     walk.block(body);
     let value = walk.resolve(walk.f.value);
     walk.f.value = value;
     walk.f.body = walk.out;
+    walk.walked
 }
 
 impl Rewriter<'_> {

@@ -2,13 +2,16 @@
 //! the time a scene of a thousand materials waits, all of them distinct. `compile` generates the
 //! text and has naga validate it.
 //!
-//! `cargo bench -p impasto-compiler --bench compile`
+//! `cargo bench -p impasto-compiler --bench compile` prints where the time goes, stage by stage;
+//! with a filter after `--` it measures all that match: `-- compile/`, `-- compile/thousand`.
 
 use std::hint::black_box;
 use std::path::Path;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, compile, diag};
+
+mod stages;
 
 struct Files;
 
@@ -143,4 +146,15 @@ fn thousand(c: &mut Criterion) {
 }
 
 criterion_group!(benches, materials, thousand);
-criterion_main!(benches);
+
+fn main() {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    match args.as_slice() {
+        [once, name] if once == stages::ONCE => return stages::once(name),
+        // Only the table, unless a filter asks for others.
+        [] => stages::table(),
+        [bench] if bench == "--bench" => stages::table(),
+        _ => benches(),
+    }
+    Criterion::default().configure_from_args().final_summary();
+}

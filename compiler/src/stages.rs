@@ -1,0 +1,88 @@
+//! The stages of a compilation, for those who want to know where its time goes.
+
+/// What a compilation is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Looking files up.
+    Read,
+    /// Texts to syntax trees.
+    Parse,
+    /// Names, types and constants; syntax trees to IR.
+    Check,
+    /// Passes over functions of the library and of users that materials reach.
+    Functions,
+    /// Constants of an instance into its material, closures that cannot show out of it, lobes.
+    Lower,
+    /// Passes over the materials' own functions, and what the host computes instead.
+    Passes,
+    /// IR to WGSL.
+    Generate,
+    /// WGSL to naga's modules.
+    ReadBack,
+    /// Naga's validation.
+    Validate,
+}
+
+impl Stage {
+    /// Every stage, in the order in which a compilation first reaches them.
+    pub const ALL: [Stage; 9] = [
+        Stage::Read,
+        Stage::Parse,
+        Stage::Check,
+        Stage::Functions,
+        Stage::Lower,
+        Stage::Passes,
+        Stage::Generate,
+        Stage::ReadBack,
+        Stage::Validate,
+    ];
+
+    /// A word for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Read => "read",
+            Stage::Parse => "parse",
+            Stage::Check => "check",
+            Stage::Functions => "functions",
+            Stage::Lower => "lower",
+            Stage::Passes => "passes",
+            Stage::Generate => "generate",
+            Stage::ReadBack => "naga read",
+            Stage::Validate => "naga check",
+        }
+    }
+}
+
+/// Tells somebody which stage a compilation is at, whenever that changes.
+pub struct Progress<'a> {
+    now: Stage,
+    told: Option<&'a mut dyn FnMut(Stage)>,
+}
+
+impl<'a> Progress<'a> {
+    /// Nobody is told.
+    pub fn silent() -> Self {
+        Self {
+            now: Stage::Read,
+            told: None,
+        }
+    }
+
+    /// `told` is called with the stage that begins.
+    pub fn telling(told: &'a mut dyn FnMut(Stage)) -> Self {
+        Self {
+            now: Stage::Read,
+            told: Some(told),
+        }
+    }
+
+    /// A stage begins; gives the one that it interrupts, for going back to it.
+    pub fn enter(&mut self, stage: Stage) -> Stage {
+        if stage != self.now
+            && let Some(told) = &mut self.told
+        {
+            told(stage);
+        }
+        std::mem::replace(&mut self.now, stage)
+    }
+}

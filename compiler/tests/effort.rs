@@ -1,0 +1,74 @@
+//! What it takes to compile, in statements that the passes walk: a number that is the same on every
+//! machine, so that a pass which goes over everything too often fails here and not in somebody's
+//! patience.
+
+use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile, diag};
+
+const IMPORTS: &str = "use std::bsdf::{conductor, dielectric_reflection, diffuse, generalized_schlick, sheen_zeltner};\n";
+
+fn compiled(text: &str, params: &[(&str, &str)]) -> Program {
+    let mut files = MemoryLoader::default();
+    files.add("m.impasto", text);
+    let mut request = MaterialRequest::new("m", "m.impasto");
+    let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
+    request.params = params.iter().map(owned).collect();
+    let compilation = compile(&[request], &mut files);
+    let problems = diag::render::text(&compilation.sources, &compilation.diagnostics, false);
+    compilation.program.unwrap_or_else(|| panic!("{problems}"))
+}
+
+/// A material of `n` lobes that have nothing in common but their kinds.
+fn lobes(n: usize) -> Program {
+    let lobe = |i: usize| {
+        let x = (1 + i) as f64 / (n + 1) as f64;
+        match i % 3 {
+            0 => format!("dielectric_reflection(ior: 1.5 + 0.1 * p, roughness: {x} * p)"),
+            1 => format!("generalized_schlick(color0: {x} * tint, roughness: p)"),
+            _ => format!("sheen_zeltner(tint * {x}, roughness: p)"),
+        }
+    };
+    let sum = (1..n).fold(lobe(0), |sum, i| format!("mix({sum}, {}, 0.5)", lobe(i)));
+    compiled(
+        &format!(
+            "{IMPORTS}material m {{
+                let p = fract(position.x);
+                let tint = color(p, 0.5, 0.25);
+                surface = {sum};
+            }}"
+        ),
+        &[],
+    )
+}
+
+/// Growth from each size to twice it: an algorithm that is quadratic would give 4.
+#[test]
+fn effort_grows_with_the_lobes_and_not_faster() {
+    let efforts: Vec<u64> = [8, 16, 32].into_iter().map(|n| lobes(n).effort()).collect();
+    for pair in efforts.windows(2) {
+        let growth = pair[1] as f64 / pair[0] as f64;
+        assert!(growth < 2.2, "{efforts:?}");
+    }
+    assert!(efforts[0] > 1000, "{efforts:?}: nothing is counted");
+}
+
+/// Lobes that a constant switches off cost nothing, not even their methods.
+#[test]
+fn what_is_switched_off_is_not_worked_on() {
+    let text = |more: &str| {
+        format!(
+            "{IMPORTS}material m {{
+                param on: float = 1.0;
+                param metal: float = 1.0;
+                let base = layer(dielectric_reflection(roughness: 0.3), diffuse(0.5));
+                surface = {more};
+            }}"
+        )
+    };
+    let off = [("on", "0.0"), ("metal", "0.0")];
+    let plain = compiled(&text("base"), &off).effort();
+    let switched = "layer(on * sheen_zeltner(1.0), mix(base, conductor(), metal))";
+    let pruned = compiled(&text(switched), &off).effort();
+    let full = compiled(&text(switched), &[]).effort();
+    assert_eq!(pruned, plain, "{full} with everything on");
+    assert!(full > plain);
+}
