@@ -8,8 +8,8 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::rewrite::{Rules, operands_mut};
-use crate::ir::{Block, Const, ExprId, ExprKind, Function, Module, Stmt, Type};
+use super::rewrite::Rules;
+use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, Stmt, Type};
 use crate::ops::Op;
 
 /// Removes common subexpressions.
@@ -25,11 +25,13 @@ pub(super) fn cse(_: &Module, _: &Function) -> Rules {
 #[derive(Default)]
 pub(super) struct Table {
     /// By hash; never iterated. Of two with equal hashes the later is kept.
-    known: HashMap<u64, Entry, Hashed>,
+    known: HashMap<u64, ExprId, Hashed>,
     /// What each entry made since replaced, to close blocks.
-    undo: Vec<(u64, Option<Entry>)>,
+    undo: Vec<(u64, Option<ExprId>)>,
     /// Constants, parameters and uniforms: available everywhere, so never removed.
-    leaves: HashMap<u64, Entry, Hashed>,
+    leaves: HashMap<u64, ExprId, Hashed>,
+    /// Room for the operands of two expressions that are compared.
+    operands: [Vec<ExprId>; 2],
 }
 
 /// Keys are hashes already.
@@ -55,33 +57,34 @@ impl Hasher for Itself {
     }
 }
 
-struct Entry {
-    kind: ExprKind,
-    ty: Type,
-    id: ExprId,
-}
-
-impl Entry {
-    fn fits(&self, kind: &ExprKind, ty: Type) -> bool {
-        self.ty == ty && self.kind == *kind
-    }
-}
-
 impl Table {
     /// The one expression that stands, in keys, for all equal constants, parameters or uniforms.
     /// Elsewhere each keeps its own place in the source.
     fn leaf(&mut self, f: &Function, id: ExprId) -> ExprId {
         let e = f.expr(id);
-        let key = hash(&e.kind, e.ty);
-        match self.leaves.get(&key) {
-            Some(known) if known.fits(&e.kind, e.ty) => known.id,
-            Some(_) => id,
-            None => {
-                let (kind, ty) = (e.kind.clone(), e.ty);
-                self.leaves.insert(key, Entry { kind, ty, id });
-                id
-            }
+        let key = hash(&e.kind, e.kind.operands(), e.ty);
+        let known = *self.leaves.entry(key).or_insert(id);
+        let k = f.expr(known);
+        if k.ty == e.ty && k.kind == e.kind {
+            known
+        } else {
+            id
         }
+    }
+
+    /// The operands of an expression in the form in which equal computations have equal ones, at
+    /// `self.operands[at]`.
+    fn bring_into_form(&mut self, f: &Function, id: ExprId, at: usize) {
+        let mut operands = std::mem::take(&mut self.operands[at]);
+        operands.clear();
+        for &operand in f.expr(id).kind.operands() {
+            operands.push(match f.expr(operand).kind.is_free() {
+                true => self.leaf(f, operand),
+                false => operand,
+            });
+        }
+        order(&f.expr(id).kind, &mut operands);
+        self.operands[at] = operands;
     }
 
     /// An available value that `id` equals; if there is none, `id` is available from here on.
@@ -91,20 +94,18 @@ impl Table {
         if let ExprKind::Load(_) = e.kind {
             return None;
         }
-        let mut kind = e.kind.clone();
-        for operand in operands_mut(&mut kind) {
-            if f.expr(*operand).kind.is_free() {
-                *operand = self.leaf(f, *operand);
+        self.bring_into_form(f, id, 0);
+        let key = hash(&e.kind, &self.operands[0], e.ty);
+        if let Some(&known) = self.known.get(&key)
+            && f.ty(known) == e.ty
+            && same_but_operands(&f.expr(known).kind, &e.kind)
+        {
+            self.bring_into_form(f, known, 1);
+            if self.operands[0] == self.operands[1] {
+                return Some(known);
             }
         }
-        order(&mut kind);
-        let key = hash(&kind, e.ty);
-        if let Some(known) = self.known.get(&key)
-            && known.fits(&kind, e.ty)
-        {
-            return Some(known.id);
-        }
-        let replaced = self.known.insert(key, Entry { kind, ty: e.ty, id });
+        let replaced = self.known.insert(key, id);
         self.undo.push((key, replaced));
         None
     }
@@ -125,30 +126,45 @@ impl Table {
     }
 }
 
-/// Brings a key into the form in which equal computations are recognised: operands whose order
-/// does not matter in order, comparisons as `<` and `<=`. The expression itself stays as it was
-/// written.
-fn order(kind: &mut ExprKind) {
-    if let ExprKind::Op(op, args) = kind {
+/// Brings operands into the form in which equal computations are recognised: those whose order does
+/// not matter in order, those of `>` as of `<`. The expression itself stays as it was written.
+fn order(kind: &ExprKind, operands: &mut [ExprId]) {
+    if let ExprKind::Op(op, _) = kind {
         match op {
-            Op::Add | Op::Mul | Op::Min | Op::Max | Op::Dot | Op::Distance => args.sort(),
-            Op::Equal | Op::NotEqual | Op::And | Op::Or => args.sort(),
-            Op::BitAnd | Op::BitOr | Op::BitXor => args.sort(),
-            Op::Greater => {
-                args.swap(0, 1);
-                *op = Op::Less;
-            }
-            Op::GreaterEqual => {
-                args.swap(0, 1);
-                *op = Op::LessEqual;
-            }
+            Op::Add | Op::Mul | Op::Min | Op::Max | Op::Dot | Op::Distance => operands.sort(),
+            Op::Equal | Op::NotEqual | Op::And | Op::Or => operands.sort(),
+            Op::BitAnd | Op::BitOr | Op::BitXor => operands.sort(),
+            Op::Greater | Op::GreaterEqual => operands.swap(0, 1),
             _ => {}
         }
     }
 }
 
+/// The op that equal computations have, operands in the form of [`order`].
+fn ordered(op: Op) -> Op {
+    match op {
+        Op::Greater => Op::Less,
+        Op::GreaterEqual => Op::LessEqual,
+        other => other,
+    }
+}
+
+/// Are two expressions the same but for their operands, which are in the form of [`order`]?
+fn same_but_operands(a: &ExprKind, b: &ExprKind) -> bool {
+    use ExprKind::*;
+    match (a, b) {
+        (Op(a, x), Op(b, y)) => ordered(*a) == ordered(*b) && x.len() == y.len(),
+        (Compose(x), Compose(y)) => x.len() == y.len(),
+        (Swizzle(_, a), Swizzle(_, b)) => a == b,
+        (Call(a, _), Call(b, _)) => a == b,
+        (Make(a, _), Make(b, _)) => a == b,
+        (Field(_, a), Field(_, b)) => a == b,
+        _ => false,
+    }
+}
+
 /// A hash that is the same on every machine.
-fn hash(kind: &ExprKind, ty: Type) -> u64 {
+fn hash(kind: &ExprKind, operands: &[ExprId], ty: Type) -> u64 {
     let mut h = Hash(0xcbf2_9ce4_8422_2325);
     h.add(type_number(ty));
     match kind {
@@ -164,21 +180,25 @@ fn hash(kind: &ExprKind, ty: Type) -> u64 {
         ExprKind::Param(i) => h.all(0x400, [u64::from(*i)]),
         ExprKind::Uniform(i) => h.all(0x500, [u64::from(*i)]),
         ExprKind::Load(local) => h.all(0x600, [u64::from(local.0)]),
-        ExprKind::Op(op, _) => h.all(0x700, [*op as u64]),
+        ExprKind::Op(op, _) => h.all(0x700, [ordered(*op) as u64]),
         ExprKind::Compose(_) => h.add(0x800),
         ExprKind::Swizzle(_, c) => h.all(0x900, c.iter().map(|&c| u64::from(c))),
         ExprKind::Call(callee, _) => h.all(0xa00, [u64::from(callee.0)]),
         ExprKind::Make(s, _) => h.all(0xb00, [u64::from(s.0)]),
         ExprKind::Field(_, i) => h.all(0xc00, [u64::from(*i)]),
     }
-    h.all(0xd00, kind.operands().iter().map(|a| u64::from(a.0)));
+    h.all(0xd00, operands.iter().map(|a| u64::from(a.0)));
     h.0
 }
 
 /// A number that differs for functions of different code, but for a chance of 2^-64.
 pub(super) fn fingerprint(f: &Function) -> u64 {
     let mut h = Hash(0xcbf2_9ce4_8422_2325);
-    h.all(1, f.exprs.iter().map(|e| hash(&e.kind, e.ty)));
+    // What values count as equal must be told apart here: `a > b` from `a < b`.
+    let turned = |e: &Expr| matches!(e.kind, ExprKind::Op(op, _) if op != ordered(op));
+    let number =
+        |e: &Expr| hash(&e.kind, e.kind.operands(), e.ty).wrapping_add(u64::from(turned(e)));
+    h.all(1, f.exprs.iter().map(number));
     h.all(2, f.locals.iter().map(|l| type_number(l.ty)));
     h.block(&f.body);
     h.all(3, [u64::from(f.value.0)]);

@@ -26,6 +26,15 @@ pub(super) fn fold(_: &Module, _: &Function) -> Rules {
 /// The constant that an expression always is.
 pub(super) fn constant(f: &Function, id: ExprId) -> Option<Const> {
     let expr = f.expr(id);
+    // Asked of everything, so nothing is gathered before it is known to be of use.
+    if !expr
+        .kind
+        .operands()
+        .iter()
+        .all(|&a| f.constant(a).is_some())
+    {
+        return None;
+    }
     let constants = |args: &[ExprId]| {
         args.iter()
             .map(|&a| f.constant(a))
