@@ -19,6 +19,7 @@ mod microfacet;
 mod noise;
 mod normals;
 mod precision;
+mod promises;
 #[path = "../common/record.rs"]
 mod record;
 mod region;

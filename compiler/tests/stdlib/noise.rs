@@ -28,22 +28,23 @@ fn noises() -> Vec<Noise> {
         let ItemKind::Function(f) = &item.kind else {
             panic!("`{}` is no function", file.name)
         };
-        assert_eq!(
-            f.params[0].ty.node, "point",
-            "{}: a noise takes a point first",
-            file.name
-        );
+        let place = match f.params[0].ty.node.as_str() {
+            "point" => "p",
+            "vec2" => "p.xy",
+            "float" => "p.x",
+            ty => panic!("{}: a noise takes a place first, not a {ty}", file.name),
+        };
         // What has no default: the normal of a surface.
         let rest = f.params[1..].iter().filter(|p| p.default.is_none());
         let rest: String = rest
             .map(|p| format!(", {}(0.0, 0.0, 1.0)", p.ty.node))
             .collect();
         let text = format!(
-            "use std::noise::{0};\nfn n(p: point) -> {1} = {0}(p{rest});",
+            "use std::noise::{0};\nfn n(p: point) -> {1} = {0}({place}{rest});",
             file.name, f.result.node,
         );
         let text = match f.result.node.as_str() {
-            "float" | "vector" => text,
+            "float" | "vec2" | "vector" | "point" | "color" => text,
             // A struct of the library: import it as well.
             name => text.replacen(
                 &format!("::{};", file.name),
