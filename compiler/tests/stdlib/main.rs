@@ -4,6 +4,7 @@
 
 mod bumps;
 mod cells;
+mod colors;
 mod delta;
 mod emission;
 mod energy;
@@ -18,12 +19,14 @@ mod matte;
 mod microfacet;
 mod noise;
 mod normals;
+mod octaves;
 mod precision;
 mod promises;
 #[path = "../common/record.rs"]
 mod record;
 mod region;
 mod sampling;
+mod scattered;
 mod search;
 mod sheen;
 mod space;

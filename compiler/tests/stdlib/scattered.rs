@@ -1,0 +1,183 @@
+//! Noises of scattered points and of waves, against what they are defined as: nearest points and
+//! borders by search through all points around, variances by integrals.
+
+use super::statistics::Numbers;
+use super::text::Text;
+
+/// Text that gives a noise, and the points that it scatters: those that `worley` is nearest to,
+/// found by asking it at the centres of a fine grid.
+const CELLS: &str = "
+    use std::noise::{worley, worley_2d, voronoi, voronoi_2d, Worley, Worley2d, Voronoi, Voronoi2d};
+    use std::noise::{MANHATTAN, CHEBYSHEV, MINKOWSKI};
+    fn near2(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4);
+    fn near3(p: point) -> Worley = worley(p, jitter: 0.9, seed: 4);
+    fn manhattan(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4, metric: MANHATTAN);
+    fn chebyshev(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4, metric: CHEBYSHEV);
+    fn cubes(uv: vec2) -> Worley2d =
+        worley_2d(uv, jitter: 0.9, seed: 4, metric: MINKOWSKI, exponent: 3.0);
+    fn border2(uv: vec2) -> Voronoi2d = voronoi_2d(uv, jitter: 0.9, seed: 4);
+    fn border3(p: point) -> Voronoi = voronoi(p, jitter: 0.9, seed: 4);
+";
+
+/// Every point near the origin, without repeats.
+fn scattered<const N: usize>(text: &Text, function: &str, reach: f64) -> Vec<[f64; N]> {
+    let steps = (reach * 2.0 / 0.23) as usize;
+    let mut found: Vec<[f64; N]> = Vec::new();
+    for cell in 0..steps.pow(N as u32) {
+        let at: [f64; N] = std::array::from_fn(|axis| {
+            ((cell / steps.pow(axis as u32)) % steps) as f64 * 0.23 - reach + 0.037
+        });
+        let near = text.call::<f64>(function, &[&at]);
+        let point: [f64; N] = std::array::from_fn(|axis| at[axis] + near[3 + axis]);
+        if !found.iter().any(|f| apart(f, &point) < 1e-6) {
+            found.push(point);
+        }
+    }
+    found
+}
+
+fn apart<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+/// The nearest of some points, and the distance to the nearest plane halfway to another.
+fn border<const N: usize>(points: &[[f64; N]], at: &[f64; N]) -> (f64, f64) {
+    let by_distance = |a: &&[f64; N], b: &&[f64; N]| apart(a, at).total_cmp(&apart(b, at));
+    let nearest = *points.iter().min_by(by_distance).expect("points");
+    let others = points.iter().filter(|p| apart(p, &nearest) > 1e-6);
+    let halfway = others.map(|p| {
+        let way: [f64; N] = std::array::from_fn(|c| p[c] - nearest[c]);
+        let along = |c: usize| ((p[c] + nearest[c]) * 0.5 - at[c]) * way[c];
+        (0..N).map(along).sum::<f64>() / apart(p, &nearest)
+    });
+    (apart(&nearest, at), halfway.fold(f64::MAX, f64::min))
+}
+
+#[test]
+fn distances_are_those_to_the_points_that_are_scattered() {
+    let text = Text::new(CELLS);
+    let points = scattered::<2>(&text, "near2", 5.0);
+    assert!((80..150).contains(&points.len()), "{} points", points.len());
+    let mut n = Numbers::new(1);
+    type Metric = fn(f64, f64) -> f64;
+    let metrics: [(&str, Metric); 4] = [
+        ("near2", |x, y| (x * x + y * y).sqrt()),
+        ("manhattan", |x, y| x + y),
+        ("chebyshev", f64::max),
+        ("cubes", |x, y| (x.powi(3) + y.powi(3)).cbrt()),
+    ];
+    for _ in 0..300 {
+        let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.5, 2.5));
+        for (name, metric) in metrics {
+            let mut all: Vec<f64> = points
+                .iter()
+                .map(|p| metric((p[0] - at[0]).abs(), (p[1] - at[1]).abs()))
+                .collect();
+            all.sort_by(f64::total_cmp);
+            let found = text.call::<f64>(name, &[&at]);
+            // Points farther away than a square may be missed.
+            for (found, expected) in found.iter().zip(&all).filter(|(_, e)| **e < 1.0) {
+                assert!(
+                    (found - expected).abs() < 1e-9,
+                    "{name} at {at:?}: {found} instead of {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn borders_of_cells_are_where_two_points_are_as_near() {
+    let text = Text::new(CELLS);
+    let (plane, space) = (
+        scattered::<2>(&text, "near2", 6.0),
+        scattered::<3>(&text, "near3", 4.0),
+    );
+    let mut n = Numbers::new(2);
+    let mut worst = 0.0f64;
+    for _ in 0..400 {
+        let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.0, 2.0));
+        let found = text.call::<f64>("border2", &[&at]);
+        let (center, edge) = border(&plane, &at);
+        worst = worst.max((found[0] - edge).abs()).max((found[1] - center).abs());
+        let at: [f64; 3] = std::array::from_fn(|_| n.between(-1.0, 1.0));
+        let found = text.call::<f64>("border3", &[&at]);
+        let (center, edge) = border(&space, &at);
+        worst = worst.max((found[0] - edge).abs()).max((found[1] - center).abs());
+    }
+    assert!(worst < 1e-9, "off by {worst}");
+}
+
+/// Mean and variance of `f(uv)` or `f(p)` over a large part of space, and of its mean over boxes.
+fn spread(text: &Text, function: &str, axes: usize, count: usize) -> (f64, f64) {
+    let mut n = Numbers::new(3);
+    let draw = |_| {
+        let at: Vec<f64> = (0..axes).map(|_| n.between(-400.0, 400.0)).collect();
+        text.call::<f64>(function, &[&at])[0]
+    };
+    let values: Vec<f64> = (0..count).map(draw).collect();
+    let mean = values.iter().sum::<f64>() / count as f64;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64;
+    (mean, variance)
+}
+
+#[test]
+fn waves_have_their_variance_direction_and_length() {
+    let text = Text::new(
+        "use std::noise::{gabor, gabor_2d};
+         fn plane(uv: vec2) -> float = gabor_2d(uv);
+         fn any(uv: vec2) -> float = gabor_2d(uv, spread: 90 deg, impulses: 2);
+         fn space(p: point) -> float = gabor(p);
+         fn slanted(uv: vec2) -> float = gabor_2d(uv, direction: 30 deg, bandwidth: 0.5);
+         fn wide(uv: vec2) -> float = gabor_2d(uv, direction: 30 deg, bandwidth: 0.5, width: vec2(0.4));",
+    );
+    for (name, axes, count) in [("plane", 2, 6000), ("any", 2, 6000), ("space", 3, 3000)] {
+        let (mean, variance) = spread(&text, name, axes, count);
+        // A third of the range is a standard deviation; few values are cut off.
+        assert!(mean.abs() < 0.02, "{name}: mean {mean}");
+        assert!(
+            (variance * 9.0 - 1.0).abs() < 0.12,
+            "{name}: variance {variance}"
+        );
+    }
+    // Along the direction, half a wave turns the sign; across it, little changes.
+    let mut n = Numbers::new(4);
+    let (mut half, mut whole, mut across, mut total) = (0.0, 0.0, 0.0, 0.0);
+    let way = [30f64.to_radians().cos(), 30f64.to_radians().sin()];
+    let at = |p: [f64; 2], along: f64, side: f64| {
+        let q = [
+            p[0] + along * way[0] - side * way[1],
+            p[1] + along * way[1] + side * way[0],
+        ];
+        text.call::<f64>("slanted", &[&q])[0]
+    };
+    let (mut product, mut square) = (0.0, 0.0);
+    for _ in 0..2500 {
+        let p: [f64; 2] = std::array::from_fn(|_| n.between(-300.0, 300.0));
+        let here = at(p, 0.0, 0.0);
+        total += here * here;
+        half += here * at(p, 0.5, 0.0);
+        whole += here * at(p, 1.0, 0.0);
+        across += here * at(p, 0.0, 0.3);
+        let box_mean: f64 = (0..25)
+            .map(|i| {
+                let offset = |k: i32| (f64::from(k) + 0.5) / 5.0 * 0.4 - 0.2;
+                text.call::<f64>("slanted", &[&[p[0] + offset(i % 5), p[1] + offset(i / 5)]])[0]
+            })
+            .sum::<f64>()
+            / 25.0;
+        let wide = text.call::<f64>("wide", &[&p])[0];
+        product += box_mean * wide;
+        square += wide * wide;
+    }
+    assert!(half / total < -0.6, "half a wave on: {}", half / total);
+    assert!(whole / total > 0.5, "a wave on: {}", whole / total);
+    assert!(across / total > 0.8, "across: {}", across / total);
+    // What is averaged in closed form is the mean over the box, up to the bells' shape.
+    assert!(
+        (product / square - 1.0).abs() < 0.1,
+        "the mean over a box is {} of it",
+        product / square
+    );
+}
