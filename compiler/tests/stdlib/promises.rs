@@ -102,7 +102,7 @@ fn parsed(file: &StdFile) -> Module {
 fn of_file(file: &StdFile) -> Vec<Promised> {
     let ast = parsed(file);
     let functions = ast.items.iter().filter_map(|item| match &item.kind {
-        ItemKind::Function(f) => Some((item, f)),
+        ItemKind::Function(f) if !item.private => Some((item, f)),
         _ => None,
     });
     let plain = functions.filter(|(_, f)| f.params.iter().all(|p| width(&p.ty.node).is_some()));

@@ -77,7 +77,8 @@ fn distances_are_those_to_the_points_that_are_scattered() {
             all.sort_by(f64::total_cmp);
             let found = text.call::<f64>(name, &[&at]);
             // Points farther away than a square may be missed.
-            for (found, expected) in found.iter().zip(&all).filter(|(_, e)| **e < 1.0) {
+            let both = found.iter().zip(&all).take(2);
+            for (found, expected) in both.filter(|(_, e)| **e < 1.0) {
                 assert!(
                     (found - expected).abs() < 1e-9,
                     "{name} at {at:?}: {found} instead of {expected}"
