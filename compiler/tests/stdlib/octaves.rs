@@ -174,7 +174,9 @@ fn faded_noise_is_nearer_to_the_mean_over_a_box_than_bare_noise() {
                 faded < most * bare,
                 "{function} over {side}: off by {faded}, bare by {bare}"
             );
-            assert!(shift.abs() < 0.05, "{function} over {side}: darker by {shift}");
+            // Of `billow`, the dark half of the range is stretched.
+            let most = if function == "billow" { 0.1 } else { 0.04 };
+            assert!(shift.abs() < most, "{function} over {side}: off by {shift}");
         }
     }
 }
