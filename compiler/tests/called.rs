@@ -5,8 +5,9 @@ mod common;
 
 use common::asked::{Asked, direction, near, point4};
 use impasto_compiler::abi::{Emission, Medium};
-use impasto_compiler::ir::{Expr, ExprKind};
+use impasto_compiler::ir::{Closure, Expr, ExprKind, parse, print};
 use impasto_compiler::ops::Op;
+use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag};
 
 /// A model with a coat, an inside and light of its own, in a file that others import it from.
@@ -210,4 +211,60 @@ fn an_interior_is_there_where_its_condition_holds() {
     let media: Vec<Option<Medium>> = program.instances().iter().map(|i| i.info.medium).collect();
     assert!(media[0].is_some_and(|m| m.ior == 1.5), "{media:?}");
     assert_eq!(media[1], None);
+}
+
+#[test]
+fn what_a_call_puts_in_place_knows_its_line_and_the_call() {
+    let mut loader = MemoryLoader::default();
+    loader.add("model.impasto", MODEL);
+    let text = "use model::model;\nmaterial m { material = model(coat: uv.y); }";
+    loader.add("user.impasto", text);
+    let checked = impasto_compiler::check("user.impasto", &mut loader);
+    let m = &checked.checked[0];
+    let file = |span: Span| checked.sources.file(span.file).name.as_str();
+    let from_model: Vec<&Expr> = m
+        .body
+        .exprs
+        .iter()
+        .filter(|e| file(e.span) == "model.impasto" && e.via.is_some())
+        .collect();
+    assert!(from_model.len() > 5);
+    for expr in from_model {
+        let call = m.body.calls_to(expr.via).last().expect("a call");
+        assert_eq!(checked.sources.line_column(call.span), (2, 25));
+        assert_eq!(file(call.span), "user.impasto");
+    }
+    for closure in &m.closures {
+        if let Closure::Lobe(lobe) = closure {
+            assert!(file(lobe.span) == "model.impasto" && lobe.via.is_some());
+        }
+    }
+}
+
+#[test]
+fn materials_of_the_library_are_named_by_paths() {
+    let compiled = compile(
+        &[MaterialRequest::new("m", "std::bsdf::diffuse")],
+        &mut MemoryLoader::default(),
+    );
+    // The module is found; that it defines no material is another matter.
+    let codes: Vec<&str> = compiled.diagnostics.iter().map(|d| d.code.id()).collect();
+    assert_eq!(codes, ["E0109"]);
+    let compiled = compile(
+        &[MaterialRequest::new("m", "std::surface::open_pdf")],
+        &mut MemoryLoader::default(),
+    );
+    let codes: Vec<&str> = compiled.diagnostics.iter().map(|d| d.code.id()).collect();
+    assert_eq!(codes, ["E0203"]);
+}
+
+#[test]
+fn the_text_of_an_interior_with_a_condition_can_be_read() {
+    let mut loader = MemoryLoader::default();
+    loader.add("model.impasto", MODEL);
+    let checked = impasto_compiler::check("model.impasto", &mut loader);
+    let text = print::module(&checked.ir, &checked.checked);
+    assert!(text.contains(") when $4\n"), "{text}");
+    let parsed = parse::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    assert_eq!(print::module(&parsed.module, &parsed.materials), text);
 }

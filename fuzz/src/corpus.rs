@@ -60,7 +60,7 @@ pub fn irs() -> Corpus {
 }
 
 const SOURCE_WORDS: &str = "
-    material param let var fn bsdf edf delta struct const use if else for in while limit return
+    material private none label soft group unit param let var fn bsdf edf delta struct const use if else for in while limit return
     break continue true false surface emission interior opacity layer mix medium position normal
     uv tangent exterior_ior bool int float length angle vec2 vec3 vec4 color point vector mat3
     texture std :: ; , . .. : = == != < <= > >= + - * / % & | ^ << >> && || ! += -= *= /= -> ( )
@@ -70,7 +70,7 @@ const SOURCE_WORDS: &str = "
 
 const IR_WORDS: &str = "
     fn struct texture bsdf edf delta material uniform var return if else for in loop limit while
-    break continue load call true false surface = emission = interior = opacity = medium( lobe
+    break continue load call when true false surface = emission = interior = opacity = medium( lobe
     layer mix weight add select normal tangent as turns bool int float vec2 vec3 vec4 mat3 %0 %1 %2
     %3 $0 $1 @0.x @1.i @0 : = .. . , ( ) { } -> 0 1 -1 2147483647 0.0 1.0 1e38 1e-300 (0.0,0.0,0.0)
     (1.0,2.0) .xyz .x .w neg add sub mul div rem mod min max clamp sqrt pow exp log hash dot cross

@@ -297,3 +297,37 @@ fn a_full_standard_output_exits_with_2() {
         .says("standard output")
         .says("no space left");
 }
+
+#[test]
+fn parameters_are_told_as_json() {
+    let source = "use std::bsdf::diffuse;\n\
+        material plain { param shade: float = 0.5 in 0.0 .. 1.0; surface = diffuse(shade); }\n\
+        material other { surface = diffuse(0.5); }\n";
+    let run = impasto_with(&["emit", "-", "--what", "params"], source.as_bytes()).exits(0);
+    let told = run.json();
+    assert_eq!(told["version"], 1);
+    assert_eq!(told["materials"][0]["name"], "plain");
+    assert_eq!(told["materials"][0]["params"][0]["hard"][1], 1.0);
+    assert_eq!(told["materials"][1]["name"], "other");
+    let one = ["emit", "-", "--what", "params", "--material", "other"];
+    let told = impasto_with(&one, source.as_bytes()).exits(0).json();
+    assert_eq!(told["materials"].as_array().map(Vec::len), Some(1));
+    let none = ["emit", "-", "--what", "params", "--material", "others"];
+    impasto_with(&none, source.as_bytes())
+        .exits(1)
+        .prints_nothing()
+        .says("did you mean `other`");
+}
+
+#[test]
+fn the_library_is_named_by_its_paths() {
+    impasto(&["check", "std::bsdf::diffuse"])
+        .exits(0)
+        .prints_nothing();
+    let ast = impasto(&["emit", "std::bsdf::diffuse", "--what", "ast"]).exits(0);
+    assert!(ast.stdout.contains("(bsdf diffuse"), "{ast:#?}");
+    impasto(&["check", "std::bsdf::difuse"])
+        .exits(2)
+        .prints_nothing()
+        .says("did you mean `std::bsdf::diffuse`");
+}

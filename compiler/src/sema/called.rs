@@ -20,8 +20,8 @@ use super::outputs::OUTPUTS;
 use super::types::Ty;
 use super::{Checked, Checker, Param};
 
-/// How a value's range is looked for: operations within each other.
-const RANGE_DEPTH: usize = 8;
+/// How many operations within each other are looked through for a value's range.
+const RANGE_DEPTH: usize = 4;
 
 /// A parameter of a material that checks.
 #[derive(Clone, Debug)]
