@@ -15,6 +15,10 @@
 //! fn material_of(instance: u32) -> u32   // apart from the others: `Program::lookup_wgsl`
 //! // Provided by the runtime when a material reads textures:
 //! fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32>
+//! // The same with the bits of `texture_mode`, and averaged over a width in `at.zw`. Their text is the
+//! // compiler's (`codegen::lookups`), over levels and texels that the runtime provides:
+//! fn texture_fetch_as(slot: u32, uv: vec2<f32>, mode: i32) -> vec4<f32>
+//! fn texture_fetch_wide(slot: u32, at: vec4<f32>, mode: i32) -> vec4<f32>
 //! // Provided by the runtime, where `Program::tables` has them:
 //! var<storage, read> material_instances: array<vec2<u32>>;    // material, first row of parameters
 //! var<storage, read> material_parameters: array<vec4<u32>>;   // bits of the values
@@ -31,6 +35,10 @@ pub const EMISSION: &str = "material_emission";
 pub const MATERIAL_OF: &str = "material_of";
 /// The WGSL function the runtime provides: bilinear, wrapping lookup of texture `slot`.
 pub const TEXTURE_FETCH: &str = "texture_fetch";
+/// The lookup that wraps and filters as its last argument says.
+pub const TEXTURE_FETCH_AS: &str = "texture_fetch_as";
+/// The lookup that also averages over a width.
+pub const TEXTURE_FETCH_WIDE: &str = "texture_fetch_wide";
 /// The buffer of instances: material and first row of parameters of each.
 pub const INSTANCES: &str = "material_instances";
 /// The buffer of parameter values.
@@ -101,10 +109,70 @@ pub enum Emission {
 /// What the color values of a texture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum TextureSpace {
-    /// 8-bit files hold sRGB, to be decoded to linear.
+    /// Integers are sRGB, to be decoded to linear, all but the fourth number (alpha).
     Color,
-    /// The numbers are used as they are.
+    /// Four numbers, used as they are.
     Data,
+}
+
+/// The constants of `std::core` that say how a lookup goes on beyond the picture, by value.
+pub const WRAPS: [&str; 4] = ["REPEAT", "MIRROR", "CLAMP", "BORDER"];
+/// The constants of `std::core` that say how a lookup goes between texels, by value.
+pub const FILTERS: [&str; 3] = ["BILINEAR", "NEAREST", "BICUBIC"];
+
+/// The int that stands for two of [`WRAPS`], along u and v, and one of [`FILTERS`]; 0 is what
+/// [`TEXTURE_FETCH`] does.
+pub const fn texture_mode(wrap_u: i32, wrap_v: i32, filter: i32) -> i32 {
+    wrap_u + 4 * wrap_v + 16 * filter
+}
+
+/// What of the lookups beyond [`TEXTURE_FETCH`] code needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Lookups {
+    /// Some average over a width, which takes smaller versions of the picture.
+    pub levels: bool,
+    /// Some give alpha: it is how much there is of a texel's color, and colors are averaged by it.
+    pub alpha: bool,
+    /// Bit n: the nth of [`WRAPS`] occurs.
+    pub wraps: u8,
+    /// Bit n: the nth of [`FILTERS`] occurs.
+    pub filters: u8,
+}
+
+impl Lookups {
+    /// Everything but levels: what code needs whose mode is not known before it runs.
+    pub const ANY_MODE: Self = Self {
+        levels: false,
+        alpha: false,
+        wraps: 0b1111,
+        filters: 0b111,
+    };
+
+    /// What one lookup of a known mode needs.
+    pub fn of_mode(mode: i32) -> Self {
+        let filter = (mode >> 4).clamp(0, 2);
+        Self {
+            levels: false,
+            alpha: false,
+            wraps: 1 << (mode & 3) | 1 << (mode >> 2 & 3),
+            filters: 1 << filter,
+        }
+    }
+
+    /// What both need.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            levels: self.levels || other.levels,
+            alpha: self.alpha || other.alpha,
+            wraps: self.wraps | other.wraps,
+            filters: self.filters | other.filters,
+        }
+    }
+
+    /// Is [`TEXTURE_FETCH`] all that is needed?
+    pub fn is_plain(self) -> bool {
+        !self.levels && self.wraps == 0 && self.filters == 0
+    }
 }
 
 /// A texture that compiled code fetches; its index in [`crate::Program::textures`] is its slot.
@@ -114,6 +182,8 @@ pub struct TextureRef {
     pub path: String,
     /// How to read it.
     pub space: TextureSpace,
+    /// How it is looked up.
+    pub lookups: Lookups,
 }
 
 /// What the runtime must know of one compiled material, whatever its instances.

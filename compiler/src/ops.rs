@@ -8,6 +8,7 @@
 mod derivative;
 mod meaning;
 
+use crate::abi::TextureSpace;
 use crate::ir::Type;
 use crate::ir::value::{Real, Value};
 use meaning::*;
@@ -42,8 +43,11 @@ pub enum Shape {
     IntToFloat,
     /// A float, giving an int.
     FloatToInt,
-    /// A texture (int) and a vec2, giving a vec3 or a vec4.
+    /// A texture (int) and a vec2, giving so many floats.
     Lookup(usize),
+    /// As `Lookup`, with the bits of [`crate::abi::texture_mode`]; a vec4 in place of the vec2 holds
+    /// the width to average over in its second half.
+    LookupAs(usize),
     /// A matrix and a vector of three.
     MatVec,
 }
@@ -296,6 +300,10 @@ ops! {
     // Textures: a texture is an index
     Image "image" function Lookup(3), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5), lookup;
     ImageData "image_data" function Lookup(4), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5), lookup;
+    ImageAlpha "image_alpha" function Lookup(1), Texture, Builtin("texture_fetch"), None, |a| all(a, 0.5), lookup;
+    ImageAs "image" function LookupAs(3), Texture, Builtin("texture_fetch_as"), None, |a| all(a, 0.5), lookup;
+    ImageDataAs "image_data" function LookupAs(4), Texture, Builtin("texture_fetch_as"), None, |a| all(a, 0.5), lookup;
+    ImageAlphaAs "image_alpha" function LookupAs(1), Texture, Builtin("texture_fetch_as"), None, |a| all(a, 0.5), lookup;
 }
 
 const HASH1: &str = "(a: T) -> i32 { let s = bitcast<u32>(a) * 747796405u + 2891336453u; let w = ((s >> ((s >> 28u) + 4u)) ^ s) * 277803737u; return bitcast<i32>((w >> 22u) ^ w); }";
@@ -315,7 +323,7 @@ impl Op {
             Shape::Float(n) | Shape::Number(n) | Shape::Int(n) | Shape::Bool(n) => n,
             Shape::Reduce(n) | Shape::Vector(n) => n,
             Shape::Compare | Shape::Equal | Shape::Cross | Shape::Lookup(_) | Shape::MatVec => 2,
-            Shape::Select => 3,
+            Shape::Select | Shape::LookupAs(_) => 3,
             Shape::IntToFloat | Shape::FloatToInt => 1,
         }
     }
@@ -344,16 +352,60 @@ impl Op {
             Shape::IntToFloat => all(Int).then_some(Float),
             Shape::FloatToInt => all(Float).then_some(Int),
             Shape::Lookup(n) => (args == [Int, Vec2]).then_some(Type::of_width(n)),
+            Shape::LookupAs(n) => {
+                let fits = args == [Int, Vec2, Int] || args == [Int, Vec4, Int];
+                fits.then_some(Type::of_width(n))
+            }
             Shape::MatVec => (args == [Mat3, Vec3]).then_some(Vec3),
         }
     }
 }
 
 impl Op {
+    /// How a lookup of a texture reads it; `None` of other ops.
+    pub fn texture_space(self) -> Option<TextureSpace> {
+        match self {
+            Op::Image | Op::ImageAs | Op::ImageAlpha | Op::ImageAlphaAs => {
+                Some(TextureSpace::Color)
+            }
+            Op::ImageData | Op::ImageDataAs => Some(TextureSpace::Data),
+            _ => None,
+        }
+    }
+
+    /// Which of the four numbers of a texel a lookup gives.
+    pub fn texel_part(self) -> std::ops::Range<usize> {
+        match self.info().shape {
+            Shape::Lookup(1) | Shape::LookupAs(1) => 3..4,
+            Shape::Lookup(n) | Shape::LookupAs(n) => 0..n,
+            _ => 0..0,
+        }
+    }
+
+    /// The lookup of the same kind that says how to wrap, filter and average.
+    pub fn with_mode(self) -> Op {
+        match self {
+            Op::Image => Op::ImageAs,
+            Op::ImageData => Op::ImageDataAs,
+            Op::ImageAlpha => Op::ImageAlphaAs,
+            other => other,
+        }
+    }
+
+    /// The lookup of the same kind that repeats, is bilinear and averages over nothing.
+    pub fn without_mode(self) -> Op {
+        match self {
+            Op::ImageAs => Op::Image,
+            Op::ImageDataAs => Op::ImageData,
+            Op::ImageAlphaAs => Op::ImageAlpha,
+            other => other,
+        }
+    }
+
     /// How many components [`kernel`] works on for operands of types `args`; 0 for ints.
     pub fn components(self, args: &[Type]) -> usize {
         match self.info().shape {
-            Shape::Lookup(n) => n,
+            Shape::Lookup(n) | Shape::LookupAs(n) => n,
             _ => args.iter().filter_map(|a| a.width()).max().unwrap_or(0),
         }
     }

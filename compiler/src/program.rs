@@ -7,19 +7,22 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::abi::{self, Emission, InstanceInfo, MaterialInfo, Table, TextureRef, TextureSpace};
+use crate::abi::{
+    self, Emission, InstanceInfo, Lookups, MaterialInfo, Table, TextureRef, TextureSpace,
+};
 use crate::codegen::{self, Target};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{
     self, ClosureDefId, Const, ExprKind, Function, FunctionId, Methods, Module, Type, walk,
 };
-use crate::ops::Op;
 use crate::parameters::Layout;
 use crate::passes::{self, Hoisted, Widths};
 use crate::sema::Checker;
 use crate::source::{SourceMap, Span};
 use crate::stages::{Progress, Stage};
 use crate::{closure, interior};
+
+mod lookups;
 
 /// Compiled materials and their instances.
 #[derive(Clone, Debug)]
@@ -29,10 +32,9 @@ pub struct Program {
     pub(crate) core: closure::Core,
     pub(crate) materials: Vec<CompiledMaterial>,
     instances: Vec<Instance>,
-    /// Textures that some material may read, as indices of `module.textures`.
-    textures: BTreeSet<usize>,
-    /// Which lookups occur: with and without color conversion.
-    spaces: BTreeSet<TextureSpace>,
+    /// Textures that some material may read and how, by index of `module.textures`, in the order of
+    /// their slots.
+    textures: Vec<lookups::Slot>,
     /// Line of each span that generated code mentions, by file.
     sources: SourceMap,
     effort: u64,
@@ -96,14 +98,18 @@ impl Program {
 
     /// The textures to provide; a texture's position is its slot.
     pub fn textures(&self) -> Vec<TextureRef> {
-        let both = |&t: &usize| self.spaces.iter().map(move |&space| (t, space));
-        let slots = self.textures.iter().flat_map(both);
-        slots
-            .map(|(t, space)| TextureRef {
-                path: self.module.textures[t].clone(),
-                space,
-            })
-            .collect()
+        let texture = |&(t, space, lookups): &lookups::Slot| TextureRef {
+            path: self.module.textures[t].clone(),
+            space,
+            lookups,
+        };
+        self.textures.iter().map(texture).collect()
+    }
+
+    /// What all lookups need together.
+    pub fn lookups(&self) -> Lookups {
+        let all = self.textures.iter().map(|slot| slot.2);
+        all.fold(Lookups::default(), Lookups::and)
     }
 
     /// The WGSL of some materials: structs, the functions they reach, one function a material,
@@ -165,30 +171,10 @@ impl Program {
             .pack(&instance.uniforms)
     }
 
-    /// The first slot of texture `t`.
-    pub(crate) fn first_slot(&self, t: usize) -> u32 {
-        let rank = self.textures.iter().take_while(|&&x| x < t).count();
-        (rank * self.spaces.len().max(1)) as u32
-    }
-
-    /// What a kind of lookup adds to the first slot.
-    pub(crate) fn slot_offset(&self, op: Op) -> u32 {
-        u32::from(op == Op::ImageData && self.spaces.len() > 1)
-    }
-
-    fn resolve_texture_slots(&mut self) {
-        for i in 0..self.materials.len() {
-            let read = std::mem::take(&mut self.materials[i].info.textures);
-            let per_texture = self.spaces.len();
-            let slots = read
-                .iter()
-                .filter(|t| self.textures.contains(t))
-                .flat_map(|&t| {
-                    let first = self.first_slot(t) as usize;
-                    first..first + per_texture
-                });
-            self.materials[i].info.textures = slots.collect();
-        }
+    /// The slot of texture `t` read in one way; the first where it is not read so.
+    pub(crate) fn slot(&self, t: usize, space: TextureSpace) -> u32 {
+        let found = self.textures.iter().position(|s| (s.0, s.1) == (t, space));
+        found.unwrap_or(0) as u32
     }
 
     /// The first function of some materials whose blocks lie deeper within each other than WGSL
@@ -247,7 +233,6 @@ pub(crate) struct ProgramBuilder {
     materials: Vec<CompiledMaterial>,
     instances: Vec<Instance>,
     names: BTreeMap<String, u32>,
-    textures: BTreeSet<usize>,
 }
 
 impl ProgramBuilder {
@@ -270,7 +255,6 @@ impl ProgramBuilder {
             materials: Vec::new(),
             instances: Vec::new(),
             names: BTreeMap::from([("material".to_owned(), 1)]),
-            textures: BTreeSet::new(),
         })
     }
 
@@ -294,7 +278,6 @@ impl ProgramBuilder {
             Err(problem) => return checker.diagnostics.push(problem),
         };
         let read = texture_values(&material, settings, &checker.literal_textures);
-        self.textures.extend(read.iter().copied());
         match self.instances(&material, &lowered, settings) {
             Ok(instances) => self.instances.extend(instances),
             Err(problem) => return checker.diagnostics.push(problem),
@@ -564,11 +547,8 @@ impl ProgramBuilder {
             instance.row = row;
             row += self.materials[instance.info.material].layout.rows;
         }
-        let spaces = texture_spaces(&self.module, &self.materials);
-        if spaces.is_empty() {
-            self.textures.clear();
-        }
-        let mut program = Program {
+        let textures = lookups::slots(&self.module, &mut self.materials);
+        Program {
             names: codegen::Names::new(
                 &self.module,
                 &checker.sources,
@@ -578,13 +558,10 @@ impl ProgramBuilder {
             core: self.core,
             materials: self.materials,
             instances: self.instances,
-            textures: self.textures,
-            spaces,
+            textures,
             sources: checker.sources.clone(),
             effort: self.effort,
-        };
-        program.resolve_texture_slots();
-        program
+        }
     }
 }
 
@@ -637,22 +614,6 @@ fn texture_values(
         .chain(literal.iter().copied())
         .collect();
     textures.into_iter().collect()
-}
-
-/// The lookups that occur in materials and what they call.
-fn texture_spaces(module: &Module, materials: &[CompiledMaterial]) -> BTreeSet<TextureSpace> {
-    let own = materials
-        .iter()
-        .flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
-    let all = own
-        .chain(&module.functions)
-        .flat_map(|f| f.evaluated().into_iter().map(move |id| f.expr(id)));
-    all.filter_map(|e| match e.kind {
-        ExprKind::Op(Op::Image, _) => Some(TextureSpace::Color),
-        ExprKind::Op(Op::ImageData, _) => Some(TextureSpace::Data),
-        _ => None,
-    })
-    .collect()
 }
 
 /// Most expressions of a material after its calls are put in line, as a GPU driver does.

@@ -1,10 +1,12 @@
 //! Image files, decoded to linear floats.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 use image::codecs::hdr::HdrDecoder;
+use image::error::{DecodingError, ImageFormatHint};
 use image::{
     DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits,
 };
@@ -14,8 +16,11 @@ use crate::scene::SceneError;
 /// Texels a side of the largest picture that is read.
 pub(crate) const MAX_SIDE: u32 = 16_384;
 
-/// Bytes that decoding one picture may take: an RGBA float picture of half the largest size.
-const MAX_DECODE_BYTES: u64 = 2 << 30;
+/// Texels of the largest picture that is read, and of all textures of a scene.
+pub(crate) const MAX_TEXELS: u64 = 1 << 27;
+
+/// Bytes that decoding one picture may take: a float picture of the largest size.
+const MAX_DECODE_BYTES: u64 = MAX_TEXELS * 16;
 
 /// Linear RGBA, top row first.
 pub(crate) struct Picture {
@@ -24,33 +29,28 @@ pub(crate) struct Picture {
     pub(crate) texels: Vec<[f32; 4]>,
 }
 
-/// Reads a PNG, JPEG, Radiance HDR or OpenEXR file; `what` names its use in errors.
+impl Picture {
+    /// Row `y`; nothing where there is none.
+    pub(crate) fn row(&self, y: usize) -> &[[f32; 4]] {
+        let width = self.width as usize;
+        self.texels.get(y * width..(y + 1) * width).unwrap_or(&[])
+    }
+}
+
+/// Reads a PNG, JPEG, Radiance HDR or OpenEXR file, which its contents tell and not its name; `what`
+/// names its use in errors.
 ///
 /// Integer colors of PNG and JPEG files are sRGB and become linear if `is_color`; everything else
-/// is used as it is.
+/// is used as it is. Grey fills red, green and blue, and alpha is 1 where there is none.
+///
+/// # Errors
+/// If the file is no such picture, is damaged, or is larger than [`MAX_SIDE`] and [`MAX_TEXELS`].
 pub(crate) fn load(path: &Path, what: &str, is_color: bool) -> Result<Picture, SceneError> {
-    let error = |message: String| SceneError::in_file(path, message);
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_DECODE_BYTES);
-    let unreadable = |e: std::io::Error| error(format!("cannot read the {what}: {e}"));
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let decoded = if file.fill_buf().map_err(unreadable)?.starts_with(b"#?RGBE") {
-        decode_rgbe(file, limits)
-    } else {
-        let mut reader = ImageReader::new(file);
-        // What the contents do not tell, the name may.
-        if let Ok(format) = ImageFormat::from_path(path) {
-            reader.set_format(format);
-        }
-        let mut reader = reader.with_guessed_format().map_err(unreadable)?;
-        reader.limits(limits);
-        reader.decode()
-    };
+    let (format, decoder) = open(path, what)?;
+    let decoded = guarded(|| DynamicImage::from_decoder(decoder));
     let image = decoded.map_err(|e| decode_error(path, what, &e))?;
-    if image.width() == 0 || image.height() == 0 {
-        return Err(error(format!("the {what} has no texels")));
+    if format == ImageFormat::Jpeg && !jpeg_is_whole(path).unwrap_or(false) {
+        return Err(damaged(path, what, "its end is missing"));
     }
     Ok(Picture {
         width: image.width(),
@@ -59,25 +59,153 @@ pub(crate) fn load(path: &Path, what: &str, is_color: bool) -> Result<Picture, S
     })
 }
 
-/// Radiance HDR as many programs begin it, after the example of Ward's own code: `#?RGBE` in place of
-/// `#?RADIANCE`.
-fn decode_rgbe(file: BufReader<File>, limits: Limits) -> ImageResult<DynamicImage> {
-    let mut decoder = HdrDecoder::new_nonstrict(file)?;
-    decoder.set_limits(limits)?;
-    DynamicImage::from_decoder(decoder)
+/// How many texels a file has, by its header. Errors as of [`load`].
+pub(crate) fn texels(path: &Path, what: &str) -> Result<u64, SceneError> {
+    let (width, height) = open(path, what)?.1.dimensions();
+    Ok(u64::from(width) * u64::from(height))
+}
+
+/// A file whose header was read and says what can be decoded.
+fn open<'a>(
+    path: &Path,
+    what: &str,
+) -> Result<(ImageFormat, Box<dyn ImageDecoder + 'a>), SceneError> {
+    let error = |message: String| SceneError::in_file(path, message);
+    let unreadable = |e: std::io::Error| error(format!("cannot read the {what}: {e}"));
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let start = file.fill_buf().map_err(unreadable)?.to_vec();
+    if start.is_empty() {
+        return Err(error(format!("the {what} is an empty file")).hint(FORMATS));
+    }
+    let rgbe = start.starts_with(b"#?RGBE");
+    // What the contents do not tell, the name may.
+    let told = match rgbe {
+        true => Some(ImageFormat::Hdr),
+        false => image::guess_format(&start).ok(),
+    };
+    let named = ImageFormat::from_path(path).ok();
+    let Some(format) = told.or(named) else {
+        return Err(unknown_format(path, what, None));
+    };
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_DECODE_BYTES);
+    let decoder = guarded(|| decoder(format, rgbe, file, limits));
+    let decoder = decoder.map_err(|e| match (&e, told) {
+        (ImageError::Unsupported(_), _) if !READ.contains(&format) => {
+            unknown_format(path, what, Some(format))
+        }
+        (_, None) => error(format!("the {what} is no picture, whatever its name says"))
+            .hint(format!("{FORMATS}; {}", whole_file(&start))),
+        _ => decode_error(path, what, &e),
+    })?;
+    check_size(path, what, decoder.dimensions())?;
+    Ok((format, decoder))
+}
+
+fn decoder<'a>(
+    format: ImageFormat,
+    rgbe: bool,
+    file: BufReader<File>,
+    limits: Limits,
+) -> ImageResult<Box<dyn ImageDecoder + 'a>> {
+    if rgbe {
+        // Radiance HDR as many programs begin it, after the example of Ward's own code: `#?RGBE` in
+        // place of `#?RADIANCE`.
+        let mut decoder = HdrDecoder::new_nonstrict(file)?;
+        decoder.set_limits(limits)?;
+        return Ok(Box::new(decoder));
+    }
+    let mut reader = ImageReader::with_format(file, format);
+    reader.limits(limits);
+    Ok(Box::new(reader.into_decoder()?))
+}
+
+/// What a decoder gives; one that panics has met a file that is not what it should be.
+fn guarded<T>(decode: impl FnOnce() -> ImageResult<T>) -> ImageResult<T> {
+    std::panic::catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        let problem = DecodingError::new(ImageFormatHint::Unknown, "it contradicts itself");
+        Err(ImageError::Decoding(problem))
+    })
+}
+
+fn check_size(path: &Path, what: &str, (width, height): (u32, u32)) -> Result<(), SceneError> {
+    let error = |message: String| SceneError::in_file(path, message);
+    if width == 0 || height == 0 {
+        return Err(error(format!("the {what} has no texels")));
+    }
+    let count = u64::from(width) * u64::from(height);
+    if width.max(height) > MAX_SIDE || count > MAX_TEXELS {
+        let message = format!("the {what} is too large: {width} x {height} texels");
+        let hint = format!("at most {MAX_SIDE} a side and {MAX_TEXELS} in all fit; scale it down");
+        return Err(error(message).hint(hint));
+    }
+    Ok(())
+}
+
+/// Does a JPEG file go on to the end of its picture? Its decoder fills in what is missing.
+fn jpeg_is_whole(path: &Path) -> std::io::Result<bool> {
+    const SCAN: u8 = 0xda;
+    const END: u8 = 0xd9;
+    let mut whole = false;
+    let mut before = 0;
+    for byte in BufReader::new(File::open(path)?).bytes() {
+        let byte = byte?;
+        // Pictures within the header end as well; what counts is the end after the last scan.
+        match (before, byte) {
+            (0xff, SCAN) => whole = false,
+            (0xff, END) => whole = true,
+            _ => {}
+        }
+        before = byte;
+    }
+    Ok(whole)
+}
+
+/// The formats that are read.
+const READ: [ImageFormat; 4] = [
+    ImageFormat::Png,
+    ImageFormat::Jpeg,
+    ImageFormat::Hdr,
+    ImageFormat::OpenExr,
+];
+
+/// The same, as hints say them.
+const FORMATS: &str = "expected PNG, JPEG, Radiance HDR (.hdr) or OpenEXR (.exr)";
+
+fn unknown_format(path: &Path, what: &str, format: Option<ImageFormat>) -> SceneError {
+    let message = match format {
+        Some(format) => format!("the {what} is in a format that is not read here: {format:?}"),
+        None => format!("the {what} is in no format that is read here"),
+    };
+    SceneError::in_file(path, message).hint(FORMATS)
+}
+
+/// What to do about a file that begins with `start`, which no picture does.
+fn whole_file(start: &[u8]) -> &'static str {
+    match start.starts_with(b"version https://git-lfs") {
+        true => "this is what Git LFS keeps in its place: `git lfs pull` gets the file",
+        false => "export it again",
+    }
 }
 
 fn decode_error(path: &Path, what: &str, cause: &ImageError) -> SceneError {
-    let error = |message: String| SceneError::in_file(path, message);
     match cause {
         ImageError::Unsupported(_) => {
-            error(format!("the {what} is in no format that is read here"))
-                .hint("PNG, JPEG, Radiance HDR (.hdr) and OpenEXR (.exr) are")
+            let message = format!("the {what} is damaged, or of a kind that is not read here: {cause}");
+            SceneError::in_file(path, message).hint(FORMATS)
         }
-        ImageError::Limits(_) => error(format!("the {what} is too large"))
-            .hint(format!("pictures may have {MAX_SIDE} texels a side")),
-        _ => error(format!("the {what} is damaged or cut short: {cause}")),
+        ImageError::Limits(_) => {
+            SceneError::in_file(path, format!("the {what} is too large to be decoded")).hint(
+                format!("at most {MAX_SIDE} texels a side and {MAX_TEXELS} in all fit"),
+            )
+        }
+        _ => damaged(path, what, &cause.to_string()),
     }
+}
+
+fn damaged(path: &Path, what: &str, cause: &str) -> SceneError {
+    let message = format!("the {what} is damaged or cut short: {cause}");
+    SceneError::in_file(path, message).hint("copy or export it again")
 }
 
 fn linear_texels(image: DynamicImage, is_color: bool) -> Vec<[f32; 4]> {

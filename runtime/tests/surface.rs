@@ -195,6 +195,7 @@ fn texture_part(files: &[(&str, Vec<u8>, TextureSpace)]) -> Result<ShaderPart, S
     let texture = |(name, _, space): &(&str, Vec<u8>, TextureSpace)| TextureRef {
         path: (*name).into(),
         space: *space,
+        lookups: Default::default(),
     };
     let textures: Vec<TextureRef> = files.iter().map(texture).collect();
     Ok(texture::part(&textures, folder.path())?.expect("there are textures"))
@@ -323,12 +324,12 @@ fn textures_that_cannot_be_read_are_explained() {
     let data = TextureSpace::Data;
     let text = message(&[("a.png", b"hello, this is no picture".to_vec(), data)]);
     assert!(
-        text.contains("a.png: the texture is damaged or cut short"),
+        text.contains("a.png: the texture is no picture, whatever its name says"),
         "{text}"
     );
     let text = message(&[("a.tga", b"hello, this is no picture".to_vec(), data)]);
     assert!(
-        text.contains("a.tga: the texture is in no format that is read here"),
+        text.contains("a.tga: the texture is in a format that is not read here"),
         "{text}"
     );
     assert!(text.contains("PNG, JPEG"), "{text}");
@@ -343,6 +344,7 @@ fn textures_that_cannot_be_read_are_explained() {
     let missing = TextureRef {
         path: "none.png".into(),
         space: data,
+        lookups: Default::default(),
     };
     let text = texture::part(&[missing], Path::new("."))
         .expect_err("it is missing")

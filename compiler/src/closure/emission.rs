@@ -113,7 +113,7 @@ fn reads_point(module: &Module, f: &Function) -> bool {
             }
             _ => false,
         },
-        ExprKind::Op(Op::Image | Op::ImageData, _) => true,
+        ExprKind::Op(op, _) => op.texture_space().is_some(),
         _ => false,
     })
 }

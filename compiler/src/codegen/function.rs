@@ -12,7 +12,7 @@ use super::names::unique;
 use super::walk::{counters, stored, used_uniforms};
 use super::{inliner, type_name};
 use crate::Program;
-use crate::abi::PARAMETERS;
+use crate::abi::{self, PARAMETERS, TextureSpace};
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
 use crate::ops::{Op, Shape, Wgsl};
 use crate::parameters::{Layout, Place};
@@ -64,8 +64,14 @@ fn called_names(program: &Program, f: &Function) -> BTreeMap<String, u32> {
         Type::Struct(id) => Some(program.names.structure(id)),
         _ => None,
     });
+    let lookups = [
+        abi::TEXTURE_FETCH,
+        abi::TEXTURE_FETCH_AS,
+        abi::TEXTURE_FETCH_WIDE,
+    ];
     functions
         .chain(structs)
+        .chain(lookups)
         .map(|name| (name.to_owned(), 1))
         .collect()
 }
@@ -348,8 +354,8 @@ impl Printer<'_> {
     }
 
     fn op(&mut self, op: Op, args: &[ExprId], ty: Type) -> String {
-        if matches!(op, Op::Image | Op::ImageData) {
-            return self.texture(op, args);
+        if let Some(space) = op.texture_space() {
+            return self.texture(op, space, args);
         }
         match self.spelling(op, args) {
             Wgsl::Prefix(symbol) => format!("{symbol}{}", self.tight(args[0])),
@@ -388,30 +394,26 @@ impl Printer<'_> {
         joined(args.iter().map(widen).collect())
     }
 
-    fn texture(&mut self, op: Op, args: &[ExprId]) -> String {
-        let offset = self.program.slot_offset(op);
+    fn texture(&mut self, op: Op, space: TextureSpace, args: &[ExprId]) -> String {
         let slot = match self.f.constant(args[0]) {
-            Some(Const::Int(t)) => format!("{}u", self.program.first_slot(*t as usize) + offset),
+            Some(Const::Int(t)) => format!("{}u", self.program.slot(*t as usize, space)),
             _ => {
-                self.helpers.texture_slot = true;
-                let slot = format!("op_texture_slot({})", self.operand(args[0]));
-                if offset > 0 {
-                    format!("{slot} + {offset}u")
-                } else {
-                    slot
-                }
+                self.helpers.texture_slots.insert(space);
+                let name = super::helpers::texture_slot_name(space);
+                format!("{name}({})", self.operand(args[0]))
             }
         };
-        let fetch = format!(
-            "{}({slot}, {})",
-            crate::abi::TEXTURE_FETCH,
-            self.operand(args[1])
-        );
-        if op == Op::Image {
-            format!("{fetch}.xyz")
-        } else {
-            fetch
-        }
+        let name = match (args.len(), self.f.ty(args[1])) {
+            (2, _) => abi::TEXTURE_FETCH,
+            (_, Type::Vec4) => abi::TEXTURE_FETCH_WIDE,
+            _ => abi::TEXTURE_FETCH_AS,
+        };
+        let part = match op.texel_part() {
+            whole if whole.len() == 4 => "",
+            color if color.len() == 3 => ".xyz",
+            _ => ".w",
+        };
+        format!("{name}({slot}, {}){part}", self.list(&args[1..]))
     }
 }
 

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use super::type_name;
 use crate::Program;
+use crate::abi::TextureSpace;
 use crate::ir::Type;
 use crate::ops::{Op, Wgsl};
 
@@ -12,8 +13,8 @@ use crate::ops::{Op, Wgsl};
 #[derive(Default)]
 pub struct Helpers {
     used: BTreeSet<(Op, Type)>,
-    /// Is a texture chosen at run time?
-    pub texture_slot: bool,
+    /// How textures are read that are chosen at run time.
+    pub texture_slots: BTreeSet<TextureSpace>,
 }
 
 impl Helpers {
@@ -63,18 +64,27 @@ impl Helpers {
                 }
             }
         }
-        if self.texture_slot {
+        for &space in &self.texture_slots {
             let slots: Vec<String> = (0..program.module.textures.len())
-                .map(|t| format!("{}u", program.first_slot(t)))
+                .map(|t| format!("{}u", program.slot(t, space)))
                 .collect();
             let n = slots.len().max(1);
+            let name = texture_slot_name(space);
             let _ = writeln!(
                 out,
-                "fn op_texture_slot(texture: i32) -> u32 {{\n    var slots = array<u32, {n}>({});\n    return slots[clamp(texture, 0, {})];\n}}\n",
+                "fn {name}(texture: i32) -> u32 {{\n    var slots = array<u32, {n}>({});\n    return slots[clamp(texture, 0, {})];\n}}\n",
                 slots.join(", "),
                 n - 1
             );
         }
+    }
+}
+
+/// The function from a texture to the slot where it is read in one way.
+pub fn texture_slot_name(space: TextureSpace) -> &'static str {
+    match space {
+        TextureSpace::Color => "op_texture_slot",
+        TextureSpace::Data => "op_texture_slot_data",
     }
 }
 

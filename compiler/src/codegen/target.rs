@@ -6,9 +6,9 @@
 
 use std::fmt::Write;
 
-use super::module;
+use super::{lookups, module};
 use crate::Program;
-use crate::abi::{TEXTURE_FETCH, TextureSpace};
+use crate::abi::{TEXTURE_FETCH, TEXTURE_FETCH_AS, TEXTURE_FETCH_WIDE, TextureSpace};
 
 /// What a module is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,11 +54,9 @@ pub fn complete(program: &Program, members: &[usize], target: Target) -> String 
         );
     }
     let body = module(program, members);
-    let fetches = body.contains(TEXTURE_FETCH);
     match target {
-        Target::WebGpu if fetches => textures(program, tables.len(), &mut out),
-        _ if fetches => stand_in(&mut out),
-        _ => {}
+        Target::WebGpu => textures(program, &body, tables.len(), &mut out),
+        Target::Native => stand_ins(&body, &mut out),
     }
     if !out.is_empty() {
         out.push('\n');
@@ -66,43 +64,107 @@ pub fn complete(program: &Program, members: &[usize], target: Target) -> String 
     enables(&body, target) + &out + &body
 }
 
-/// A lookup that only completes the module.
-fn stand_in(out: &mut String) {
-    let _ = writeln!(
-        out,
-        "fn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{\n    return vec4f(uv, f32(slot), 1.0);\n}}"
-    );
+/// Does a text call a function?
+fn calls(text: &str, function: &str) -> bool {
+    text.contains(&format!("{function}("))
 }
 
-/// Textures as bindings, and the lookup in them: v points up, as the renderer has it.
-fn textures(program: &Program, first: usize, out: &mut String) {
-    let _ = writeln!(out, "// Linear filter, repeating.");
-    let _ = writeln!(
-        out,
-        "@group(0) @binding({first}) var material_sampler: sampler;"
-    );
-    let mut cases = String::new();
+/// Lookups that only complete the module.
+fn stand_ins(body: &str, out: &mut String) {
+    let lookups = [
+        (TEXTURE_FETCH, "uv: vec2f", "vec4f(uv, f32(slot), 1.0)"),
+        (
+            TEXTURE_FETCH_AS,
+            "uv: vec2f, mode: i32",
+            "vec4f(uv, f32(slot), f32(mode))",
+        ),
+        (
+            TEXTURE_FETCH_WIDE,
+            "at: vec4f, mode: i32",
+            "at + f32(slot) + f32(mode)",
+        ),
+    ];
+    for (name, parameters, value) in lookups.into_iter().filter(|(name, ..)| calls(body, name)) {
+        let _ = writeln!(
+            out,
+            "fn {name}(slot: u32, {parameters}) -> vec4f {{\n    return {value};\n}}"
+        );
+    }
+}
+
+/// Textures as bindings from number `first` on, and the lookups in them that `body` calls: v points up,
+/// as the renderer has it.
+fn textures(program: &Program, body: &str, first: usize, out: &mut String) {
+    let plain = calls(body, TEXTURE_FETCH);
+    let special = calls(body, TEXTURE_FETCH_AS) || calls(body, TEXTURE_FETCH_WIDE);
+    if !plain && !special {
+        return;
+    }
+    if plain {
+        let _ = writeln!(out, "// Linear filter, repeating.");
+        let _ = writeln!(
+            out,
+            "@group(0) @binding({first}) var material_sampler: sampler;"
+        );
+    }
     for (slot, texture) in program.textures().iter().enumerate() {
         let kind = match texture.space {
             TextureSpace::Color => "decoded to linear color, as the -srgb formats are",
             TextureSpace::Data => "numbers as they are",
         };
+        let levels = match texture.lookups.levels {
+            true => ", all mip levels",
+            false => "",
+        };
         let path = texture.path.replace(|c: char| c.is_control(), "?");
-        let _ = writeln!(out, "// {path}: {kind}.");
+        let _ = writeln!(out, "// {path}: {kind}{levels}.");
         let _ = writeln!(
             out,
             "@group(0) @binding({}) var material_texture_{slot}: texture_2d<f32>;",
             first + 1 + slot
         );
-        let _ = writeln!(
-            cases,
-            "        case {slot}u: {{ return textureSampleLevel(material_texture_{slot}, material_sampler, at, 0.0); }}"
+    }
+    let slots = program.textures().len();
+    if plain {
+        let value = "textureSampleLevel(TEXTURE, material_sampler, at, 0.0)";
+        let body = format!(
+            "    let at = vec2f(uv.x, 1.0 - uv.y);\n{}",
+            by_slot("slot", slots, value, "vec4f()")
+        );
+        let _ = write!(
+            out,
+            "\nfn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{\n{body}}}\n"
         );
     }
-    let _ = writeln!(
-        out,
-        "\nfn {TEXTURE_FETCH}(slot: u32, uv: vec2f) -> vec4f {{\n    let at = vec2f(uv.x, 1.0 - uv.y);\n    switch slot {{\n{cases}        default: {{ return vec4f(); }}\n    }}\n}}"
-    );
+    if special {
+        let _ = write!(out, "\n{}", levels(slots));
+        out.push_str(&lookups(program.lookups()));
+    }
+}
+
+/// What [`lookups`] asks for: a level is the slot and the number of the level.
+fn levels(slots: usize) -> String {
+    let last = by_slot("slot", slots, "textureNumLevels(TEXTURE) - 1u", "0u");
+    let size = "vec2<i32>(textureDimensions(TEXTURE, level.y))";
+    let size = by_slot("level.x", slots, size, "vec2<i32>(1)");
+    let texel = "textureLoad(TEXTURE, p, level.y)";
+    let texel = by_slot("level.x", slots, texel, "vec4<f32>()");
+    format!(
+        "fn texture_level(slot: u32, level: u32) -> vec2<u32> {{\n    return vec2<u32>(slot, level);\n}}\n\n\
+         fn texture_last_level(slot: u32) -> u32 {{\n{last}}}\n\n\
+         fn texture_level_size(level: vec2<u32>) -> vec2<i32> {{\n{size}}}\n\n\
+         fn texture_level_texel(level: vec2<u32>, p: vec2<i32>) -> vec4<f32> {{\n{texel}}}\n\n"
+    )
+}
+
+/// Statements that return `value` with the texture of the slot that `slot` gives in place of `TEXTURE`.
+fn by_slot(slot: &str, slots: usize, value: &str, otherwise: &str) -> String {
+    let case = |n: usize| {
+        let value = value.replace("TEXTURE", &format!("material_texture_{n}"));
+        format!("        case {n}u: {{ return {value}; }}\n")
+    };
+    let cases: String = (0..slots).map(case).collect();
+    format!("    switch {slot} {{\n{cases}        default: {{ return {otherwise}; }}\n    }}\n")
 }
 
 #[cfg(test)]

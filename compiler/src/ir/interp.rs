@@ -15,8 +15,23 @@ use super::value::{Real, Value};
 use super::{Const, ExprId, Function, FunctionId, Module};
 use crate::ops::{Counts, Op, Operands};
 
-/// Looks up a texture: index, u, v, color or data; gives RGBA.
-pub type TextureLookup<'a> = dyn Fn(usize, f64, f64, Op) -> [f64; 4] + 'a;
+/// What is asked of a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRequest {
+    /// Its index in the module.
+    pub texture: usize,
+    /// Which lookup asks; it tells whether a color is meant or data.
+    pub op: Op,
+    /// Where.
+    pub uv: [f64; 2],
+    /// How wide an average is wanted; zero for none.
+    pub width: [f64; 2],
+    /// The bits of [`crate::abi::texture_mode`].
+    pub mode: i32,
+}
+
+/// Looks up a texture; gives RGBA.
+pub type TextureLookup<'a> = dyn Fn(&TextureRequest) -> [f64; 4] + 'a;
 
 /// Runs functions of one module. Keep it for many calls: the code it makes of a function stays.
 pub struct Interpreter<'a, F> {
@@ -308,8 +323,13 @@ impl<'a, F: Real> Interpreter<'a, F> {
                     ints[*counter as usize] += 1;
                     next = *top as usize;
                 }
-                Ins::Texture(op, kernel, at) => match self.texture {
-                    Some(texture) => fetch(texture, *op, floats, ints, at),
+                Ins::Texture {
+                    op,
+                    wide,
+                    kernel,
+                    at,
+                } => match self.texture {
+                    Some(texture) => fetch(texture, *op, *wide, floats, ints, at),
                     None => kernel(floats, ints, at),
                 },
                 Ins::Call { call, frame, to } => {
@@ -331,19 +351,26 @@ fn range(start: u32, count: u32) -> std::ops::Range<usize> {
     start as usize..(start + count) as usize
 }
 
-/// Looks up a texture: its index is an int, its coordinates two floats.
+/// Looks up a texture: its index is an int, its coordinates two floats, which those of the width
+/// follow if it is `wide`; what its mode is, if it has one, another int.
 fn fetch<F: Real>(
     texture: &TextureLookup<'_>,
     op: Op,
+    wide: bool,
     floats: &mut [F],
     ints: &[i32],
     at: &Operands,
 ) {
-    let [index, uv, _] = at.from.map(|i| i as usize);
-    let (u, v) = (floats[uv].f64(), floats[uv + 1].f64());
-    let rgba = texture(ints[index].max(0) as usize, u, v, op);
-    let components = if op == Op::Image { 3 } else { 4 };
-    for (c, x) in rgba.into_iter().take(components).enumerate() {
-        floats[at.to as usize + c] = F::of(x);
+    let [index, uv, mode] = at.from.map(|i| i as usize);
+    let pair = |first: usize| [floats[first].f64(), floats[first + 1].f64()];
+    let rgba = texture(&TextureRequest {
+        texture: ints[index].max(0) as usize,
+        op,
+        uv: pair(uv),
+        width: if wide { pair(uv + 2) } else { [0.0; 2] },
+        mode: if op.arity() == 3 { ints[mode] } else { 0 },
+    });
+    for (c, x) in rgba[op.texel_part()].iter().enumerate() {
+        floats[at.to as usize + c] = F::of(*x);
     }
 }

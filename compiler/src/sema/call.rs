@@ -242,18 +242,8 @@ impl Body<'_, '_> {
         let Some(&first) = candidates.first() else {
             return self.unknown_function(callee, args);
         };
-        if let (Some(Op::Image | Op::ImageData), [texture, uv]) = (candidates.first(), args) {
-            let texture_id = self.value_as(&texture.value, Ty::Texture, "the texture")?;
-            let uv_id = self.value_as(&uv.value, Ty::Vec2, "the texture coordinate")?;
-            let ty = if first == Op::Image {
-                Ty::Color
-            } else {
-                Ty::Vec4
-            };
-            return Some(Operand::Value(
-                self.builder.op(first, &[texture_id, uv_id], span),
-                ty,
-            ));
+        if first.texture_space().is_some() {
+            return self.image(callee, first, args, span);
         }
         let values = self.positional(&callee.node, args)?;
         let Some(op) = candidates

@@ -32,6 +32,7 @@ mod modules;
 mod outputs;
 mod params;
 mod stmt;
+mod texture;
 mod tree;
 pub mod types;
 mod varying;

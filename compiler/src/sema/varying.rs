@@ -7,7 +7,6 @@
 use std::collections::BTreeMap;
 
 use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Module, Stmt, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 /// Why a value varies.
@@ -137,7 +136,7 @@ impl Walk<'_> {
             ExprKind::Field(base, field) if self.is_point(*base) => {
                 Some(Cause::Input(expr.span, self.input(*base, *field)))
             }
-            ExprKind::Op(Op::Image | Op::ImageData, _) => Some(Cause::Texture(expr.span)),
+            ExprKind::Op(op, _) if op.texture_space().is_some() => Some(Cause::Texture(expr.span)),
             ExprKind::Load(local) => self.found.locals.get(local).cloned(),
             _ => None,
         };

@@ -1,7 +1,7 @@
 //! Control flow, calls and aggregates of the interpreter, its fuel and its counts.
 
 use impasto_compiler::ir::build::Builder;
-use impasto_compiler::ir::interp::{Interpreter, OutOfFuel};
+use impasto_compiler::ir::interp::{Interpreter, OutOfFuel, TextureRequest};
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprKind, Function, FunctionId, Local, Module, Type};
 use impasto_compiler::ops::{Counts, Op};
@@ -280,9 +280,10 @@ fn uniforms_and_textures_come_from_outside() {
     let value = b.op(Op::Mul, &[tint, texel], HERE);
     let f = b.finish(value);
     let uniforms = [Const::Int(3), Const::Float(vec![2.0, 3.0, 4.0])];
-    let texture = |index: usize, u: f64, v: f64, op: Op| {
-        assert_eq!((index, op), (3, Op::Image));
-        [u, v, 10.0, 99.0]
+    let texture = |of: &TextureRequest| {
+        assert_eq!((of.texture, of.op), (3, Op::Image));
+        assert_eq!((of.width, of.mode), ([0.0; 2], 0));
+        [of.uv[0], of.uv[1], 10.0, 99.0]
     };
     let mut run = Interpreter::<f64>::new(&m, 100)
         .with_uniforms(&uniforms)

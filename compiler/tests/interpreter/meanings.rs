@@ -141,6 +141,10 @@ unit_float i-1 = 0.999999940395355224609375
 unit_float i256 = 5.9604644775390625e-8
 image i0 0.5,0.5 = 0.5,0.5,0.5
 image_data i0 0.5,0.5 = 0.5,0.5,0.5,0.5
+image_alpha i0 0.5,0.5 = 0.5
+image i0 0.5,0.5 i1 = 0.5,0.5,0.5
+image_data i0 0.5,0.5,0.1,0.1 i0 = 0.5,0.5,0.5,0.5
+image_alpha i0 0.5,0.5 i7 = 0.5
 ";
 
 /// A row that was read: op, operands, result.

@@ -1,9 +1,8 @@
 //! Widths through branches, loops, variables, structs and calls: against differences of the same code
 //! without `filter_width`.
 
-use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::interp::{Interpreter, TextureRequest};
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::ops::Op;
 
 use super::common::program;
 
@@ -39,7 +38,10 @@ fn evaluate(items: &str, statements: &str, x: &str, [s, t]: [f64; 2]) -> Vec<f64
         Value::vector(&ux),
         Value::vector(&uy),
     ]);
-    let picture = |_: usize, u: f64, v: f64, _: Op| [u * u, v, u * v, 1.0];
+    let picture = |of: &TextureRequest| {
+        let [u, v] = of.uv;
+        [u * u, v, u * v, 1.0]
+    };
     let emission = program.compiled()[0].emission.as_ref().expect("emits");
     Interpreter::<f64>::new(program.ir(), 1 << 22)
         .with_texture(&picture)

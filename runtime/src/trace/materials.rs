@@ -1,11 +1,9 @@
 //! Who answers what the kernel asks of materials: the compiler's own interpreter, which is the
 //! oracle that generated WGSL is held against, or that generated WGSL itself.
 
-use impasto_compiler::abi::{TextureRef, TextureSpace};
 use impasto_compiler::ir::interp::{Interpreter, TextureLookup};
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Type};
-use impasto_compiler::ops::Op;
 use impasto_compiler::program::{CompiledMaterial, Program};
 
 use super::LIMIT;
@@ -171,71 +169,5 @@ impl<F: Float> Materials<'_, F> {
             of.result.put("", value.components(), result);
         }
         Ok(())
-    }
-}
-
-/// Looks textures up as `kernels/texture.wgsl` does, from the same words, in double precision.
-pub(super) struct Textures {
-    words: Vec<u32>,
-    /// The program's slots by texture of the IR, for colors and for data.
-    slots: Vec<[Option<usize>; 2]>,
-}
-
-impl Textures {
-    /// Those of a program, whose texels are in `words`.
-    pub(super) fn new(program: &Program, words: Vec<u32>) -> Self {
-        let slots: Vec<TextureRef> = program.textures();
-        let slot = |path: &String, space| {
-            slots
-                .iter()
-                .position(|slot| slot.path == *path && slot.space == space)
-        };
-        let textures = program.ir().textures.iter();
-        let slots = textures
-            .map(|path| [TextureSpace::Color, TextureSpace::Data].map(|space| slot(path, space)));
-        Self {
-            slots: slots.collect(),
-            words,
-        }
-    }
-
-    /// The texture `index` at (u, v).
-    pub(super) fn fetch(&self, index: usize, u: f64, v: f64, op: Op) -> [f64; 4] {
-        let data = usize::from(op != Op::Image);
-        let last = self.slots.len().saturating_sub(1);
-        let slot = self.slots.get(index.min(last)).and_then(|s| s[data]);
-        slot.and_then(|slot| self.filter(slot, u, v))
-            .unwrap_or_default()
-    }
-
-    fn filter(&self, slot: usize, u: f64, v: f64) -> Option<[f64; 4]> {
-        let [first, size] = [self.words.get(2 * slot)?, self.words.get(2 * slot + 1)?];
-        let size = [size & 0xffff, size >> 16];
-        let wrapped = [u - u.floor(), 1.0 - (v - v.floor())];
-        let mut cells = [[0u32; 2]; 2];
-        let mut weight = [0.0; 2];
-        for axis in 0..2 {
-            let p = wrapped[axis] * f64::from(size[axis]) - 0.5;
-            weight[axis] = p - p.floor();
-            let low = p.floor() as i64;
-            cells[axis] = [low, low + 1].map(|i| i.rem_euclid(i64::from(size[axis].max(1))) as u32);
-        }
-        let texel = |x: usize, y: usize| {
-            let index = first + cells[1][y] * size[0] + cells[0][x];
-            self.texel(index as usize)
-        };
-        let corners = [texel(0, 0)?, texel(1, 0)?, texel(0, 1)?, texel(1, 1)?];
-        Some([0, 1, 2, 3].map(|c| {
-            let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-            let top = mix(corners[0][c], corners[1][c], weight[0]);
-            let bottom = mix(corners[2][c], corners[3][c], weight[0]);
-            mix(top, bottom, weight[1])
-        }))
-    }
-
-    fn texel(&self, index: usize) -> Option<[f64; 4]> {
-        let [low, high] = [self.words.get(2 * index)?, self.words.get(2 * index + 1)?];
-        let half = |bits: u32| half::f16::from_bits(bits as u16).to_f64();
-        Some([half(*low), half(low >> 16), half(*high), half(high >> 16)])
     }
 }

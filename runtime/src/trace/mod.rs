@@ -34,6 +34,7 @@ mod shape;
 mod signature;
 #[cfg(test)]
 mod tests;
+mod textures;
 
 pub use compare::{Parting, parting};
 pub use error::TraceError;

@@ -4,8 +4,7 @@ use std::marker::PhantomData;
 use std::time::Instant;
 
 use impasto_compiler::Program;
-use impasto_compiler::ir::interp::TextureLookup;
-use impasto_compiler::ops::Op;
+use impasto_compiler::ir::interp::{TextureLookup, TextureRequest};
 use impasto_compiler::partition::Strategy;
 use naga::valid::ModuleInfo;
 use wgpu::naga;
@@ -14,9 +13,10 @@ use super::code::Code;
 use super::error::TraceError;
 use super::float::Float;
 use super::machine::Machine;
-use super::materials::{MaterialCode, Materials, Oracle, Textures};
+use super::materials::{MaterialCode, Materials, Oracle};
 use super::path::Path;
 use super::record::{self, Names, Recorder};
+use super::textures::Textures;
 use super::{LIMIT, lower};
 use crate::film::{self, Sums};
 use crate::layout::Layout;
@@ -49,7 +49,7 @@ pub fn with_room<R: Send>(f: impl FnOnce() -> R + Send) -> Result<R, TraceError>
     })
 }
 
-type Texture = Box<dyn Fn(usize, f64, f64, Op) -> [f64; 4] + Send + Sync>;
+type Texture = Box<dyn Fn(&TextureRequest) -> [f64; 4] + Send + Sync>;
 
 /// A world whose paths can be replayed.
 pub struct Replayer<'p> {
@@ -94,7 +94,7 @@ impl<'p> Replayer<'p> {
             .find(|(name, _)| *name == "texture_data");
         if let Some((_, words)) = words {
             let textures = Textures::new(program, words.clone());
-            replayer.texture = Some(Box::new(move |i, u, v, op| textures.fetch(i, u, v, op)));
+            replayer.texture = Some(Box::new(move |of| textures.fetch(of)));
         }
         replayer.program = Some(program);
         Ok(replayer)

@@ -163,7 +163,13 @@ pub(super) enum Ins<F> {
     /// An operation.
     Op(Kernel<F>, Operands),
     /// A texture lookup, or its stand-in where there is no texture.
-    Texture(Op, Kernel<F>, Operands),
+    Texture {
+        op: Op,
+        /// Do its coordinates come with a width?
+        wide: bool,
+        kernel: Kernel<F>,
+        at: Operands,
+    },
     /// Copies a float.
     Float { from: u32, to: u32 },
     /// Copies floats.

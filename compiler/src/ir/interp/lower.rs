@@ -396,9 +396,14 @@ impl<F: Real> Lowering<'_, F> {
         let from = |k: usize| args.get(k).map_or(0, |&a| self.index(a));
         let at = op.operands(&types, result, [from(0), from(1), from(2)]);
         let kernel = ops::kernel(op, components);
-        self.emit(match op {
-            Op::Image | Op::ImageData => Ins::Texture(op, kernel, at),
-            _ => Ins::Op(kernel, at),
+        self.emit(match op.texture_space() {
+            Some(_) => Ins::Texture {
+                op,
+                wide: types.get(1) == Some(&Type::Vec4),
+                kernel,
+                at,
+            },
+            None => Ins::Op(kernel, at),
         });
         to
     }

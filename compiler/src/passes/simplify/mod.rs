@@ -18,6 +18,7 @@ mod choice;
 mod clamps;
 mod powers;
 mod range;
+mod textures;
 mod vectors;
 
 /// Most variables that a branch may set to become selections.
@@ -93,6 +94,7 @@ fn ternary(
         Op::Clamp => clamps::clamp(w, site, a, b, c),
         Op::Mix => arithmetic::mix(w, site, a, b, c),
         Op::Select => choice::select(w, a, b, c),
+        Op::ImageAs | Op::ImageDataAs | Op::ImageAlphaAs => textures::lookup(w, site, op, a, b, c),
         _ => None,
     }
 }
