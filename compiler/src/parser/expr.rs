@@ -1,6 +1,5 @@
 //! Expressions: operands, operators by binding power, calls, and `if` as a value.
 
-use chumsky::pratt::{infix, left, postfix, prefix};
 use chumsky::prelude::*;
 
 use super::common::{
@@ -251,18 +250,15 @@ fn argument_name<'t>(text: &'t str) -> impl Parse<'t, Option<Name>> {
     })
 }
 
-/// An operator of one level of binding power.
-fn operator<'t>(level: u16) -> impl Parse<'t, BinaryOp> + Copy {
-    custom(move |inp: &mut Input<'t, '_>| {
+/// An infix operator with its binding power.
+fn operator<'t>() -> impl Parse<'t, (u16, BinaryOp)> + Copy {
+    custom(|inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
         let found = inp.next();
-        match found.and_then(binary) {
-            Some((at, op)) if at == level => Ok(op),
-            _ => {
-                let expected = Expected::want(Want::Operator);
-                Err(SyntaxError::new(inp.span_since(&start), found, expected))
-            }
-        }
+        found.and_then(binary).ok_or_else(|| {
+            let expected = Expected::want(Want::Operator);
+            SyntaxError::new(inp.span_since(&start), found, expected)
+        })
     })
 }
 
@@ -292,50 +288,78 @@ fn binary(token: Token) -> Option<(u16, BinaryOp)> {
 }
 
 const COMPARISON: u16 = 3;
-const PREFIX: u16 = 10;
-const FIELD: u16 = 11;
 
+/// `value op value op value`. Operators are read in a row and put in order after: asking for each
+/// binding power at each place would take most of the time of parsing.
 fn operators<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
-    let level = |level| infix(left(level), operator(level), combine);
-    let unary = choice((
+    let value = value(text, operand).boxed();
+    let more = operator()
+        .then(value.clone())
+        .repeated()
+        .collect::<Vec<_>>();
+    value.then(more).map_with(|(first, more), e| {
+        // What waits for its right side, by growing power.
+        let mut open: Vec<(Expr, (u16, BinaryOp))> = Vec::new();
+        let mut last = first;
+        for ((power, op), next) in more {
+            while let Some((left, (_, waiting))) = open.pop_if(|(_, (p, _))| *p >= power) {
+                last = combine(left, waiting, last, e);
+            }
+            open.push((last, (power, op)));
+            last = next;
+        }
+        for (left, (_, op)) in open.into_iter().rev() {
+            last = combine(left, op, last, e);
+        }
+        last
+    })
+}
+
+/// An operand with what binds closer than infix operators: signs before it, and fields after it,
+/// which bind closest.
+fn value<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
+    let sign = choice((
         just(Token::Minus).to(UnaryOp::Neg),
         just(Token::Not).to(UnaryOp::Not),
     ));
+    let signs = sign.map_with(|op, e| (op, e.span())).repeated().collect();
     let field_name = name(text)
         .map(Some)
         .recover_with(via_parser(empty().to(None)));
     let field = just(Token::Dot).ignore_then(field_name);
-    operand.pratt((
-        postfix(
-            FIELD,
-            field,
-            |base: Expr, name: Option<Name>, e: &mut Extras<'t, '_>| {
-                let kind = match name {
-                    Some(name) => ExprKind::Field(Box::new(base), name),
-                    None => ExprKind::Error,
-                };
-                Expr {
-                    kind,
-                    span: e.span(),
-                }
+    let fields = field
+        .map_with(|name, e| (name, e.span()))
+        .repeated()
+        .collect();
+    signs
+        .then(operand)
+        .then(fields)
+        .map_with(with_signs_and_fields)
+}
+
+type Signed = ((Vec<(UnaryOp, Span)>, Expr), Vec<(Option<Name>, Span)>);
+
+fn with_signs_and_fields<'t>(parts: Signed, e: &mut Extras<'t, '_>) -> Expr {
+    let ((signs, mut value), fields) = parts;
+    for (name, at) in fields {
+        let span = value.span.to(at);
+        let kind = match name {
+            Some(name) => ExprKind::Field(Box::new(value), name),
+            None => ExprKind::Error,
+        };
+        value = Expr { kind, span };
+    }
+    let whole: Span = e.span();
+    for (op, at) in signs.into_iter().rev() {
+        value = Expr {
+            kind: ExprKind::Unary(op, Box::new(value)),
+            span: Span {
+                end: whole.end,
+                ..at
             },
-        ),
-        prefix(PREFIX, unary, |op, value: Expr, e: &mut Extras<'t, '_>| {
-            Expr {
-                kind: ExprKind::Unary(op, Box::new(value)),
-                span: e.span(),
-            }
-        }),
-        level(9),
-        level(8),
-        level(7),
-        level(6),
-        level(5),
-        level(4),
-        level(COMPARISON),
-        level(2),
-        level(1),
-    ))
+        };
+    }
+    value
 }
 
 type Extras<'t, 'p> = chumsky::input::MapExtra<'t, 'p, Tokens<'t>, Extra>;
