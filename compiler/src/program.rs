@@ -391,7 +391,7 @@ impl ProgramBuilder {
         // Callees stand before their callers.
         for id in found {
             let mut f = self.module.functions[id.index()].clone();
-            self.effort += passes::run(&self.module, &mut f);
+            self.effort += passes::run_callee(&self.module, &mut f);
             self.sizes[id.index()] = Some(self.size(&f));
             self.module.functions[id.index()] = f;
         }

@@ -47,6 +47,42 @@ fn three_layers_in_order() {
         .for_each(|a| near(*a, 0.2 + 0.8 * below, 3e-3, "albedo of three layers"));
 }
 
+/// A bsdf that reflects a tenth and passes 0.5, whatever that leaves.
+const VEIL: &str = "
+    delta bsdf veil(share: float) {
+        eval(wo, wi) = color(share) when same_side(wo, wi);
+        sample(wo, u) = reflect_z(wo);
+        pdf(wo, wi) = 1.0 when same_side(wo, wi);
+        albedo(wo) = color(share);
+        passes(wo) = color(0.5, 0.25, 0.0);
+    }";
+
+#[test]
+fn layers_pass_what_they_say() {
+    let under = |tree: &str, expected: [f64; 3]| {
+        let m = Asked::new(&format!("{USES}{VEIL}"), tree);
+        let albedo = m.sampled_albedo(direction(30.0, 0.4), 20_000);
+        for (a, b) in albedo.iter().zip(expected) {
+            near(*a, b, 3e-3, tree);
+        }
+    };
+    let of = |passed: [f64; 3], reflected: f64| passed.map(|p| reflected + p * 0.8);
+    under("layer(veil(0.1), diffuse(0.8))", of([0.5, 0.25, 0.0], 0.1));
+    // Without a reflection of its own, it shows in what lies under it.
+    under("layer(veil(0.0), diffuse(0.8))", of([0.5, 0.25, 0.0], 0.0));
+    // A weight is the share that is covered.
+    let covered = [0.5, 0.25, 0.0].map(|p| 1.0 - 0.4 * (1.0 - p));
+    under("layer(0.4 * veil(0.1), diffuse(0.8))", of(covered, 0.04));
+    let twice = [0.25, 0.0625, 0.0];
+    under("layer(veil(0.0), veil(0.0), diffuse(0.8))", of(twice, 0.0));
+    let stacked = "layer(layer(veil(0.0), veil(0.0)), diffuse(0.8))";
+    under(stacked, of(twice, 0.0));
+    // Beside one that passes all that it leaves, 0.9.
+    let mixed = [0.5, 0.25, 0.0].map(|p| 0.75 * p + 0.25 * 0.9);
+    let tree = "layer(mix(veil(0.1), specular(0.1), 0.25), diffuse(0.8))";
+    under(tree, of(mixed, 0.1));
+}
+
 #[test]
 fn mix_is_linear_and_ends_are_exact() {
     for (t, expected) in [(0.0, 0.2), (0.25, 0.2 * 0.75 + 0.8 * 0.25), (1.0, 0.8)] {

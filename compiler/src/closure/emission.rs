@@ -40,10 +40,8 @@ impl View<'_> {
             Closure::Layer(top, under) => {
                 let under = self.radiance(under, wo);
                 let paths = lobes(self.m, top);
-                let (_, albedo) = self.lobes(top, &paths);
-                let (one, zero) = (self.float(1.0), self.float(0.0));
-                let passed = self.op(Op::Sub, &[one, albedo]);
-                let passed = self.op(Op::Max, &[passed, zero]);
+                let (_, seen) = self.lobes(top, &paths);
+                let passed = self.passed(seen);
                 self.op(Op::Mul, &[under, passed])
             }
             _ if kept.len() == 1 => self.radiance(kept[0], wo),

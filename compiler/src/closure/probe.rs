@@ -48,7 +48,7 @@ pub fn probe(module: &Module, core: &Core, m: &Material) -> Probe {
     let mut found = Vec::new();
     let mut rest = Vec::new();
     if let Some(root) = m.surface {
-        let (ready, albedo) = view.lobes(root, &paths);
+        let (ready, seen) = view.lobes(root, &paths);
         let total = ready.iter().map(|l| l.share);
         let total = total.reduce(|sum, share| view.op(Op::Add, &[sum, share]));
         for lobe in &ready {
@@ -62,7 +62,7 @@ pub fn probe(module: &Module, core: &Core, m: &Material) -> Probe {
                 delta: def.delta,
             });
         }
-        rest.push(("albedo".to_owned(), albedo));
+        rest.push(("albedo".to_owned(), seen.albedo));
     }
     rest.extend(m.opacity.map(|id| ("opacity".to_owned(), id)));
     if let Some(medium) = &m.interior {

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use super::{Core, Path, children};
 use crate::ir::build::Builder;
 use crate::ir::{
-    Closure, ClosureId, Const, ExprId, Function, FunctionId, Lobe, Local, Material, Methods,
-    Module, Type,
+    Closure, ClosureId, Const, ExprId, ExprKind, Function, FunctionId, Lobe, Local, Material,
+    Methods, Module, Type,
 };
 use crate::ops::Op;
 use crate::source::Span;
@@ -33,10 +33,31 @@ pub(super) struct Ready<'a> {
     pub wo: ExprId,
     /// Directional albedo, from 0 to 1.
     pub albedo: ExprId,
+    /// What it lets through, where that is not all that it leaves.
+    passed: Option<ExprId>,
     /// Color by which its value counts.
     pub weight: ExprId,
     /// Probability of being chosen, before division by the total.
     pub share: ExprId,
+}
+
+/// What a node does to the light that `wo` sees.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    /// Directional albedo.
+    pub albedo: ExprId,
+    /// What it lets through to the node under it, where that is not all that it leaves.
+    passed: Option<ExprId>,
+}
+
+impl Seen {
+    /// A node that lets through what it does not reflect.
+    fn all_else(albedo: ExprId) -> Self {
+        Self {
+            albedo,
+            passed: None,
+        }
+    }
 }
 
 /// A function of a material under construction: `(point, wo, ...)` after its patterns.
@@ -79,16 +100,12 @@ impl<'m> View<'m> {
         self.b.finish(value)
     }
 
-    /// The lobes under a node, of which `paths` are those that contribute, and the node's albedo.
-    pub fn lobes<'a>(
-        &mut self,
-        root: ClosureId,
-        paths: &'a [Path<'a>],
-    ) -> (Vec<Ready<'a>>, ExprId) {
+    /// The lobes under a node, of which `paths` are those that contribute, and what the node does.
+    pub fn lobes<'a>(&mut self, root: ClosureId, paths: &'a [Path<'a>]) -> (Vec<Ready<'a>>, Seen) {
         let mut ready: Vec<Ready<'a>> = paths.iter().filter_map(|p| self.lobe(p)).collect();
         self.at_material();
         let white = self.color(1.0);
-        let albedo = self.weights(root, white, &mut ready);
+        let seen = self.weights(root, white, &mut ready);
         for lobe in &mut ready {
             let least = self.float(LEAST_ALBEDO);
             let floor = self.op(Op::Max, &[lobe.albedo, least]);
@@ -98,7 +115,7 @@ impl<'m> View<'m> {
             self.b.name(lobe.weight, &format!("{name}_weight"));
             self.b.name(lobe.share, &format!("{name}_share"));
         }
-        (ready, albedo)
+        (ready, seen)
     }
 
     /// A lobe with its frame and albedo; its weight is not known yet.
@@ -110,6 +127,7 @@ impl<'m> View<'m> {
             eval,
             pdf,
             albedo,
+            passes,
         } = def.methods
         else {
             return None;
@@ -118,10 +136,9 @@ impl<'m> View<'m> {
         let (frame, wo) = self.frame(path);
         let mut args = path.lobe.args.clone();
         args.push(wo);
-        let value = self.call(albedo, &args);
-        let (one, zero) = (self.float(1.0), self.float(0.0));
-        let value = self.op(Op::Clamp, &[value, zero, one]);
+        let value = self.share_of_light(albedo, &args);
         self.b.name(value, &format!("{}_albedo", def.name));
+        let passed = passes.map(|passes| self.share_of_light(passes, &args));
         Some(Ready {
             path,
             delta: def.delta,
@@ -129,19 +146,31 @@ impl<'m> View<'m> {
             frame,
             wo,
             albedo: value,
+            passed,
             weight: value,
             share: value,
         })
     }
 
+    /// A color from 0 to 1, by a method of a lobe.
+    fn share_of_light(&mut self, method: FunctionId, args: &[ExprId]) -> ExprId {
+        let value = self.call(method, args);
+        let (one, zero) = (self.float(1.0), self.float(0.0));
+        self.op(Op::Clamp, &[value, zero, one])
+    }
+
     /// The frame of a lobe and `wo` in it; lobes with the same normal and tangent share them.
     fn frame(&mut self, path: &Path<'_>) -> (ExprId, ExprId) {
-        let key = (path.lobe.normal, path.lobe.tangent);
+        let own = |v: &Self, id: Option<ExprId>, field| id.filter(|&id| !v.is_point(id, field));
+        let key = (
+            own(self, path.lobe.normal, "normal"),
+            own(self, path.lobe.tangent, "tangent"),
+        );
         if let Some(found) = self.frames.get(&key) {
             return *found;
         }
-        let normal = path.lobe.normal.unwrap_or_else(|| self.point("normal"));
-        let tangent = path.lobe.tangent.unwrap_or_else(|| self.point("tangent"));
+        let normal = key.0.unwrap_or_else(|| self.point("normal"));
+        let tangent = key.1.unwrap_or_else(|| self.point("tangent"));
         let (geometric, wo) = (self.point("geometric_normal"), self.wo());
         let normal = self.call(self.core.valid_normal, &[normal, geometric, wo]);
         let frame = self.call(self.core.frame, &[normal, tangent]);
@@ -152,43 +181,68 @@ impl<'m> View<'m> {
         (frame, wo_local)
     }
 
-    /// Hands weights down the tree; gives the albedo of the node.
-    fn weights(&mut self, id: ClosureId, weight: ExprId, ready: &mut [Ready<'_>]) -> ExprId {
+    /// What a node lets through to the one under it.
+    pub fn passed(&mut self, seen: Seen) -> ExprId {
+        seen.passed.unwrap_or_else(|| {
+            let (one, zero) = (self.float(1.0), self.float(0.0));
+            let rest = self.op(Op::Sub, &[one, seen.albedo]);
+            self.op(Op::Max, &[rest, zero])
+        })
+    }
+
+    /// The same of two nodes, if it needs telling for either.
+    fn both_passed(&mut self, a: Seen, b: Seen) -> Option<(ExprId, ExprId)> {
+        (a.passed.is_some() || b.passed.is_some()).then(|| (self.passed(a), self.passed(b)))
+    }
+
+    /// Hands weights down the tree; tells what the node does.
+    fn weights(&mut self, id: ClosureId, weight: ExprId, ready: &mut [Ready<'_>]) -> Seen {
         let kept = children(self.m, id);
-        let black = self.color(0.0);
+        let black = Seen::all_else(self.color(0.0));
         match self.m.closures[id.index()].clone() {
             Closure::Lobe(_) => match ready.iter_mut().find(|l| l.path.id == id) {
                 Some(lobe) => {
                     lobe.weight = weight;
-                    lobe.albedo
+                    Seen {
+                        albedo: lobe.albedo,
+                        passed: lobe.passed,
+                    }
                 }
                 None => black,
             },
             _ if kept.is_empty() => black,
             Closure::Weight(w, a) => {
                 let inner = self.op(Op::Mul, &[weight, w]);
-                let albedo = self.weights(a, inner, ready);
-                self.op(Op::Mul, &[albedo, w])
+                let a = self.weights(a, inner, ready);
+                Seen {
+                    albedo: self.op(Op::Mul, &[a.albedo, w]),
+                    passed: a.passed.map(|passed| self.weighted_passage(passed, w)),
+                }
             }
             Closure::Layer(a, b) => {
                 let top = self.weights(a, weight, ready);
-                let one = self.float(1.0);
-                let passed = self.op(Op::Sub, &[one, top]);
-                let zero = self.float(0.0);
-                let passed = self.op(Op::Max, &[passed, zero]);
+                let passed = self.passed(top);
                 let under = self.op(Op::Mul, &[weight, passed]);
                 let base = self.weights(b, under, ready);
-                let base = self.op(Op::Mul, &[passed, base]);
-                self.op(Op::Add, &[top, base])
+                let lit = self.op(Op::Mul, &[passed, base.albedo]);
+                let through = self.both_passed(top, base);
+                Seen {
+                    albedo: self.op(Op::Add, &[top.albedo, lit]),
+                    passed: through.map(|(a, b)| self.op(Op::Mul, &[a, b])),
+                }
             }
             Closure::Add(a, b) => {
                 let (a, b) = (
                     self.weights(a, weight, ready),
                     self.weights(b, weight, ready),
                 );
-                let sum = self.op(Op::Add, &[a, b]);
+                let sum = self.op(Op::Add, &[a.albedo, b.albedo]);
                 let one = self.float(1.0);
-                self.op(Op::Min, &[sum, one])
+                let through = self.both_passed(a, b);
+                Seen {
+                    albedo: self.op(Op::Min, &[sum, one]),
+                    passed: through.map(|(a, b)| self.less_than_either(a, b)),
+                }
             }
             Closure::Mix(_, _, _) | Closure::Select(..) if kept.len() == 1 => {
                 self.weights(kept[0], weight, ready)
@@ -209,15 +263,36 @@ impl<'m> View<'m> {
         t: ExprId,
         weight: ExprId,
         ready: &mut [Ready<'_>],
-    ) -> ExprId {
+    ) -> Seen {
         let one = self.float(1.0);
         let rest = self.op(Op::Sub, &[one, t]);
         let (wa, wb) = (
             self.op(Op::Mul, &[weight, rest]),
             self.op(Op::Mul, &[weight, t]),
         );
-        let (ea, eb) = (self.weights(a, wa, ready), self.weights(b, wb, ready));
-        self.op(Op::Mix, &[ea, eb, t])
+        let (a, b) = (self.weights(a, wa, ready), self.weights(b, wb, ready));
+        let through = self.both_passed(a, b);
+        Seen {
+            albedo: self.op(Op::Mix, &[a.albedo, b.albedo, t]),
+            passed: through.map(|(a, b)| self.op(Op::Mix, &[a, b, t])),
+        }
+    }
+
+    /// What passes where only the share `w` of the surface is covered: 1 - w (1 - passed).
+    fn weighted_passage(&mut self, passed: ExprId, w: ExprId) -> ExprId {
+        let (one, zero) = (self.float(1.0), self.float(0.0));
+        let kept = self.op(Op::Sub, &[one, passed]);
+        let kept = self.op(Op::Mul, &[kept, w]);
+        let rest = self.op(Op::Sub, &[one, kept]);
+        self.op(Op::Max, &[rest, zero])
+    }
+
+    /// What passes two closures side by side: each takes away what it does not let through.
+    fn less_than_either(&mut self, a: ExprId, b: ExprId) -> ExprId {
+        let (one, zero) = (self.float(1.0), self.float(0.0));
+        let sum = self.op(Op::Add, &[a, b]);
+        let rest = self.op(Op::Sub, &[sum, one]);
+        self.op(Op::Max, &[rest, zero])
     }
 
     /// What is added from now on comes from a lobe.
@@ -257,6 +332,17 @@ impl<'m> View<'m> {
 
     pub fn wo(&mut self) -> ExprId {
         self.param(WO)
+    }
+
+    /// Is an expression that field of the surface point?
+    fn is_point(&self, id: ExprId, name: &str) -> bool {
+        let f = self.b.function();
+        let ExprKind::Field(base, index) = f.expr(id).kind else {
+            return false;
+        };
+        let fields = &self.module.structs[self.core.surface_point.index()].fields;
+        let of_point = matches!(f.expr(base).kind, ExprKind::Param(p) if p as usize == POINT);
+        of_point && fields.get(index as usize).is_some_and(|(n, _)| n == name)
     }
 
     /// A field of the surface point.

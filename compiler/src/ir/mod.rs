@@ -325,6 +325,8 @@ pub enum Methods {
         eval: FunctionId,
         pdf: FunctionId,
         albedo: FunctionId,
+        /// What it lets through to what lies under it, where that is not all that it leaves.
+        passes: Option<FunctionId>,
     },
     Edf {
         emit: FunctionId,
@@ -340,7 +342,11 @@ impl Methods {
                 eval,
                 pdf,
                 albedo,
-            } => vec![sample, eval, pdf, albedo],
+                passes,
+            } => [sample, eval, pdf, albedo]
+                .into_iter()
+                .chain(passes)
+                .collect(),
             Methods::Edf { emit } => vec![emit],
         }
     }
@@ -351,7 +357,7 @@ impl Methods {
 pub enum Closure {
     /// A bsdf or edf with its arguments.
     Lobe(Lobe),
-    /// The first over the second: `f_a + (1 - E_a) f_b`.
+    /// The first over the second: `f_a + p_a f_b`, p_a being what a passes, as a rule 1 - E_a.
     Layer(ClosureId, ClosureId),
     /// `(1 - t) a + t b`, t a float.
     Mix(ClosureId, ClosureId, ExprId),

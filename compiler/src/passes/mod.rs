@@ -112,11 +112,24 @@ const MAX_ROUNDS: usize = 6;
 /// # Panics
 /// In debug builds, if a pass breaks the function: a defect of the pass.
 pub fn run(module: &Module, function: &mut Function) -> u64 {
+    repeat(module, function, false)
+}
+
+/// The same for a function that others call: what its arguments may rid it of stays apart, so that
+/// little is left where they do.
+///
+/// # Panics
+/// As [`run`].
+pub fn run_callee(module: &Module, function: &mut Function) -> u64 {
+    repeat(module, function, true)
+}
+
+fn repeat(module: &Module, function: &mut Function, callee: bool) -> u64 {
     verify(module, function, "lowering");
     let mut walked = 0;
     let mut before = cse::fingerprint(function);
     for _ in 0..MAX_ROUNDS {
-        walked += round(module, function);
+        walked += round(module, function, callee);
         let after = cse::fingerprint(function);
         // Were two functions with one fingerprint, the second would only be left as it is.
         if before == after {
@@ -129,7 +142,7 @@ pub fn run(module: &Module, function: &mut Function) -> u64 {
 
 /// Runs the pipeline once; passes that are walks and follow each other in one walk. Gives the
 /// statements that were walked.
-fn round(module: &Module, f: &mut Function) -> u64 {
+fn round(module: &Module, f: &mut Function, callee: bool) -> u64 {
     let mut walked = 0;
     let mut rest = PIPELINE;
     let mut changed = true;
@@ -141,7 +154,12 @@ fn round(module: &Module, f: &mut Function) -> u64 {
         let rules: Vec<Rules> = walks.collect();
         let count = rules.len().max(1);
         match (rules.into_iter().reduce(Rules::and), &first.how) {
-            (Some(rules), _) => walked += rewrite::run(module, f, rules),
+            (Some(mut rules), _) => {
+                if let Some(policy) = rules.inline.as_mut().filter(|_| callee) {
+                    policy.keep_options(f);
+                }
+                walked += rewrite::run(module, f, rules);
+            }
             (None, How::Own(change)) => changed = change(f),
             (None, How::Walk(rules) | How::Again(rules)) if changed => {
                 let rules = rules(module, f);
@@ -175,7 +193,7 @@ pub fn library(module: &mut Module, first: usize) {
     for i in first..module.functions.len() {
         // Callees stand before their callers, so they are done already.
         let mut f = module.functions[i].clone();
-        run(module, &mut f);
+        run_callee(module, &mut f);
         module.functions[i] = f;
     }
 }

@@ -64,7 +64,7 @@ fn run(module: &Module, material: &mut Material, albedos: bool) {
 #[derive(Clone)]
 struct Node {
     id: ClosureId,
-    /// Its albedo, where that is the same for all directions; none for edfs.
+    /// Its albedo, where that is the same for all directions and all else passes; none for edfs.
     albedo: Option<[f64; 3]>,
 }
 
@@ -224,11 +224,19 @@ impl Pruner<'_> {
     /// A lobe, unless it never reflects or emits anything.
     fn lobe(&mut self, lobe: &Lobe) -> Option<Node> {
         let value = self.value(lobe);
-        if value == Some([0.0; 3]) {
+        let def = &self.module.closures[lobe.def.index()];
+        // What takes light away without reflecting it shows as well, in what lies under it.
+        let absorbs = matches!(
+            def.methods,
+            Methods::Bsdf {
+                passes: Some(_),
+                ..
+            }
+        );
+        if value == Some([0.0; 3]) && !absorbs {
             return None;
         }
-        let def = &self.module.closures[lobe.def.index()];
-        let scatters = matches!(def.methods, Methods::Bsdf { .. });
+        let scatters = matches!(def.methods, Methods::Bsdf { passes: None, .. });
         let clamped = |v: [f64; 3]| v.map(|x| x.clamp(0.0, 1.0));
         let albedo = value.filter(|_| scatters).map(clamped);
         self.add(Closure::Lobe(lobe.clone()), albedo)

@@ -10,12 +10,15 @@ use super::types::Ty;
 use super::{Checked, Checker, Param};
 
 /// Methods of closures: name, types of the arguments, type of the value.
-const BSDF_METHODS: [(&str, &[Ty], Ty); 4] = [
+const BSDF_METHODS: [(&str, &[Ty], Ty); 5] = [
     ("sample", &[Ty::Vector, Ty::Vec3], Ty::Vector),
     ("eval", &[Ty::Vector, Ty::Vector], Ty::Color),
     ("pdf", &[Ty::Vector, Ty::Vector], Ty::Float),
     ("albedo", &[Ty::Vector], Ty::Color),
+    (PASSES, &[Ty::Vector], Ty::Color),
 ];
+/// The method that a bsdf may leave out: all that it does not reflect passes then.
+const PASSES: &str = "passes";
 const EDF_METHODS: [(&str, &[Ty], Ty); 1] = [("emit", &[Ty::Vector], Ty::Color)];
 
 impl Checker<'_> {
@@ -33,24 +36,30 @@ impl Checker<'_> {
         };
         let known = self.known_methods(item, def, methods);
         let mut ids = Vec::new();
+        let mut optional = 0;
         for (name, types, result) in methods {
             let Some(method) = def.methods.iter().find(|m| m.name.node == *name) else {
-                self.missing_method(item, name, types.len());
+                if *name == PASSES {
+                    optional += 1;
+                } else {
+                    self.missing_method(item, name, types.len());
+                }
                 continue;
             };
             ids.extend(self.method(module, item, def, &params, method, types, *result));
         }
-        if !known || ids.len() != methods.len() {
+        if !known || ids.len() + optional != methods.len() {
             return None;
         }
         let (ty, methods) = match ids.as_slice() {
-            [sample, eval, pdf, albedo] => (
+            [sample, eval, pdf, albedo, passes @ ..] => (
                 Ty::Bsdf,
                 Methods::Bsdf {
                     sample: *sample,
                     eval: *eval,
                     pdf: *pdf,
                     albedo: *albedo,
+                    passes: passes.first().copied(),
                 },
             ),
             [emit] => (Ty::Edf, Methods::Edf { emit: *emit }),

@@ -238,7 +238,10 @@ fn retyped(mut expr: Expr, ty: &str) -> Expr {
 impl Body<'_, '_> {
     fn bind_params(&mut self, params: &[ast::MaterialParam], declared: &MaterialSignature) {
         for (p, declared) in params.iter().zip(declared.iter()) {
-            if expr::INPUTS.contains(&p.name.node.as_str()) {
+            // `normal: normal = normal` is the input, unless a caller gives another.
+            let of = |d: &Declared| matches!(&d.origin, Origin::Input(i) if *i == p.name.node);
+            let same = declared.as_ref().is_some_and(of);
+            if expr::INPUTS.contains(&p.name.node.as_str()) && !same {
                 let message = format!("`{}` is an input of every material", p.name.node);
                 self.report::<()>(
                     Diagnostic::new(Code::Duplicate, p.name.span, message).expected("another name"),

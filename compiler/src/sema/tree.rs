@@ -304,7 +304,7 @@ impl Body<'_, '_> {
             }
             (BinaryOp::Add, Operand::Closure(x, xt), Operand::Closure(y, yt)) => {
                 self.same_kind(xt, yt, span)?;
-                if xt == Ty::Bsdf {
+                if xt == Ty::Bsdf && self.may_gain(x, y) {
                     let gain = Diagnostic::new(Code::EnergyGain, span, "this sum of closures can reflect more light than it receives")
                         .hint("use `layer(top, bottom)` or `mix(a, b, t)`, or weights that sum to at most one");
                     self.report::<()>(gain);
@@ -321,6 +321,32 @@ impl Body<'_, '_> {
                     }
                     _ => wrong.hint("to take light away, multiply by a weight below one"),
                 })
+            }
+        }
+    }
+
+    /// May a sum of closures reflect more than comes? Not if constant weights keep it to one.
+    fn may_gain(&self, x: ClosureId, y: ClosureId) -> bool {
+        let (x, y) = (self.most_reflected(x), self.most_reflected(y));
+        x.iter().zip(y).any(|(x, y)| x + y > 1.0 + 1e-9)
+    }
+
+    /// How much a closure reflects at most in each channel, by its constant weights.
+    fn most_reflected(&self, id: ClosureId) -> [f64; 3] {
+        match &self.closures[id.index()] {
+            Closure::Weight(w, a) => match self.builder.function().constant(*w) {
+                Some(Const::Float(w)) => {
+                    let a = self.most_reflected(*a);
+                    std::array::from_fn(|c| a[c] * w.get(c).or(w.first()).copied().unwrap_or(1.0))
+                }
+                _ => self.most_reflected(*a),
+            },
+            Closure::Add(a, b) => {
+                let (a, b) = (self.most_reflected(*a), self.most_reflected(*b));
+                std::array::from_fn(|c| a[c] + b[c])
+            }
+            Closure::Mix(..) | Closure::Layer(..) | Closure::Select(..) | Closure::Lobe(_) => {
+                [1.0; 3]
             }
         }
     }

@@ -79,7 +79,10 @@ fn colors_are_where_tables_have_them() {
         let found = text.call::<f64>(name, &[&at]);
         let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0, f64::max);
-        assert!(off < 2e-5, "{name} of {at:?}: {found:?} instead of {expected:?}");
+        assert!(
+            off < 2e-5,
+            "{name} of {at:?}: {found:?} instead of {expected:?}"
+        );
     }
 }
 

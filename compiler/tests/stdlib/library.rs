@@ -45,6 +45,8 @@ pub struct Bsdf {
     pub eval: FunctionId,
     pub pdf: FunctionId,
     pub albedo: FunctionId,
+    /// What it lets through, where that is not all that it leaves.
+    pub passes: Option<FunctionId>,
     pub cases: Vec<Case>,
 }
 
@@ -231,6 +233,7 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         eval,
         pdf,
         albedo,
+        passes,
     } = def.methods
     else {
         panic!("`{name}` is no bsdf")
@@ -267,6 +270,7 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         eval,
         pdf,
         albedo,
+        passes,
         cases,
         module,
     }
@@ -311,7 +315,7 @@ pub fn promise(docs: &str, topic: &str) -> Option<f64> {
 }
 
 /// The lines of a doc comment, where one that ends with a comma or `&&` goes on in the next.
-fn whole_lines(docs: &[String]) -> Vec<String> {
+pub fn whole_lines(docs: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for line in docs.iter().map(|l| l.trim()) {
         match lines.last_mut().filter(|l| l.ends_with([',', '&'])) {

@@ -20,6 +20,7 @@ mod microfacet;
 mod noise;
 mod normals;
 mod octaves;
+mod open_pbr;
 mod precision;
 mod promises;
 #[path = "../common/record.rs"]
@@ -32,6 +33,7 @@ mod sheen;
 mod space;
 mod statistics;
 mod subsurface;
+mod surfaces;
 mod symmetry;
 mod tally;
 mod text;

@@ -112,14 +112,17 @@ fn the_number_of_octaves_may_be_a_fraction_and_periods_repeat() {
     for p in points(4, 50) {
         let at = |octaves: f64| text.call::<f64>("part", &[&p, &[octaves]])[0];
         for whole in [2.0, 3.0] {
-            assert!((at(whole - 1e-9) - at(whole + 1e-9)).abs() < 1e-6, "a jump at {whole}");
+            assert!(
+                (at(whole - 1e-9) - at(whole + 1e-9)).abs() < 1e-6,
+                "a jump at {whole}"
+            );
         }
         // Between two and three octaves, the third is weighted by the fraction.
         let third = at(3.0) * 1.75 - at(2.0) * 1.5;
         let expected = (at(2.0) * 1.5 + 0.4 * third) / (1.5 + 0.4 * 0.25);
         assert!((at(2.4) - expected).abs() < 1e-9, "{} at {p:?}", at(2.4));
-        let [here, there] = [0.0, 5.0]
-            .map(|by| text.call::<f64>("tiled", &[&[p[0] + by, p[1] - 2.0 * by]])[0]);
+        let [here, there] =
+            [0.0, 5.0].map(|by| text.call::<f64>("tiled", &[&[p[0] + by, p[1] - 2.0 * by]])[0]);
         assert!((here - there).abs() < 1e-9, "{here} and {there}");
     }
 }
@@ -143,7 +146,13 @@ fn against_boxes(function: &str, args: &str, side: f64) -> (f64, f64, f64) {
         let offset = |k: usize| ((k as f64 + 0.5) / CELLS as f64 - 0.5) * side;
         let moved: Vec<[f64; 3]> = places
             .iter()
-            .map(|p| [p[0] + offset(cell % CELLS), p[1] + offset(cell / CELLS), p[2]])
+            .map(|p| {
+                [
+                    p[0] + offset(cell % CELLS),
+                    p[1] + offset(cell / CELLS),
+                    p[2],
+                ]
+            })
             .collect();
         let values = many(&text, "bare", &moved);
         means

@@ -138,9 +138,7 @@ fn calls(file: &StdFile, item: &Item, f: &Function) -> String {
         let params: Vec<_> = kept()
             .map(|p| format!("{}: {}", p.name.node, p.ty.node))
             .collect();
-        let args: Vec<_> = kept()
-            .map(|p| format!("{0}: {0}", p.name.node))
-            .collect();
+        let args: Vec<_> = kept().map(|p| format!("{0}: {0}", p.name.node)).collect();
         text += &format!(
             "fn {form}_({}) -> {result} = {name}({});\n",
             params.join(", "),

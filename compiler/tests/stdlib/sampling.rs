@@ -106,7 +106,7 @@ pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distrib
 }
 
 /// Added to the seed where a fault is looked at again.
-const AGAIN: u64 = 1 << 32;
+pub const AGAIN: u64 = 1 << 32;
 
 /// Adds an outcome to what is kept of a BSDF or material.
 pub fn tell(tally: &Tally, name: &str, o: &Outcome, tests: usize, label: &str) {
@@ -305,6 +305,33 @@ pub fn albedo(bsdf: &Bsdf, case: &Case, wo: [f64; 3]) -> [f64; 3] {
     args.push(lanes::uniform(&wo));
     let albedo = lanes::call(&bsdf.module, bsdf.albedo, args);
     std::array::from_fn(|c| lanes::float_at(&albedo, c, 0))
+}
+
+#[test]
+fn bsdfs_pass_no_more_than_they_leave() {
+    let all = super::library::bsdfs();
+    let passing = all.iter().filter_map(|b| Some((b, b.passes?)));
+    let mut seen = 0;
+    for (bsdf, passes) in passing {
+        for (case, degrees) in bsdf.cases.iter().flat_map(|c| VIEWS.map(|v| (c, v))) {
+            let wo = view(degrees);
+            let mut args: Vec<Lanes> = case.args.iter().map(lanes::constant).collect();
+            args.push(lanes::uniform(&wo));
+            let passed = lanes::call(&bsdf.module, passes, args);
+            let reflected = albedo(bsdf, case, wo);
+            for (c, reflected) in reflected.into_iter().enumerate() {
+                let passed = lanes::float_at(&passed, c, 0);
+                let sound = passed >= 0.0 && passed + reflected <= 1.0 + 1e-9;
+                assert!(
+                    sound,
+                    "{} from {degrees} degrees: passes {passed}, reflects {reflected}",
+                    case.label
+                );
+            }
+        }
+        seen += 1;
+    }
+    assert!(seen >= 3, "only {seen} bsdfs say what they pass");
 }
 
 /// `albedo` is the integral, within what its documentation promises.

@@ -101,11 +101,15 @@ fn borders_of_cells_are_where_two_points_are_as_near() {
         let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.0, 2.0));
         let found = text.call::<f64>("border2", &[&at]);
         let (center, edge) = border(&plane, &at);
-        worst = worst.max((found[0] - edge).abs()).max((found[1] - center).abs());
+        worst = worst
+            .max((found[0] - edge).abs())
+            .max((found[1] - center).abs());
         let at: [f64; 3] = std::array::from_fn(|_| n.between(-1.0, 1.0));
         let found = text.call::<f64>("border3", &[&at]);
         let (center, edge) = border(&space, &at);
-        worst = worst.max((found[0] - edge).abs()).max((found[1] - center).abs());
+        worst = worst
+            .max((found[0] - edge).abs())
+            .max((found[1] - center).abs());
     }
     assert!(worst < 1e-9, "off by {worst}");
 }

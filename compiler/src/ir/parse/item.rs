@@ -110,7 +110,7 @@ impl Parser {
         Ok(())
     }
 
-    /// `bsdf name(params) { sample = f eval = f pdf = f albedo = f }`
+    /// `bsdf name(params) { sample = f eval = f pdf = f albedo = f [passes = f] }`
     fn bsdf(&mut self, start: Span) -> Result<()> {
         let delta = self.eat_word("delta");
         self.expect_word("bsdf")?;
@@ -120,6 +120,10 @@ impl Parser {
                 eval: p.method("eval")?,
                 pdf: p.method("pdf")?,
                 albedo: p.method("albedo")?,
+                passes: p
+                    .is_word("passes")
+                    .then(|| p.method("passes"))
+                    .transpose()?,
             })
         })
     }

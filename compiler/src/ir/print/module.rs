@@ -153,13 +153,15 @@ fn methods(def: &ClosureDef) -> Vec<(&'static str, FunctionId)> {
             eval,
             pdf,
             albedo,
-        } => {
-            vec![
-                ("sample", sample),
-                ("eval", eval),
-                ("pdf", pdf),
-                ("albedo", albedo),
-            ]
-        }
+            passes,
+        } => [
+            ("sample", sample),
+            ("eval", eval),
+            ("pdf", pdf),
+            ("albedo", albedo),
+        ]
+        .into_iter()
+        .chain(passes.map(|id| ("passes", id)))
+        .collect(),
     }
 }

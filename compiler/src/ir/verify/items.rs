@@ -77,12 +77,16 @@ fn closure(module: &Module, def: &ClosureDef) -> Result<(), Problem> {
             eval,
             pdf,
             albedo,
-        } => vec![
+            passes,
+        } => [
             (sample, 2, Vec3),
             (eval, 2, Vec3),
             (pdf, 2, Float),
             (albedo, 1, Vec3),
-        ],
+        ]
+        .into_iter()
+        .chain(passes.map(|id| (id, 1, Vec3)))
+        .collect(),
         Methods::Edf { emit } => vec![(emit, 1, Vec3)],
     };
     for (id, directions, result) in methods {

@@ -1,7 +1,8 @@
-//! How large a function is once constant arguments have decided its branches.
+//! How large a function is once constant arguments have decided its branches, and which of its calls
+//! may go with them.
 
 use crate::ir::build::fold_op;
-use crate::ir::{Block, Const, ExprId, ExprKind, Function, Stmt};
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, Stmt};
 
 /// Operations within operations that a condition is looked into.
 const DEPTH: u32 = 8;
@@ -63,5 +64,43 @@ impl Count<'_> {
             }
             _ => None,
         }
+    }
+}
+
+/// The functions that `f` calls in branches that its arguments alone decide.
+pub(super) fn optional_calls(f: &Function) -> Vec<FunctionId> {
+    let mut found = Vec::new();
+    calls_in(f, &f.body, false, &mut found);
+    found
+}
+
+fn calls_in(f: &Function, block: &Block, optional: bool, found: &mut Vec<FunctionId>) {
+    for stmt in block {
+        match stmt {
+            Stmt::Eval(id) => match f.expr(*id).kind {
+                ExprKind::Call(callee, _) if optional => found.push(callee),
+                _ => {}
+            },
+            Stmt::If(cond, then, otherwise) => {
+                let optional = optional || of_arguments(f, *cond, DEPTH);
+                calls_in(f, then, optional, found);
+                calls_in(f, otherwise, optional, found);
+            }
+            Stmt::For { body, .. } => calls_in(f, body, optional, found),
+            Stmt::While { head, body, .. } => {
+                calls_in(f, head, optional, found);
+                calls_in(f, body, optional, found);
+            }
+            Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
+        }
+    }
+}
+
+/// Do parameters and constants alone make an expression?
+fn of_arguments(f: &Function, id: ExprId, depth: u32) -> bool {
+    match &f.expr(id).kind {
+        ExprKind::Const(_) | ExprKind::Param(_) => true,
+        ExprKind::Op(_, args) if depth > 0 => args.iter().all(|&a| of_arguments(f, a, depth - 1)),
+        _ => false,
     }
 }

@@ -9,7 +9,8 @@
 //! once, after uniform hoisting. Calls with constant arguments never get here, they are folded.
 //!
 //! Where constant arguments decide the branches of a callee, what counts is what is left: an option
-//! that is off costs nothing.
+//! that is off costs nothing. So that little is left, a function that has such branches keeps its
+//! calls within them until it is in line itself.
 //!
 //! Callees are copied through the walk that folds and simplifies, so a lobe with constant
 //! parameters arrives small.
@@ -51,6 +52,8 @@ pub(super) struct Policy {
     sites: Vec<u32>,
     /// Is a function the method of a bsdf or edf?
     method: Vec<bool>,
+    /// Is a function called where the caller's own arguments may decide that it is not?
+    optional: Vec<bool>,
     /// Expressions that each function evaluates, where asked.
     sizes: Vec<Option<u32>>,
     /// Is an expression the same for a whole instance? By expression.
@@ -65,6 +68,7 @@ impl Policy {
         let mut policy = Self {
             sites: vec![0; n],
             method: vec![false; n],
+            optional: vec![false; n],
             sizes: vec![None; n],
             uniform: Vec::new(),
             textures: vec![None; n],
@@ -99,7 +103,15 @@ impl Policy {
 
     /// Does a function go in line, as far as it alone decides?
     fn wanted(&mut self, module: &Module, id: FunctionId) -> bool {
-        self.method[id.index()] || self.sites[id.index()] == 1 || self.size(module, id) <= SMALL
+        let single = self.sites[id.index()] == 1 && !self.optional[id.index()];
+        self.method[id.index()] || single || self.size(module, id) <= SMALL
+    }
+
+    /// Leaves the calls of `f` that its callers may rid it of, even where each is the only one.
+    pub(super) fn keep_options(&mut self, f: &Function) {
+        for id in decided::optional_calls(f) {
+            self.optional[id.index()] = true;
+        }
     }
 
     fn size(&mut self, module: &Module, id: FunctionId) -> u32 {
