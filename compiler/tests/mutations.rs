@@ -34,7 +34,8 @@ material m {
     let mapped = normal_map(c, bent, tangent, scale: a);
     var k = a;
     for i in 0 .. min(n, 4) { if k > 0.7 { break; } k += 0.1 * a; }
-    surface = coat(coat(diffuse(c, normal: mapped), a, on), uv.x * a / exterior_ior, uv.y > 0.5) + 0.1 * translucent(c);
+    let w = filter_width(k * position).x;
+    surface = coat(coat(diffuse(c, normal: mapped), a + w, on), uv.x * a / exterior_ior, uv.y > 0.5) + 0.1 * translucent(c);
     emission = glow(uniform(c), saturate(a * uv.x));
     interior = inner(medium(absorption: c * k, ior: 1.0 + a, priority: n), medium(ior: 1.5 / (1.0 + k)), on);
     opacity = smoothstep(0.2, 0.8, uv.x + a);
@@ -42,11 +43,12 @@ material m {
 ";
 
 /// Words that change what is around them.
-const WORDS: [&str; 24] = [
+const WORDS: [&str; 25] = [
     "medium",
     "bsdf",
     "edf",
     "gradient",
+    "filter_width",
     "layer",
     "mix",
     "opacity",

@@ -66,7 +66,7 @@ const SOURCE_WORDS: &str = "
     texture std :: ; , . .. : = == != < <= > >= + - * / % & | ^ << >> && || ! += -= *= /= -> ( )
     { } [ ] /// //! /* */ // \" \" when diffuse mirror specular blinn_phong uniform flakes perlin
     sample eval pdf albedo emit wo wi u 0 1 2 0.5 1e38 1e-45 -1 65536 2147483648 0xff 1 mm 30 deg
-    srgb( gradient( image( hash( clamp( select( normalize( x y z xyz r g b _ a b m é \u{0}";
+    srgb( gradient( filter_width( image( hash( clamp( select( normalize( x y z xyz r g b _ a b m é \u{0}";
 
 const IR_WORDS: &str = "
     fn struct texture bsdf edf delta material uniform var return if else for in loop limit while
@@ -75,4 +75,4 @@ const IR_WORDS: &str = "
     %3 $0 $1 @0.x @1.i @0 : = .. . , ( ) { } -> 0 1 -1 2147483647 0.0 1.0 1e38 1e-300 (0.0,0.0,0.0)
     (1.0,2.0) .xyz .x .w neg add sub mul div rem mod min max clamp sqrt pow exp log hash dot cross
     normalize transform select lt eq and or not bit_and shift_left to_float to_int image
-    image_data point wo a b x // \" \u{0}";
+    filter_width image_data point wo a b x // \" \u{0}";

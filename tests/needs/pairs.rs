@@ -156,10 +156,10 @@ pairs! {
     "texture coordinates", also &[], "functions +hit_uv",
         with_uvs(thing(SHADE)) => with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"));
     "tangents", also &[], "bindings +vertex_uvs; functions +hit_tangent", Text::default() => with_uvs(Text::default());
-    "ray cones", also &[], "+16 bytes; functions +across +footprint +load_cone +scattered_spread +store_cone",
+    "ray cones", also &[], "+16 bytes; functions +footprint +load_cone +scattered_spread +store_cone",
         thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x)));")
         => thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x) * exp(-1.0 * filter_width(position).x)));");
-    "widths of texture coordinates", also &["ray cones"], "+16 bytes; functions +across +footprint +hit_uv_change +load_cone \
+    "widths of texture coordinates", also &["ray cones"], "+16 bytes; functions +footprint +hit_uv_change +load_cone \
          +scattered_spread +store_cone",
         with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"))
         => with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x * exp(-1.0 * filter_width(uv).x)));"));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::ir::parse::{Parsed, parse};
 use impasto_compiler::ir::{Function, Module, print, verify};
-use impasto_compiler::passes::{Hoisted, PIPELINE, hoist, prune};
+use impasto_compiler::passes::{Hoisted, PIPELINE, Widths, hoist, prune, widths};
 use impasto_compiler::source::FileId;
 
 use crate::{RULE, meaning};
@@ -90,6 +90,7 @@ impl Outcome {
     fn apply(&mut self, pass: &str) -> Result<(), String> {
         let run: &mut dyn FnMut(&Module, &mut Function) = match pass {
             "prune" => return self.prune(),
+            "widths" => return self.widths(),
             "hoist" => &mut |module, f| self.hoisted.push(hoist(module, f)),
             _ => match PIPELINE.iter().find(|p| p.name == pass) {
                 Some(row) => &mut |module, f| row.run(module, f),
@@ -115,6 +116,17 @@ impl Outcome {
         for m in &mut self.parsed.materials {
             prune(&self.parsed.module, m);
             verify::material(&self.parsed.module, m).map_err(|e| format!("after prune: {e}"))?;
+        }
+        Ok(())
+    }
+
+    fn widths(&mut self) -> Result<(), String> {
+        for m in &mut self.parsed.materials {
+            match widths(&self.parsed.module, &mut m.body) {
+                Widths::Computed => {}
+                other => return Err(format!("{}: {other:?}", m.name)),
+            }
+            verify::material(&self.parsed.module, m).map_err(|e| format!("after widths: {e}"))?;
         }
         Ok(())
     }

@@ -36,7 +36,7 @@ fn passes_make_of_each_case_what_it_expects() {
 fn every_pass_has_a_case_of_its_own() {
     let cases = files::cases();
     let names = PIPELINE.iter().map(|p| p.name);
-    for pass in names.chain(["prune", "hoist"]) {
+    for pass in names.chain(["prune", "hoist", "widths"]) {
         assert!(
             cases.iter().any(|c| c.passes == [pass]),
             "compiler/tests/passes/cases has no file that begins `// pass: {pass}`"

@@ -1,173 +1,14 @@
 //! Filter widths on the GPU: what a ray cone makes of pixels, distances, mirrors and scattering, against
 //! geometry worked out here; and what widths are for, a distant pattern without noise.
 
-use std::ops::ControlFlow;
-use std::path::Path;
+mod case;
 
-use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
-
-/// Pixels of a side; odd, so that one is in the middle.
-const SIZE: u32 = 9;
-/// Vertical field of view, in degrees.
-const FOV: f64 = 6.0;
-
-/// A square of one material in the plane y = 0 (or above it, seen from below), with u and v along x and z.
-struct Square {
-    material: &'static str,
-    half: f64,
-    y: f64,
-    /// What is said of the geometry beside its file.
-    placed: &'static str,
-}
-
-impl Square {
-    fn new(material: &'static str) -> Self {
-        Self {
-            material,
-            half: 50.0,
-            y: 0.0,
-            placed: "",
-        }
-    }
-
-    /// Facing up at the bottom, down above.
-    fn obj(&self, scale: f64, shift: f64) -> String {
-        let (h, y) = (self.half, self.y);
-        let mut corners = [[-h, h], [h, h], [h, -h], [-h, -h]];
-        if y > 0.0 {
-            corners.reverse();
-        }
-        let mut text = format!("usemtl {}\n", self.material);
-        for [x, z] in corners {
-            text += &format!("v {} {} {}\n", scale * x + shift, scale * y, scale * z);
-        }
-        for [x, z] in corners {
-            text += &format!("vt {x} {z}\n");
-        }
-        text + "f 1/1 2/2 3/3 4/4\n"
-    }
-}
-
-/// A scene as numbers.
-struct Case {
-    squares: Vec<Square>,
-    /// Statements of the materials, by name.
-    materials: Vec<(&'static str, String)>,
-    from: [f64; 3],
-    to: [f64; 3],
-    /// Everything is this many times as large, and moved along x.
-    scale: f64,
-    shift: f64,
-    camera: String,
-    depth: u32,
-    samples: u32,
-    seed: u32,
-    size: [u32; 2],
-    fov: f64,
-    strategy: Strategy,
-}
-
-impl Case {
-    /// A floor of a material, seen from a place.
-    fn floor(statements: impl Into<String>, from: [f64; 3]) -> Self {
-        Self {
-            squares: vec![Square::new("floor")],
-            materials: vec![("floor", statements.into())],
-            from,
-            to: [0.0; 3],
-            scale: 1.0,
-            shift: 0.0,
-            camera: String::new(),
-            depth: 1,
-            samples: 16,
-            seed: 0,
-            size: [SIZE; 2],
-            fov: FOV,
-            strategy: Strategy::Own,
-        }
-    }
-
-    fn write(&self, folder: &Path) {
-        let file = |name: &str, text: &str| {
-            std::fs::write(folder.join(name), text).expect("the file is written");
-        };
-        let place = |p: [f64; 3]| {
-            [
-                self.scale * p[0] + self.shift,
-                self.scale * p[1],
-                self.scale * p[2],
-            ]
-        };
-        let mut scene = format!(
-            "[camera]\nposition = {:?}\nlook_at = {:?}\nup = [0, 0, -1]\nfov = {}\n{}\n\
-             [film]\nwidth = {}\nheight = {}\n\
-             [integrator]\nmax_depth = {}\nroulette_start = 100\n",
-            place(self.from),
-            place(self.to),
-            self.fov,
-            self.camera,
-            self.size[0],
-            self.size[1],
-            self.depth
-        );
-        for (i, square) in self.squares.iter().enumerate() {
-            scene += &format!("[[geometry]]\nobj = \"{i}.obj\"\n{}\n", square.placed);
-            file(&format!("{i}.obj"), &square.obj(self.scale, self.shift));
-        }
-        for (name, statements) in &self.materials {
-            scene += &format!("[materials.{name}]\nfile = \"{name}.impasto\"\n");
-            let uses: String = [
-                ("bsdf", "diffuse"),
-                ("bsdf", "specular"),
-                ("edf", "uniform"),
-            ]
-            .iter()
-            .filter(|(_, item)| statements.contains(&format!("{item}(")))
-            .map(|(folder, item)| format!("use std::{folder}::{item};\n"))
-            .collect();
-            let (items, body) = statements.split_once("%%").unwrap_or(("", statements));
-            file(
-                &format!("{name}.impasto"),
-                &format!("{uses}{items}\nmaterial {name} {{ {body} }}\n"),
-            );
-        }
-        file("scene.toml", &scene);
-    }
-
-    /// The picture, row by row.
-    fn render(&self) -> Vec<[f64; 3]> {
-        let folder = tempfile::tempdir().expect("a folder");
-        self.write(folder.path());
-        let scene =
-            impasto::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
-        let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{e}"));
-        let plan = impasto::plan(&program, self.strategy);
-        let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-        let options = RenderOptions {
-            samples: self.samples,
-            seed: self.seed,
-            ..RenderOptions::default()
-        };
-        let renderer = Renderer::new(&gpu, &scene, &program, &plan, &options);
-        let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
-        let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(rendering.report.nonfinite_samples, 0);
-        let pixels = rendering.film.pixels.iter();
-        pixels.map(|p| p.map(f64::from)).collect()
-    }
-
-    /// The pixel in the middle.
-    fn middle(&self) -> [f64; 3] {
-        let [width, height] = self.size;
-        self.render()[(height / 2 * width + width / 2) as usize]
-    }
-
-    /// The angle from a pixel to the next in the middle of the picture.
-    fn pixel(&self) -> f64 {
-        2.0 * (0.5 * self.fov.to_radians()).tan() / f64::from(self.size[1])
-    }
-}
+use case::{Case, SIZE, Square};
+use impasto::Strategy;
+use impasto::runtime::needs::saved;
+use impasto::runtime::technique::Technique;
+use impasto::runtime::world::World;
+use impasto::trace::MaterialCode;
 
 fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
@@ -227,21 +68,18 @@ fn the_area_seen_is_that_of_a_pixel_everywhere() {
 #[test]
 fn a_larger_scene_is_seen_alike() {
     let (from, _) = VIEWS[1];
-    let picture = |material, scale| {
-        Case {
-            scale,
-            ..Case::floor(material, from)
-        }
-        .render()
+    let picture = |material: &str, scale| {
+        let case = Case::floor(material, from);
+        Case { scale, ..case }.render()
     };
-    let small = picture(POSITION, 1.0);
     for power in [-20, 13] {
         let scale = 2f64.powi(power);
-        let larger: Vec<[f64; 3]> = small.iter().map(|p| p.map(|x| scale * x)).collect();
-        // What is tiny is rounded by the film.
-        for (found, expected) in picture(POSITION, scale).into_iter().zip(&larger) {
-            assert_near(found, *expected, if power < 0 { 1e-3 } else { 0.0 });
-        }
+        // In units of the scene, so that all pictures are as bright.
+        let relative = format!(
+            "emission = uniform(color({:?} * filter_width(position)));",
+            1.0 / scale
+        );
+        assert_eq!(picture(&relative, scale), picture(POSITION, 1.0));
         assert_eq!(picture(UV, scale), picture(UV, 1.0));
     }
 }
@@ -276,30 +114,52 @@ fn placed_moved_and_blurred_floors_are_seen_alike() {
 
 #[test]
 fn every_organisation_carries_the_same_cones() {
-    let case = |strategy| {
-        let mut case = Case::floor(
-            format!("surface = diffuse(color(0.5)); {POSITION}"),
-            [0.0, 3.0, 4.0],
-        );
-        case.squares.push(Square {
-            y: 5.0,
-            ..Square::new("mirror")
-        });
-        case.materials
-            .push(("mirror", "surface = specular(color(0.9)); ".into()));
-        Case {
-            depth: 5,
-            strategy,
-            ..case
-        }
-        .render()
-    };
-    let own = case(Strategy::Own);
+    let own = hall(Strategy::Own).render();
     for strategy in [Strategy::Mixed, Strategy::Inline, Strategy::Mega] {
-        for (found, expected) in case(strategy).into_iter().zip(&own) {
+        for (found, expected) in hall(strategy).render().into_iter().zip(&own) {
             assert_near(found, *expected, 1e-5);
         }
     }
+}
+
+/// A floor that scatters, under a mirror.
+fn hall(strategy: Strategy) -> Case {
+    let mut case = Case::floor(
+        format!("surface = diffuse(color(0.5)); {POSITION}"),
+        [0.0, 3.0, 4.0],
+    );
+    case.squares.push(Square {
+        y: 5.0,
+        ..Square::new("mirror")
+    });
+    let mirror = "surface = specular(color(0.9)); ".into();
+    case.materials.push(("mirror", mirror));
+    Case {
+        depth: 5,
+        strategy,
+        ..case
+    }
+}
+
+#[test]
+fn replays_carry_the_same_cones() {
+    let case = Case {
+        samples: 1,
+        ..hall(Strategy::Own)
+    };
+    let rendered = case.render();
+    for materials in [MaterialCode::Ir, MaterialCode::Wgsl] {
+        for (found, expected) in case.replay::<f32>(materials).into_iter().zip(&rendered) {
+            assert_near(found, *expected, 1e-4);
+        }
+    }
+    // In double precision a path may part; the picture stays.
+    let sum = |picture: &[[f64; 3]]| picture.iter().map(|p| p[0]).sum::<f64>();
+    let (double, single) = (sum(&case.replay::<f64>(MaterialCode::Ir)), sum(&rendered));
+    assert!(
+        (double - single).abs() < 0.02 * single,
+        "{double} against {single}"
+    );
 }
 
 /// A mirror keeps the cone: what it shows is as far as the way there and back.
@@ -389,4 +249,26 @@ fn a_distant_checkerboard_is_grey_without_noise() {
         (found - expected).abs() < 0.01,
         "{found}, expected {expected}"
     );
+}
+
+/// The scenes by which the cost of cones is measured differ in them alone.
+#[test]
+fn a_width_that_a_parameter_takes_away_costs_nothing() {
+    let rows = |file: &str| {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/filtering/plaza");
+        let scene = impasto::load(&folder.join(file)).unwrap_or_else(|e| panic!("{e}"));
+        let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let technique = Technique::default();
+        let world = World::of_program(&scene, &program, &technique);
+        let world = world.unwrap_or_else(|e| panic!("{e}"));
+        let report = saved::report(&world, &program, technique).unwrap_or_else(|e| panic!("{e}"));
+        let needed = report.rows.into_iter().filter(|row| row.because.is_some());
+        let names: Vec<&str> = needed.map(|row| row.name).collect();
+        (names, report.extent.path_bytes)
+    };
+    let (sampled, bytes) = rows("sampled.toml");
+    let (mut filtered, more_bytes) = rows("filtered.toml");
+    assert_eq!(more_bytes - bytes, 16);
+    filtered.retain(|name| *name != "ray cones");
+    assert_eq!(filtered, sampled);
 }
