@@ -3,7 +3,8 @@
 //! text and has naga validate it.
 //!
 //! `cargo bench -p impasto-compiler --bench compile` prints where the time goes, stage by stage;
-//! with a filter after `--` it measures all that match: `-- compile/`, `-- compile/thousand`.
+//! `-- growth` how it grows with the number
+//! of lobes; with a filter after `--` it measures all that match: `-- compile/`.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -148,13 +149,19 @@ fn thousand(c: &mut Criterion) {
 criterion_group!(benches, materials, thousand);
 
 fn main() {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    // Cargo adds `--bench`.
+    let args: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
     match args.as_slice() {
-        [once, name] if once == stages::ONCE => return stages::once(name),
-        // Only the table, unless a filter asks for others.
+        // Only the tables, unless a filter asks for others.
         [] => stages::table(),
-        [bench] if bench == "--bench" => stages::table(),
-        _ => benches(),
+        [growth] if growth == "growth" => stages::growth(),
+        [once, name] if once == stages::ONCE => stages::once(name),
+        _ => {
+            benches();
+            Criterion::default().configure_from_args().final_summary();
+        }
     }
-    Criterion::default().configure_from_args().final_summary();
 }

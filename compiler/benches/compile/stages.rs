@@ -10,11 +10,14 @@ use std::process::Command;
 use std::time::Instant;
 
 use impasto_compiler::stages::{Progress, Stage};
-use impasto_compiler::{MaterialRequest, Parameters, Program, compile_telling};
+use impasto_compiler::{
+    Loader, MaterialRequest, MemoryLoader, Parameters, Program, compile_telling,
+};
 
 use super::Files;
 
-/// What is compiled: a name, a file under this crate's folder, its parameters, and where they go.
+/// What is compiled: a name, a file (of the library, or under this crate's folder), its parameters,
+/// and where they go.
 pub struct Case {
     name: &'static str,
     file: &'static str,
@@ -22,46 +25,71 @@ pub struct Case {
     table: bool,
 }
 
+const OPEN_PBR: &str = "std::surface::open_pbr";
 const LAYERED: &str = "benches/compile/layered.impasto";
 
-pub const CASES: &[Case] = &[
+/// Every feature of OpenPBR.
+const EVERYTHING: &[(&str, &str)] = &[
+    ("base_diffuse_roughness", "0.3"),
+    ("base_metalness", "0.4"),
+    ("specular_roughness_anisotropy", "0.3"),
+    ("transmission_weight", "0.3"),
+    ("transmission_dispersion_scale", "0.5"),
+    ("subsurface_weight", "0.3"),
+    ("coat_weight", "0.6"),
+    ("coat_color", "color(0.9, 0.8, 0.7)"),
+    ("coat_roughness", "0.1"),
+    ("fuzz_weight", "0.3"),
+    ("thin_film_weight", "0.5"),
+    ("emission_luminance", "1.0"),
+    ("geometry_opacity", "0.9"),
+];
+
+/// What the two lobes of `layered` leave out.
+const TWO_LOBES: &[(&str, &str)] = &[
+    ("metalness", "0.0"),
+    ("transmission_weight", "0.0"),
+    ("subsurface_weight", "0.0"),
+    ("coat_weight", "0.0"),
+    ("film_weight", "0.0"),
+    ("fuzz_weight", "0.0"),
+];
+
+const fn case(
+    name: &'static str,
+    file: &'static str,
+    params: &'static [(&'static str, &'static str)],
+) -> Case {
     Case {
-        name: "car_paint",
-        file: "../materials/car_paint.impasto",
-        params: &[],
+        name,
+        file,
+        params,
         table: false,
-    },
+    }
+}
+
+const fn tabled(name: &'static str, file: &'static str) -> Case {
     Case {
-        name: "gold",
-        file: "../materials/gold.impasto",
-        params: &[],
-        table: false,
-    },
-    Case {
-        name: "layered",
-        file: LAYERED,
-        params: &[],
-        table: false,
-    },
-    Case {
-        name: "layered, two lobes",
-        file: LAYERED,
-        params: &[
-            ("metalness", "0.0"),
-            ("transmission_weight", "0.0"),
-            ("subsurface_weight", "0.0"),
-            ("coat_weight", "0.0"),
-            ("film_weight", "0.0"),
-            ("fuzz_weight", "0.0"),
-        ],
-        table: false,
-    },
-    Case {
-        name: "layered, table",
-        file: LAYERED,
-        params: &[],
         table: true,
-    },
+        ..case(name, file, &[])
+    }
+}
+
+const CASES: &[Case] = &[
+    case("car_paint", "../materials/car_paint.impasto", &[]),
+    case("gold", "../materials/gold.impasto", &[]),
+    case("two_lobes", "benches/compile/two_lobes.impasto", &[]),
+    case("open_pbr", OPEN_PBR, &[]),
+    case("open_pbr, all on", OPEN_PBR, EVERYTHING),
+    tabled("open_pbr, table", OPEN_PBR),
+    case(
+        "open_pbr_carpaint",
+        "../materials/open_pbr_carpaint.impasto",
+        &[],
+    ),
+    case("layered", LAYERED, &[]),
+    case("layered, two lobes", LAYERED, TWO_LOBES),
+    tabled("layered, table", LAYERED),
 ];
 
 /// Runs whose fastest counts.
@@ -78,7 +106,10 @@ type Times = BTreeMap<Stage, f64>;
 
 impl Case {
     fn request(&self) -> MaterialRequest {
-        let file = format!("{}/{}", env!("CARGO_MANIFEST_DIR"), self.file);
+        let file = match self.file.starts_with("std::") {
+            true => self.file.to_owned(),
+            false => format!("{}/{}", env!("CARGO_MANIFEST_DIR"), self.file),
+        };
         let mut request = MaterialRequest::new("m", file);
         let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
         request.params = self.params.iter().map(owned).collect();
@@ -90,21 +121,7 @@ impl Case {
 
     /// Compiles; gives the seconds of each stage.
     fn run(&self) -> (Times, Program) {
-        let request = [self.request()];
-        let mut times = Times::new();
-        let (mut stage, mut since) = (Stage::Read, Instant::now());
-        let mut told = |next: Stage| {
-            let now = Instant::now();
-            *times.entry(stage).or_default() += (now - since).as_secs_f64();
-            (stage, since) = (next, now);
-        };
-        let compilation = compile_telling(&request, &mut Files, Progress::telling(&mut told));
-        told(Stage::Validate);
-        let program = compilation.program;
-        (
-            times,
-            program.unwrap_or_else(|| panic!("{} does not compile", self.name)),
-        )
+        run(self.name, self.request(), &mut Files)
     }
 
     /// The first compilation of fresh processes.
@@ -121,6 +138,24 @@ impl Case {
         };
         fastest((0..PROCESSES).filter_map(|_| once()))
     }
+}
+
+/// Compiles one request; gives the seconds of each stage.
+fn run(name: &str, request: MaterialRequest, files: &mut dyn Loader) -> (Times, Program) {
+    let mut times = Times::new();
+    let (mut stage, mut since) = (Stage::Read, Instant::now());
+    let mut told = |next: Stage| {
+        let now = Instant::now();
+        *times.entry(stage).or_default() += (now - since).as_secs_f64();
+        (stage, since) = (next, now);
+    };
+    let compilation = compile_telling(&[request], files, Progress::telling(&mut told));
+    told(Stage::Validate);
+    let program = compilation.program;
+    (
+        times,
+        program.unwrap_or_else(|| panic!("{name} does not compile")),
+    )
 }
 
 /// The fastest of each stage.
@@ -162,5 +197,57 @@ pub fn table() {
         let ops = program.compiled()[0].evaluate.evaluated().len();
         let lines = program.wgsl(&[0]).lines().count();
         println!(" |{lines:8}{ops:8}{:8}", program.effort());
+    }
+}
+
+/// A material of `n` lobes that have nothing in common but their kinds.
+fn lobes(n: usize) -> String {
+    let lobe = |i: usize| {
+        let x = (1 + i) as f64 / (n + 1) as f64;
+        match i % 3 {
+            0 => format!("dielectric_reflection(ior: 1.5 + 0.1 * p, roughness: {x} * p)"),
+            1 => format!("generalized_schlick(color0: {x} * tint, roughness: p)"),
+            _ => format!("sheen_zeltner(tint * {x}, roughness: p)"),
+        }
+    };
+    let sum = (1..n).fold(lobe(0), |sum, i| format!("mix({sum}, {}, 0.5)", lobe(i)));
+    format!(
+        "use std::bsdf::{{dielectric_reflection, generalized_schlick, sheen_zeltner}};
+        material m {{
+            let p = fract(position.x);
+            let tint = color(p, 0.5, 0.25);
+            surface = {sum};
+        }}"
+    )
+}
+
+/// Prints how times grow with the number of lobes: as its power, from each size to twice that.
+pub fn growth() {
+    println!(
+        "\n{:>6}{:>10}{:>8}{:>10}{:>8}",
+        "lobes", "own, ms", "power", "naga, ms", "power"
+    );
+    let mut before: Option<[f64; 2]> = None;
+    for n in [8, 16, 32, 64] {
+        let mut files = MemoryLoader::default();
+        files.add("m.impasto", lobes(n));
+        let mut once = || run("lobes", MaterialRequest::new("m", "m.impasto"), &mut files).0;
+        let times = fastest((0..5).map(|_| once()));
+        let naga = |stage: &Stage| matches!(stage, Stage::ReadBack | Stage::Validate);
+        let sum = |is_naga| {
+            let chosen = times.iter().filter(|(stage, _)| naga(stage) == is_naga);
+            1e3 * chosen.map(|(_, t)| t).sum::<f64>()
+        };
+        let now = [sum(false), sum(true)];
+        let power =
+            |i: usize| before.map_or(String::new(), |b| format!("{:.2}", (now[i] / b[i]).log2()));
+        println!(
+            "{n:6}{:10.1}{:>8}{:10.1}{:>8}",
+            now[0],
+            power(0),
+            now[1],
+            power(1)
+        );
+        before = Some(now);
     }
 }
