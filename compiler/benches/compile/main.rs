@@ -3,8 +3,8 @@
 //! text and has naga validate it.
 //!
 //! `cargo bench -p impasto-compiler --bench compile` prints where the time goes, stage by stage;
-//! `-- growth` how it grows with the number
-//! of lobes; with a filter after `--` it measures all that match: `-- compile/`.
+//! with `-- growth`, how it grows with the number of lobes; with a filter, `-- compile/`, criterion
+//! measures all that match.
 
 use std::hint::black_box;
 use std::path::Path;
