@@ -1,6 +1,7 @@
 //! Noises of scattered points and of waves, against what they are defined as: nearest points and
 //! borders by search through all points around, variances by integrals.
 
+use super::lanes;
 use super::statistics::Numbers;
 use super::text::Text;
 
@@ -21,14 +22,19 @@ const CELLS: &str = "
 
 /// Every point near the origin, without repeats.
 fn scattered<const N: usize>(text: &Text, function: &str, reach: f64) -> Vec<[f64; N]> {
-    let steps = (reach * 2.0 / 0.23) as usize;
+    const STEP: f64 = 0.23;
+    let steps = (reach * 2.0 / STEP) as usize;
+    let place = |cell: usize, axis: usize| {
+        ((cell / steps.pow(axis as u32)) % steps) as f64 * STEP - reach + 0.037
+    };
+    let all: Vec<[f64; N]> = (0..steps.pow(N as u32))
+        .map(|cell| std::array::from_fn(|axis| place(cell, axis)))
+        .collect();
+    let out = lanes::call(&text.module, text.id(function), vec![lanes::vectors(&all)]);
     let mut found: Vec<[f64; N]> = Vec::new();
-    for cell in 0..steps.pow(N as u32) {
-        let at: [f64; N] = std::array::from_fn(|axis| {
-            ((cell / steps.pow(axis as u32)) % steps) as f64 * 0.23 - reach + 0.037
-        });
-        let near = text.call::<f64>(function, &[&at]);
-        let point: [f64; N] = std::array::from_fn(|axis| at[axis] + near[3 + axis]);
+    for (l, at) in all.iter().enumerate() {
+        let way = |axis: usize| lanes::float_at::<f64>(&out, 3 + axis, l);
+        let point: [f64; N] = std::array::from_fn(|axis| at[axis] + way(axis));
         if !found.iter().any(|f| apart(f, &point) < 1e-6) {
             found.push(point);
         }
@@ -114,14 +120,20 @@ fn borders_of_cells_are_where_two_points_are_as_near() {
     assert!(worst < 1e-9, "off by {worst}");
 }
 
-/// Mean and variance of `f(uv)` or `f(p)` over a large part of space, and of its mean over boxes.
-fn spread(text: &Text, function: &str, axes: usize, count: usize) -> (f64, f64) {
+/// Mean and variance of a noise over a large part of the plane or of space.
+fn spread<const N: usize>(text: &Text, function: &str, count: usize) -> (f64, f64) {
     let mut n = Numbers::new(3);
-    let draw = |_| {
-        let at: Vec<f64> = (0..axes).map(|_| n.between(-400.0, 400.0)).collect();
-        text.call::<f64>(function, &[&at])[0]
-    };
-    let values: Vec<f64> = (0..count).map(draw).collect();
+    let places: Vec<[f64; N]> = (0..count)
+        .map(|_| std::array::from_fn(|_| n.between(-400.0, 400.0)))
+        .collect();
+    let out = lanes::call(
+        &text.module,
+        text.id(function),
+        vec![lanes::vectors(&places)],
+    );
+    let values: Vec<f64> = (0..count)
+        .map(|l| lanes::float_at::<f64>(&out, 0, l))
+        .collect();
     let mean = values.iter().sum::<f64>() / count as f64;
     let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64;
     (mean, variance)
@@ -137,8 +149,11 @@ fn waves_have_their_variance_direction_and_length() {
          fn slanted(uv: vec2) -> float = gabor_2d(uv, direction: 30 deg, bandwidth: 0.5);
          fn wide(uv: vec2) -> float = gabor_2d(uv, direction: 30 deg, bandwidth: 0.5, width: vec2(0.4));",
     );
-    for (name, axes, count) in [("plane", 2, 6000), ("any", 2, 6000), ("space", 3, 3000)] {
-        let (mean, variance) = spread(&text, name, axes, count);
+    for (name, (mean, variance)) in [
+        ("plane", spread::<2>(&text, "plane", 6000)),
+        ("any", spread::<2>(&text, "any", 6000)),
+        ("space", spread::<3>(&text, "space", 3000)),
+    ] {
         // A third of the range is a standard deviation; few values are cut off.
         assert!(mean.abs() < 0.02, "{name}: mean {mean}");
         assert!(
@@ -158,7 +173,7 @@ fn waves_have_their_variance_direction_and_length() {
         text.call::<f64>("slanted", &[&q])[0]
     };
     let (mut product, mut square) = (0.0, 0.0);
-    for _ in 0..2500 {
+    for _ in 0..700 {
         let p: [f64; 2] = std::array::from_fn(|_| n.between(-300.0, 300.0));
         let here = at(p, 0.0, 0.0);
         total += here * here;

@@ -25,6 +25,7 @@ const STATEMENTS: &[(&str, bool)] = &[
     ("Region", true),
     ("Source", true),
     ("Try", false),
+    ("Value", true),
     ("Weights", true),
 ];
 
