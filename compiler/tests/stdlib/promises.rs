@@ -78,20 +78,33 @@ const ANY: Range = Range {
 };
 
 /// The range of each number of a result; of a struct's, as its fields state it.
-fn ranges(folder: &str, item: &Item, result: &str) -> Vec<Range> {
+fn ranges(folder: &str, docs: &[String], result: &str) -> Vec<Range> {
     if let Some(n) = width(result) {
-        return vec![stated(&item.docs).unwrap_or(ANY); n];
+        return vec![stated(docs).unwrap_or(ANY); n];
     }
-    let items = impasto_stdlib::folder(folder).flat_map(|f| parsed(f).items);
-    let fields = items.filter_map(|i| match i.kind {
-        ItemKind::Struct(fields) if i.name.node == result => Some(fields),
+    let fields = fields(folder, result).into_iter();
+    fields
+        .flat_map(|f| ranges(folder, &f.docs, &f.ty.node))
+        .collect()
+}
+
+/// The fields of a struct of a folder.
+fn fields(folder: &str, name: &str) -> Vec<Field> {
+    let mut items = impasto_stdlib::folder(folder).flat_map(|f| parsed(f).items);
+    let found = items.find_map(|i| match i.kind {
+        ItemKind::Struct(fields) if i.name.node == name => Some(fields),
         _ => None,
     });
-    let range = |f: Field| {
-        let n = width(&f.ty.node).expect("a plain field");
-        vec![stated(&f.docs).unwrap_or(ANY); n]
-    };
-    fields.flatten().flat_map(range).collect()
+    found.unwrap_or_else(|| panic!("no struct `{name}` in {folder}"))
+}
+
+/// Does a definition say anything of its value, if only that it may be any?
+fn states(folder: &str, docs: &[String], result: &str) -> bool {
+    docs.iter().any(|l| l.trim().starts_with("Value: "))
+        || width(result).is_none()
+            && fields(folder, result)
+                .iter()
+                .any(|f| states(folder, &f.docs, &f.ty.node))
 }
 
 fn parsed(file: &StdFile) -> Module {
@@ -111,9 +124,8 @@ fn of_file(file: &StdFile) -> Vec<Promised> {
             name: format!("{}::{}", file.folder, item.name.node),
             docs: item.docs.join(" "),
             params: f.params.clone(),
-            states: width(&f.result.node).is_none()
-                || item.docs.iter().any(|l| l.trim().starts_with("Value: ")),
-            ranges: ranges(file.folder, item, &f.result.node),
+            states: states(file.folder, &item.docs, &f.result.node),
+            ranges: ranges(file.folder, &item.docs, &f.result.node),
             text: Text::new(&calls(file, item, f)),
         })
         .collect()
@@ -374,9 +386,9 @@ fn every_file_of_these_folders_states_a_range() {
         let Some(ItemKind::Function(f)) = main.map(|i| &i.kind) else {
             panic!("{name} does not define what it is named after");
         };
-        // Normals, directions and places have no range.
+        // Normals, directions and places have no range, nor what is not a number.
         let plain = f.params.iter().all(|p| width(&p.ty.node).is_some());
-        let open = ["normal", "vector", "point"].contains(&f.result.node.as_str());
+        let open = !["float", "color", "vec3", "vec4"].contains(&f.result.node.as_str());
         assert!(
             !plain || open || promised.iter().any(|p| p.name == name),
             "{name} does not state its range"

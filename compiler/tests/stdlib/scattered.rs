@@ -10,14 +10,14 @@ use super::text::Text;
 const CELLS: &str = "
     use std::noise::{worley, worley_2d, voronoi, voronoi_2d, Worley, Worley2d, Voronoi, Voronoi2d};
     use std::noise::{MANHATTAN, CHEBYSHEV, MINKOWSKI};
-    fn near2(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4);
-    fn near3(p: point) -> Worley = worley(p, jitter: 0.9, seed: 4);
-    fn manhattan(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4, metric: MANHATTAN);
-    fn chebyshev(uv: vec2) -> Worley2d = worley_2d(uv, jitter: 0.9, seed: 4, metric: CHEBYSHEV);
+    fn near2(uv: vec2) -> Worley2d = worley_2d(uv, seed: 4);
+    fn near3(p: point) -> Worley = worley(p, seed: 4);
+    fn manhattan(uv: vec2) -> Worley2d = worley_2d(uv, seed: 4, metric: MANHATTAN);
+    fn chebyshev(uv: vec2) -> Worley2d = worley_2d(uv, seed: 4, metric: CHEBYSHEV);
     fn cubes(uv: vec2) -> Worley2d =
-        worley_2d(uv, jitter: 0.9, seed: 4, metric: MINKOWSKI, exponent: 3.0);
-    fn border2(uv: vec2) -> Voronoi2d = voronoi_2d(uv, jitter: 0.9, seed: 4);
-    fn border3(p: point) -> Voronoi = voronoi(p, jitter: 0.9, seed: 4);
+        worley_2d(uv, seed: 4, metric: MINKOWSKI, exponent: 3.0);
+    fn border2(uv: vec2) -> Voronoi2d = voronoi_2d(uv, seed: 4);
+    fn border3(p: point) -> Voronoi = voronoi(p, seed: 4);
 ";
 
 /// Every point near the origin, without repeats.
@@ -103,19 +103,21 @@ fn borders_of_cells_are_where_two_points_are_as_near() {
     );
     let mut n = Numbers::new(2);
     let mut worst = 0.0f64;
+    let mut look = |found: &[f64], (center, edge): (f64, f64)| {
+        // A nearest point farther away than a cell may be missed.
+        if center < 1.0 {
+            let error = (found[0] - edge).abs().max((found[1] - center).abs());
+            worst = worst.max(error);
+        }
+    };
+    // Many, since borders with points two squares away are rare.
+    for _ in 0..6000 {
+        let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.5, 2.5));
+        look(&text.call::<f64>("border2", &[&at]), border(&plane, &at));
+    }
     for _ in 0..400 {
-        let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.0, 2.0));
-        let found = text.call::<f64>("border2", &[&at]);
-        let (center, edge) = border(&plane, &at);
-        worst = worst
-            .max((found[0] - edge).abs())
-            .max((found[1] - center).abs());
         let at: [f64; 3] = std::array::from_fn(|_| n.between(-1.0, 1.0));
-        let found = text.call::<f64>("border3", &[&at]);
-        let (center, edge) = border(&space, &at);
-        worst = worst
-            .max((found[0] - edge).abs())
-            .max((found[1] - center).abs());
+        look(&text.call::<f64>("border3", &[&at]), border(&space, &at));
     }
     assert!(worst < 1e-9, "off by {worst}");
 }
