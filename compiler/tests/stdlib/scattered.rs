@@ -110,10 +110,18 @@ fn borders_of_cells_are_where_two_points_are_as_near() {
             worst = worst.max(error);
         }
     };
-    // Many, since borders with points two squares away are rare.
-    for _ in 0..6000 {
-        let at: [f64; 2] = std::array::from_fn(|_| n.between(-2.5, 2.5));
-        look(&text.call::<f64>("border2", &[&at]), border(&plane, &at));
+    // Many, since borders with points two squares away are rare: one place in some thousands.
+    let places: Vec<[f64; 2]> = (0..40_000)
+        .map(|_| std::array::from_fn(|_| n.between(-2.5, 2.5)))
+        .collect();
+    let all = lanes::call(
+        &text.module,
+        text.id("border2"),
+        vec![lanes::vectors(&places)],
+    );
+    for (l, at) in places.iter().enumerate() {
+        let found = [0, 1].map(|c| lanes::float_at::<f64>(&all, c, l));
+        look(&found, border(&plane, at));
     }
     for _ in 0..400 {
         let at: [f64; 3] = std::array::from_fn(|_| n.between(-1.0, 1.0));
