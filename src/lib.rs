@@ -48,6 +48,7 @@ pub mod files;
 mod ir_text;
 pub mod measure;
 pub mod plan;
+pub mod starter;
 pub mod trace;
 
 /// Why there is no picture.

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::source::Span;
 
+pub mod examples;
 pub mod render;
 
 macro_rules! codes {

@@ -27,6 +27,7 @@ pub mod closure;
 pub mod codegen;
 pub mod cost;
 pub mod diag;
+pub mod format;
 pub mod inspect;
 pub mod interface;
 mod interior;

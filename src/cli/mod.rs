@@ -24,10 +24,12 @@ mod emit;
 mod eval;
 mod exhaustive;
 mod explain;
+mod fmt;
 mod info;
 mod interrupt;
 mod merge;
 mod needs;
+mod new;
 mod outputs;
 mod plan;
 mod profile;
@@ -80,6 +82,10 @@ enum Format {
 enum Command {
     /// Check material files and report every problem
     Check(check::CheckArgs),
+    /// Make a material to start from
+    New(new::NewArgs),
+    /// Format sources, keeping every comment
+    Fmt(fmt::FmtArgs),
     /// Print what the compiler makes of a material file
     Emit(emit::EmitArgs),
     /// Count the operations that one evaluation of materials takes
@@ -133,6 +139,8 @@ pub(crate) fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
+        Command::New(args) => new::run(&args, &global),
+        Command::Fmt(args) => fmt::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Converge(args) => converge::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),

@@ -9,9 +9,11 @@ mod cost_lines;
 mod emit_check;
 mod eval;
 mod film;
+mod fmt;
 #[path = "../generated/mod.rs"]
 mod generated;
 mod limits;
+mod new;
 mod plan;
 mod plans;
 mod rays;

@@ -263,7 +263,7 @@ fn operator<'t>() -> impl Parse<'t, (u16, BinaryOp)> + Copy {
 }
 
 /// An infix operator and its binding power.
-fn binary(token: Token) -> Option<(u16, BinaryOp)> {
+pub(super) fn binary(token: Token) -> Option<(u16, BinaryOp)> {
     Some(match token {
         Token::OrOr => (1, BinaryOp::Or),
         Token::AndAnd => (2, BinaryOp::And),

@@ -51,6 +51,11 @@ pub fn parse_expression(file: FileId, text: &str) -> (Option<Expr>, Vec<Diagnost
     run(file, text, |_, expression| expression)
 }
 
+/// How tightly an infix operator binds; `None` for other tokens.
+pub(crate) fn binding_power(token: Token) -> Option<u16> {
+    expr::binary(token).map(|(power, _)| power)
+}
+
 fn run<T>(
     file: FileId,
     text: &str,

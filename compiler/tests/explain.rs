@@ -1,0 +1,71 @@
+//! `impasto explain`: every code has an example that really provokes it, and a repaired one about
+//! which the compiler has nothing to say.
+
+use std::collections::BTreeSet;
+
+use impasto_compiler::diag::examples::{Example, FILE};
+use impasto_compiler::diag::{Code, Diagnostic, render};
+use impasto_compiler::format::format;
+use impasto_compiler::source::SourceMap;
+use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile};
+
+/// Checks an example by itself, and compiles it if it is a material's, or if none was found.
+fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
+    let mut files = MemoryLoader::default();
+    for (name, text) in &example.files {
+        files.add(name, &**text);
+    }
+    files.add(FILE, example.bytes());
+    let checked = check(FILE, &mut files);
+    let request = MaterialRequest {
+        params: example.params.clone(),
+        ..MaterialRequest::new("example", FILE)
+    };
+    if code != Code::NoMaterial && example.params.is_empty() {
+        return (checked.sources, checked.diagnostics);
+    }
+    let compiled = compile(&[request], &mut files);
+    (compiled.sources, compiled.diagnostics)
+}
+
+/// Codes without an example: what no source can provoke.
+fn has_example(code: Code) -> bool {
+    code != Code::InvalidWgsl
+}
+
+#[test]
+fn every_example_provokes_its_code_and_no_error_besides() {
+    for code in Code::ALL.iter().copied().filter(|c| has_example(*c)) {
+        let id = code.id();
+        let (broken, _) = code.example().unwrap_or_else(|| panic!("{id} has no example"));
+        let (sources, diagnostics) = found(&broken, code);
+        let shown = render::text(&sources, &diagnostics, false);
+        let codes: BTreeSet<&str> = diagnostics.iter().map(|d| d.code.id()).collect();
+        assert!(codes.contains(id), "{id} does not come:\n{shown}");
+        let others: Vec<_> = diagnostics.iter().filter(|d| d.is_error() && d.code != code).collect();
+        assert!(others.is_empty(), "{id} brings others:\n{shown}");
+    }
+}
+
+#[test]
+fn every_repaired_example_is_right() {
+    for code in Code::ALL.iter().copied().filter(|c| has_example(*c)) {
+        let (broken, repaired) = code.example().expect("an example");
+        assert_ne!(broken, repaired, "{}", code.id());
+        let (sources, diagnostics) = found(&repaired, code);
+        let shown = render::text(&sources, &diagnostics, false);
+        assert!(diagnostics.is_empty(), "{}:\n{shown}", code.id());
+        for (name, text) in &repaired.files {
+            let file = SourceMap::default().add(&**name, &**text);
+            assert_eq!(format(file, text).as_deref(), Ok(&**text), "{}", code.id());
+        }
+    }
+}
+
+#[test]
+fn the_page_has_every_code() {
+    let page = impasto_compiler::diag::examples::page();
+    for code in Code::ALL {
+        assert!(page.contains(&format!("\n## {}\n", code.id())), "{}", code.id());
+    }
+}
