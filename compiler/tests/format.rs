@@ -106,7 +106,12 @@ fn texts(folders: &[&str]) -> Vec<(String, String)> {
     paths.map(read).collect()
 }
 
-const ALL: [&str; 4] = ["stdlib", "materials", "tests/diagnostics", "compiler/tests/syntax"];
+const ALL: [&str; 4] = [
+    "stdlib",
+    "materials",
+    "tests/diagnostics",
+    "compiler/tests/syntax",
+];
 
 #[test]
 fn every_source_of_the_project_keeps_its_meaning_and_comments() {
@@ -170,9 +175,17 @@ fn foreign_line_ends_and_marks_become_plain_ones() {
 
 #[test]
 fn deep_sources_are_formatted() {
-    let nested = format!("fn f() -> float = {}1.0{};", "(".repeat(240), ")".repeat(240));
+    let nested = format!(
+        "fn f() -> float = {}1.0{};",
+        "(".repeat(240),
+        ")".repeat(240)
+    );
     let sums = format!("fn f() -> float = 1.0{};", " + 1.0".repeat(200));
-    let calls = format!("fn f() -> float = {}1.0{};", "abs(".repeat(120), ",)".repeat(120));
+    let calls = format!(
+        "fn f() -> float = {}1.0{};",
+        "abs(".repeat(120),
+        ",)".repeat(120)
+    );
     for text in [nested, sums, calls] {
         let done = formatted(&text).unwrap_or_else(|why| panic!("{why}"));
         assert!(done.is_some(), "it parses: {text}");

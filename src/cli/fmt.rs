@@ -152,7 +152,11 @@ fn summary(args: &FmtArgs, global: &Global, done: &Done) -> Outcome {
         }
     }
     let changed = done.changed.len();
-    let verb = if reads_only { "not formatted" } else { "formatted" };
+    let verb = if reads_only {
+        "not formatted"
+    } else {
+        "formatted"
+    };
     let broken = match done.broken {
         0 => String::new(),
         n => format!(", {} with syntax errors left alone", count(n, "file")),
@@ -184,8 +188,13 @@ fn sources(path: &str) -> Result<Vec<String>, String> {
 
 /// Collects the sources below `folder`. Hidden folders and links to folders are passed by.
 fn walk(folder: &Path, depth: usize, found: &mut Vec<String>) -> Result<(), String> {
-    let cannot =
-        |error: &std::io::Error| format!("cannot read `{}`: {}", folder.display(), files::reason(error));
+    let cannot = |error: &std::io::Error| {
+        format!(
+            "cannot read `{}`: {}",
+            folder.display(),
+            files::reason(error)
+        )
+    };
     if depth > MAX_DEPTH {
         return Err(format!("`{}` lies too deep", folder.display()));
     }

@@ -56,25 +56,36 @@ pub(super) fn run(args: &NewArgs, global: &Global) -> Outcome {
         let files = starter::scene(name, template).map_err(failed)?;
         let path = starter::write_folder(here, name, &files).map_err(failed)?;
         let written = files.iter().map(|f| path.join(&f.name)).collect();
-        (written, vec![
-            format!("impasto check {name}/{name}.impasto"),
-            format!("impasto render {name}/scene.toml --spp 64 --out {name}.png"),
-        ])
+        (
+            written,
+            vec![
+                format!("impasto check {name}/{name}.impasto"),
+                format!("impasto render {name}/scene.toml --spp 64 --out {name}.png"),
+            ],
+        )
     } else {
         let file = starter::material(name, template).map_err(failed)?;
         let path = starter::write_file(here, &file).map_err(failed)?;
-        (vec![path], vec![
-            format!("impasto check {name}.impasto"),
-            format!("impasto eval {name}.impasto"),
-            "impasto new NAME --scene    makes a folder with a scene that renders it".to_owned(),
-        ])
+        (
+            vec![path],
+            vec![
+                format!("impasto check {name}.impasto"),
+                format!("impasto eval {name}.impasto"),
+                "impasto new NAME --scene    makes a folder with a scene that renders it"
+                    .to_owned(),
+            ],
+        )
     };
     let written: Vec<String> = written.iter().map(|p| p.display().to_string()).collect();
     if global.json() {
         let result = json!({ "written": written, "next": commands });
         return print(&format!("{result:#}\n"));
     }
-    global.note(&format!("wrote {}\nnext:\n    {}", written.join(", "), commands.join("\n    ")));
+    global.note(&format!(
+        "wrote {}\nnext:\n    {}",
+        written.join(", "),
+        commands.join("\n    ")
+    ));
     Ok(())
 }
 

@@ -16,7 +16,11 @@ pub(super) fn ball() -> String {
         let (v, theta) = part(row, DOWN, PI);
         for column in 0..=AROUND {
             let (u, phi) = part(column, AROUND, 2.0 * PI);
-            let n = [theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos()];
+            let n = [
+                theta.sin() * phi.sin(),
+                theta.cos(),
+                theta.sin() * phi.cos(),
+            ];
             let [x, y, z] = n.map(|c| c * RADIUS);
             // Writing to a string cannot fail.
             let _ = writeln!(out, "v {x:.6} {y:.6} {z:.6}");

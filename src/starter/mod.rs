@@ -61,7 +61,9 @@ impl Template {
 #[derive(Debug, thiserror::Error)]
 pub enum StarterError {
     /// No material can be called that.
-    #[error("`{name}` cannot be the name of a material: {why}\nhint: use letters, digits and `_`, as in `red_paint`")]
+    #[error(
+        "`{name}` cannot be the name of a material: {why}\nhint: use letters, digits and `_`, as in `red_paint`"
+    )]
     Name {
         /// As it was given.
         name: String,
@@ -145,7 +147,9 @@ pub fn write_file(folder: &Path, file: &StarterFile) -> Result<PathBuf, StarterE
         path: path.clone(),
         why: reason(error),
     };
-    let mut temporary = builder(0o666).tempfile_in(here(folder)).map_err(|e| failed(&e))?;
+    let mut temporary = builder(0o666)
+        .tempfile_in(here(folder))
+        .map_err(|e| failed(&e))?;
     let written = temporary.write_all(file.text.as_bytes());
     written.map_err(|e| failed(&e))?;
     match temporary.persist_noclobber(&path) {
@@ -174,7 +178,9 @@ pub fn write_folder(
         path: path.clone(),
         why: reason(error),
     };
-    let temporary = builder(0o777).tempdir_in(here(folder)).map_err(|e| failed(&e))?;
+    let temporary = builder(0o777)
+        .tempdir_in(here(folder))
+        .map_err(|e| failed(&e))?;
     for file in files {
         write_file(temporary.path(), file)?;
     }

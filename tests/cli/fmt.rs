@@ -36,7 +36,9 @@ fn a_formatted_file_is_not_written() {
     let temporary = folder();
     let path = write(temporary.path(), "a.impasto", NEAT);
     let before = std::fs::metadata(&path).and_then(|m| m.modified());
-    impasto(&["fmt", &path]).exits(0).says("1 file: 0 formatted");
+    impasto(&["fmt", &path])
+        .exits(0)
+        .says("1 file: 0 formatted");
     let after = std::fs::metadata(&path).and_then(|m| m.modified());
     assert_eq!(before.expect("a time"), after.expect("a time"));
 }
@@ -46,11 +48,15 @@ fn check_writes_nothing_and_tells() {
     let temporary = folder();
     let path = write(temporary.path(), "a.impasto", UGLY);
     let run = impasto(&["fmt", "--check", &path]).exits(1);
-    run.says("not formatted: ").says("a.impasto").prints_nothing();
+    run.says("not formatted: ")
+        .says("a.impasto")
+        .prints_nothing();
     assert_eq!(read(&path), UGLY);
     write(temporary.path(), "a.impasto", NEAT);
     impasto(&["fmt", "--check", &path]).exits(0);
-    let json = impasto(&["fmt", "--check", "--format", "json", &path]).exits(0).json();
+    let json = impasto(&["fmt", "--check", "--format", "json", &path])
+        .exits(0)
+        .json();
     assert_eq!(json["files"], 1);
     assert_eq!(json["changed"].as_array().map(Vec::len), Some(0));
 }

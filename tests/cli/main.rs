@@ -8,6 +8,7 @@ mod cost;
 mod cost_lines;
 mod emit_check;
 mod eval;
+mod explain;
 mod film;
 mod fmt;
 #[path = "../generated/mod.rs"]

@@ -16,7 +16,9 @@ fn every_template_is_a_formatted_source_without_a_word_to_say() {
     let temporary = folder();
     for template in TEMPLATES {
         let args = [&format!("my_{template}"), "--template", template, "--scene"];
-        new_in(temporary.path(), &args).exits(0).says("impasto render");
+        new_in(temporary.path(), &args)
+            .exits(0)
+            .says("impasto render");
         let made = temporary.path().join(format!("my_{template}"));
         let wanted = [
             "ball.obj".to_owned(),
@@ -40,15 +42,26 @@ fn every_template_is_a_formatted_source_without_a_word_to_say() {
 fn a_scene_renders_at_once() {
     let temporary = folder();
     for template in ["paint", "scene"] {
-        new_in(temporary.path(), &["thing", "--template", template, "--scene"]).exits(0);
-        let scene = temporary.path().join("thing/scene.toml").display().to_string();
+        new_in(
+            temporary.path(),
+            &["thing", "--template", template, "--scene"],
+        )
+        .exits(0);
+        let scene = temporary
+            .path()
+            .join("thing/scene.toml")
+            .display()
+            .to_string();
         let picture = temporary.path().join("thing.png");
         let out = picture.display().to_string();
         let size = ["--size", "32x24", "--spp", "4"];
         impasto(&[&["render", &scene, "--out", &out], &size[..]].concat()).exits(0);
         let pixels = image::open(&picture).expect("a picture").to_rgb8();
         let middle = pixels.get_pixel(16, 12).0;
-        assert!(middle.iter().any(|c| *c > 20), "the ball is lit: {middle:?}");
+        assert!(
+            middle.iter().any(|c| *c > 20),
+            "the ball is lit: {middle:?}"
+        );
         std::fs::remove_dir_all(temporary.path().join("thing")).expect("it is removed");
     }
 }
@@ -68,10 +81,14 @@ fn nothing_is_overwritten() {
     let temporary = folder();
     let path = temporary.path().join("red.impasto");
     std::fs::write(&path, "mine").expect("it is written");
-    new_in(temporary.path(), &["red"]).exits(2).says("`red.impasto` exists already");
+    new_in(temporary.path(), &["red"])
+        .exits(2)
+        .says("`red.impasto` exists already");
     assert_eq!(std::fs::read(&path).expect("the file"), b"mine");
     std::fs::create_dir(temporary.path().join("blue")).expect("a folder");
-    new_in(temporary.path(), &["blue", "--scene"]).exits(2).says("`blue` exists already");
+    new_in(temporary.path(), &["blue", "--scene"])
+        .exits(2)
+        .says("`blue` exists already");
     assert_eq!(names(temporary.path()), ["blue", "red.impasto"]);
     assert!(names(&temporary.path().join("blue")).is_empty());
 }
@@ -106,5 +123,7 @@ fn names_that_no_material_can_have_are_refused() {
     }
     assert!(names(&inner).is_empty());
     assert_eq!(names(temporary.path()), ["inner"]);
-    new_in(&inner, &["red", "--template", "gold"]).exits(2).says("matte");
+    new_in(&inner, &["red", "--template", "gold"])
+        .exits(2)
+        .says("matte");
 }

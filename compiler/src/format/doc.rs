@@ -18,9 +18,14 @@ pub(super) enum Kind<'t> {
     /// A line break in a broken group, else this text.
     Line(&'static str),
     /// A line break, and an empty line before it if `blank`. Nothing more where a line starts.
-    Hard { blank: bool },
+    Hard {
+        blank: bool,
+    },
     /// A comment; the line ends behind it if `ends_line`.
-    Comment { text: &'t str, ends_line: bool },
+    Comment {
+        text: &'t str,
+        ends_line: bool,
+    },
     /// Text that appears in a broken group only.
     WhenBroken(&'static str),
     /// Nothing, but what holds it cannot stand on one line.

@@ -13,8 +13,7 @@ impl<'t> Layout<'t> {
         let at = usize::from(self.is_private());
         let is_definition = |t| matches!(t, Material | Bsdf | Delta | Edf | Fn | Struct | Const);
         self.peek_at(at).is_some_and(is_definition)
-            && self.peek_at(at + 1) != Some(Assign)
-            && self.peek_at(at + 1) != Some(Dot)
+            && matches!(self.peek_at(at + 1), Some(Ident | Bsdf))
     }
 
     fn is_private(&self) -> bool {

@@ -133,7 +133,11 @@ impl<'d, 't> Renderer<'d, 't> {
         let later = self.todo.len().saturating_sub(1);
         let rest = self.todo.get(..later).unwrap_or_default();
         let part = Part::Doc(doc);
-        let first = Task { flat: true, part, ..task };
+        let first = Task {
+            flat: true,
+            part,
+            ..task
+        };
         doc.flat.is_some() && fits(self.out.column(), vec![first], rest, Inner::Flat)
     }
 
@@ -229,10 +233,18 @@ impl<'d, 't> Renderer<'d, 't> {
         }
         self.todo.push(Task {
             flat: same_line || fits_here || breaks_value,
-            indent: if breaks_value { next_start } else { task.indent },
+            indent: if breaks_value {
+                next_start
+            } else {
+                task.indent
+            },
             part: Part::Doc(value),
         });
-        let first = if breaks_value { Part::Break } else { Part::Space };
+        let first = if breaks_value {
+            Part::Break
+        } else {
+            Part::Space
+        };
         self.todo.push(part(first));
     }
 
@@ -358,8 +370,7 @@ impl Output {
 
     /// Where the next text would start.
     fn column(&self) -> usize {
-        self.start
-            .unwrap_or(self.column + usize::from(self.space))
+        self.start.unwrap_or(self.column + usize::from(self.space))
     }
 
     fn space(&mut self) {

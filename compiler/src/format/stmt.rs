@@ -48,12 +48,7 @@ impl<'t> Layout<'t> {
         }
         let (comments, close) = self.closer(false);
         inner.extend(comments);
-        Doc::concat(vec![
-            open,
-            Doc::concat(inner).nest(),
-            Doc::line(" "),
-            close,
-        ])
+        Doc::concat(vec![open, Doc::concat(inner).nest(), Doc::line(" "), close])
     }
 
     /// A statement, definition, declaration, line of documentation, or value.

@@ -18,18 +18,27 @@ fn word() -> impl Strategy<Value = String> {
 
 fn leaf() -> impl Strategy<Value = String> {
     let literals = [
-        "0", "1.5", ".5", "2.", "1e-3", "0xFF8800", "0.60 mm", "30 deg", "true", "\"wood.png\"", "5km",
+        "0",
+        "1.5",
+        ".5",
+        "2.",
+        "1e-3",
+        "0xFF8800",
+        "0.60 mm",
+        "30 deg",
+        "true",
+        "\"wood.png\"",
+        "5km",
     ];
-    prop_oneof![
-        word(),
-        select(literals.to_vec()).prop_map(String::from)
-    ]
+    prop_oneof![word(), select(literals.to_vec()).prop_map(String::from)]
 }
 
 /// An expression. Operands are in parentheses, so that comparisons are never chained.
 fn expr() -> impl Strategy<Value = String> {
     leaf().prop_recursive(5, 40, 4, |inner| {
-        let tight = ["+", "-", "*", "/", "%", "&&", "||", "|", "^", "&", "<<", ">>"];
+        let tight = [
+            "+", "-", "*", "/", "%", "&&", "||", "|", "^", "&", "<<", ">>",
+        ];
         let compare = ["==", "!=", "<", "<=", ">", ">="];
         let args = prop::collection::vec((prop::option::of(word()), inner.clone()), 0..5);
         let comma = select(vec!["", ",", ",\n"]);
@@ -42,8 +51,9 @@ fn expr() -> impl Strategy<Value = String> {
             inner.clone().prop_map(|a| format!("({a}).xy.x")),
             (inner.clone(), block(inner.clone()), block(inner.clone()))
                 .prop_map(|(c, a, b)| format!("(if {c} {a} else {b})")),
-            (inner.clone(), inner.clone(), block(inner.clone()))
-                .prop_map(|(c, d, a)| format!("(if {c} {{\n{d} }} else if {d} {a} else {{ {c} }})")),
+            (inner.clone(), inner.clone(), block(inner.clone())).prop_map(|(c, d, a)| format!(
+                "(if {c} {{\n{d} }} else if {d} {a} else {{ {c} }})"
+            )),
             block(inner.clone()).prop_map(|b| format!("({b})")),
             (word(), args, comma).prop_map(|(name, args, comma)| call(&name, &args, comma)),
         ]
@@ -86,17 +96,26 @@ fn statement() -> impl Strategy<Value = String> {
 }
 
 fn statements() -> impl Strategy<Value = String> {
-    let plain = select(vec!["break;", "x = 1;", "", "let a = { 2.0 };\n\n\nvar b = a;"]);
+    let plain = select(vec![
+        "break;",
+        "x = 1;",
+        "",
+        "let a = { 2.0 };\n\n\nvar b = a;",
+    ]);
     prop::collection::vec(plain, 0..3).prop_map(|all| all.join(" "))
 }
 
 fn item() -> impl Strategy<Value = String> {
-    let body = prop::collection::vec(statement(), 0..4).prop_map(|all| all.join("\n")).boxed();
+    let body = prop::collection::vec(statement(), 0..4)
+        .prop_map(|all| all.join("\n"))
+        .boxed();
     let parameter = (word(), prop::option::of(expr())).prop_map(|(name, default)| match default {
         Some(value) => format!("{name}: float = {value}"),
         None => format!("{name}: bsdf"),
     });
-    let parameters = prop::collection::vec(parameter, 0..5).prop_map(|all| all.join(", ")).boxed();
+    let parameters = prop::collection::vec(parameter, 0..5)
+        .prop_map(|all| all.join(", "))
+        .boxed();
     let private = select(vec!["", "", "private "]);
     let meta = select(vec![
         "",
