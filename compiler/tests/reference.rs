@@ -156,14 +156,7 @@ fn names_of_the_table_of_features_exist() {
 #[test]
 fn functions_that_the_table_of_features_writes_with_brackets_exist() {
     let language = page();
-    for call in [
-        "image(",
-        "image_data(",
-        "hash(",
-        "filter_width(",
-        "gradient(",
-        "medium(",
-    ] {
+    for call in ["image(", "hash(", "filter_width(", "gradient(", "medium("] {
         assert!(read("features.md").contains(call), "{call} is gone");
         assert!(language.contains(&format!("`{call}")), "{call}");
     }

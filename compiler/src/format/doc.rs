@@ -60,6 +60,8 @@ pub(super) struct Operation<'t> {
 pub(super) struct Assign<'t> {
     pub(super) value: Doc<'t>,
     pub(super) when: Option<Doc<'t>>,
+    /// Does the value start on the next line if it cannot stand on one?
+    pub(super) breaks: bool,
 }
 
 impl<'t> Doc<'t> {
@@ -123,13 +125,15 @@ impl<'t> Doc<'t> {
         Self::new(Kind::Fill(Box::new(Fill { first, rest })), flat)
     }
 
-    /// Starts with the blank behind the `=`.
-    pub(super) fn assign(value: Doc<'t>, when: Option<Doc<'t>>) -> Self {
+    /// Starts with the blank behind the `=`. `breaks` if a line of the source breaks there, which
+    /// counts for chains of operators.
+    pub(super) fn assign(value: Doc<'t>, when: Option<Doc<'t>>, breaks: bool) -> Self {
+        let breaks = breaks && matches!(value.kind, Kind::Fill(_));
         let more = match &when {
             Some(when) => when.flat.map(|width| 1 + width),
             None => Some(0),
         };
         let flat = value.flat.zip(more).map(|(a, b)| 1 + a + b);
-        Self::new(Kind::Assign(Box::new(Assign { value, when })), flat)
+        Self::new(Kind::Assign(Box::new(Assign { value, when, breaks })), flat)
     }
 }

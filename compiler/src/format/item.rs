@@ -3,7 +3,6 @@
 use super::doc::Doc;
 use super::layout::Layout;
 use super::list::Style;
-use super::stmt::Entry;
 use crate::lexer::Token;
 
 impl<'t> Layout<'t> {
@@ -20,14 +19,14 @@ impl<'t> Layout<'t> {
         self.is_spelled("private") && self.peek_at(1).is_some_and(Token::is_keyword)
     }
 
-    pub(super) fn definition(&mut self) -> Entry<'t> {
+    pub(super) fn definition(&mut self) -> Doc<'t> {
         let mut parts = Vec::new();
         if self.is_private() {
             parts.extend([self.token(), Doc::space()]);
         }
         if self.is(Token::Const) {
-            parts.push(self.statement().doc);
-            return Entry::statement(parts);
+            parts.push(self.statement());
+            return Doc::concat(parts);
         }
         let is_struct = self.is(Token::Struct);
         parts.push(self.token());
@@ -51,11 +50,11 @@ impl<'t> Layout<'t> {
                 Some(_) => parts.extend([Doc::space(), self.token()]),
             }
         }
-        Entry::statement(parts)
+        Doc::concat(parts)
     }
 
     /// `use path::{a, b as c};`
-    pub(super) fn import(&mut self) -> Entry<'t> {
+    pub(super) fn import(&mut self) -> Doc<'t> {
         let mut parts = vec![self.token(), Doc::space()];
         loop {
             match self.peek() {
@@ -69,6 +68,6 @@ impl<'t> Layout<'t> {
                 Some(_) => parts.push(self.token()),
             }
         }
-        Entry::statement(parts)
+        Doc::concat(parts)
     }
 }

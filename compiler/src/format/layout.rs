@@ -23,7 +23,7 @@ impl<'t> Layout<'t> {
         let mut parts = Vec::new();
         while self.peek().is_some() {
             parts.push(Doc::hard(self.blank()));
-            parts.push(self.statement().doc);
+            parts.push(self.statement());
         }
         let end = self.take();
         parts.push(leads(&end.lead, true));

@@ -222,7 +222,8 @@ impl<'d, 't> Renderer<'d, 't> {
             is_flat && self.fits(column, tasks.collect(), Inner::Flat)
         };
         let fits_here = same_line || (when.is_some() && fits_alone(self.out.column() + 1));
-        let breaks_value = !fits_here && fits_alone(next_start);
+        let fits_next = !fits_here && fits_alone(next_start);
+        let breaks_value = fits_next || (!fits_here && assign.breaks);
         if let Some(when) = when {
             self.todo.push(part(Part::Doc(when)));
             self.todo.push(part(match (same_line, fits_here) {
@@ -232,7 +233,7 @@ impl<'d, 't> Renderer<'d, 't> {
             }));
         }
         self.todo.push(Task {
-            flat: same_line || fits_here || breaks_value,
+            flat: fits_here || fits_next,
             indent: if breaks_value {
                 next_start
             } else {

@@ -5,25 +5,8 @@ use super::layout::Layout;
 use super::list::Style;
 use crate::lexer::Token;
 
-/// An entry of a block or file.
-pub(super) struct Entry<'t> {
-    pub(super) doc: Doc<'t>,
-    /// Is it the value of its block?
-    pub(super) is_value: bool,
-}
-
-impl<'t> Entry<'t> {
-    pub(super) fn statement(parts: Vec<Doc<'t>>) -> Self {
-        let doc = Doc::concat(parts);
-        Self {
-            doc,
-            is_value: false,
-        }
-    }
-}
-
 impl<'t> Layout<'t> {
-    /// `{ ... }`. One of a value alone may stand on one line, unless `broken`.
+    /// `{ ... }`. One of a single entry may stand on one line, unless `broken`.
     pub(super) fn block(&mut self, broken: bool) -> Doc<'t> {
         let open = self.token();
         if self.at_end() {
@@ -36,7 +19,7 @@ impl<'t> Layout<'t> {
             blanks.push(self.blank());
             entries.push(self.statement());
         }
-        let is_short = !broken && !starts_line && matches!(&entries[..], [entry] if entry.is_value);
+        let is_short = !broken && !starts_line && entries.len() == 1;
         let mut inner = Vec::new();
         for (entry, blank) in entries.into_iter().zip(blanks) {
             inner.push(if is_short {
@@ -44,7 +27,7 @@ impl<'t> Layout<'t> {
             } else {
                 Doc::hard(blank)
             });
-            inner.push(entry.doc);
+            inner.push(entry);
         }
         let (comments, close) = self.closer(false);
         inner.extend(comments);
@@ -52,18 +35,15 @@ impl<'t> Layout<'t> {
     }
 
     /// A statement, definition, declaration, line of documentation, or value.
-    pub(super) fn statement(&mut self) -> Entry<'t> {
+    pub(super) fn statement(&mut self) -> Doc<'t> {
         match self.peek() {
-            Some(Token::DocOuter | Token::DocInner) => Entry::statement(vec![self.token()]),
-            Some(Token::If) => Entry {
-                doc: self.if_chain(),
-                is_value: true,
-            },
+            Some(Token::DocOuter | Token::DocInner) => Doc::concat(vec![self.token()]),
+            Some(Token::If) => self.if_chain(),
             Some(Token::For | Token::While) => self.turns(),
             Some(Token::Break | Token::Continue) => {
                 let mut parts = vec![self.token()];
                 self.semicolon(&mut parts);
-                Entry::statement(parts)
+                Doc::concat(parts)
             }
             Some(Token::Let | Token::Var | Token::Const | Token::Param) => self.binding(),
             Some(Token::Use) => self.import(),
@@ -73,42 +53,42 @@ impl<'t> Layout<'t> {
     }
 
     /// `for name in low .. high { ... }`, `while condition limit count { ... }`
-    fn turns(&mut self) -> Entry<'t> {
+    fn turns(&mut self) -> Doc<'t> {
         let mut parts = vec![self.token(), Doc::space(), self.expr()];
         while matches!(self.peek(), Some(Token::In | Token::Range | Token::Limit)) {
             parts.extend([Doc::space(), self.token(), Doc::space(), self.expr()]);
         }
         parts.extend([Doc::space(), self.block(true)]);
-        Entry::statement(parts)
+        Doc::concat(parts)
     }
 
     /// `let name: type = value;`, also with `var`, `const` and `param`.
-    fn binding(&mut self) -> Entry<'t> {
+    fn binding(&mut self) -> Doc<'t> {
         let mut parts = vec![self.token(), Doc::space(), self.token()];
         if self.is(Token::Colon) {
             parts.extend([self.token(), Doc::space(), self.token()]);
         }
         parts.extend([Doc::space(), self.token()]);
-        let mut value = vec![self.expr()];
+        let breaks = self.breaks();
+        let mut value = self.expr();
         while matches!(self.peek(), Some(Token::In | Token::Range)) {
-            value.extend([Doc::space(), self.token(), Doc::space(), self.expr()]);
+            let bound = [Doc::space(), self.token(), Doc::space(), self.expr()];
+            value = Doc::concat([value].into_iter().chain(bound).collect());
         }
-        let value = Doc::concat(value);
         if self.is(Token::LeftBrace) {
             parts.extend([Doc::space(), value, Doc::space()]);
             parts.push(self.list(Style::PADDED));
         } else {
-            parts.push(Doc::assign(value, None));
+            parts.push(Doc::assign(value, None, breaks));
         }
         self.semicolon(&mut parts);
-        Entry::statement(parts)
+        Doc::concat(parts)
     }
 
     /// `place = value when condition;`, a method, or a value.
-    fn assignment(&mut self) -> Entry<'t> {
+    fn assignment(&mut self) -> Doc<'t> {
         let before = self.remaining();
         let mut parts = vec![self.expr()];
-        let mut is_value = false;
         match self.peek() {
             Some(
                 Token::Assign
@@ -122,23 +102,23 @@ impl<'t> Layout<'t> {
             }
             Some(Token::LeftBrace) => parts.extend([Doc::space(), self.block(true)]),
             Some(Token::Semicolon) => self.semicolon(&mut parts),
-            _ => is_value = true,
+            _ => {}
         }
         if self.remaining() == before {
             // Nothing that is known starts here.
             parts.push(self.token());
         }
-        let doc = Doc::concat(parts);
-        Entry { doc, is_value }
+        Doc::concat(parts)
     }
 
     /// `= value when condition;`
     pub(super) fn assigned(&mut self, parts: &mut Vec<Doc<'t>>) {
         parts.push(self.token());
+        let breaks = self.breaks();
         let value = self.expr();
         let is_when = self.is(Token::When);
         let when = is_when.then(|| Doc::concat(vec![self.token(), Doc::space(), self.expr()]));
-        parts.push(Doc::assign(value, when));
+        parts.push(Doc::assign(value, when, breaks));
         self.semicolon(parts);
     }
 
