@@ -56,7 +56,9 @@ impl Board<'_> {
         let picture = image::RgbaImage::from_fn(19, 6, |x, y| {
             image::Rgba([level(x, y), level(y, x + 1), 128, 255])
         });
-        picture.save(folder.join("picture.png")).expect("it is saved");
+        picture
+            .save(folder.join("picture.png"))
+            .expect("it is saved");
         let scene = impasto::load(&folder.join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
         let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{e}"));
         (scene, program)
@@ -109,7 +111,10 @@ fn far_boards_have_the_same_mean_and_less_noise_with_a_width() {
         let wide = seen(&format!("image(picture, 9.0 * uv, width: {width})"), FAR);
         // The error of a mean of that many pixels; then the noise.
         let error = (point.1 / f64::from(SIDE * SIDE)).sqrt();
-        assert!((wide.0 - point.0).abs() < 4.0 * error, "{width}: {wide:?}, {point:?}");
+        assert!(
+            (wide.0 - point.0).abs() < 4.0 * error,
+            "{width}: {wide:?}, {point:?}"
+        );
         assert!(wide.1 < 0.2 * point.1, "{width}: {wide:?}, {point:?}");
     }
 }
@@ -120,18 +125,39 @@ fn far_boards_have_the_same_mean_and_less_noise_with_a_width() {
 fn replays_look_textures_up_as_kernels_do() {
     for (expr, camera) in [
         ("image(picture, 3.0 * uv - 1.2, wrap: MIRROR)", FACING),
-        ("image(picture, 2.0 * uv - 0.4, wrap_u: CLAMP, wrap_v: BORDER)", FACING),
-        ("image(picture, 2.0 * uv, filter: NEAREST, width: vec2(0.02, 0.4))", FACING),
-        ("image(picture, 3.0 * uv - 1.0, filter: BICUBIC, wrap_u: BORDER, wrap_v: MIRROR)", FACING),
-        ("image(picture, uv, width: vec2(0.7, 0.1), wrap: CLAMP)", FACING),
-        ("color(image_data(picture, 5.0 * uv, width: 0.3 * uv).xyz) * image_alpha(picture, uv)", FACING),
-        ("image(picture, 4.0 * uv, width: filter_width(4.0 * uv))", GRAZING),
+        (
+            "image(picture, 2.0 * uv - 0.4, wrap_u: CLAMP, wrap_v: BORDER)",
+            FACING,
+        ),
+        (
+            "image(picture, 2.0 * uv, filter: NEAREST, width: vec2(0.02, 0.4))",
+            FACING,
+        ),
+        (
+            "image(picture, 3.0 * uv - 1.0, filter: BICUBIC, wrap_u: BORDER, wrap_v: MIRROR)",
+            FACING,
+        ),
+        (
+            "image(picture, uv, width: vec2(0.7, 0.1), wrap: CLAMP)",
+            FACING,
+        ),
+        (
+            "color(image_data(picture, 5.0 * uv, width: 0.3 * uv).xyz) * image_alpha(picture, uv)",
+            FACING,
+        ),
+        (
+            "image(picture, 4.0 * uv, width: filter_width(4.0 * uv))",
+            GRAZING,
+        ),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
         let (scene, program) = Board { expr, camera }.load(folder.path());
         let gpu = render(&scene, &program, 1);
         let (mean, variance) = statistics(&gpu);
-        assert!(mean > 0.02 && variance > 1e-5, "{expr}: nothing to see: {mean} {variance}");
+        assert!(
+            mean > 0.02 && variance > 1e-5,
+            "{expr}: nothing to see: {mean} {variance}"
+        );
         for code in [MaterialCode::Ir, MaterialCode::Wgsl] {
             let replayed = replay(&scene, &program, code);
             let off = gpu.iter().zip(&replayed);
@@ -140,7 +166,10 @@ fn replays_look_textures_up_as_kernels_do() {
                 (0..3).any(|c| (f64::from(a[c]) - b[c]).abs() > 2e-3 * b[c].abs() + 1e-4)
             };
             let different = off.filter(far).count();
-            assert!(different <= 3, "{expr}: {different} pixels differ by {code:?}");
+            assert!(
+                different <= 3,
+                "{expr}: {different} pixels differ by {code:?}"
+            );
         }
     }
 }

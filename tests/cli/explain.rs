@@ -5,7 +5,12 @@ use crate::common::{impasto, root};
 #[test]
 fn a_code_is_explained_with_a_source_that_provokes_it() {
     let run = impasto(&["explain", "e0303"]).exits(0);
-    for part in ["error[E0303]: a unit is needed", "It comes from:", "Repaired:", "0.5 mm;"] {
+    for part in [
+        "error[E0303]: a unit is needed",
+        "It comes from:",
+        "Repaired:",
+        "0.5 mm;",
+    ] {
         assert!(run.stdout.contains(part), "`{part}` is not in {run:#?}");
     }
     let run = impasto(&["explain", "E0205"]).exits(0);
@@ -16,7 +21,9 @@ fn a_code_is_explained_with_a_source_that_provokes_it() {
 
 #[test]
 fn json_holds_the_examples() {
-    let json = impasto(&["explain", "W0001", "--format", "json"]).exits(0).json();
+    let json = impasto(&["explain", "W0001", "--format", "json"])
+        .exits(0)
+        .json();
     let text = json[0]["example"]["files"][0]["text"].as_str();
     assert!(text.is_some_and(|text| text.contains("diffuse(0.8) + mirror()")));
     assert_eq!(json[0]["repaired"]["files"][0]["name"], "example.impasto");
@@ -30,6 +37,8 @@ fn the_page_is_that_of_the_documentation() {
 
 #[test]
 fn unknown_codes_get_a_suggestion() {
-    impasto(&["explain", "E2001"]).exits(2).says("did you mean E0201?");
+    impasto(&["explain", "E2001"])
+        .exits(2)
+        .says("did you mean E0201?");
     impasto(&["explain", "E0201", "--markdown"]).exits(2);
 }

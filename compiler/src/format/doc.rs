@@ -134,6 +134,13 @@ impl<'t> Doc<'t> {
             None => Some(0),
         };
         let flat = value.flat.zip(more).map(|(a, b)| 1 + a + b);
-        Self::new(Kind::Assign(Box::new(Assign { value, when, breaks })), flat)
+        Self::new(
+            Kind::Assign(Box::new(Assign {
+                value,
+                when,
+                breaks,
+            })),
+            flat,
+        )
     }
 }
