@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::ast::Unit;
 use impasto_compiler::diag::{self, Code};
+use impasto_compiler::format::format;
 use impasto_compiler::lexer::Token;
 use impasto_compiler::ops::Op;
 use impasto_compiler::parser;
@@ -190,5 +191,20 @@ fn pictures_of_the_tutorial_are_there_and_small() {
             "{picture} has {} bytes",
             bytes.len()
         );
+    }
+}
+
+#[test]
+fn examples_of_the_tutorial_and_of_ports_are_formatted() {
+    for page in ["tutorial.md", "features.md"] {
+        let text = read(page);
+        let examples = text.split("```impasto\n").skip(1);
+        let examples: Vec<&str> = examples.filter_map(|e| e.split("```").next()).collect();
+        assert!(examples.len() >= 3, "{page} lost its examples");
+        for example in examples {
+            let file = SourceMap::default().add(page, example);
+            let formatted = format(file, example).expect("an example parses");
+            assert_eq!(formatted, example, "in {page}");
+        }
     }
 }
