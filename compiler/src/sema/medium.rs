@@ -72,6 +72,13 @@ fn parameters() -> Vec<Param> {
     parts.map(param).collect()
 }
 
+/// Why a medium cannot vary, and what can.
+const BETWEEN_SURFACES: &str = "a path crosses the inside between surfaces, where it is at no \
+                                point of one; vary the surface instead";
+/// The same where the medium is that of a material from another file.
+const OWN_INTERIOR: &str = "to vary the surface alone, name the call with `let m`, and write \
+                            `surface = m.surface;` and an `interior` of its own";
+
 impl Body<'_, '_> {
     /// `medium(absorption: color = 0, ior: float = 1, priority: int = 0, scattering: color = 0,
     /// anisotropy: float = 0)`
@@ -183,10 +190,15 @@ impl Checker<'_> {
                 Cause::Input(span, input) => (*span, format!("`{input}`")),
                 Cause::Texture(span) => (*span, "a texture".into()),
             };
+            // Of a material that is called, the caller may keep the surface alone.
+            let hint = match interior.span.file == body.span.file {
+                true => BETWEEN_SURFACES,
+                false => OWN_INTERIOR,
+            };
             let message = format!("{name} depends on {what}");
             let varies = Diagnostic::new(Code::VaryingMedium, span, message)
                 .expected("parameters and constants only")
-                .hint("a path crosses the inside between surfaces, where it is at no point of one; vary the surface instead")
+                .hint(hint)
                 .label(interior.span, "the medium that needs it");
             self.report(varies);
             ok = None;
