@@ -56,7 +56,9 @@ impl Loader for FileLoader {
 
     fn beside(&mut self, path: &str) -> Vec<String> {
         let folder = path.rfind('/').map_or("", |slash| &path[..=slash]);
-        let Ok(entries) = std::fs::read_dir(self.base.join(folder)) else {
+        // Of the working directory, the empty path is no name.
+        let here = Path::new(".").join(&self.base).join(folder);
+        let Ok(entries) = std::fs::read_dir(here) else {
             return Vec::new();
         };
         let names = entries.flatten().take(MAX_BESIDE);

@@ -5,13 +5,14 @@ use std::path::Path;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use impasto::compiler::codegen::Target;
+use impasto::compiler::interface::{self, MaterialInterface};
+use impasto::compiler::ir;
 use impasto::compiler::passes::{PIPELINE, run_until};
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
-use impasto::compiler::{interface, ir};
 use impasto::files;
 use impasto::{FileLoader, Program};
-use serde_json::json;
+use serde::Serialize;
 
 use super::docs::docs;
 use super::{Failure, Global, Outcome, print};
@@ -205,12 +206,23 @@ fn params(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<S
         // The compiler knows what to say of a material that is not there.
         compiled(args, loader, global)?;
     }
-    let shown = json!({
-        "version": interface::VERSION,
-        "file": args.file,
-        "materials": materials,
-    });
-    Ok(format!("{shown:#}\n"))
+    let told = Told {
+        version: interface::VERSION,
+        file: &args.file,
+        materials,
+    };
+    // Written from the types, not through a value: numbers are as short as they can be, and fields
+    // in the order of the page that describes them.
+    let text = serde_json::to_string_pretty(&told).map_err(|e| e.to_string())?;
+    Ok(text + "\n")
+}
+
+/// What `--what params` prints.
+#[derive(Serialize)]
+struct Told<'a> {
+    version: u32,
+    file: &'a str,
+    materials: Vec<MaterialInterface>,
 }
 
 fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Program, Failure> {

@@ -306,6 +306,8 @@ fn parameters_are_told_as_json() {
     let run = impasto_with(&["emit", "-", "--what", "params"], source.as_bytes()).exits(0);
     let told = run.json();
     assert_eq!(told["version"], 1);
+    let declared = run.stdout.find("\"name\"").zip(run.stdout.find("\"docs\""));
+    assert!(declared.is_some_and(|(name, docs)| name < docs), "{run:#?}");
     assert_eq!(told["materials"][0]["name"], "plain");
     assert_eq!(told["materials"][0]["params"][0]["hard"][1], 1.0);
     assert_eq!(told["materials"][1]["name"], "other");
