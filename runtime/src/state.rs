@@ -104,9 +104,16 @@ const STRAIGHT: When = When {
 /// Shadow rays, wherever they are.
 const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
-/// Cones of rays that see what they meet.
+/// Cones of rays that see what they meet, where casting rays does not change them.
 const CONES: When = When {
     all: &[Need::RayCones],
+    none: &[Need::Overlap, Need::Scattering],
+};
+/// Those that boundaries of hidden media widen on the way.
+const CROSSING_CONES: When = when(&[Need::RayCones, Need::Overlap]);
+/// Those that only light which is turned on the way widens.
+const TURNING_CONES: When = When {
+    all: &[Need::RayCones, Need::Scattering],
     none: &[Need::Overlap],
 };
 
@@ -281,7 +288,7 @@ pub(crate) const FIELDS: [Field; 10] = [
     },
     Field {
         // The cone that its ray stands for: how wide it is where the ray begins, in metres, and by how
-        // much a metre it widens; see docs/filtering.md. Boundaries that are not there widen it on the way.
+        // much a metre it widens; see docs/filtering.md.
         uses: &[
             Use {
                 name: "cone",
@@ -293,7 +300,14 @@ pub(crate) const FIELDS: [Field; 10] = [
             Use {
                 name: "cone",
                 components: CONE,
-                need: when(&[Need::RayCones, Need::Overlap]),
+                need: CROSSING_CONES,
+                readers: &[Material, Extension],
+                writers: &[NewPath, Material, Extension],
+            },
+            Use {
+                name: "cone",
+                components: CONE,
+                need: TURNING_CONES,
                 readers: &[Material, Extension],
                 writers: &[NewPath, Material, Extension],
             },

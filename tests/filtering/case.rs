@@ -19,6 +19,8 @@ pub struct Square {
     pub material: &'static str,
     pub half: f64,
     pub y: f64,
+    /// Does it face up all the same?
+    pub turned: bool,
     /// What is said of the geometry beside its file.
     pub placed: &'static str,
 }
@@ -29,6 +31,7 @@ impl Square {
             material,
             half: 50.0,
             y: 0.0,
+            turned: false,
             placed: "",
         }
     }
@@ -37,7 +40,7 @@ impl Square {
     fn obj(&self, scale: f64, shift: f64) -> String {
         let (h, y) = (self.half, self.y);
         let mut corners = [[-h, h], [h, h], [h, -h], [-h, -h]];
-        if y > 0.0 {
+        if y > 0.0 && !self.turned {
             corners.reverse();
         }
         let mut text = format!("usemtl {}\n", self.material);
@@ -120,6 +123,7 @@ impl Case {
         for (name, statements) in &self.materials {
             scene += &format!("[materials.{name}]\nfile = \"{name}.impasto\"\n");
             let uses: String = [
+                ("bsdf", "smooth_dielectric"),
                 ("bsdf", "diffuse"),
                 ("bsdf", "specular"),
                 ("edf", "uniform"),

@@ -210,6 +210,31 @@ fn scattered_rays_stand_for_the_solid_angle_of_their_density() {
     );
 }
 
+/// Under a metre of fog, the floor is narrow for light that was not turned, and wide for the rest.
+#[test]
+fn light_that_was_turned_in_a_medium_sees_widely() {
+    let narrow = "emission = uniform(color(1.0 - step(0.05, filter_width(position).x)));";
+    let mut case = Case::floor(narrow, [0.0, 2.0, 0.0]);
+    // The end of the sheet is out of reach; its front is above.
+    case.squares.push(Square {
+        y: 1.0,
+        half: 40.0,
+        turned: true,
+        ..Square::new("fog")
+    });
+    let fog = "surface = smooth_dielectric(ior: 1.0); interior = medium(scattering: color(1.0));";
+    case.materials.push(("fog", fog.into()));
+    (case.depth, case.samples) = (2, 64);
+    let pixels = case.render();
+    let found = pixels.iter().map(|p| p[0]).sum::<f64>() / pixels.len() as f64;
+    // Some of what was turned was so just above the floor.
+    let straight = (-1.0f64).exp();
+    assert!(
+        (straight - 0.02..straight + 0.05).contains(&found),
+        "{found}, of {straight}"
+    );
+}
+
 /// A checkerboard of squares of one metre, averaged over a width; see docs/filtering.md.
 fn checker(width: &str) -> String {
     format!(

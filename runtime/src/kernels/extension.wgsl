@@ -63,6 +63,11 @@ fn keep_flight(slot: u32, sample: u32, flight: Flight) {
     store_throughput(slot, flight.carried);
     if flight.turns > 0u {
         store_ray_direction(slot, PathRayDirection(flight.direction, sample));
+#if ray_cones
+        // Light that was turned may come from anywhere: its last segment begins as narrow as it can.
+        let cone = load_cone(slot);
+        store_cone(slot, PathCone(cone.width, WIDEST_CONE, 0u, 0u));
+#endif
     }
 }
 
@@ -119,13 +124,13 @@ fn trace_to_boundary(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u
 #if absorption
         carried.throughput *= transmittance(media, hit.t);
 #endif
+        carried.bsdf_pdf = 0.0;
+        store_throughput(slot, carried);
+#endif
 #if ray_cones
         let cone = load_cone(slot);
         let width = cone.width + cone.spread * hit.t;
         store_cone(slot, PathCone(width, cone.spread, 0u, 0u));
-#endif
-        carried.bsdf_pdf = 0.0;
-        store_throughput(slot, carried);
 #endif
         media = cross_boundary(media, medium, inside);
         store_media(slot, PathMedia(media));

@@ -8,7 +8,7 @@ struct Footprint {
 }
 
 // Of a cone of a width, which comes from the direction wo. At grazing angles it is no longer than LONGEST_FOOTPRINT
-// times its width: the cone's curvature counts there, and nothing could be told apart anyway.
+// times its width: what patterns average over is a box, and one that long would blur across the view as well.
 fn footprint(normal: vec3<f32>, wo: vec3<f32>, width: f32) -> Footprint {
     let cosine = dot(normal, wo);
     let along = wo - cosine * normal;
