@@ -12,6 +12,8 @@ mod page;
 mod prose;
 mod render;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -64,18 +66,17 @@ pub(crate) fn run(args: &GalleryArgs) -> Result {
     let impasto = command(args)?;
     let out = shell::root().join(&args.out);
     let library = library::read(&impasto)?;
-    let shown = shown(&library)?;
+    let (shown, mut failures) = shown(&library);
     let manifest_path = out.join("images/manifest.json");
     let mut manifest = manifest::read(&manifest_path)?;
     if args.check {
-        return check(&shown, &manifest, &out);
+        return check(&shown, failures, &manifest, &out);
     }
     let known: Vec<String> = shown.iter().map(|s| s.entry.id()).collect();
     manifest.retain(|id, _| known.contains(id));
     let studio =
         Studio::new(std::env::temp_dir().join(format!("impasto-gallery-{}", std::process::id())))?;
-    let result = update(args, &impasto, &studio, &shown, &mut manifest, &out);
-    // What was made before a failure is kept.
+    failures.extend(update(args, &impasto, &studio, &shown, &mut manifest, &out));
     manifest::write(&manifest_path, &manifest)?;
     studio.remove();
     let written = page::pages(&shown, &manifest);
@@ -83,7 +84,7 @@ pub(crate) fn run(args: &GalleryArgs) -> Result {
         write_atomically(&out.join(name), text.as_bytes())?;
     }
     eprintln!("{} pages in {}", written.len(), out.display());
-    result
+    all_well(&failures)
 }
 
 /// The command that knows the language.
@@ -105,8 +106,16 @@ fn command(args: &GalleryArgs) -> Result<PathBuf> {
     Ok(impasto)
 }
 
-/// Everything with its example.
-fn shown(library: &Library) -> Result<Vec<Shown<'_>>> {
+/// An error that lists what failed. One entry that cannot be shown leaves the others their pictures.
+fn all_well(failures: &[String]) -> Result {
+    match failures.is_empty() {
+        true => Ok(()),
+        false => Err(failures.join("\n")),
+    }
+}
+
+/// Everything with its example, and why some have none.
+fn shown(library: &Library) -> (Vec<Shown<'_>>, Vec<String>) {
     let mut shown = Vec::new();
     let mut failures = Vec::new();
     for entry in &library.entries {
@@ -114,19 +123,16 @@ fn shown(library: &Library) -> Result<Vec<Shown<'_>>> {
             true => example::example(entry, library).map(Some),
             false => Ok(None),
         };
-        match example {
-            Ok(example) => shown.push(Shown { entry, example }),
-            Err(why) => failures.push(why),
-        }
+        let example = example.unwrap_or_else(|why| {
+            failures.push(why);
+            None
+        });
+        shown.push(Shown { entry, example });
     }
-    match failures.is_empty() {
-        true => Ok(shown),
-        false => Err(failures.join("\n")),
-    }
+    (shown, failures)
 }
 
-/// Renders what is stale and measures what it costs. Goes on after a failure: one material that
-/// does not compile leaves the others their pictures.
+/// Renders what is stale and measures what it costs; what failed.
 fn update(
     args: &GalleryArgs,
     impasto: &Path,
@@ -134,7 +140,7 @@ fn update(
     shown: &[Shown],
     manifest: &mut Manifest,
     out: &Path,
-) -> Result {
+) -> Vec<String> {
     let settings = Settings {
         impasto: impasto.to_owned(),
         size: args.size,
@@ -185,10 +191,7 @@ fn update(
             Err(why) => failures.push(why),
         }
     }
-    match failures.is_empty() {
-        true => Ok(()),
-        false => Err(failures.join("\n")),
-    }
+    failures
 }
 
 /// Writes a picture, with its folder.
@@ -221,8 +224,8 @@ impl Studio {
 }
 
 /// Compares what is there with what would be written.
-fn check(shown: &[Shown], manifest: &Manifest, out: &Path) -> Result {
-    let mut wrong = Vec::new();
+fn check(shown: &[Shown], failures: Vec<String>, manifest: &Manifest, out: &Path) -> Result {
+    let mut wrong = failures;
     for Shown { entry, example } in shown {
         let Some(example) = example else { continue };
         let id = entry.id();

@@ -153,7 +153,7 @@ fn scene_text(example: &Example, sample: &Path) -> String {
     text += &match example.stand {
         Stand::Ball => format!(
             "\n[camera]\nposition = {}\nlook_at = {}\nfov = 17.5\n\
-             \n[integrator]\nmax_depth = 12\n\
+             \n[integrator]\nmax_depth = 32\n\
              \n[environment]\nfile = \"surroundings.hdr\"\n\
              \n[[lights]]\nkind = \"quad\"\ncorner = {}\nu = {}\nv = {}\nradiance = [17.0, 16.2, 15.0]\n\
              \n[[lights]]\nkind = \"quad\"\ncorner = {}\nu = {}\nv = {}\nradiance = [9.0, 9.7, 11.0]\n",
