@@ -28,6 +28,10 @@ fn heading(folder: &str) -> (String, &'static str) {
             "BSDFs",
             "How light is scattered: what `surface` is made of. Combine them with `layer`, `mix` and weights. Each has its defaults on the shader ball.",
         ),
+        "color" => (
+            "Colors",
+            "Color spaces, corrections, blends, and the colors of hot bodies and metals.",
+        ),
         CORE => (
             "Core",
             "In scope everywhere, without `use`: what the library's own BSDFs and noises are written with.",
@@ -148,7 +152,7 @@ it wants to be shown, if the defaults do not do:
 | `Gallery: surface = diffuse(0.5, normal: ...)` | what the shader ball is made of, for what bends normals |
 | `Gallery: item = fn height(p: point) -> length = ...;` | a function that the others call |
 
-Names of the library are imported by themselves. `images/manifest.json` keeps for each picture a hash of the source \
+Names of the library are imported by themselves. An example of textures may name `\"stone.png\"`. `images/manifest.json` keeps for each picture a hash of the source \
 that it shows (without comments and spaces) and how it was made. Costs on the pages are operations of one evaluation, \
 on average over random points and directions, as `impasto cost` counts them.
 ";

@@ -30,6 +30,9 @@ pub(super) struct Settings {
     pub(super) seconds: u32,
 }
 
+/// The picture that examples of textures may name, of `materials/textures`.
+const PICTURE: &str = "stone.png";
+
 /// The temporary folder with what all scenes share.
 pub(super) struct Studio {
     folder: PathBuf,
@@ -48,6 +51,10 @@ impl Studio {
         write("lamp.obj", &obj(&stage::lamp()))?;
         write("surroundings.hdr", &stage::surroundings()?)?;
         write("stage.impasto", STAGE.as_bytes())?;
+        let picture = shell::root().join("materials/textures").join(PICTURE);
+        let picture =
+            fs::read(&picture).map_err(|e| format!("cannot read {}: {e}", picture.display()))?;
+        write(PICTURE, &picture)?;
         Ok(Self { folder })
     }
 
