@@ -100,7 +100,8 @@ fn field(field: &Field) -> Value {
     json!({ "name": field.name.node, "type": field.ty.node, "docs": field.docs })
 }
 
-/// An expression as its author wrote it.
-fn source<'t>(expr: &Expr, text: &'t str) -> &'t str {
-    text.get(expr.span.range()).unwrap_or_default()
+/// An expression as its author wrote it, in one line.
+fn source(expr: &Expr, text: &str) -> String {
+    let words = text.get(expr.span.range()).unwrap_or_default();
+    words.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -76,6 +76,7 @@ fn everything_has_an_entry_and_a_picture() {
 fn pictures_are_small_square_and_show_something() {
     let images = shell::root().join("docs/library/images");
     let manifest = manifest::read(&images.join("manifest.json")).expect("a manifest");
+    assert!(manifest.len() > 70, "only {} pictures", manifest.len());
     for (id, record) in &manifest {
         let path = images.join(format!("{id}.png"));
         let bytes = fs::read(&path).expect("a picture");
