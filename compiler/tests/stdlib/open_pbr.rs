@@ -398,6 +398,7 @@ fn clear_glass_is_a_dielectric() {
         ("transmission_scatter", "color(0.1)"),
     ]);
     let inked = inked.expect("an interior");
+    assert!(inked.scattering.iter().all(|s| (s - 5.0).abs() < 1e-4));
     // ln 2 / 2 cm less a tenth over 2 cm; blue would shine and is lifted to 0, the rest with it.
     let lost = [2.0f64.ln(), 4.0f64.ln(), 0.0].map(|x| x / 0.02);
     for (found, exact) in inked.absorption.iter().zip(lost) {
