@@ -16,7 +16,7 @@ use crate::scene::SceneError;
 /// Texels a side of the largest picture that is read.
 pub(crate) const MAX_SIDE: u32 = 16_384;
 
-/// Texels of the largest picture that is read, and of all textures of a scene.
+/// Texels of the largest picture that is read.
 pub(crate) const MAX_TEXELS: u64 = 1 << 27;
 
 /// Bytes that decoding one picture may take: a float picture of the largest size.
@@ -191,7 +191,8 @@ fn whole_file(start: &[u8]) -> &'static str {
 fn decode_error(path: &Path, what: &str, cause: &ImageError) -> SceneError {
     match cause {
         ImageError::Unsupported(_) => {
-            let message = format!("the {what} is damaged, or of a kind that is not read here: {cause}");
+            let message =
+                format!("the {what} is damaged, or of a kind that is not read here: {cause}");
             SceneError::in_file(path, message).hint(FORMATS)
         }
         ImageError::Limits(_) => {

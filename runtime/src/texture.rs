@@ -17,6 +17,9 @@ use crate::shader_part::{BufferData, ShaderPart};
 
 mod levels;
 
+/// Texels of all textures of a scene, levels not counted: 32 pictures of 4096 x 4096, 4 GiB.
+const MAX_TEXELS: u64 = 1 << 29;
+
 /// Texels of pictures that are decoded at a time: each takes up to 36 bytes meanwhile.
 const DECODED_AT_ONCE: u64 = 1 << 25;
 
@@ -37,7 +40,7 @@ pub fn part(textures: &[TextureRef], base: &Path) -> Result<Option<ShaderPart>, 
         data.push([first, texture.levels[0].size]);
         at += texture.pairs() as u32 - 1;
     }
-    for (slot, texture) in packed.iter().enumerate() {
+    for (slot, texture) in packed.into_iter().enumerate() {
         texture.write(data[slot][0], &mut data);
     }
     let all = textures.iter().map(|texture| texture.lookups);
@@ -61,12 +64,9 @@ fn load_all(textures: &[TextureRef], base: &Path) -> Result<Vec<Packed>, SceneEr
         .map(|t| image_file::texels(&base.join(&t.path), "texture"))
         .collect::<Result<_, _>>()?;
     let total: u64 = sizes.iter().sum();
-    if total > image_file::MAX_TEXELS {
+    if total > MAX_TEXELS {
         let message = format!("the scene's textures have {total} texels in all");
-        let hint = format!(
-            "at most {} fit; use smaller pictures",
-            image_file::MAX_TEXELS
-        );
+        let hint = format!("at most {MAX_TEXELS} fit; use smaller pictures");
         return Err(SceneError::new(message).hint(hint));
     }
     let mut packed = Vec::with_capacity(textures.len());
@@ -105,7 +105,7 @@ impl Packed {
     }
 
     /// Adds everything but the first pair, where `first` is the place of the first texel.
-    fn write(&self, first: u32, data: &mut Vec<[u32; 2]>) {
+    fn write(self, first: u32, data: &mut Vec<[u32; 2]>) {
         let mut at = first;
         let mut pairs = Vec::new();
         for level in &self.levels {
@@ -113,7 +113,9 @@ impl Packed {
             at += level.texels.len() as u32;
         }
         data.extend(pairs[1..].iter().rev());
-        data.extend(self.levels.iter().flat_map(|level| &level.texels));
+        for level in self.levels {
+            data.extend(level.texels);
+        }
     }
 }
 
