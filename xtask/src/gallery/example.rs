@@ -85,7 +85,7 @@ pub(super) fn example(entry: &Entry, library: &Library) -> Result<Example, Strin
             let page = called(main).map_err(|why| failed(&why))?;
             let page = source(&format!("emission = {page};"));
             let call = call()?;
-            let text = source(&format!("emission = 30.0 * {call};"));
+            let text = source(&format!("emission = 9.0 * {call};"));
             made(Stand::Lamp, text, page)
         }
         ("fn", Some(result)) => {

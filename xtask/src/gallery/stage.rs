@@ -153,11 +153,11 @@ pub(super) fn tile() -> Mesh {
 pub(super) fn lamp() -> Mesh {
     let mut mesh = Mesh::default();
     let turn = DQuat::from_rotation_x(-0.30);
-    let place = DAffine3::from_rotation_translation(turn, dvec3(0.0, 11.5, 0.0));
-    mesh.add("core", cylinder(1.7, 0.0, 2.2, 48).transformed(&place));
+    let place = DAffine3::from_rotation_translation(turn, dvec3(0.0, 10.8, 0.6));
+    mesh.add("core", cylinder(3.4, 0.0, 2.0, 64).transformed(&place));
     let disc = grid(48, 4, Topology::Tube, |u, v| {
         let (sin, cos) = (u * TAU).sin_cos();
-        let r = 1.5 * (0.02 + 0.98 * v);
+        let r = 3.1 * (0.02 + 0.98 * v);
         dvec3(r * cos, -0.02, -r * sin)
     });
     mesh.add("sample", disc.transformed(&place));
