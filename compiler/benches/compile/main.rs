@@ -6,6 +6,9 @@
 //! with `-- growth`, how it grows with the number of lobes; with a filter, `-- compile/`, criterion
 //! measures all that match.
 
+// Tables are what this program is for.
+#![allow(clippy::print_stdout)]
+
 use std::hint::black_box;
 use std::path::Path;
 
