@@ -72,3 +72,44 @@ fn what_is_switched_off_is_not_worked_on() {
     assert_eq!(pruned, plain, "{full} with everything on");
     assert!(full > plain);
 }
+
+/// A file of this repository, or a path of the library, with its defaults.
+fn file(path: &str) -> Program {
+    struct Disk;
+    impl impasto_compiler::Loader for Disk {
+        fn load(&mut self, path: &str) -> Result<Vec<u8>, String> {
+            let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+            std::fs::read(root.join(path)).map_err(|e| e.to_string())
+        }
+    }
+    let compilation = compile(&[MaterialRequest::new("m", path)], &mut Disk);
+    let problems = diag::render::text(&compilation.sources, &compilation.diagnostics, false);
+    compilation.program.unwrap_or_else(|| panic!("{problems}"))
+}
+
+fn operations(program: &Program) -> usize {
+    program.compiled()[0].evaluate.evaluated().len()
+}
+
+/// What OpenPBR does not use of itself costs a render nothing: base and specular are the gloss on a
+/// matte base that one would write by hand.
+#[test]
+fn open_pbr_by_default_is_two_lobes() {
+    let model = file("std::surface::open_pbr");
+    let by_hand = file("compiler/benches/compile/two_lobes.impasto");
+    let (all, two) = (operations(&model), operations(&by_hand));
+    assert!(
+        20 * all <= 21 * two && two > 100,
+        "{all} operations, {two} by hand"
+    );
+    assert_eq!(model.infos()[0].lobes, 2);
+}
+
+#[test]
+fn car_paint_by_open_pbr_fits_a_reviewer() {
+    let lines = file("materials/open_pbr_carpaint.impasto")
+        .wgsl(&[0])
+        .lines()
+        .count();
+    assert!((100..600).contains(&lines), "{lines} lines");
+}
