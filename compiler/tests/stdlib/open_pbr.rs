@@ -1,7 +1,7 @@
 //! OpenPBR against what its specification says, by formulas that are written again here, and against
 //! the same layers written by hand.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use impasto_compiler::cost::{self, Inputs};
 use impasto_compiler::inspect::At;
@@ -68,7 +68,7 @@ fn toward(p: &Program, wo: [f64; 3], wl: [f64; 3]) -> [f64; 4] {
 fn same(a: &Program, b: &Program, relative: f64) {
     let mut n = Numbers::new(3);
     for i in 0..200 {
-        let wo = direction(n.between(0.05, 1.0), n.between(0.0, 6.28));
+        let wo = direction(n.between(0.05, 1.0), n.between(0.0, TAU));
         let (wl, u) = (n.direction(), n.four());
         let x = answers::<f64>(a, &here(), wo, &[wl], &[u]);
         let y = answers::<f64>(b, &here(), wo, &[wl], &[u]);
