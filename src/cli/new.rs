@@ -71,8 +71,7 @@ pub(super) fn run(args: &NewArgs, global: &Global) -> Outcome {
             vec![
                 format!("impasto check {name}.impasto"),
                 format!("impasto eval {name}.impasto"),
-                "impasto new NAME --scene    makes a folder with a scene that renders it"
-                    .to_owned(),
+                format!("impasto emit {name}.impasto"),
             ],
         )
     };

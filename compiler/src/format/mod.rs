@@ -15,6 +15,7 @@ mod expr;
 mod item;
 mod layout;
 mod list;
+mod output;
 mod render;
 mod stmt;
 mod trivia;
