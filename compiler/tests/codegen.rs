@@ -4,6 +4,10 @@ mod common;
 
 use common::{codes, compilation, program, wgsl};
 use impasto_compiler::abi::{Emission, TextureSpace};
+use impasto_compiler::ir::build::Builder;
+use impasto_compiler::ir::{Local, Type};
+use impasto_compiler::ops::Op;
+use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, codegen, compile};
 
 const DIFFUSE: &str = "use std::bsdf::diffuse;";
@@ -374,4 +378,28 @@ fn whatever_a_source_may_nest_compiles() {
     let layers = "layer(uv.x * diffuse(0.1), ".repeat(60) + "diffuse(0.5)" + &")".repeat(60);
     let text = format!("{DIFFUSE} material m {{ surface = {layers}; }}");
     assert!(codes(&text, &[]).is_empty(), "{:?}", codes(&text, &[]));
+}
+
+/// A variable's value stands where it is read, not where it is used: a store may lie between.
+#[test]
+fn reads_do_not_move_across_stores() {
+    let none = Span::new(FileId(0), 0..0);
+    let a = Local {
+        name: "a".into(),
+        ty: Type::Float,
+    };
+    let mut b = Builder::new("f", vec![a], none);
+    let (x, a) = (b.local("x", Type::Float), b.param(0, none));
+    b.store(x, a);
+    let old = b.load(x, none);
+    let two = b.float(2.0, none);
+    b.store(x, two);
+    let new = b.load(x, none);
+    let sum = b.op(Op::Sub, &[old, new], none);
+    let program = program(&format!(
+        "{DIFFUSE} material m {{ surface = diffuse(0.5); }}"
+    ));
+    let text = codegen::functions(&program, &[b.finish(sum)]);
+    let (read, store) = (text.find("= x;"), text.find("x = 2.0;"));
+    assert!(read.is_some() && read < store, "{text}");
 }
