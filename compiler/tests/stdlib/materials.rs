@@ -111,7 +111,12 @@ pub fn reflected(program: &Program, at: &[f64], wo: [f64; 3], samples: usize) ->
     let medium = program.instances()[0].info.medium;
     let entered = medium.map_or(1.0, |m| f64::from(m.ior * m.ior));
     let mut n = Numbers::new(11);
-    let u: Vec<[f64; 4]> = (0..samples).map(|_| n.four()).collect();
+    // In strata of the choice of a lobe, which is most of the noise.
+    let stratified = |i: usize| {
+        let [lobe, a, b, c] = n.four();
+        [(i as f64 + lobe) / samples as f64, a, b, c]
+    };
+    let u: Vec<[f64; 4]> = (0..samples).map(stratified).collect();
     let args = vec![
         lanes::uniform(at),
         lanes::uniform(&wo),

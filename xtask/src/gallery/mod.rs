@@ -62,12 +62,15 @@ pub(crate) struct GalleryArgs {
     out: PathBuf,
 }
 
+/// What is known of the pictures, in the folder of the pages.
+const MANIFEST: &str = "images/manifest.json";
+
 pub(crate) fn run(args: &GalleryArgs) -> Result {
     let impasto = command(args)?;
     let out = shell::root().join(&args.out);
     let library = library::read(&impasto)?;
     let (shown, mut failures) = shown(&library);
-    let manifest_path = out.join("images/manifest.json");
+    let manifest_path = out.join(MANIFEST);
     let mut manifest = manifest::read(&manifest_path)?;
     if args.check {
         return check(&shown, failures, &manifest, &out);
@@ -187,6 +190,10 @@ fn update(
                         operations,
                     },
                 );
+                // With every picture, so that one that is interrupted goes on from there.
+                if let Err(why) = manifest::write(&out.join(MANIFEST), manifest) {
+                    failures.push(why);
+                }
             }
             Err(why) => failures.push(why),
         }
