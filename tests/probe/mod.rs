@@ -12,7 +12,9 @@ use impasto::compiler::source::SourceMap;
 pub(crate) fn source(path: &Path) -> Option<String> {
     let folder = path.parent()?.file_name()?.to_str()?;
     let name = path.file_stem()?.to_str()?;
-    let module = parsed(impasto_stdlib::file(folder, name)?.text);
+    let mut module = parsed(impasto_stdlib::file(folder, name)?.text);
+    // What is private shows in what uses it.
+    module.items.retain(|item| !item.private);
     let used = module.items.iter();
     let used = used.filter(|item| is_callable(item) || is_argument(&module, item));
     let names: Vec<&str> = used.map(|item| item.name.node.as_str()).collect();
@@ -52,6 +54,8 @@ fn output(item: &Item) -> Option<(&'static str, &[Param])> {
             "medium" => Some(("emission = probe_uniform(1.0); let _unused", &f.params)),
             _ => None,
         },
+        // With its defaults.
+        ItemKind::Material(_) => Some(("material", &[])),
         _ => None,
     }
 }
@@ -89,7 +93,10 @@ fn functions(module: &Module) -> String {
 }
 
 fn is_callable(item: &Item) -> bool {
-    matches!(item.kind, ItemKind::Function(_) | ItemKind::Closure(_))
+    matches!(
+        item.kind,
+        ItemKind::Function(_) | ItemKind::Closure(_) | ItemKind::Material(_)
+    )
 }
 
 /// Is an item a struct that some function of the module takes?
