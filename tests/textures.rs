@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path as File;
+use std::sync::LazyLock;
 
 use impasto::runtime::technique::{Regeneration, Sampler, Technique};
 use impasto::runtime::world::World;
@@ -10,6 +11,10 @@ use impasto::trace::path::{Replayer, with_room};
 use impasto::{Gpu, GpuOptions, Program, RenderOptions, Renderer, Scene, Strategy};
 
 const SIDE: u32 = 24;
+
+/// One for all tests: some drivers cannot make and drop several at a time.
+static GPU: LazyLock<Gpu> =
+    LazyLock::new(|| Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}")));
 
 /// A board of 2 m, seen from the front or lying on the ground, that shines with the color `expr`.
 struct Board<'a> {
@@ -74,7 +79,6 @@ fn technique() -> Technique {
 }
 
 fn render(scene: &Scene, program: &Program, samples: u32) -> Vec<[f32; 3]> {
-    let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let options = RenderOptions {
         samples,
         seed: 5,
@@ -82,7 +86,7 @@ fn render(scene: &Scene, program: &Program, samples: u32) -> Vec<[f32; 3]> {
         ..RenderOptions::default()
     };
     let plan = impasto::plan(program, Strategy::Own);
-    let renderer = Renderer::new(&gpu, scene, program, &plan, &options);
+    let renderer = Renderer::new(&GPU, scene, program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
