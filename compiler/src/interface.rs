@@ -124,7 +124,7 @@ fn described(
     let params = params.filter_map(|(p, d)| Some(param(sources, p, d.as_ref()?)));
     MaterialInterface {
         name: item.name.node.clone(),
-        docs: item.docs.join("\n"),
+        docs: prose(&item.docs),
         params: params.collect(),
     }
 }
@@ -146,7 +146,7 @@ fn param(sources: &SourceMap, p: &ast::MaterialParam, declared: &Declared) -> Pa
         ty: p.ty.node.clone(),
         label: label.clone().unwrap_or_else(|| readable(&p.name.node)),
         group: group.clone(),
-        docs: p.docs.join("\n"),
+        docs: prose(&p.docs),
         settable,
         default,
         default_text: written.get(p.default.span.range()).unwrap_or("").to_owned(),
@@ -205,5 +205,43 @@ fn readable(name: &str) -> String {
     match label.trim_end() {
         "" => name.to_owned(),
         label => label.to_owned(),
+    }
+}
+
+/// What a line of a doc comment begins with that tells tests of the library what to try, and to
+/// what a definition is held.
+const FOR_TESTS: [&str; 9] = [
+    "Albedo", "Furnace", "Gain", "Gallery", "Range", "Region", "Try", "Value", "Weights",
+];
+
+/// A doc comment as a person reads it: without what is for tests, which goes on to the next empty line
+/// or the next word of the kind.
+fn prose(lines: &[String]) -> String {
+    let mut shown: Vec<&str> = Vec::new();
+    let mut hidden = false;
+    for line in lines {
+        let word = line.split_once(':').map_or("", |(word, _)| word);
+        hidden = !line.is_empty() && (FOR_TESTS.contains(&word) || hidden && word != "Source");
+        if !hidden {
+            shown.push(line);
+        }
+    }
+    shown.join("\n").trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::prose;
+
+    #[test]
+    fn what_is_for_tests_is_not_shown() {
+        let lines =
+            "A metal.\n\nBoth sides: alike.\n\nTry: roughness = 0 |\n    1\nRange: ior = 1 .. 2\n\
+             Source: Walter 2007,\nHeitz 2014.\n\nTry: ior = 3"
+                .lines()
+                .map(str::to_owned);
+        let lines: Vec<String> = lines.collect();
+        let expected = "A metal.\n\nBoth sides: alike.\n\nSource: Walter 2007,\nHeitz 2014.";
+        assert_eq!(prose(&lines), expected);
     }
 }

@@ -101,7 +101,7 @@ fn black_bodies_have_the_color_of_plancks_law() {
          fn rgb(xyz: vec3) -> color = from_xyz(xyz);",
     );
     let curve: Vec<(f64, Vec<f64>)> = (360..830)
-        .map(|nm| f64::from(nm))
+        .map(f64::from)
         .map(|nm| (nm, text.call::<f64>("matching", &[&[nm * 1e-9]])))
         .collect();
     for step in 0..=60 {

@@ -397,7 +397,7 @@ const FRACTALS: [&str; 1] = ["mandelbrot_wall"];
 /// The same for materials whose finest noise is a thousandth of the coordinates that the points have:
 /// there the last digits of a coordinate show in colors and normals.
 const FINE: f64 = 0.05;
-const FINE_NOISES: [&str; 2] = ["verdigris_copper", "wet_asphalt"];
+const FINE_NOISES: [&str; 3] = ["crushed_velvet", "verdigris_copper", "wet_asphalt"];
 
 /// The relative error of all other directions.
 const NEAR: f64 = 1e-3;
