@@ -1,6 +1,6 @@
 //! `impasto fmt`: a source in the one layout that all sources have.
 //!
-//! Only white space, and commas before closing brackets, ever change: [`format`] compares tokens
+//! Only white space, and commas before closing brackets, ever change: [`format()`] compares tokens
 //! and comments before and after, and gives up rather than lose one. Formatting what is formatted
 //! changes nothing.
 //!
