@@ -216,6 +216,15 @@ fn respaced(text: &str, picks: &[u8]) -> String {
     out
 }
 
+/// What breaks lines everywhere, `bsdf` as a type among them.
+#[test]
+fn sources_survive_a_line_for_every_token() {
+    for (path, text) in texts(&["stdlib", "materials"]) {
+        let done = formatted(&respaced(&text, &[0])).unwrap_or_else(|why| panic!("{why}"));
+        assert!(done.is_some(), "{path} parses");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -160,7 +160,9 @@ impl<'t> Balancer<'t> {
         let keyword = match self.tokens[index].0 {
             // `material = ...;` is a statement.
             Material => self.tokens.get(index + 1).is_none_or(|t| t.0 != Assign),
-            Private | Bsdf | Delta | Edf | Fn | Struct | Const | Use => true,
+            // They are types as well, and no name follows those.
+            Bsdf | Edf => self.tokens.get(index + 1).is_none_or(|t| t.0 == Ident),
+            Private | Delta | Fn | Struct | Const | Use => true,
             _ => false,
         };
         keyword && !self.open.is_empty() && self.lines.is_first && self.lines.indent == 0
