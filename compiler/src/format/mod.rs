@@ -45,8 +45,15 @@ pub fn format(file: FileId, text: &str) -> Result<String, Unformatted> {
         return Err(Unformatted::Syntax(diagnostics));
     }
     let (tokens, _) = lex(file, text);
-    let document = layout::Layout::new(trivia::pieces(text, &tokens)).file();
-    let formatted = render::render(&document);
+    let mut formatted = laid_out(file, text);
+    // Comments in odd places may end up where the layout would have put the rest otherwise.
+    for _ in 0..MOST_ROUNDS {
+        let again = laid_out(file, &formatted);
+        if again == formatted {
+            break;
+        }
+        formatted = again;
+    }
     let (after, _) = lex(file, &formatted);
     let kept = significant(text, &tokens) == significant(&formatted, &after)
         && sorted_comments(text, &tokens) == sorted_comments(&formatted, &after);
@@ -55,6 +62,15 @@ pub fn format(file: FileId, text: &str) -> Result<String, Unformatted> {
     } else {
         Err(Unformatted::Lost)
     }
+}
+
+/// A layout is laid out at most so many times more until it stays as it is.
+const MOST_ROUNDS: usize = 4;
+
+fn laid_out(file: FileId, text: &str) -> String {
+    let (tokens, _) = lex(file, text);
+    let document = layout::Layout::new(trivia::pieces(text, &tokens)).file();
+    render::render(&document)
 }
 
 /// All tokens with their texts, but for commas before closing brackets.
