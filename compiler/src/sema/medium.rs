@@ -23,25 +23,16 @@ const IOR: (f64, f64) = (0.1, 10.0);
 /// Turns light forward or backward by at most this mean cosine.
 const MAX_ANISOTROPY: f64 = 0.99;
 
-/// A value of a medium and what it may be.
-#[derive(Clone, Copy)]
-struct Limits {
-    name: &'static str,
-    range: (f64, f64),
-    unit: &'static str,
-}
-
-const fn limits(name: &'static str, range: (f64, f64), unit: &'static str) -> Limits {
-    Limits { name, range, unit }
-}
+/// What the values of a medium may be: from where to where, and their unit.
+type Limits = ((f64, f64), &'static str);
 
 /// The limits of [`Interior::PARTS`].
 const LIMITS: [Limits; Interior::PARTS.len()] = [
-    limits("absorption", (0.0, f64::INFINITY), " 1/m"),
-    limits("ior", IOR, ""),
-    limits("priority", (0.0, MAX_PRIORITY as f64), ""),
-    limits("scattering", (0.0, f64::INFINITY), " 1/m"),
-    limits("anisotropy", (-MAX_ANISOTROPY, MAX_ANISOTROPY), ""),
+    ((0.0, f64::INFINITY), " 1/m"),
+    (IOR, ""),
+    ((0.0, MAX_PRIORITY as f64), ""),
+    ((0.0, f64::INFINITY), " 1/m"),
+    ((-MAX_ANISOTROPY, MAX_ANISOTROPY), ""),
 ];
 
 /// The values of a medium that does nothing, which are the defaults.
@@ -89,9 +80,10 @@ impl Body<'_, '_> {
             return self.report(wrong);
         }
         let values = self.value_arguments(callee, args, &parameters())?;
-        let mut parts = [*values.first()?; Interior::PARTS.len()];
-        for (part, (value, limits)) in parts.iter_mut().zip(values.iter().zip(LIMITS)) {
-            *part = self.limited(*value, limits)?;
+        let mut parts: [ExprId; Interior::PARTS.len()] = values.try_into().ok()?;
+        for (part, ((name, _), limits)) in parts.iter_mut().zip(Interior::PARTS.iter().zip(LIMITS))
+        {
+            *part = self.limited(*part, name, limits)?;
         }
         let when = None;
         self.media.push(Interior { when, parts, span });
@@ -99,12 +91,8 @@ impl Body<'_, '_> {
     }
 
     /// `id` kept between `low` and `high`; a constant outside is an error.
-    fn limited(&mut self, id: ExprId, limits: Limits) -> Option<ExprId> {
-        let Limits {
-            name,
-            range: (low, high),
-            unit,
-        } = limits;
+    fn limited(&mut self, id: ExprId, name: &str, limits: Limits) -> Option<ExprId> {
+        let ((low, high), unit) = limits;
         let span = self.builder.function().expr(id).span;
         let components = match self.builder.function().constant(id) {
             Some(Const::Float(v)) => v.clone(),

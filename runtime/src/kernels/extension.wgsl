@@ -53,7 +53,7 @@ fn extension(request: u32) {
 #endif
 #if scattering
 
-// A flight that begins where the path is, with the path's pixel, sample and vertex.
+// The pixel, sample and vertex of a path.
 fn path_of(slot: u32) -> vec3<u32> {
     let vertex = load_radiance(slot).flags & DEPTH_MASK;
     return vec3<u32>(load_ray_origin(slot).pixel, load_ray_direction(slot).sample, vertex);
