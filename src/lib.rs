@@ -18,7 +18,7 @@
 //! let plan = impasto::plan(&program, Strategy::Own);
 //! let options = RenderOptions { samples: 16, ..RenderOptions::default() };
 //! let rendering = impasto::render(&scene, &program, &plan, &options)?;
-//! impasto::runtime::output::write(&rendering.film, "cornell.png".as_ref(), 0.0)?;
+//! impasto::runtime::film::output::write(&rendering.film, "cornell.png".as_ref(), 0.0)?;
 //! # Ok(())
 //! # }
 //! ```
@@ -37,9 +37,11 @@ pub use compiler::{Compilation, MaterialRequest, Program};
 pub use files::FileLoader;
 pub use ir_text::ir_text;
 pub use runtime::error::RuntimeError;
+pub use runtime::error::SceneError;
 pub use runtime::gpu::{Gpu, GpuOptions};
-pub use runtime::render::{RenderOptions, Renderer, Rendering};
-pub use runtime::scene::{Scene, SceneError};
+pub use runtime::options::RenderOptions;
+pub use runtime::render::{Renderer, Rendering};
+pub use runtime::scene::Scene;
 
 pub mod calibrate;
 pub mod converge;

@@ -6,9 +6,9 @@ use std::path::Path;
 use glam::Vec3;
 use impasto::converge::metrics::mean_squared;
 use impasto::runtime::render::Samples;
+use impasto::runtime::render::until::{Ending, Goals, second_seed};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Sampler, Technique};
-use impasto::runtime::until::{Ending, Goals, second_seed};
 use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Scene, Strategy};
 
 /// The box without caustics and without the lamp in the picture, whose few pixels would need far more

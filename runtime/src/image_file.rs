@@ -11,7 +11,7 @@ use image::{
     DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits,
 };
 
-use crate::scene::SceneError;
+use crate::error::SceneError;
 
 /// Texels a side of the largest picture that is read.
 pub(crate) const MAX_SIDE: u32 = 16_384;

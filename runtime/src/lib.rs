@@ -1,55 +1,30 @@
 //! The wavefront path tracer that runs compiled Impasto materials.
 //!
-//! The scene side turns files into [`shader_part::ShaderPart`]s: WGSL text and the buffers it
-//! reads. The GPU side composes kernels of them and of compiled materials, as a plan says; a
-//! [`render::Renderer`] dispatches those until every path is done, and gives a [`film::Film`]
-//! and a [`report::Report`]. Between the two lies [`world::World`].
+//! The folders are layers, and each names only those before it:
+//!
+//! | layer | does |
+//! |---|---|
+//! | [`error`], [`options`], [`technique`], [`film`], `wgsl` | what every layer may name |
+//! | [`scene`] | files to a [`scene::Scene`] |
+//! | [`world`] | a scene as kernels read it: [`wgsl::ShaderPart`]s, which are WGSL text with the buffers that it reads |
+//! | `kernels` | the text of every kernel that a plan needs |
+//! | [`gpu`] | device, pipelines, buffers, dispatches |
+//! | [`render`] | a [`render::Renderer`] dispatches kernels until every path is done, and gives a [`film::Film`] and a [`render::report::Report`] |
+//! | [`lab`], [`audit`], [`trace`] | experiments on top of all |
 
-pub mod bvh;
-pub mod camera;
-mod compose;
-mod cones;
-pub mod dropped;
+pub mod audit;
 pub mod error;
 pub mod film;
-pub mod film_file;
 mod fingerprint;
-pub mod first_hit;
-
 pub mod gpu;
 mod image_file;
+pub mod kernels;
 pub mod lab;
-mod layout;
-pub mod lights;
-pub mod media;
-mod modules;
-pub mod needs;
-mod order;
-pub mod output;
+pub mod options;
 mod parallel;
-pub mod passes;
-mod pool;
-mod profile;
-mod queues;
-pub mod random;
-pub mod rays;
 pub mod render;
-pub mod report;
-mod resources;
 pub mod scene;
-mod schedule;
-mod settings;
-pub mod shader_part;
-mod shells;
-mod stages;
-mod state;
-mod status;
 pub mod technique;
-mod text;
-pub mod texture;
 pub mod trace;
-pub mod until;
-mod wavefront;
-mod wgsl;
-mod workload;
+pub mod wgsl;
 pub mod world;

@@ -8,7 +8,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::gpu::Gpu;
-use crate::needs::Needs;
+use crate::world::needs::Needs;
 
 /// A choice between techniques, each with a name on the command line.
 pub trait Choice: Copy + PartialEq + 'static {

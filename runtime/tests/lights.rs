@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
-use impasto_runtime::lights;
 use impasto_runtime::scene::Scene;
+use impasto_runtime::world::lights;
 use support::light_scenes::{
     Sample, dark_scene, distant, emissive, evaluate, map_scene, met, mixed_scene, parts, push_quad,
     push_triangle, quad, sample, sample_with, scenes, uniform_environment,

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::{Loader, MaterialRequest, Program, compile, diag};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 use support::{Random, Row, floats, row, run};
 
 const QUERIES: usize = 400;

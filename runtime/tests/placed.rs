@@ -5,14 +5,14 @@ mod support;
 
 use glam::{DVec3, Vec2, Vec3};
 use impasto_compiler::abi::{Emission, InstanceInfo, Medium};
-use impasto_runtime::bvh::Bvh;
-use impasto_runtime::lights::NO_LIGHT;
-use impasto_runtime::scene::surface::{geometry_part, surface_part};
-use impasto_runtime::scene::{
-    Mesh, NO_MATERIAL, Object, Placed, Placement, Scene, Split, Transform,
-};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::scene::{Mesh, NO_MATERIAL, Object, Placement, Scene, Transform};
 use impasto_runtime::technique::{Copies, Stack, Technique, Traversal};
+use impasto_runtime::wgsl::ShaderPart;
+use impasto_runtime::world::Placed;
+use impasto_runtime::world::Split;
+use impasto_runtime::world::bvh::Bvh;
+use impasto_runtime::world::lights::NO_LIGHT;
+use impasto_runtime::world::surface::{geometry_part, surface_part};
 use support::light_scenes::dark_scene;
 use support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 

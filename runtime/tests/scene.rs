@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
-use impasto_runtime::scene::{
-    EnvironmentSource, Integrator, Light, NO_MATERIAL, Scene, SceneError, load,
-};
+use impasto_runtime::error::SceneError;
+use impasto_runtime::scene::{EnvironmentSource, Integrator, Light, NO_MATERIAL, Scene, load};
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -8,10 +8,11 @@ use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 use impasto_compiler::abi::{TextureRef, TextureSpace};
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile};
-use impasto_runtime::scene::surface::{geometry_part, surface_part};
-use impasto_runtime::scene::{Mesh, NO_MATERIAL, SceneError};
-use impasto_runtime::shader_part::ShaderPart;
-use impasto_runtime::texture;
+use impasto_runtime::error::SceneError;
+use impasto_runtime::scene::{Mesh, NO_MATERIAL};
+use impasto_runtime::wgsl::ShaderPart;
+use impasto_runtime::world::surface::{geometry_part, surface_part};
+use impasto_runtime::world::texture;
 use support::{Random, Row, floats, row, run};
 
 /// A mesh with one entry a triangle: corners, vertex normals, texture coordinates.

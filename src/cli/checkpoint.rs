@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use impasto::runtime::film_file::FilmFile;
-use impasto::runtime::passes::Keeping;
-use impasto::runtime::render::Progress;
+use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::options::Progress;
+use impasto::runtime::render::passes::Keeping;
 use impasto::{Renderer, Rendering, RuntimeError, files};
 
 use super::{Failure, Global};

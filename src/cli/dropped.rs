@@ -1,7 +1,7 @@
 //! What `render` says of samples that were left out, and how their paths can be replayed.
 
-use impasto::runtime::dropped::{Dropped, Example};
-use impasto::runtime::report::Report;
+use impasto::runtime::kernels::dropped::{Dropped, Example};
+use impasto::runtime::render::report::Report;
 use impasto::runtime::technique::{Choice, Sampler};
 
 use super::render::RenderArgs;

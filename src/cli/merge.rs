@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use impasto::runtime::film_file::{FilmFile, Range};
+use impasto::runtime::film::file::{FilmFile, Range};
 
 use super::outputs::{Outputs, parse_exposure};
 use super::{Global, Outcome, count, runtime};

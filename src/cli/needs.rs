@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use impasto::runtime::needs::saved::{Extent, NeedReport, NeedsReport, report};
+use impasto::runtime::audit::{Extent, NeedReport, NeedsReport, report};
 use impasto::runtime::technique::Technique;
 use impasto::runtime::world::World;
 use impasto::{Program, Scene};

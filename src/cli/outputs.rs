@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use impasto::files;
 use impasto::runtime::film::Film;
-use impasto::runtime::film_file::FilmFile;
-use impasto::runtime::output;
+use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::film::output;
 
 use super::Failure;
 

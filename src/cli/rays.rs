@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use impasto::runtime::rays::{RayOptions, RayRate, measure, techniques};
+use impasto::runtime::lab::rays::{RayOptions, RayRate, measure, techniques};
 use impasto::runtime::technique::{Choice, Technique};
 
 use super::info::GpuArgs;

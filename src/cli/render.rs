@@ -11,12 +11,13 @@ use std::time::Instant;
 use clap::Args;
 use impasto::compiler::partition::{Known, Needs, Wanted};
 use impasto::compiler::{self, Loader};
-use impasto::runtime::film_file::FilmFile;
-use impasto::runtime::media::MAX_NESTED;
-use impasto::runtime::render::{Progress, Replanning};
-use impasto::runtime::report::{MaterialReport, ReplanReport, Report};
+use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::options::Progress;
+use impasto::runtime::render::Replanning;
+use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
+use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::FilmSettings;
-use impasto::runtime::until::{Check, Ending, Goals};
+use impasto::runtime::world::media::MAX_NESTED;
 use impasto::{
     FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files, plan,
 };

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use clap::Args;
-use impasto::runtime::report::Report;
-use impasto::runtime::until::{Check, Ending, Goals, LEAST_SAMPLES};
+use impasto::runtime::render::report::Report;
+use impasto::runtime::render::until::{Check, Ending, Goals, LEAST_SAMPLES};
 
 use super::Failure;
 use super::outputs::Outputs;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use impasto_runtime::report::AdapterReport;
+use impasto_runtime::render::report::AdapterReport;
 use impasto_runtime::technique::Sampler;
 use serde::{Deserialize, Serialize};
 

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use impasto_compiler::partition::Plan;
-use impasto_runtime::first_hit;
-use impasto_runtime::render::{RenderOptions, Renderer, Samples};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::{Renderer, Samples};
 use impasto_runtime::technique::Sampler;
+use impasto_runtime::world::first_hit;
 
 use super::StudyError;
 use super::data::MaterialShare;

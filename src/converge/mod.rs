@@ -5,7 +5,7 @@
 //! keeps every step in a folder (`store`), from which it goes on after it was ended.
 
 use impasto_runtime::error::RuntimeError;
-use impasto_runtime::scene::SceneError;
+use impasto_runtime::error::SceneError;
 
 pub mod compare;
 pub mod data;

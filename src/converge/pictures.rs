@@ -7,7 +7,7 @@ use std::path::Path;
 
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Film;
-use impasto_runtime::output;
+use impasto_runtime::film::output;
 use impasto_runtime::technique::Sampler;
 
 /// The pictures of all scenes, in the order of [`Convergence::scenes`](super::data::Convergence).

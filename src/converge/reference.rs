@@ -10,7 +10,7 @@
 
 use impasto_compiler::partition::Plan;
 use impasto_runtime::film::Film;
-use impasto_runtime::film_file::FilmFile;
+use impasto_runtime::film::file::FilmFile;
 use impasto_runtime::render::{Renderer, Samples};
 use impasto_runtime::technique::Sampler;
 

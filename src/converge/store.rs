@@ -9,9 +9,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use impasto_runtime::film::Film;
-use impasto_runtime::film_file::FilmFile;
-use impasto_runtime::output;
-use impasto_runtime::report::AdapterReport;
+use impasto_runtime::film::file::FilmFile;
+use impasto_runtime::film::output;
+use impasto_runtime::render::report::AdapterReport;
 use impasto_runtime::technique::{Choice, Sampler};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use impasto_compiler::partition::{Plan, Wanted};
 use impasto_runtime::film::Film;
+use impasto_runtime::film::output;
 use impasto_runtime::gpu::Gpu;
-use impasto_runtime::output;
 use impasto_runtime::technique::{Choice, Sampler};
 
 use super::data::{Errors, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series};

@@ -3,7 +3,8 @@
 use impasto_compiler::Program;
 use impasto_compiler::partition::{DeviceProfile, Known, Needs, Plan, Wanted};
 use impasto_runtime::gpu::Gpu;
-use impasto_runtime::render::{RenderOptions, identity};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::identity;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Sampler, Technique};
 use impasto_runtime::world::World;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use impasto::converge::data::{Convergence, Metric, Point};
 use impasto::runtime::film::Film;
-use impasto::runtime::output;
+use impasto::runtime::film::output;
 use serde_json::Value;
 
 use crate::common::{Run, SCENE, command, folder, impasto, names, write};

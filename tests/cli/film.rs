@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impasto::runtime::film_file::FilmFile;
+use impasto::runtime::film::file::FilmFile;
 
 use crate::common::{Run, SCENE, command, folder, impasto, names, write};
 

@@ -5,7 +5,7 @@ mod case;
 
 use case::{Case, SIZE, Square};
 use impasto::Strategy;
-use impasto::runtime::needs::saved;
+use impasto::runtime::audit;
 use impasto::runtime::technique::Technique;
 use impasto::runtime::world::World;
 use impasto::trace::MaterialCode;
@@ -286,7 +286,7 @@ fn a_width_that_a_parameter_takes_away_costs_nothing() {
         let technique = Technique::default();
         let world = World::of_program(&scene, &program, &technique);
         let world = world.unwrap_or_else(|e| panic!("{e}"));
-        let report = saved::report(&world, &program, technique).unwrap_or_else(|e| panic!("{e}"));
+        let report = audit::report(&world, &program, technique).unwrap_or_else(|e| panic!("{e}"));
         let needed = report.rows.into_iter().filter(|row| row.because.is_some());
         let names: Vec<&str> = needed.map(|row| row.name).collect();
         (names, report.extent.path_bytes)

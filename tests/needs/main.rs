@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use impasto::runtime::needs::saved::{self, KernelText, NeedsReport};
+use impasto::runtime::audit::{self, KernelText, NeedsReport};
 use impasto::runtime::technique::{Features, Technique};
 use impasto::runtime::world::World;
 use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
@@ -35,7 +35,7 @@ const GENERATED: [&str; 9] = [
 
 #[test]
 fn every_row_has_one_pair() {
-    let rows: Vec<&str> = saved::rows().map(|(name, _)| name).collect();
+    let rows: Vec<&str> = audit::rows().map(|(name, _)| name).collect();
     for row in &rows {
         let count = PAIRS.iter().filter(|pair| pair.row == *row).count();
         let elsewhere = HELD_ELSEWHERE.iter().filter(|(name, _)| name == row);
@@ -222,12 +222,12 @@ impl Kernels {
             ..
         } = scene;
         let report: NeedsReport =
-            saved::report(world, program, *technique).unwrap_or_else(|e| panic!("{e}"));
+            audit::report(world, program, *technique).unwrap_or_else(|e| panic!("{e}"));
         let needed = report.rows.iter().filter(|row| row.because.is_some());
         Self {
             needed: needed.map(|row| row.name).collect(),
             path_bytes: report.extent.path_bytes,
-            texts: saved::kernels(world, program, *technique).unwrap_or_else(|e| panic!("{e}")),
+            texts: audit::kernels(world, program, *technique).unwrap_or_else(|e| panic!("{e}")),
         }
     }
 
@@ -287,12 +287,12 @@ fn the_documentation_lists_every_row() {
             Some((cells.next()?.trim(), cells.next()?.trim()))
         })
         .collect();
-    for (name, when) in saved::rows() {
+    for (name, when) in audit::rows() {
         assert_eq!(listed.get(name), Some(&when), "the line of `{name}`");
     }
     assert_eq!(
         listed.len(),
-        saved::rows().count() + 1,
+        audit::rows().count() + 1,
         "rows and a heading"
     );
 }
@@ -308,7 +308,7 @@ fn forcing_everything_forces_what_can_be() {
     };
     let world = World::of_program(&scene.scene, &scene.program, &technique);
     let world = world.unwrap_or_else(|e| panic!("{e}"));
-    let texts = saved::kernels(&world, &scene.program, technique).unwrap_or_else(|e| panic!("{e}"));
+    let texts = audit::kernels(&world, &scene.program, technique).unwrap_or_else(|e| panic!("{e}"));
     let all: String = texts.iter().map(|k| k.wgsl.as_str()).collect();
     for function in [
         "sample_mesh_light",

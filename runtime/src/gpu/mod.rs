@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::RuntimeError;
 
 mod info;
+pub(crate) mod resources;
+pub(crate) mod schedule;
 pub(crate) mod shader;
 pub(crate) mod statistics;
 mod timing;

@@ -4,8 +4,8 @@
 use wgpu::naga;
 
 use super::Gpu;
-use crate::bvh;
 use crate::error::RuntimeError;
+use crate::world::bvh;
 
 /// Parses and validates `wgsl`, the text of the kernel called `kernel`.
 pub(crate) fn validate(

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use super::snapshot::Snapshot;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::queues::Counters;
-use crate::resources::Resources;
-use crate::schedule::Schedule;
-use crate::status::{Flight, Status};
+use crate::gpu::resources::Resources;
+use crate::gpu::schedule::Schedule;
+use crate::kernels::queues::Counters;
+use crate::render::status::{Flight, Status};
 
 /// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
 const WARM_UP: Duration = Duration::from_millis(200);

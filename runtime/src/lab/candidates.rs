@@ -9,11 +9,11 @@ use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel};
 use super::bench::Run;
 use super::{Candidate, Lab, Unmeasured};
 use crate::error::RuntimeError;
+use crate::gpu::resources::Resources;
+use crate::gpu::schedule::{Schedule, Step};
 use crate::gpu::{Gpu, KernelStatistics};
-use crate::modules::{Composer, Feed, Kernel, Recipe, Sizes};
+use crate::kernels::modules::{Composer, Feed, Kernel, Recipe, Sizes};
 use crate::render::build_step;
-use crate::resources::Resources;
-use crate::schedule::{Schedule, Step};
 
 /// Kernels built so far, by their text; or why they could not be.
 pub(super) type Cache = BTreeMap<String, Result<Step, Unmeasured>>;

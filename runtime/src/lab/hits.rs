@@ -5,7 +5,7 @@ use impasto_compiler::partition::{Form, Plan};
 
 use super::{Candidate, Lab};
 use crate::error::RuntimeError;
-use crate::queues::Queues;
+use crate::kernels::queues::Queues;
 
 impl Lab<'_> {
     /// Counts the hits of each material, and the blocks of neighbouring slots with any.

@@ -10,20 +10,23 @@ use impasto_compiler::partition::{Form, Plan, Workload};
 use serde::Serialize;
 
 use crate::error::RuntimeError;
+use crate::gpu::resources::Resources;
 use crate::gpu::statistics::Statistics;
 use crate::gpu::{Gpu, KernelStatistics, Timing};
-use crate::modules::{Composer, Sizes};
-use crate::pool;
-use crate::render::{ENDLESS, Makings, RenderOptions};
-use crate::resources::Resources;
-use crate::settings;
+use crate::kernels::modules::{Composer, Sizes};
+use crate::options::ENDLESS;
+use crate::options::RenderOptions;
+use crate::render::Makings;
+use crate::render::pool;
+use crate::render::settings;
+use crate::render::workload;
 use crate::technique::Technique;
-use crate::workload;
 use crate::world::{MaterialSource, World};
 
 mod bench;
 mod candidates;
 mod hits;
+pub mod rays;
 mod snapshot;
 
 use bench::{Run, Sample};

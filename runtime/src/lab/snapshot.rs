@@ -6,8 +6,8 @@
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::queues::Counters;
-use crate::resources::Resources;
+use crate::gpu::resources::Resources;
+use crate::kernels::queues::Counters;
 
 /// The buffers that paths live in.
 const BUFFERS: [&str; 3] = ["state", "extension_hits", "shadow_results"];

@@ -12,10 +12,10 @@ use super::Planner;
 use super::build::{Makings, Ready, build_all, build_step};
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::modules::Kernel;
-use crate::needs::Need;
-use crate::schedule::{Schedule, Step};
+use crate::gpu::schedule::{Schedule, Step};
+use crate::kernels::modules::Kernel;
 use crate::technique::Technique;
+use crate::world::needs::Need;
 use crate::world::{MaterialSource, World};
 
 /// Compiling materials recurses.

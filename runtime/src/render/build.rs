@@ -9,21 +9,21 @@ use impasto_compiler::partition::workload::BLOCK;
 
 use super::{Facts, RenderOptions, Renderer};
 use crate::error::RuntimeError;
-use crate::film_file::Identity;
+use crate::film::file::Identity;
 use crate::gpu::Gpu;
-use crate::layout::Layout;
-use crate::modules::{Composer, Feed, Kernel, Sizes};
-use crate::needs::{Facts as NeedFacts, Need, Needs};
-use crate::pool;
-use crate::random::{self, Demand};
-use crate::report::MaterialReport;
-use crate::resources::Resources;
+use crate::gpu::resources::Resources;
+use crate::gpu::schedule::{Schedule, Size, Step};
+use crate::kernels::layout::Layout;
+use crate::kernels::modules::{Composer, Feed, Kernel, Sizes};
+use crate::kernels::random::{self, Demand};
+use crate::render::pool;
+use crate::render::report::MaterialReport;
+use crate::render::settings;
+use crate::render::workload;
 use crate::scene::Scene;
-use crate::schedule::{Schedule, Size, Step};
-use crate::settings;
-use crate::shader_part::{BufferData, ShaderPart};
 use crate::technique::Technique;
-use crate::workload;
+use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::needs::{Facts as NeedFacts, Need, Needs};
 use crate::world::{MaterialSource, World};
 
 /// A plan that can run: its kernels, and the buffers they work in.

@@ -9,10 +9,10 @@ use std::ops::ControlFlow;
 
 use super::{Progress, Renderer};
 use crate::error::RuntimeError;
-use crate::passes::Pass;
-use crate::pool::{self, Pace};
-use crate::queues::{Queues, Scalar};
-use crate::status::{Flight, Status};
+use crate::kernels::queues::{Queues, Scalar};
+use crate::render::passes::Pass;
+use crate::render::pool::{self, Pace};
+use crate::render::status::{Flight, Status};
 
 /// Submissions in flight.
 const FLIGHTS: usize = 2;

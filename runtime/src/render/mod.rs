@@ -6,9 +6,15 @@ mod background;
 mod build;
 mod iterate;
 mod observe;
+pub mod passes;
+pub(crate) mod pool;
 mod replan;
+pub mod report;
 mod selection;
-mod until;
+pub(crate) mod settings;
+pub(crate) mod status;
+pub mod until;
+pub(crate) mod workload;
 
 pub use build::identity;
 pub(crate) use build::{Makings, build_step};
@@ -17,75 +23,25 @@ pub use replan::{Planner, Replanning};
 pub use selection::Samples;
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use impasto_compiler::partition::Workload;
 
-use crate::dropped::Dropped;
 use crate::error::RuntimeError;
+use crate::film::file::{FilmFile, Identity, Range};
 use crate::film::{Film, Sums};
-use crate::film_file::{FilmFile, Identity, Range};
 use crate::gpu::{Gpu, Timing};
-use crate::passes::{Keeping, Pass, Passes};
-use crate::queues::Scalar;
-use crate::report::{MaterialReport, Report, Resumed};
-use crate::scene::GeometryCounts;
-use crate::status::Status;
-use crate::technique::Technique;
-use crate::workload::Mark;
+use crate::kernels::dropped::Dropped;
+use crate::kernels::queues::Scalar;
+use crate::options::{Progress, RenderOptions};
+use crate::render::passes::{Keeping, Pass, Passes};
+use crate::render::report::{MaterialReport, Report, Resumed};
+use crate::render::status::Status;
+use crate::render::workload::Mark;
+use crate::world::GeometryCounts;
 use crate::world::World;
 use build::Ready;
 use replan::{Change, Replan};
-
-/// Samples a pixel that no number of iterations uses up, for those who look on and want no picture.
-pub(crate) const ENDLESS: u32 = 1 << 24;
-
-/// What to render of a world.
-#[derive(Clone, Debug)]
-pub struct RenderOptions {
-    /// Samples in each pixel, at least 1.
-    pub samples: u32,
-    /// Index of each pixel's first sample: renders of disjoint ranges are independent and may
-    /// be averaged.
-    pub first_sample: u32,
-    /// The seed of all random numbers.
-    pub seed: u32,
-    /// Paths in flight; chosen by the size of the picture and the GPU if `None`.
-    pub pool: Option<u32>,
-    /// How the work is done.
-    pub technique: Technique,
-    /// Whether a wavefront's logic kernel counts what paths hit, for the report's workload.
-    pub count_hits: bool,
-    /// The pixels to render, ascending, each as row x width + column; all if `None`. The others have no
-    /// samples, and those given have the bits that they have in the whole picture.
-    pub pixels: Option<Arc<[u32]>>,
-}
-
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            samples: 16,
-            first_sample: 0,
-            seed: 0,
-            pool: None,
-            technique: Technique::default(),
-            count_hits: false,
-            pixels: None,
-        }
-    }
-}
-
-/// How far a render is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// Paths finished.
-    pub paths: u64,
-    /// Paths in all.
-    pub total: u64,
-    /// Time since the render began.
-    pub elapsed: Duration,
-}
 
 /// A finished (or stopped) render.
 #[derive(Clone, Debug)]
@@ -268,7 +224,7 @@ impl<'g> Renderer<'g> {
     }
 
     fn report(&self, status: &Status, film: &Film, resumed: Resumed, wall_seconds: f64) -> Report {
-        crate::report::Inputs {
+        crate::render::report::Inputs {
             resumed,
             gpu: self.gpu.info(),
             options: &self.options,

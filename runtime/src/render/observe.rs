@@ -3,12 +3,13 @@
 
 use impasto_compiler::partition::Workload;
 
-use super::{ENDLESS, RenderOptions, Renderer};
+use super::Renderer;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::status::{Flight, Status};
+use crate::options::{ENDLESS, RenderOptions};
+use crate::render::status::{Flight, Status};
+use crate::render::workload::Mark;
 use crate::technique::Technique;
-use crate::workload::Mark;
 use crate::world::{MaterialSource, World};
 
 /// Iterations until the mixture of paths is steady, at most: paths of a pool begin together, and

@@ -14,11 +14,11 @@ use impasto_compiler::partition::{Form, Plan, Workload};
 use super::Renderer;
 use super::background::{Job, Made};
 use super::build::Ready;
-use crate::dropped::Dropped;
-use crate::queues::{Counters, Queues};
-use crate::report::{Ran, ReplanReport, partition};
-use crate::status::{Before, Status};
-use crate::workload::Mark;
+use crate::kernels::dropped::Dropped;
+use crate::kernels::queues::{Counters, Queues};
+use crate::render::report::{Ran, ReplanReport, partition};
+use crate::render::status::{Before, Status};
+use crate::render::workload::Mark;
 use crate::world::MaterialSource;
 
 /// Makes a plan for a workload, or says why there is none. It runs on a thread of its own.

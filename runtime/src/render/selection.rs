@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{RenderOptions, Renderer};
 use crate::error::RuntimeError;
 use crate::fingerprint::Fingerprint;
-use crate::settings;
+use crate::render::settings;
 
 /// Which samples of every pixel a render takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -7,14 +7,15 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::MAX_TRIANGLES;
 use super::bindings::Bindings;
 use super::description::{Description, GeometrySpec};
 use super::load::Source;
 use super::mesh::{MAX_COORDINATE, Oddities};
 use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
-use super::split::MAX_TRIANGLES;
-use super::{Light, MaterialBinding, Mesh, Object, Placement, SceneError, Transform};
+use super::{Light, MaterialBinding, Mesh, Object, Placement, Transform};
+use crate::error::SceneError;
 
 /// Copies of an OBJ file are shared if that saves so many triangles. Below, one level of
 /// hierarchy is faster than two (docs/measurements.md), and memory no concern.

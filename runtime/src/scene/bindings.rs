@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::diag::nearest;
 
+use super::MaterialBinding;
 use super::description::{MaterialName, MaterialSpec, ParamSpec};
 use super::document::list;
-use super::{MaterialBinding, SceneError};
+use crate::error::SceneError;
 
 /// The name whose binding serves every name without one of its own.
 const WILDCARD: &str = "*";

@@ -7,10 +7,9 @@ use toml::de::DeValue;
 use super::document::{Document, Table, Value, numbers};
 use super::mtl::MtlValue;
 use super::placements::{self, PlacesSpec};
-use super::{
-    Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, SceneError, Transform,
-};
-use crate::media::MAX_NESTED;
+use super::{Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, Transform};
+use crate::error::SceneError;
+use crate::world::media::MAX_NESTED;
 
 /// Pixels a side of the largest film.
 const MAX_FILM: u32 = 16_384;

@@ -9,7 +9,7 @@ use impasto_compiler::diag::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::SceneError;
+use crate::error::SceneError;
 
 /// The text of a TOML file.
 pub(super) struct Document<'d> {

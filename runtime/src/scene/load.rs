@@ -11,7 +11,8 @@ use super::bindings::Library;
 use super::description::{Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec};
 use super::document::Document;
 use super::obj::{self, Obj};
-use super::{Environment, EnvironmentMap, EnvironmentSource, Scene, SceneError, mtl};
+use super::{Environment, EnvironmentMap, EnvironmentSource, Scene, mtl};
+use crate::error::SceneError;
 use crate::image_file;
 
 /// Texels of the largest environment map.

@@ -5,7 +5,11 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::obj::{Obj, ObjTriangle};
-use super::{QuadLight, SceneError, Transform};
+use super::{QuadLight, Transform};
+use crate::error::SceneError;
+
+/// Most triangles that are stored: what a binding of 4 GiB holds.
+pub(crate) const MAX_TRIANGLES: usize = (u32::MAX / 48) as usize;
 
 /// Material of a triangle that has none: the geometry of a quad light.
 pub const NO_MATERIAL: u32 = u32::MAX;
@@ -52,7 +56,7 @@ impl Mesh {
     }
 
     /// Drops lists that say nothing.
-    pub(super) fn simplify(&mut self) {
+    pub(crate) fn simplify(&mut self) {
         if self.normals.iter().all(Option::is_none) {
             self.normals.clear();
         }
@@ -113,7 +117,7 @@ impl Mesh {
 
     /// Adds a copy of the triangles of `object` that `keep` keeps, with its materials looked up
     /// in `materials`.
-    pub(super) fn push_copy(
+    pub(crate) fn push_copy(
         &mut self,
         object: &Mesh,
         keep: impl Fn(usize) -> bool,
@@ -173,7 +177,7 @@ impl Mesh {
     }
 
     /// The triangles that `keep` keeps.
-    pub(super) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Mesh {
+    pub(crate) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Mesh {
         let kept: Vec<usize> = (0..self.len()).filter(|t| keep(*t)).collect();
         fn pick<T: Clone>(list: &[T], kept: &[usize]) -> Vec<T> {
             kept.iter().filter_map(|&t| list.get(t).cloned()).collect()
@@ -190,7 +194,7 @@ impl Mesh {
     }
 
     /// The lists that say nothing, made to say it for each triangle.
-    pub(super) fn spell_out(&mut self) {
+    pub(crate) fn spell_out(&mut self) {
         self.normals.resize(self.len(), None);
         self.uvs.resize(self.len(), [Vec2::ZERO; 3]);
     }

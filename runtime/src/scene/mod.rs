@@ -13,25 +13,17 @@ mod bindings;
 mod bound;
 mod description;
 mod document;
-mod error;
 mod load;
 mod mesh;
 mod mtl;
 mod obj;
 mod origin;
-mod parts;
-mod placed;
 mod placements;
-mod split;
-pub mod surface;
 mod transform;
 
-pub use error::SceneError;
 pub use load::load;
+pub(crate) use mesh::MAX_TRIANGLES;
 pub use mesh::{Mesh, NO_MATERIAL};
-pub use parts::{SceneParts, Sources};
-pub use placed::Placed;
-pub use split::{GeometryCounts, Split};
 pub use transform::Transform;
 
 /// Everything a scene file names, loaded and checked.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::SceneError;
 use super::description::{array_source, float_source};
+use crate::error::SceneError;
 
 /// A value of an MTL material, written `$Kd` and so on in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::SceneError;
+use crate::error::SceneError;
 
 /// The triangles of an OBJ file, in its order.
 pub(super) struct Obj {

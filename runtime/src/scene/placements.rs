@@ -6,9 +6,10 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use toml::de::DeValue;
 
+use super::Transform;
 use super::description::MaterialName;
 use super::document::{Table, Value, list};
-use super::{SceneError, Transform};
+use crate::error::SceneError;
 
 /// Most placements of one entry, and of a scene.
 pub(super) const MAX_PLACEMENTS: usize = 1 << 24;

@@ -9,7 +9,7 @@ use super::machine::Host;
 use super::materials::Materials;
 use super::path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
 use super::signature::Signature;
-use crate::dropped;
+use crate::kernels::dropped;
 
 /// The functions whose calls are looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

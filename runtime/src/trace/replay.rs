@@ -19,15 +19,15 @@ use super::record::{self, Names, Recorder};
 use super::textures::Textures;
 use super::{LIMIT, lower};
 use crate::film::{self, Sums};
-use crate::layout::Layout;
-use crate::modules::{Composer, Sizes};
-use crate::queues::{Counters, Scalar};
-use crate::random::{self, Demand};
-use crate::render::RenderOptions;
-use crate::resources::run_words;
-use crate::settings;
-use crate::shader_part::BufferData;
+use crate::gpu::resources::run_words;
+use crate::kernels::layout::Layout;
+use crate::kernels::modules::{Composer, Sizes};
+use crate::kernels::queues::{Counters, Scalar};
+use crate::kernels::random::{self, Demand};
+use crate::options::RenderOptions;
+use crate::render::settings;
 use crate::technique::{Regeneration, Sampler, Technique};
+use crate::wgsl::BufferData;
 use crate::world::{MaterialSource, World};
 
 /// Bytes of the stack that code is interpreted on: blocks within blocks are calls within calls.

@@ -1,7 +1,8 @@
 //! Ways to cast rays are ways to find the same hits: pictures of a room of several lights, with a
 //! mirrored ball of a thousand triangles in it, do not depend on them.
 
-use impasto_runtime::render::{RenderOptions, Rendering};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal};
 
 use crate::scene::{load, render, room};

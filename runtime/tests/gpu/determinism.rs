@@ -2,7 +2,7 @@
 
 use crate::stub::{Kind, Materials, Room, materials, red, render, samples};
 use impasto_runtime::film::Film;
-use impasto_runtime::render::RenderOptions;
+use impasto_runtime::options::RenderOptions;
 use impasto_runtime::technique::{Choice, Sampler, Technique};
 
 fn room() -> Room {

@@ -3,8 +3,9 @@
 
 use crate::stub::{Kind, Materials, Room, materials, plan, red, render_plan, samples};
 use impasto_compiler::partition::Strategy;
-use impasto_runtime::dropped::Dropped;
-use impasto_runtime::render::{RenderOptions, Rendering};
+use impasto_runtime::kernels::dropped::Dropped;
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Sampler, Technique};
 use impasto_runtime::trace::{End, MaterialCode, Replayer};
 

@@ -2,7 +2,7 @@
 
 use crate::stub::{Kind, Room, materials, red, render, samples};
 use impasto_runtime::render::Rendering;
-use impasto_runtime::shader_part::BufferData;
+use impasto_runtime::wgsl::BufferData;
 
 /// Every path sees the sky at once, so that every sample is `value` exactly.
 fn sky(value: f32, count: u32) -> Rendering {

@@ -1,7 +1,7 @@
 //! Light sampling against scattering: a lamp on the ceiling, a plate that throws a shadow.
 
 use crate::stub::{Kind, Room, Strategies, assert_same_picture, materials, red, render, samples};
-use impasto_runtime::render::RenderOptions;
+use impasto_runtime::options::RenderOptions;
 
 fn lamp(strategies: Strategies) -> Room {
     Room {

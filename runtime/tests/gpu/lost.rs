@@ -7,8 +7,8 @@ use crate::stub::{Kind, Room, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
-use impasto_runtime::passes::Keeping;
 use impasto_runtime::render::Renderer;
+use impasto_runtime::render::passes::Keeping;
 
 #[test]
 fn a_lost_gpu_is_an_error_and_what_was_kept_can_be_gone_on_from() {
@@ -51,7 +51,7 @@ fn a_lost_gpu_is_an_error_and_what_was_kept_can_be_gone_on_from() {
     );
     drop(renderer);
 
-    let kept: impasto_runtime::film_file::FilmFile = last.expect("something was kept");
+    let kept: impasto_runtime::film::file::FilmFile = last.expect("something was kept");
     let done = kept.samples();
     assert!((1..1000).contains(&done));
     let options = samples(done as u32 + 2);

@@ -2,7 +2,8 @@
 //! seen, and that a scene carries no more of it than it needs.
 
 use impasto_compiler::partition::Strategy;
-use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::{Renderer, Rendering};
 
 use crate::planes::{Light, Plane, Planes, Solid, Solids, Surface, planned, render, slab};
 use crate::record::{Bound, Row};

@@ -7,9 +7,10 @@ use std::time::Duration;
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::error::RuntimeError;
-use impasto_runtime::film_file::{FilmFile, Range};
-use impasto_runtime::passes::Keeping;
-use impasto_runtime::render::{Progress, RenderOptions, Renderer, Rendering};
+use impasto_runtime::film::file::{FilmFile, Range};
+use impasto_runtime::options::{Progress, RenderOptions};
+use impasto_runtime::render::passes::Keeping;
+use impasto_runtime::render::{Renderer, Rendering};
 
 fn room() -> Room {
     Room {

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
-use impasto_runtime::render::{RenderOptions, Renderer, Rendering, Samples};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::{Renderer, Rendering, Samples};
 use impasto_runtime::world::World;
 
 const SIZE: (u32, u32) = (16, 8);

@@ -1,6 +1,7 @@
 //! Pictures of scenes whose objects are placed: in closed form, and against the same with copies.
 
-use impasto_runtime::render::{RenderOptions, Rendering};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::Rendering;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Copies, Leaves, RayFetch, Stack, Technique, Traversal};
 

@@ -8,8 +8,8 @@ use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel, Strategy
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Film;
 use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
+use impasto_runtime::render::report::Report;
 use impasto_runtime::render::{Renderer, Rendering};
-use impasto_runtime::report::Report;
 use impasto_runtime::technique::{Append, Choice, RayData, RayOrder};
 
 pub fn room() -> Room {

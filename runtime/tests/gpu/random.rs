@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 
 use crate::stub::{Kind, Room, materials, red, render};
 use crate::support::{Row, run};
-use impasto_runtime::random::{self, Demand, hash_seed};
-use impasto_runtime::render::RenderOptions;
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::kernels::random::{self, Demand, hash_seed};
+use impasto_runtime::options::RenderOptions;
 use impasto_runtime::technique::{Choice, Sampler, Technique};
+use impasto_runtime::wgsl::ShaderPart;
 
 /// Everything that a path may draw.
 const DEMAND: Demand = Demand {

@@ -8,11 +8,12 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use impasto_compiler::partition::{Form, Plan, Strategy, Workload};
-use impasto_runtime::film_file::{FilmFile, Range};
-use impasto_runtime::passes::Keeping;
-use impasto_runtime::render::{Planner, Progress, RenderOptions, Renderer, Rendering, Replanning};
-use impasto_runtime::report::{KernelReport, Report};
-use impasto_runtime::until::Goals;
+use impasto_runtime::film::file::{FilmFile, Range};
+use impasto_runtime::options::{Progress, RenderOptions};
+use impasto_runtime::render::passes::Keeping;
+use impasto_runtime::render::report::{KernelReport, Report};
+use impasto_runtime::render::until::Goals;
+use impasto_runtime::render::{Planner, Renderer, Rendering, Replanning};
 
 use crate::plans::custom;
 use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};

@@ -7,13 +7,16 @@ use std::sync::OnceLock;
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::{Plan, Strategy};
-use impasto_runtime::camera::CameraFrame;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
-use impasto_runtime::media::Media;
-use impasto_runtime::needs::facts::SceneFacts;
-use impasto_runtime::render::{RenderOptions, Renderer, Rendering};
-use impasto_runtime::scene::{Camera, GeometryCounts, SceneParts};
-use impasto_runtime::shader_part::{BufferData, ShaderPart};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::{Renderer, Rendering};
+use impasto_runtime::scene::Camera;
+use impasto_runtime::wgsl::{BufferData, ShaderPart};
+use impasto_runtime::world::GeometryCounts;
+use impasto_runtime::world::SceneParts;
+use impasto_runtime::world::camera::CameraFrame;
+use impasto_runtime::world::media::Media;
+use impasto_runtime::world::needs::facts::SceneFacts;
 use impasto_runtime::world::{MaterialSource, World};
 
 pub fn gpu() -> &'static Gpu {

@@ -6,7 +6,8 @@ use std::fmt::Debug;
 use crate::plans::{room, surfaces};
 use crate::stub::{gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
-use impasto_runtime::render::{RenderOptions, Rendering};
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Append, Choice, RayData, Regeneration, StateLayout, Technique};
 
 fn run(strategy: Strategy, technique: Technique) -> Rendering {

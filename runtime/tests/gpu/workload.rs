@@ -2,8 +2,9 @@
 //! append, and in how many blocks of neighbouring slots.
 
 use impasto_compiler::partition::{Form, Hits, Plan, Strategy, Workload};
-use impasto_runtime::render::{RenderOptions, Rendering, profile_workload};
-use impasto_runtime::report::Report;
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::report::Report;
+use impasto_runtime::render::{Rendering, profile_workload};
 use impasto_runtime::technique::{Append, Sampler, Technique};
 
 use crate::plans::{custom, room, surfaces};

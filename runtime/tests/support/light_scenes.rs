@@ -5,9 +5,10 @@ use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::{
     Camera, DistantLight, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator,
-    Light, Mesh, NO_MATERIAL, QuadLight, Scene, SceneParts,
+    Light, Mesh, NO_MATERIAL, QuadLight, Scene,
 };
 use impasto_runtime::technique::Technique;
+use impasto_runtime::world::SceneParts;
 
 use super::{Random, Row, floats, row, run};
 
@@ -259,7 +260,7 @@ pub(crate) fn evaluate(
     count: usize,
     rows: usize,
 ) -> Vec<Row> {
-    let mis = impasto_runtime::lights::mis();
+    let mis = impasto_runtime::world::lights::mis();
     let all = [
         &parts.geometry,
         &parts.bvh,

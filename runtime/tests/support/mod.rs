@@ -8,7 +8,7 @@ pub(crate) mod light_scenes;
 
 use std::sync::OnceLock;
 
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 use wgpu::util::DeviceExt;
 
 /// One word of input or output of [`run`].

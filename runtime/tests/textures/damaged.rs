@@ -279,7 +279,7 @@ fn folders_and_values_out_of_range_are_refused() {
         space: TextureSpace::Color,
         lookups: Lookups::default(),
     };
-    let error = impasto_runtime::texture::part(&[texture], folder.path());
+    let error = impasto_runtime::world::texture::part(&[texture], folder.path());
     let text = error.expect_err("a folder").to_string();
     assert!(text.contains("a.png: cannot read the texture"), "{text}");
 }

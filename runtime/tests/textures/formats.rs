@@ -4,7 +4,7 @@
 use half::f16;
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 use impasto_compiler::abi::{Lookups, TextureSpace};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 
 use crate::{encode, part};
 

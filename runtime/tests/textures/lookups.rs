@@ -2,7 +2,7 @@
 
 use image::{ImageBuffer, ImageFormat, Rgba};
 use impasto_compiler::abi::{Lookups, TextureSpace, texture_mode};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 
 use crate::support::{Row, floats, run};
 use crate::{encode, part};

@@ -8,8 +8,8 @@ mod support;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use impasto_compiler::abi::{Lookups, TextureRef, TextureSpace};
-use impasto_runtime::shader_part::ShaderPart;
-use impasto_runtime::texture;
+use impasto_runtime::wgsl::ShaderPart;
+use impasto_runtime::world::texture;
 
 /// The bytes of a picture file.
 fn encode<P, C>(picture: ImageBuffer<P, C>, format: ImageFormat) -> Vec<u8>

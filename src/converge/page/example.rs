@@ -6,7 +6,7 @@ use crate::converge::data::{
     Convergence, Errors, MaterialShare, Point, Reference, Run, SceneConvergence, Series,
 };
 use crate::converge::fit::fits;
-use crate::runtime::report::AdapterReport;
+use crate::runtime::render::report::AdapterReport;
 use crate::runtime::technique::Sampler;
 
 /// The relMSE of the first series at its last point.

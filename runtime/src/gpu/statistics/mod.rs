@@ -31,7 +31,7 @@ impl<'g> Statistics<'g> {
         &self,
         _name: &str,
         _wgsl: &str,
-        _bindings: &[crate::compose::Binding],
+        _bindings: &[crate::kernels::compose::Binding],
     ) -> Option<KernelStatistics> {
         None
     }

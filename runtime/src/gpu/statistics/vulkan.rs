@@ -10,8 +10,8 @@ use wgpu::hal::api::Vulkan;
 use wgpu::naga::back::spv;
 
 use super::KernelStatistics;
-use crate::compose::{Access, Binding};
 use crate::gpu::{Gpu, shader};
+use crate::kernels::compose::{Access, Binding};
 
 /// A device of its own, on which kernels are built to be asked.
 pub(crate) struct Statistics<'g> {

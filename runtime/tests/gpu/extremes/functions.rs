@@ -4,7 +4,8 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec3};
-use impasto_runtime::scene::{EnvironmentMap, EnvironmentSource, Scene, SceneParts};
+use impasto_runtime::scene::{EnvironmentMap, EnvironmentSource, Scene};
+use impasto_runtime::world::SceneParts;
 
 use crate::record::{Bound, Row, effort};
 use crate::support::light_scenes::{

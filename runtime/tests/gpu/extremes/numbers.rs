@@ -88,8 +88,8 @@ fn weights_of_densities_are_shares_of_one() {
     let body = "
         let p = bitcast<vec2<f32>>(input[i].xy);
         result[i] = bitcast<vec4<u32>>(vec4<f32>(power_heuristic(p.x, p.y), power_heuristic(p.y, p.x), 0.0, 0.0));";
-    let part = impasto_runtime::shader_part::ShaderPart {
-        wgsl: include_str!("../../../src/kernels/mis.wgsl").to_owned(),
+    let part = impasto_runtime::wgsl::ShaderPart {
+        wgsl: include_str!("../../../src/world/lights/mis.wgsl").to_owned(),
         buffers: Vec::new(),
     };
     let answers = run(&[&part], body, &input, pairs.len(), pairs.len());

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, diag};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 
 use crate::library;
 use crate::record::{Bound, Row, effort};

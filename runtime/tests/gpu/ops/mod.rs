@@ -15,7 +15,7 @@ use impasto_compiler::ir::{Function, Local, Type};
 use impasto_compiler::ops::Op;
 use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, Program, codegen, compile};
-use impasto_runtime::shader_part::ShaderPart;
+use impasto_runtime::wgsl::ShaderPart;
 
 use crate::support::{Row, run};
 

@@ -1,0 +1,143 @@
+//! What can go wrong while rendering, said for the person who started it.
+
+use std::path::PathBuf;
+
+mod scene;
+
+pub use scene::SceneError;
+
+/// An error of the renderer.
+#[derive(Debug, thiserror::Error)]
+pub enum RuntimeError {
+    /// No GPU (or none of the wanted name) was found.
+    #[error("{}", no_adapter(wanted.as_deref(), found))]
+    NoAdapter {
+        /// What the user asked for.
+        wanted: Option<String>,
+        /// The adapters there are.
+        found: Vec<String>,
+    },
+    /// A limit of the GPU is too small for what is asked of it.
+    #[error("{what} needs {needs}, but the GPU's limit `{limit}` is {has}\n  hint: {hint}")]
+    LimitTooSmall {
+        /// The limit's name in WebGPU.
+        limit: &'static str,
+        /// Its value.
+        has: u64,
+        /// The value that would be enough.
+        needs: u64,
+        /// What needs it.
+        what: String,
+        /// What to do about it.
+        hint: &'static str,
+    },
+    /// The GPU refused to be opened.
+    #[error("the GPU `{adapter}` could not be opened: {reason}")]
+    DeviceRequest {
+        /// The adapter's name.
+        adapter: String,
+        /// The driver's reason.
+        reason: String,
+    },
+    /// The driver gave the device up.
+    #[error(
+        "the GPU was lost while rendering: {0}\n  hint: a kernel may have run longer than the driver allows; try a smaller pool (`--pool`), or look at the driver's log"
+    )]
+    DeviceLost(String),
+    /// A buffer did not fit.
+    #[error(
+        "the GPU is out of memory: {0}\n  hint: try a smaller pool (`--pool`) or a smaller picture"
+    )]
+    OutOfMemory(String),
+    /// Generated WGSL was refused; always a defect of Impasto.
+    #[error(
+        "internal error: the generated kernel `{kernel}` is not valid WGSL; please report this\n{message}"
+    )]
+    Shader {
+        /// The kernel's name.
+        kernel: String,
+        /// What naga or the driver says, with the line it concerns.
+        message: String,
+    },
+    /// wgpu refused a call; always a defect of Impasto.
+    #[error("internal error: the GPU interface refused a call; please report this\n{0}")]
+    Validation(String),
+    /// No path was finished for longer than any path can take; always a defect of Impasto.
+    #[error(
+        "internal error: no path was finished in {iterations} iterations, where each takes at most {expected}; please report this"
+    )]
+    Stalled {
+        /// Iterations since the last path was finished.
+        iterations: u64,
+        /// Iterations that the longest path takes.
+        expected: u64,
+    },
+    /// Kernels are to be timed on a GPU that cannot.
+    #[error(
+        "the GPU `{0}` has no timestamps, by which kernels are timed\n  hint: choose another GPU (`--gpu`), or update its driver"
+    )]
+    NoTimestamps(String),
+    /// A setting has a value that cannot be rendered.
+    #[error("{setting} is {value}: expected {expected}")]
+    Setting {
+        /// Which.
+        setting: &'static str,
+        /// What was given.
+        value: String,
+        /// What is possible.
+        expected: String,
+    },
+    /// The plan does not fit the materials.
+    #[error("the plan `{strategy}` does not fit the materials: {reason}")]
+    Plan {
+        /// The plan's strategy.
+        strategy: String,
+        /// What does not fit.
+        reason: String,
+    },
+    /// The scene cannot be rendered as it is.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A film file or checkpoint cannot be used.
+    #[error("cannot use the film `{}`: {reason}", path.display())]
+    FilmFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// What a render should go on from is no beginning of it.
+    #[error("this render cannot go on from the film given: {0}")]
+    OtherRender(String),
+    /// A picture could not be written.
+    #[error("cannot write `{}`: {reason}", path.display())]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl RuntimeError {
+    /// With another hint, where a limit is too small.
+    pub(crate) fn with_hint(mut self, better: &'static str) -> Self {
+        if let Self::LimitTooSmall { hint, .. } = &mut self {
+            *hint = better;
+        }
+        self
+    }
+}
+
+fn no_adapter(wanted: Option<&str>, found: &[String]) -> String {
+    match wanted {
+        Some(wanted) if !found.is_empty() => format!(
+            "no GPU is called `{wanted}`\n  there are: {}\n  hint: part of a name is enough, in any case of letters",
+            found.join(", ")
+        ),
+        _ => "no GPU was found: Impasto needs a driver for Vulkan, Metal or Direct3D 12\n  \
+              hint: install your GPU's Vulkan driver, or Mesa's software driver \
+              (Debian and Ubuntu: `apt install mesa-vulkan-drivers libvulkan1`)"
+            .to_string(),
+    }
+}

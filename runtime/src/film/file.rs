@@ -1,0 +1,463 @@
+//! Film files (`.film`): the exact sums of some samples, so that parts of a render can be taken
+//! apart, on other days or other machines, and merged into the very bits of the whole.
+//!
+//! All numbers are little-endian. After the magic number and a version come the identity of the
+//! render, what was dropped, the ranges of samples, the planes of the film that are not all zero,
+//! and a fingerprint of everything before it.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use crate::error::RuntimeError;
+use crate::film::output;
+use crate::film::{PLANES, Sums};
+use crate::fingerprint;
+use crate::technique::{Choice, Sampler};
+
+const MAGIC: [u8; 8] = *b"IMPASTOF";
+const VERSION: u32 = 1;
+/// The most ranges that a file may list.
+const MAX_RANGES: u32 = 1 << 16;
+
+/// What must be equal for samples to belong to one picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Where random numbers come from.
+    pub sampler: Sampler,
+    /// A fingerprint of scene and materials as kernels see them.
+    pub scene: u64,
+}
+
+impl Identity {
+    /// In what `other` differs, said for people.
+    fn difference(&self, other: &Self) -> Option<String> {
+        let size = |i: &Self| format!("{}x{}", i.width, i.height);
+        if size(self) != size(other) {
+            return Some(format!("one is {}, the other {}", size(self), size(other)));
+        }
+        if self.seed != other.seed {
+            let (a, b) = (self.seed, other.seed);
+            return Some(format!("one has the seed {a}, the other {b}"));
+        }
+        if self.sampler != other.sampler {
+            let (a, b) = (self.sampler.name(), other.sampler.name());
+            return Some(format!("one has the sampler {a}, the other {b}"));
+        }
+        (self.scene != other.scene).then(|| {
+            "the scene differs, or its materials, or how rays are cast through it".to_string()
+        })
+    }
+}
+
+/// Samples of every pixel from `first` on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Range {
+    /// Index of the first sample.
+    pub first: u64,
+    /// How many.
+    pub count: u64,
+}
+
+impl Range {
+    fn end(self) -> u64 {
+        self.first + self.count
+    }
+}
+
+/// The exact sums of whole samples, each of which every pixel has taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmFile {
+    /// Of which render.
+    pub identity: Identity,
+    /// Samples dropped because a value was no number.
+    pub nonfinite: u64,
+    /// Samples cut to what the film holds.
+    pub clamped: u64,
+    /// Which samples: ascending, apart, never empty.
+    pub ranges: Vec<Range>,
+    /// Their sums.
+    pub sums: Sums,
+}
+
+impl FilmFile {
+    /// Samples of each pixel.
+    pub fn samples(&self) -> u64 {
+        self.ranges.iter().map(|r| r.count).sum()
+    }
+
+    /// Adds the samples of another part of the same render. Fails, in words, if it is of
+    /// another, or if a sample is in both.
+    pub fn merge(&mut self, other: &FilmFile) -> Result<(), String> {
+        if let Some(difference) = self.identity.difference(&other.identity) {
+            return Err(format!("they are of different renders: {difference}"));
+        }
+        for a in &self.ranges {
+            for b in &other.ranges {
+                let (first, end) = (a.first.max(b.first), a.end().min(b.end()));
+                if first < end {
+                    let last = end - 1;
+                    return Err(format!("both hold the samples {first} to {last}"));
+                }
+            }
+        }
+        if self.samples() + other.samples() > u64::from(u32::MAX) {
+            return Err("together they hold more than 2^32 - 1 samples a pixel".into());
+        }
+        self.sums.add(&other.sums);
+        self.nonfinite += other.nonfinite;
+        self.clamped += other.clamped;
+        self.ranges.extend(&other.ranges);
+        self.ranges.sort_unstable();
+        self.ranges.dedup_by(|next, before| {
+            let adjoins = before.end() == next.first;
+            if adjoins {
+                before.count += next.count;
+            }
+            adjoins
+        });
+        Ok(())
+    }
+
+    /// How many samples of a render are done, if these are the first ones of it. Fails, in
+    /// words, if they are not.
+    pub fn done_of(&self, identity: &Identity, first: u32, samples: u32) -> Result<u32, String> {
+        if let Some(difference) = identity.difference(&self.identity) {
+            return Err(format!("it is of another render: {difference}"));
+        }
+        let [range] = self.ranges[..] else {
+            return Err("its samples have gaps".into());
+        };
+        let (from, last) = (range.first, range.end() - 1);
+        if from != u64::from(first) {
+            return Err(format!(
+                "it holds the samples {from} to {last}, but this render starts at {first}"
+            ));
+        }
+        match u32::try_from(range.count) {
+            Ok(count) if count <= samples => Ok(count),
+            _ => Err(format!(
+                "it holds {} samples a pixel, more than the {samples} asked for",
+                range.count
+            )),
+        }
+    }
+
+    /// Reads a file. Whatever its bytes are, the answer is a film or an error that names the file.
+    pub fn read(path: &Path) -> Result<Self, RuntimeError> {
+        let failure = |reason: String| RuntimeError::FilmFile {
+            path: path.to_path_buf(),
+            reason,
+        };
+        let bytes = std::fs::read(path).map_err(|e| failure(e.to_string()))?;
+        Self::from_bytes(&bytes).map_err(failure)
+    }
+
+    /// Writes the file whole, or leaves what was there before.
+    pub fn write(&self, path: &Path) -> Result<(), RuntimeError> {
+        let bytes = self.to_bytes();
+        output::replace(path, |file| {
+            file.write_all(&bytes).map_err(|e| e.to_string())
+        })
+        .map_err(|reason| RuntimeError::Output {
+            path: path.to_path_buf(),
+            reason,
+        })?;
+        sync_folder(path);
+        Ok(())
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        let identity = &self.identity;
+        let mut out = MAGIC.to_vec();
+        let mut sampler = [0; SAMPLER_BYTES];
+        for (to, from) in sampler.iter_mut().zip(identity.sampler.name().bytes()) {
+            *to = from;
+        }
+        for word in [VERSION, identity.width, identity.height, identity.seed] {
+            out.extend(word.to_le_bytes());
+        }
+        out.extend(sampler);
+        for long in [identity.scene, self.nonfinite, self.clamped] {
+            out.extend(long.to_le_bytes());
+        }
+        out.extend((self.ranges.len() as u32).to_le_bytes());
+        for range in &self.ranges {
+            out.extend(range.first.to_le_bytes());
+            out.extend(range.count.to_le_bytes());
+        }
+        let planes = (0..PLANES).filter(|i| self.sums.plane(*i).iter().any(|w| *w != 0));
+        let present = planes.clone().fold(0u32, |bits, i| bits | 1 << i);
+        out.extend(present.to_le_bytes());
+        for plane in planes {
+            out.extend(self.sums.plane(plane).iter().flat_map(|w| w.to_le_bytes()));
+        }
+        out.extend(fingerprint::of(&out).to_le_bytes());
+        out
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+            return Err("it is no film file".into());
+        };
+        let mut reader = Reader(rest);
+        let version = reader.word()?;
+        if version != VERSION {
+            return Err(format!(
+                "it is a film file of version {version}; this program reads version {VERSION}"
+            ));
+        }
+        let (content, sum) = bytes.split_last_chunk::<8>().ok_or_else(damaged)?;
+        if fingerprint::of(content) != u64::from_le_bytes(*sum) {
+            return Err(damaged());
+        }
+        let [width, height, seed] = [reader.word()?, reader.word()?, reader.word()?];
+        let sampler = reader.sampler()?;
+        let [scene, nonfinite, clamped] = [reader.long()?, reader.long()?, reader.long()?];
+        let identity = Identity {
+            width,
+            height,
+            seed,
+            sampler,
+            scene,
+        };
+        let ranges = reader.ranges()?;
+        let sums = reader.sums(width, height)?;
+        Ok(Self {
+            identity,
+            nonfinite,
+            clamped,
+            ranges,
+            sums,
+        })
+    }
+}
+
+const SAMPLER_BYTES: usize = 16;
+
+fn damaged() -> String {
+    "it is damaged: not what was written (was it copied whole?)".into()
+}
+
+/// Bytes still to be read.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let (taken, rest) = self.0.split_at_checked(count).ok_or_else(damaged)?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        self.take(N)?.try_into().map_err(|_| damaged())
+    }
+
+    fn word(&mut self) -> Result<u32, String> {
+        Ok(u32::from_le_bytes(self.array()?))
+    }
+
+    fn long(&mut self) -> Result<u64, String> {
+        Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    fn sampler(&mut self) -> Result<Sampler, String> {
+        let bytes: [u8; SAMPLER_BYTES] = self.array()?;
+        let name = String::from_utf8_lossy(&bytes);
+        let name = name.trim_end_matches('\0');
+        Sampler::from_name(name).ok_or_else(|| format!("its sampler `{name}` is unknown"))
+    }
+
+    /// Ranges that are ascending, apart and not empty, with ends that are sample indices.
+    fn ranges(&mut self) -> Result<Vec<Range>, String> {
+        let count = self.word()?;
+        if count == 0 || count > MAX_RANGES {
+            return Err(damaged());
+        }
+        let mut ranges: Vec<Range> = Vec::new();
+        for _ in 0..count {
+            let (first, count) = (self.long()?, self.long()?);
+            let after = ranges.last().is_none_or(|last| last.end() < first);
+            let end = first.checked_add(count).filter(|end| *end <= 1 << 32);
+            if !after || count == 0 || end.is_none() {
+                return Err(damaged());
+            }
+            ranges.push(Range { first, count });
+        }
+        Ok(ranges)
+    }
+
+    /// The planes, of which the file has exactly as many bytes as are left before its end.
+    fn sums(&mut self, width: u32, height: u32) -> Result<Sums, String> {
+        let present = self.word()?;
+        let pixels = u64::from(width) * u64::from(height);
+        let planes = u128::from((present).count_ones());
+        let expected = 4 * u128::from(pixels) * planes + 8;
+        if present >> PLANES != 0 || pixels == 0 || expected != self.0.len() as u128 {
+            return Err(damaged());
+        }
+        // One plane at least is there: every pixel has samples.
+        if planes == 0 {
+            return Err(damaged());
+        }
+        let pixels = pixels as usize;
+        let mut words = Vec::with_capacity(pixels * PLANES);
+        for plane in 0..PLANES {
+            if present >> plane & 1 == 1 {
+                let (chunks, _) = self.take(4 * pixels)?.as_chunks::<4>();
+                words.extend(chunks.iter().map(|c| u32::from_le_bytes(*c)));
+            } else {
+                words.resize(words.len() + pixels, 0);
+            }
+        }
+        Sums::new(width, height, words).ok_or_else(damaged)
+    }
+}
+
+/// Makes a renamed file survive a power cut, where the system can; the file itself is safe already.
+fn sync_folder(path: &Path) {
+    let folder = path.parent().filter(|f| *f != Path::new(""));
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(first: u64, count: u64, value: u32) -> FilmFile {
+        let samples = vec![count as u32; 2];
+        let mut words = vec![value; 2 * (PLANES - 1)];
+        words[4..6].fill(0);
+        words.extend(samples);
+        FilmFile {
+            identity: Identity {
+                width: 2,
+                height: 1,
+                seed: 7,
+                sampler: Sampler::Owen,
+                scene: 0x1234_5678_9abc_def0,
+            },
+            nonfinite: 1,
+            clamped: 2,
+            ranges: vec![Range { first, count }],
+            sums: Sums::new(2, 1, words).expect("two pixels' words"),
+        }
+    }
+
+    #[test]
+    fn a_file_comes_back_as_it_was() {
+        let film = part(3, 5, u32::MAX);
+        assert_eq!(FilmFile::from_bytes(&film.to_bytes()), Ok(film));
+    }
+
+    #[test]
+    fn no_damage_goes_unseen() {
+        let bytes = part(3, 5, 9).to_bytes();
+        for length in 0..bytes.len() {
+            assert!(
+                FilmFile::from_bytes(&bytes[..length]).is_err(),
+                "{length} bytes"
+            );
+        }
+        for at in 0..bytes.len() {
+            let mut other = bytes.clone();
+            other[at] ^= 4;
+            assert!(FilmFile::from_bytes(&other).is_err(), "byte {at}");
+        }
+        let mut longer = bytes.clone();
+        longer.push(0);
+        assert!(FilmFile::from_bytes(&longer).is_err());
+    }
+
+    /// A file whose fingerprint is right may still say what cannot be.
+    #[test]
+    fn numbers_that_cannot_be_are_refused() {
+        let good = part(3, 5, 9).to_bytes();
+        let refused = |at: usize, bytes: &[u8]| {
+            let mut content = good[..good.len() - 8].to_vec();
+            content[at..at + bytes.len()].copy_from_slice(bytes);
+            content.extend(fingerprint::of(&content).to_le_bytes());
+            FilmFile::from_bytes(&content).expect_err("refused")
+        };
+        assert!(refused(8, &[2]).contains("version 2"));
+        for width in [0, 1, 3, u32::MAX] {
+            assert!(
+                refused(12, &width.to_le_bytes()).contains("damaged"),
+                "{width}"
+            );
+        }
+        assert!(refused(24, b"halton").contains("halton"));
+        let ranges = 24 + SAMPLER_BYTES + 24;
+        for count in [0, 2, u32::MAX] {
+            refused(ranges, &count.to_le_bytes());
+        }
+        refused(ranges + 4, &u64::MAX.to_le_bytes());
+        refused(ranges + 12, &0u64.to_le_bytes());
+        refused(ranges + 12, &(1u64 << 32).to_le_bytes());
+        refused(ranges + 20, &u32::MAX.to_le_bytes());
+    }
+
+    #[test]
+    fn parts_merge_in_any_order_to_the_same() {
+        let parts = [part(0, 4, 10), part(4, 2, u32::MAX), part(9, 1, 30)];
+        let merged = |order: [usize; 3]| {
+            let mut sum = parts[order[0]].clone();
+            for i in &order[1..] {
+                sum.merge(&parts[*i]).expect("they merge");
+            }
+            sum
+        };
+        let all = merged([0, 1, 2]);
+        assert_eq!(all, merged([2, 0, 1]));
+        assert_eq!(all, merged([1, 2, 0]));
+        let ranges = [(0, 6), (9, 1)].map(|(first, count)| Range { first, count });
+        assert_eq!(all.ranges, ranges);
+        assert_eq!((all.samples(), all.nonfinite, all.clamped), (7, 3, 6));
+        assert_eq!(all.sums.picture().samples, [7, 7]);
+        assert_eq!(FilmFile::from_bytes(&all.to_bytes()), Ok(all));
+    }
+
+    #[test]
+    fn what_does_not_belong_together_is_not_merged() {
+        let refused = |change: &dyn Fn(&mut FilmFile)| {
+            let mut other = part(4, 4, 1);
+            change(&mut other);
+            let mut film = part(0, 4, 1);
+            film.merge(&other).expect_err("refused")
+        };
+        let overlap = refused(&|f| f.ranges[0].first = 3);
+        assert!(overlap.contains("samples 3 to 3"), "{overlap}");
+        assert!(refused(&|f| f.identity.seed = 8).contains("the seed 7, the other 8"));
+        assert!(refused(&|f| f.identity.width = 3).contains("2x1, the other 3x1"));
+        assert!(refused(&|f| f.identity.sampler = Sampler::Sobol).contains("sobol"));
+        assert!(refused(&|f| f.identity.scene = 0).contains("scene"));
+        let many = refused(&|f| f.ranges[0].count = (1 << 32) - 4);
+        assert!(many.contains("2^32"), "{many}");
+    }
+
+    #[test]
+    fn a_checkpoint_fits_its_render_and_no_other() {
+        let film = part(4, 6, 1);
+        let done = |first, samples| film.done_of(&film.identity, first, samples);
+        assert_eq!(done(4, 6), Ok(6));
+        assert_eq!(done(4, 100), Ok(6));
+        assert!(done(4, 5).is_err_and(|e| e.contains("holds 6 samples")));
+        assert!(done(0, 6).is_err_and(|e| e.contains("samples 4 to 9")));
+        let other = Identity {
+            seed: 1,
+            ..film.identity
+        };
+        assert!(
+            film.done_of(&other, 4, 6)
+                .is_err_and(|e| e.contains("another render"))
+        );
+    }
+}

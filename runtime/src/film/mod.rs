@@ -1,0 +1,217 @@
+//! The film: sums of radiance as the kernels keep them, and the picture they amount to.
+//!
+//! `kernels/film.wgsl` adds in 96-bit fixed point, in three words a channel. Sums of disjoint
+//! ranges of samples therefore add up to exactly the sums of one render of all of them.
+
+pub mod file;
+pub mod output;
+
+/// Words of a sum, from the lowest.
+const SUM_WORDS: usize = 3;
+/// Words of the film buffer for one pixel: three sums and a count. They are planes, each of one
+/// word a pixel.
+pub(crate) const PLANES: usize = 3 * SUM_WORDS + 1;
+/// The plane that counts a pixel's samples.
+pub(crate) const COUNT_PLANE: usize = PLANES - 1;
+/// What one unit of a sum is worth.
+const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
+
+/// A rendered picture: mean linear RGB radiance (Rec. 709 primaries), rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// One mean a pixel; zero where no sample was taken.
+    pub pixels: Vec<[f32; 3]>,
+    /// How many samples each mean is of.
+    pub samples: Vec<u32>,
+}
+
+impl Film {
+    /// Samples in all.
+    pub fn total_samples(&self) -> u64 {
+        self.samples.iter().map(|n| u64::from(*n)).sum()
+    }
+}
+
+/// Exact sums of radiance: the words of a film buffer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sums {
+    width: u32,
+    height: u32,
+    words: Vec<u32>,
+}
+
+impl Sums {
+    /// The sums in a film buffer of a picture's size; `None` if that is not how many words it has.
+    pub(crate) fn new(width: u32, height: u32, words: Vec<u32>) -> Option<Self> {
+        let expected = (width as usize) * (height as usize) * PLANES;
+        (words.len() == expected).then_some(Self {
+            width,
+            height,
+            words,
+        })
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// The words of the film buffer, plane by plane.
+    pub(crate) fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// The words of one plane.
+    pub(crate) fn plane(&self, index: usize) -> &[u32] {
+        let count = self.pixel_count();
+        self.words
+            .get(index * count..(index + 1) * count)
+            .unwrap_or(&[])
+    }
+
+    /// Means of the samples.
+    pub fn picture(&self) -> Film {
+        let samples = self.plane(COUNT_PLANE).to_vec();
+        let pixel = |i: usize| [0, 1, 2].map(|channel| mean(self.sum(channel, i), samples[i]));
+        Film {
+            width: self.width,
+            height: self.height,
+            pixels: (0..self.pixel_count()).map(pixel).collect(),
+            samples,
+        }
+    }
+
+    /// Adds the sums of other samples of a picture of the same size.
+    pub(crate) fn add(&mut self, other: &Sums) {
+        let count = self.pixel_count();
+        for pixel in 0..count {
+            for channel in 0..3 {
+                let sum = self.sum(channel, pixel) + other.sum(channel, pixel);
+                self.set(channel, pixel, sum);
+            }
+            let at = COUNT_PLANE * count + pixel;
+            self.words[at] = self.words[at].saturating_add(other.words[at]);
+        }
+    }
+
+    /// Takes the sums of some of these samples away.
+    pub(crate) fn subtract(&mut self, part: &Sums) {
+        let count = self.pixel_count();
+        for pixel in 0..count {
+            for channel in 0..3 {
+                let sum = self
+                    .sum(channel, pixel)
+                    .saturating_sub(part.sum(channel, pixel));
+                self.set(channel, pixel, sum);
+            }
+            let at = COUNT_PLANE * count + pixel;
+            self.words[at] = self.words[at].saturating_sub(part.words[at]);
+        }
+    }
+
+    /// Samples of a pixel.
+    pub(crate) fn count(&self, pixel: usize) -> u32 {
+        self.plane(COUNT_PLANE)[pixel]
+    }
+
+    /// The sum of radiance in a pixel.
+    pub(crate) fn radiance(&self, channel: usize, pixel: usize) -> f64 {
+        self.sum(channel, pixel) as f64 * UNIT
+    }
+
+    fn set(&mut self, channel: usize, pixel: usize, sum: u128) {
+        let count = self.pixel_count();
+        for word in 0..SUM_WORDS {
+            let at = (SUM_WORDS * channel + word) * count + pixel;
+            self.words[at] = (sum >> (32 * word)) as u32;
+        }
+    }
+
+    fn pixel_count(&self) -> usize {
+        (self.width as usize) * (self.height as usize)
+    }
+
+    /// The sum of one pixel in units.
+    fn sum(&self, channel: usize, pixel: usize) -> u128 {
+        let word = |k: usize| u128::from(self.plane(SUM_WORDS * channel + k)[pixel]);
+        word(0) | word(1) << 32 | word(2) << 64
+    }
+}
+
+fn mean(sum: u128, samples: u32) -> f32 {
+    if samples == 0 {
+        return 0.0;
+    }
+    (sum as f64 * UNIT / f64::from(samples)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One pixel's film.
+    fn pixel(sums: [u128; 3], samples: u32) -> Sums {
+        let words = sums
+            .iter()
+            .flat_map(|s| [0, 32, 64].map(|at| (s >> at) as u32));
+        let words = words.chain([samples]).collect();
+        Sums::new(1, 1, words).expect("a pixel's words")
+    }
+
+    #[test]
+    fn sums_are_read_across_all_words() {
+        // 2^32 units are 256; three samples of 256 + 2^-24 each, one channel empty.
+        let film = pixel([3 * ((1 << 32) + 1), 1 << 24, 0], 3).picture();
+        assert_eq!(film.pixels, [[256.0 + 1.0 / 16777216.0, 1.0 / 3.0, 0.0]]);
+        assert_eq!(film.total_samples(), 3);
+    }
+
+    #[test]
+    fn a_pixel_without_samples_is_black() {
+        assert_eq!(pixel([0; 3], 0).picture().pixels, [[0.0; 3]]);
+    }
+
+    /// The most samples there can be, all of the largest value, and of the smallest.
+    #[test]
+    fn the_extremes_of_samples_and_values_fit() {
+        let (samples, unit) = (u128::from(u32::MAX), 1);
+        let largest = 1u128 << (32 + 24);
+        assert!(samples * largest < 1 << (32 * SUM_WORDS));
+        let film = pixel([samples * largest, samples * unit, 0], u32::MAX).picture();
+        assert_eq!(
+            film.pixels,
+            [[f32::powi(2.0, 32), f32::powi(2.0, -24), 0.0]]
+        );
+    }
+
+    #[test]
+    fn sums_add_with_every_carry() {
+        let values = [(1u128 << 32) - 1, (1 << 64) - 1, (1 << 56) + 12345];
+        let mut sum = pixel(values, 100_000_000);
+        sum.add(&pixel([1, 1, (1 << 80) + (1 << 63)], 3));
+        let expected = [1 << 32, 1 << 64, (1 << 80) + (1 << 63) + (1 << 56) + 12345];
+        assert_eq!(sum, pixel(expected, 100_000_003));
+    }
+
+    #[test]
+    fn what_was_added_can_be_taken_away() {
+        let (a, b) = (
+            pixel([1, (1 << 64) + 7, 9], 5),
+            pixel([(1 << 40) - 1, 3, 0], 2),
+        );
+        let mut sum = a.clone();
+        sum.add(&b);
+        sum.subtract(&b);
+        assert_eq!(sum, a);
+        assert_eq!((a.count(0), a.radiance(0, 0)), (5, UNIT));
+    }
+
+    #[test]
+    fn a_film_of_another_size_is_none() {
+        assert_eq!(Sums::new(2, 1, vec![0; PLANES]), None);
+    }
+}

@@ -1,0 +1,227 @@
+//! Picture files: OpenEXR for numbers, PNG for looking.
+//!
+//! A file appears under its name only when it is complete: it is written beside it and then
+//! renamed, so that a full disk or an interruption leaves an older picture as it was.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use image::{ExtendedColorType, ImageEncoder};
+
+use crate::error::RuntimeError;
+use crate::error::SceneError;
+use crate::film::Film;
+use crate::image_file;
+
+/// Reads a picture that this or another program wrote, `what` naming its use in errors. The values of
+/// OpenEXR and Radiance HDR files are taken as linear radiance, those of others are made linear; nothing
+/// is known of how many samples they are of.
+///
+/// # Errors
+/// If the file is no such picture, or a value in it is no finite number.
+pub fn read(path: &Path, what: &str) -> Result<Film, SceneError> {
+    let picture = image_file::load(path, what, true)?;
+    let (width, height) = (picture.width, picture.height);
+    let pixels: Vec<[f32; 3]> = picture
+        .texels
+        .iter()
+        .map(|[r, g, b, _]| [*r, *g, *b])
+        .collect();
+    let finite = |pixel: &[f32; 3]| pixel.iter().all(|value| value.is_finite());
+    if let Some(index) = pixels.iter().position(|pixel| !finite(pixel)) {
+        let (column, row) = (index as u32 % width, index as u32 / width);
+        let message = format!(
+            "the {what} is no finite number at the pixel {column},{row} (from the top left)"
+        );
+        return Err(SceneError::in_file(path, message));
+    }
+    Ok(Film {
+        width,
+        height,
+        samples: vec![0; pixels.len()],
+        pixels,
+    })
+}
+
+/// The formats by the extension of a file's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    /// 32-bit floats, linear.
+    Exr,
+    /// 8 bits, sRGB.
+    Png,
+}
+
+/// Writes `film` to `path`, as its extension says: `.exr` holds linear radiance, `.png` what
+/// a screen shows after `exposure` stops (a factor of two each). The folder must exist.
+pub fn write(film: &Film, path: &Path, exposure: f32) -> Result<(), RuntimeError> {
+    let failure = |reason: String| RuntimeError::Output {
+        path: path.to_path_buf(),
+        reason,
+    };
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    let format = match extension.to_ascii_lowercase().as_str() {
+        "exr" => Format::Exr,
+        "png" => Format::Png,
+        _ => return Err(failure("its name should end in .exr or .png".into())),
+    };
+    replace(path, |file| match format {
+        Format::Exr => write_exr(film, file),
+        Format::Png => write_png(film, exposure, file),
+    })
+    .map_err(failure)
+}
+
+/// Writes a file through `content`, or leaves what was there before.
+pub(crate) fn replace(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<(), String> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let text = |e: std::io::Error| e.to_string();
+    let mut file = tempfile::Builder::new()
+        .prefix(".impasto-")
+        .tempfile_in(folder)
+        .map_err(text)?;
+    let mut writer = BufWriter::new(file.as_file_mut());
+    content(&mut writer)?;
+    writer.flush().map_err(text)?;
+    drop(writer);
+    file.as_file().sync_all().map_err(text)?;
+    make_readable(file.as_file()).map_err(text)?;
+    file.persist(path).map_err(|e| text(e.error))?;
+    Ok(())
+}
+
+/// Temporary files are private; a picture is not.
+#[cfg(unix)]
+fn make_readable(file: &File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn make_readable(_: &File) -> std::io::Result<()> {
+    Ok(())
+}
+
+fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), String> {
+    // The encoder seeks, which a file can and a pipe could not.
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::codecs::openexr::OpenExrEncoder::new(&mut bytes)
+        .write_image(
+            bytemuck::cast_slice(&film.pixels),
+            film.width,
+            film.height,
+            ExtendedColorType::Rgb32F,
+        )
+        .map_err(|e| e.to_string())?;
+    file.write_all(bytes.get_ref()).map_err(|e| e.to_string())
+}
+
+fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Result<(), String> {
+    let scale = exposure.exp2();
+    let bytes: Vec<u8> = film
+        .pixels
+        .iter()
+        .flatten()
+        .map(|v| srgb_byte(v * scale))
+        .collect();
+    image::codecs::png::PngEncoder::new(file)
+        .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
+        .map_err(|e| e.to_string())
+}
+
+/// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1].
+fn srgb_byte(linear: f32) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let encoded = if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    };
+    (encoded * 255.0 + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film() -> Film {
+        Film {
+            width: 2,
+            height: 1,
+            pixels: vec![[0.0, 0.5, 1.0], [2.0, 33_952.0, 1e-6]],
+            samples: vec![1, 1],
+        }
+    }
+
+    #[test]
+    fn exr_keeps_every_bit_and_png_is_srgb() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let exr = folder.path().join("a.exr");
+        write(&film(), &exr, 0.0).expect("written");
+        let read = image::open(&exr).expect("readable").into_rgb32f();
+        assert_eq!(
+            read.as_raw(),
+            bytemuck::cast_slice::<_, f32>(&film().pixels)
+        );
+
+        let png = folder.path().join("a.PNG");
+        write(&film(), &png, -1.0).expect("written");
+        let read = image::open(&png).expect("readable").into_rgb8();
+        assert_eq!(read.as_raw(), &[0, 137, 188, 255, 255, 0]);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 2);
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_what_is_no_number_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let exr = folder.path().join("a.exr");
+        write(&film(), &exr, 0.0).expect("written");
+        let back = read(&exr, "reference").expect("read");
+        assert_eq!((back.width, back.height), (2, 1));
+        assert_eq!(back.pixels, film().pixels);
+        for value in [f32::NAN, f32::INFINITY] {
+            let mut bad = film();
+            bad.pixels[1][2] = value;
+            write(&bad, &exr, 0.0).expect("written");
+            let error = read(&exr, "reference").expect_err("refused").to_string();
+            assert!(
+                error.contains("no finite number at the pixel 1,0"),
+                "{error}"
+            );
+            assert!(error.contains("a.exr"), "{error}");
+        }
+        assert!(read(&folder.path().join("none.exr"), "reference").is_err());
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_picture_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr");
+        std::fs::write(&path, "old").expect("written");
+        let full = replace(&path, |file| {
+            file.write_all(b"half").map_err(|e| e.to_string())?;
+            Err("No space left on device".to_string())
+        });
+        assert_eq!(full, Err("No space left on device".to_string()));
+        assert_eq!(std::fs::read(&path).expect("readable"), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn errors_name_the_file_and_the_reason() {
+        let error = write(&film(), Path::new("no/such/folder/a.exr"), 0.0).expect_err("no folder");
+        assert!(
+            error.to_string().contains("no/such/folder/a.exr"),
+            "{error}"
+        );
+        let error = write(&film(), Path::new("a.tiff"), 0.0).expect_err("no format");
+        assert!(error.to_string().contains(".exr or .png"), "{error}");
+    }
+}

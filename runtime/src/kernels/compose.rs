@@ -1,0 +1,344 @@
+//! The text of one kernel: constants, accessors of path state, the parts that its stages name
+//! in the stage table, the stage functions, and the shell with the entry point.
+//!
+//! Buffers are declared if the text mentions them, so that a kernel binds what it uses and
+//! nothing else.
+
+use impasto_compiler::abi::{InputSet, MATERIAL_OF};
+
+use crate::film;
+use crate::fingerprint::Fingerprint;
+use crate::kernels::cones;
+use crate::kernels::modules::{Composer, Kernel, Recipe};
+use crate::kernels::profile;
+use crate::kernels::stages::{Part, StageId};
+use crate::kernels::state::{self, Storage};
+use crate::wgsl;
+use crate::wgsl::text::{Flag, mentions, predicate, preprocess, reachable, without_comments};
+use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::needs::{Need, Needs};
+
+/// A buffer as a kernel binds it, in group 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Binding {
+    /// The index, the same in all kernels of a plan.
+    pub index: u32,
+    /// The WGSL variable.
+    pub name: String,
+    /// What kernels may do with it.
+    pub access: Access,
+}
+
+/// What kernels may do with a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Access {
+    Uniform,
+    Read,
+    ReadWrite,
+}
+
+/// The runtime's own buffers: name, type, access.
+pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 13] = [
+    ("run", "Run", Access::Uniform),
+    ("state", "array<vec4<u32>>", Access::ReadWrite),
+    ("queues", "array<u32>", Access::ReadWrite),
+    ("counters", "array<atomic<u32>>", Access::ReadWrite),
+    ("film", "array<atomic<u32>>", Access::ReadWrite),
+    ("arguments", "array<u32>", Access::ReadWrite),
+    ("bins", "array<atomic<u32>>", Access::ReadWrite),
+    ("extension_rays", "array<vec4<u32>>", Access::ReadWrite),
+    ("extension_hits", "array<vec4<u32>>", Access::ReadWrite),
+    ("shadow_rays", "array<vec4<u32>>", Access::ReadWrite),
+    ("shadow_results", "array<u32>", Access::ReadWrite),
+    ("queue_table", "array<u32>", Access::Read),
+    ("pixel_list", "array<u32>", Access::Read),
+];
+
+/// Members of the uniform `run`, the settings that do not change a kernel's text.
+/// `none` is 0, which compilers do not know.
+pub(crate) const RUN_MEMBERS: [&str; 5] = ["seed", "first_sample", "samples", "pixels", "none"];
+
+impl Composer<'_> {
+    /// Writes the text of the kernel that comes `index`-th in an iteration.
+    pub(crate) fn compose(&self, index: usize, recipe: Recipe) -> Kernel {
+        let (stages, members) = (&recipe.stages, &recipe.members);
+        let storage = if self.layout.wavefront {
+            Storage::Memory(self.technique.state)
+        } else {
+            Storage::Registers
+        };
+        let mut text = self.constants();
+        text += &state::accessors(self.layout.needs, stages, storage);
+        let mut parts: Vec<Part> = stages
+            .iter()
+            .flat_map(|s| s.stage().parts)
+            .filter(|(_, need)| self.layout.needs.met(*need))
+            .map(|(part, _)| *part)
+            .collect();
+        parts.sort_unstable();
+        parts.dedup();
+        for part in parts {
+            text += &self.part(part, members);
+        }
+        if stages.contains(&StageId::Logic) {
+            text += &self.fates();
+        }
+        for id in stages {
+            text += &preprocess(id.stage().body, &self.flags(*id, members));
+        }
+        text += &recipe.shell;
+        if mentions(&without_comments(&text), MATERIAL_OF) {
+            text += &self.source.lookup_wgsl();
+        }
+        if self.technique.profile {
+            text = profile::instrument(&text) + &self.profile_constants(index);
+        }
+        let text = reachable(&text);
+        let (declarations, bindings) = self.declarations(&text);
+        Kernel {
+            recipe,
+            wgsl: declarations + &text,
+            bindings,
+        }
+    }
+
+    /// The conditions of a stage's text.
+    fn flags(&self, stage: StageId, members: &[usize]) -> Vec<Flag> {
+        let needs = match stage {
+            StageId::Material => self.needs_of(members),
+            _ => self.layout.needs,
+        };
+        let derived = [
+            ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
+            ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
+            ("fetched", self.fetches(stage)),
+        ];
+        needs.flags().chain(derived).collect()
+    }
+
+    fn constants(&self) -> String {
+        let (world, sizes) = (self.world, self.sizes);
+        let mut out = wgsl::constants_u32(&[
+            ("POOL_SIZE", sizes.pool),
+            ("WORKGROUP_SIZE", sizes.workgroup),
+            ("ROW_GROUPS", sizes.row_groups),
+            ("PIXELS", world.width * world.height),
+            ("MAX_DEPTH", world.max_depth),
+            ("ROULETTE_START", world.roulette_start),
+            ("NOTHING", u32::MAX),
+            ("FILM_COUNT_PLANE", film::COUNT_PLANE as u32),
+        ]);
+        if self.layout.needs.has(Need::Media) {
+            let [a, b, c, d] = world.parts.media.camera;
+            out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
+        }
+        if self.layout.needs.has(Need::RayCones) {
+            out += &cones::constants(&world.camera, world.width, world.height);
+        }
+        out + &self.layout.counters.constants() + &state::constants()
+    }
+
+    fn profile_constants(&self, kernel: usize) -> String {
+        wgsl::constants_u32(&[
+            ("COUNTER_LANES", self.layout.counters.lanes(kernel) as u32),
+            ("SUBGROUP_SIZE", self.subgroup_size),
+        ])
+    }
+
+    fn part(&self, part: Part, members: &[usize]) -> String {
+        let world = self.world;
+        let parts = &world.parts;
+        match part {
+            Part::Random => self.random.wgsl.clone(),
+            Part::Camera => {
+                let lens = self.layout.needs.has(Need::Lens);
+                world.camera.wgsl(world.width, world.height, lens)
+            }
+            Part::Film => include_str!("film.wgsl").to_string(),
+            Part::Numbers => include_str!("numbers.wgsl").to_string(),
+            Part::Geometry => parts.geometry.wgsl.clone(),
+            Part::Surface => parts.surface.wgsl.clone(),
+            Part::Mis => crate::world::lights::mis().wgsl,
+            Part::Lights => parts.lights.wgsl.clone(),
+            Part::Media => {
+                let part = parts.media.part.as_ref();
+                part.map_or_else(String::new, |part| part.wgsl.clone())
+            }
+            Part::Order => crate::kernels::order::bins(self.technique.ray_order, parts.bounds),
+            Part::Traversal => parts.bvh.wgsl.clone(),
+            Part::Materials => self.materials(members),
+        }
+    }
+
+    /// Generated code for `members`, what it reads, and how its surface point is filled.
+    fn materials(&self, members: &[usize]) -> String {
+        let infos = self.infos(members);
+        let textured = infos.iter().any(|m| !m.textures.is_empty());
+        let textures = self.world.parts.texture.as_ref().filter(|_| textured);
+        let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
+        out += &self.source.wgsl(members);
+        let needs = self.needs_of(members);
+        if needs.has(Need::VaryingEmission) && infos.iter().all(|m| !m.varying_emission) {
+            out += NO_EMISSION;
+        }
+        let seen = infos
+            .iter()
+            .map(|m| m.inputs)
+            .fold(InputSet::default(), both);
+        if seen.footprint || seen.footprint_uv {
+            out += include_str!("../world/footprint.wgsl");
+        }
+        out += &surface_point(needs, seen);
+        out + &dropped_row(members)
+    }
+
+    /// What the logic stage must know of every material that paths can hit, as functions of an instance.
+    fn fates(&self) -> String {
+        let (infos, planned) = (self.materials, self.planned());
+        let smooth = |i: usize| !infos[i].delta_only;
+        let emits = |i: usize| infos[i].varying_emission;
+        predicate("scatters_sampled_light", &planned, smooth)
+            + &predicate("needs_last_evaluation", &planned, emits)
+    }
+
+    /// Declarations of the buffers that `text` mentions.
+    fn declarations(&self, text: &str) -> (String, Vec<Binding>) {
+        let code = without_comments(text);
+        let scene = self.scene_buffers();
+        let scene = scene.map(|b| (b.name, b.wgsl_type, Access::Read));
+        let mut out = String::new();
+        let mut bindings = Vec::new();
+        for (index, (name, ty, access)) in OWN_BUFFERS.into_iter().chain(scene).enumerate() {
+            if !mentions(&code, name) {
+                continue;
+            }
+            let space = match access {
+                Access::Uniform => {
+                    out += &format!("struct {ty} {{ {}: u32 }}\n", RUN_MEMBERS.join(": u32, "));
+                    "uniform"
+                }
+                Access::Read => "storage, read",
+                Access::ReadWrite => "storage, read_write",
+            };
+            out += &format!("@group(0) @binding({index}) var<{space}> {name}: {ty};\n");
+            bindings.push(Binding {
+                index: index as u32,
+                name: name.to_string(),
+                access,
+            });
+        }
+        (out, bindings)
+    }
+
+    /// The buffers of all parts of the scene, and the tables of its materials.
+    pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
+        self.parts()
+            .flat_map(|part| &part.buffers)
+            .chain(self.tables)
+    }
+
+    /// A fingerprint of what is rendered: everything that decides what a path is worth, and
+    /// nothing of how the work is organised.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let world = self.world;
+        let all: Vec<usize> = (0..self.materials.len()).collect();
+        let mut fingerprint = Fingerprint::new();
+        for number in [world.max_depth, world.roulette_start] {
+            fingerprint.add(&number.to_le_bytes());
+        }
+        fingerprint.add(
+            world
+                .camera
+                .wgsl(world.width, world.height, world.camera.lens_radius > 0.0)
+                .as_bytes(),
+        );
+        fingerprint.add(self.source.wgsl(&all).as_bytes());
+        fingerprint.add(self.source.lookup_wgsl().as_bytes());
+        for part in self.parts() {
+            fingerprint.add(part.wgsl.as_bytes());
+        }
+        for buffer in self.scene_buffers() {
+            fingerprint.add(buffer.name.as_bytes());
+            fingerprint.add(&buffer.bytes);
+        }
+        fingerprint.finish()
+    }
+
+    /// Random numbers and the parts of the scene.
+    fn parts(&self) -> impl Iterator<Item = &ShaderPart> {
+        let parts = &self.world.parts;
+        let parts: [Option<&ShaderPart>; 7] = [
+            Some(&self.random),
+            Some(&parts.geometry),
+            Some(&parts.bvh),
+            Some(&parts.surface),
+            Some(&parts.lights),
+            parts.media.part.as_ref(),
+            parts.texture.as_ref(),
+        ];
+        parts.into_iter().flatten()
+    }
+}
+
+/// The function that gives the row that samples of an instance are counted in if they are dropped.
+fn dropped_row(members: &[usize]) -> String {
+    let row = match members {
+        [sole] => format!("{sole}u"),
+        _ => format!("{MATERIAL_OF}(instance)"),
+    };
+    format!("fn dropped_row(instance: u32) -> u32 {{ return {row}; }}\n")
+}
+
+/// The emission of materials of which none has any that varies, where it is asked for nevertheless.
+const NO_EMISSION: &str = "fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32> {\n    \
+                           return vec3<f32>(0.0);\n}\n";
+
+/// The fields of footprints that code which reads either must be given.
+fn both(a: InputSet, b: InputSet) -> InputSet {
+    InputSet {
+        footprint: a.footprint || b.footprint,
+        footprint_uv: a.footprint_uv || b.footprint_uv,
+        ..a
+    }
+}
+
+/// The function that fills a material's inputs, those that some member reads; the others get
+/// what is at hand.
+fn surface_point(needs: Needs, seen: InputSet) -> String {
+    let cone = match needs.has(Need::RayCones) {
+        true => ", wo: vec3<f32>, width: f32",
+        false => "",
+    };
+    let (footprint, axes) = cones::footprint(needs, seen);
+    let geometric = "hit_geometric_normal(hit.primitive)";
+    let pick = |need, value, other| if needs.has(need) { value } else { other };
+    format!(
+        "fn surface_point(hit: PathHit, exterior_ior: f32{cone}) -> SurfacePoint {{\n    \
+         let barycentrics = vec2<f32>(hit.u, hit.v);\n    {footprint}\
+         return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior{axes});\n}}\n",
+        pick(
+            Need::Position,
+            if needs.has(Need::Moved) {
+                "in_world(hit_position(hit.primitive, barycentrics))"
+            } else {
+                "hit_position(hit.primitive, barycentrics)"
+            },
+            "vec3<f32>(0.0)"
+        ),
+        pick(
+            Need::Normals,
+            "hit_normal(hit.primitive, barycentrics)",
+            geometric
+        ),
+        pick(
+            Need::Tangents,
+            "hit_tangent(hit.primitive)",
+            "vec3<f32>(0.0)"
+        ),
+        pick(
+            Need::Uvs,
+            "hit_uv(hit.primitive, barycentrics)",
+            "vec2<f32>(0.0)"
+        ),
+    )
+}

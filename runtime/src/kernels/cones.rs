@@ -1,0 +1,60 @@
+//! Ray cones: how much of the scene a ray stands for, for materials that ask for `filter_width`.
+//!
+//! A cone is a width and a spread, carried by the path (`cone` in the state) only where some material
+//! asks. It begins as a pixel (`kernels/new_path.wgsl`), widens where light is scattered into more than one direction
+//! (`kernels/material.wgsl`), and meets surfaces as an ellipse (`kernels/footprint.wgsl`).
+//! docs/filtering.md has the formulas.
+
+use impasto_compiler::abi::InputSet;
+
+use crate::wgsl::constant_f32;
+use crate::world::camera::CameraFrame;
+use crate::world::needs::{Need, Needs};
+
+/// A scattered ray stands for the solid angle that it would have to itself among so many rays of its
+/// density: about as many as a pixel gets in a quick picture.
+const RAYS: f32 = 16.0;
+/// The widest cone: more than a radian is no direction any more.
+const WIDEST: f32 = 1.0;
+/// The longest footprint, in widths of its cone.
+const LONGEST: f32 = 16.0;
+
+/// The constants of the stages that make and widen cones.
+pub(crate) fn constants(camera: &CameraFrame, width: u32, height: u32) -> String {
+    constant_f32("PIXEL_ANGLE", pixel_angle(camera, width, height))
+        + &constant_f32("CONE_RAYS", RAYS)
+        + &constant_f32("WIDEST_CONE", WIDEST)
+        + &constant_f32("LONGEST_FOOTPRINT", LONGEST)
+}
+
+/// The square root of the solid angle of the pixel in the middle of a picture, in radians.
+fn pixel_angle(camera: &CameraFrame, width: u32, height: u32) -> f32 {
+    let across = 2.0 * camera.right.length() / width as f32;
+    let down = 2.0 * camera.up.length() / height as f32;
+    across.sqrt() * down.sqrt()
+}
+
+/// The WGSL that computes what code that reads `inputs` is told of footprints: statements, and the last
+/// arguments of `SurfacePoint`.
+pub(crate) fn footprint(needs: Needs, inputs: InputSet) -> (&'static str, String) {
+    let cones = needs.has(Need::RayCones);
+    let uvs = cones && needs.has(Need::UvWidths);
+    let mut arguments = String::new();
+    if inputs.footprint {
+        arguments += match cones {
+            true => ", seen.x, seen.y",
+            false => ", vec3<f32>(0.0), vec3<f32>(0.0)",
+        };
+    }
+    if inputs.footprint_uv {
+        arguments += match uvs {
+            true => ", hit_uv_change(hit.primitive, seen.x), hit_uv_change(hit.primitive, seen.y)",
+            false => ", vec2<f32>(0.0), vec2<f32>(0.0)",
+        };
+    }
+    let statements = match arguments.contains("seen") {
+        true => "let seen = footprint(hit_geometric_normal(hit.primitive), wo, width);\n    ",
+        false => "",
+    };
+    (statements, arguments)
+}

@@ -1,0 +1,15 @@
+//! The kernels of a plan as text: which there are, what each is made of, and what they share.
+
+pub(crate) mod compose;
+pub(crate) mod cones;
+pub mod dropped;
+pub(crate) mod layout;
+pub(crate) mod modules;
+pub(crate) mod order;
+pub(crate) mod profile;
+pub(crate) mod queues;
+pub mod random;
+pub(crate) mod shells;
+pub(crate) mod stages;
+pub(crate) mod state;
+mod wavefront;

@@ -1,0 +1,277 @@
+//! Which kernels a plan needs, and what each is made of: the megakernel here, those of the
+//! wavefront in `wavefront`. Their text is put together in `compose`.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::ops::Range;
+
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
+use impasto_compiler::partition::{Form, Organisation, Plan};
+
+use crate::kernels::compose::Binding;
+use crate::kernels::layout::Layout;
+use crate::kernels::queues::Queues;
+use crate::kernels::shells::SUBGROUP;
+use crate::kernels::stages::{STAGES, StageId};
+use crate::technique::{Regeneration, Technique};
+use crate::wgsl;
+use crate::wgsl::text::preprocess;
+use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::bvh;
+use crate::world::needs::{self, Facts, Need, Needs};
+use crate::world::{MaterialSource, World};
+
+/// Threads of a prepare kernel, which is one workgroup.
+const PREPARE_THREADS: u32 = 64;
+
+/// What decides how many threads a kernel gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Feed {
+    /// One for every slot of the pool.
+    Pool,
+    /// As many as fill the GPU; they fetch items until the pool's number is used up.
+    Fetched,
+    /// As many as fill the GPU; they fetch items of a queue until it is used up.
+    FetchedQueue(usize),
+    /// One for every item of a queue, through indirect arguments.
+    Queue(usize),
+    /// Workgroups enough for each of some consecutive queues, through the arguments of the first.
+    Queues {
+        /// The first.
+        first: usize,
+        /// How many.
+        count: usize,
+    },
+    /// A number of workgroups.
+    Groups(u32),
+    /// One workgroup.
+    Once,
+}
+
+/// What a kernel is made of, before its text.
+#[derive(Clone, Debug)]
+pub(crate) struct Recipe {
+    /// Its name in reports and GPU captures.
+    pub name: String,
+    /// How it treats its materials, if it evaluates any.
+    pub form: Option<Form>,
+    /// The stages it runs.
+    pub stages: Vec<StageId>,
+    /// The materials it evaluates.
+    pub members: Vec<usize>,
+    /// How many threads it gets.
+    pub feed: Feed,
+    /// WGSL of its requests and entry point.
+    pub shell: String,
+}
+
+impl Recipe {
+    /// Of a kernel that evaluates no material.
+    pub(crate) fn plain(name: &str, stages: Vec<StageId>, feed: Feed, shell: String) -> Self {
+        Self {
+            name: name.to_string(),
+            form: None,
+            stages,
+            members: Vec::new(),
+            feed,
+            shell,
+        }
+    }
+}
+
+/// One kernel of a plan.
+#[derive(Clone, Debug)]
+pub(crate) struct Kernel {
+    /// What it is made of.
+    pub recipe: Recipe,
+    /// Its text, entry point `main`.
+    pub wgsl: String,
+    /// The buffers it binds.
+    pub bindings: Vec<Binding>,
+}
+
+/// Sizes that the kernels of a plan share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sizes {
+    /// Slots in the pool.
+    pub pool: u32,
+    /// Threads of a workgroup.
+    pub workgroup: u32,
+    /// Threads that fill the GPU, for kernels whose threads fetch one item after another.
+    pub threads: u32,
+    /// Items that such a thread may fetch, which bounds the work of a dispatch.
+    pub fetch_limit: u32,
+    /// Workgroups in the first dimension of a dispatch, before a second is opened.
+    pub row_groups: u32,
+}
+
+/// Composes the kernels of one plan.
+pub(crate) struct Composer<'a> {
+    pub world: &'a World,
+    pub source: &'a dyn MaterialSource,
+    pub materials: &'a [MaterialInfo],
+    pub instances: &'a [InstanceInfo],
+    pub tables: &'a [BufferData],
+    pub plan: &'a Plan,
+    pub layout: Layout,
+    pub sizes: Sizes,
+    pub technique: Technique,
+    /// Whether kernels look the queue of a material up in the buffer `queue_table`, so that one logic
+    /// kernel serves many plans; otherwise it is part of their text.
+    pub queue_table: bool,
+    /// Lanes of the GPU's largest subgroups.
+    pub subgroup_size: u32,
+    /// Random numbers of the sampler.
+    pub random: ShaderPart,
+}
+
+impl Composer<'_> {
+    /// Every kernel, in the order of an iteration.
+    pub(crate) fn kernels(&self) -> Vec<Kernel> {
+        let recipes = self.recipes().into_iter().enumerate();
+        recipes
+            .map(|(index, recipe)| self.compose(index, recipe))
+            .collect()
+    }
+
+    /// What every kernel is made of, in the same order. Each has a name of its own.
+    pub(crate) fn recipes(&self) -> Vec<Recipe> {
+        let mut recipes = match self.plan.organisation {
+            Organisation::Wavefront => self.wavefront(),
+            Organisation::Mega => vec![self.prepare("prepare", 0..0, true), self.mega()],
+        };
+        let mut taken = BTreeSet::new();
+        for recipe in &mut recipes {
+            recipe.name = unused_name(&recipe.name, &taken);
+            taken.insert(recipe.name.clone());
+        }
+        recipes
+    }
+
+    /// The materials that some kernel evaluates, ascending.
+    pub(crate) fn planned(&self) -> Vec<usize> {
+        let all = 0..self.materials.len();
+        all.filter(|m| !self.plan.unused.contains(m)).collect()
+    }
+
+    /// What the compiler says of some materials.
+    pub(crate) fn infos(&self, members: &[usize]) -> Vec<&MaterialInfo> {
+        members
+            .iter()
+            .filter_map(|i| self.materials.get(*i))
+            .collect()
+    }
+
+    /// The needs of a kernel that evaluates `members` only.
+    pub(crate) fn needs_of(&self, members: &[usize]) -> Needs {
+        let materials: Vec<MaterialInfo> = self.infos(members).into_iter().cloned().collect();
+        let facts = Facts {
+            world: self.world,
+            materials: &materials,
+            technique: &self.technique,
+            wavefront: self.layout.wavefront,
+        };
+        let all = self.layout.needs;
+        let own = Needs::of(&facts, Needs::default()).or(self.layout.forced);
+        let needs = all.minus(needs::OF_MATERIALS.minus(own));
+        let lit = needs.has(Need::ShadowRays);
+        let needs = if lit {
+            needs
+        } else {
+            needs.without(Need::Absorption)
+        };
+        match needs.any(&[Need::Absorption, Need::MediumChanges, Need::ExteriorIor]) {
+            true => needs,
+            false => needs.without(Need::Media),
+        }
+    }
+
+    /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
+    pub(crate) fn prepare(&self, name: &str, consumed: Range<usize>, hands_out: bool) -> Recipe {
+        let of_kernels = Queues::of_kernels(self.plan);
+        let binned: Vec<_> = of_kernels
+            .into_iter()
+            .filter(|queues| queues.len() > 1 && consumed.contains(&queues.start))
+            .collect();
+        let fetched = STAGES.iter().any(|stage| self.fetches(stage.id));
+        let flags = [
+            ("queues", !consumed.is_empty()),
+            ("binned", !binned.is_empty()),
+            ("work", hands_out),
+            ("regenerates", self.regenerates()),
+            ("fetched", fetched),
+            ("some_pixels", self.layout.needs.has(Need::SomePixels)),
+        ];
+        let text = self.layout.queues.constants()
+            + &wgsl::constants_u32(&[
+                ("PREPARE_SIZE", PREPARE_THREADS),
+                ("FIRST_CONSUMED", consumed.start as u32),
+                ("END_CONSUMED", consumed.end as u32),
+            ])
+            + &first_of_kernel(&binned)
+            + &preprocess(include_str!("prepare.wgsl"), &flags);
+        Recipe::plain(name, Vec::new(), Feed::Once, text)
+    }
+
+    /// All stages in one kernel.
+    fn mega(&self) -> Recipe {
+        let flags = [
+            ("shadow_rays", self.layout.needs.has(Need::ShadowRays)),
+            ("regenerates", self.regenerates()),
+            ("walk_lane", bvh::asks_for_lane(&self.world.parts.bvh)),
+        ];
+        let mut shell = preprocess(include_str!("mega.wgsl"), &flags);
+        if self.regenerates() {
+            // Idle lanes times this must exceed the subgroup's lanes.
+            let share = match self.technique.regeneration {
+                Regeneration::Always => "0xffffu",
+                Regeneration::Half | Regeneration::Never => "2u",
+            };
+            shell += &format!("const REGENERATION_SHARE: u32 = {share};\n");
+            shell += &wgsl::constant_u32("FETCH_LIMIT", self.sizes.fetch_limit);
+            shell += SUBGROUP;
+        }
+        let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));
+        let stages = stages.map(|s| s.id).collect();
+        Recipe {
+            form: Some(Form::Inline),
+            members: self.planned(),
+            ..Recipe::plain("mega", stages, self.mega_feed(), shell)
+        }
+    }
+
+    /// Whether this is a megakernel whose threads begin further paths.
+    fn regenerates(&self) -> bool {
+        !self.layout.wavefront && self.technique.regeneration != Regeneration::Never
+    }
+
+    fn mega_feed(&self) -> Feed {
+        match self.regenerates() {
+            true => Feed::Fetched,
+            false => Feed::Pool,
+        }
+    }
+}
+
+/// `name`, with the lowest number from 2 on that makes it one that is not `taken`.
+fn unused_name(name: &str, taken: &BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    let mut names = std::iter::once(name.to_string()).chain(numbered);
+    names.find(|n| !taken.contains(n)).unwrap_or_default()
+}
+
+/// The WGSL function that gives the first queue of the kernel that works on a queue, where
+/// some kernels work on several each; nothing if none does.
+fn first_of_kernel(binned: &[Range<usize>]) -> String {
+    if binned.is_empty() {
+        return String::new();
+    }
+    let mut out = "fn first_of_kernel(queue: u32) -> u32 {\n".to_string();
+    for Range { start, end } in binned {
+        let _ = writeln!(
+            out,
+            "    if queue >= {start}u && queue < {end}u {{ return {start}u; }}"
+        );
+    }
+    out + "    return queue;\n}\n"
+}

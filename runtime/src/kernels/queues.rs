@@ -1,0 +1,338 @@
+//! The queues between stages and the counters of a render: where each lies in its buffer, for
+//! the kernels (as WGSL constants) and for the host alike.
+
+use std::fmt::Write;
+use std::ops::Range;
+
+use impasto_compiler::partition::{Form, Plan};
+
+use crate::kernels::dropped::{self, Row};
+
+/// Which queues a wavefront has, in the order of the buffer: new paths, those of material
+/// kernels, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
+/// are ordered, there is as much room for the queue in that order, and for each of its items'
+/// bin and rank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Queues {
+    /// Those of material kernels.
+    pub materials: usize,
+    /// Whether shadow rays are cast.
+    pub shadow_rays: bool,
+    /// Whether rays are cast in an order of their own.
+    pub ordered: bool,
+}
+
+impl Queues {
+    pub(crate) const NEW_PATH: usize = 0;
+
+    /// Those of a plan's material kernels, in its order: none where materials are evaluated inline,
+    /// one for each member of a binned kernel, else one.
+    pub(crate) fn of_kernels(plan: &Plan) -> Vec<Range<usize>> {
+        let mut next = Self::NEW_PATH + 1;
+        let queues = plan.kernels.iter().map(|kernel| {
+            let begin = next;
+            next += match kernel.form {
+                Form::Inline => 0,
+                Form::Binned => kernel.materials.len(),
+                Form::Own | Form::Mixed => 1,
+            };
+            begin..next
+        });
+        queues.collect()
+    }
+
+    pub(crate) fn extension(self) -> usize {
+        1 + self.materials
+    }
+
+    pub(crate) fn shadow(self) -> usize {
+        2 + self.materials
+    }
+
+    pub(crate) fn count(self) -> usize {
+        2 + self.materials + usize::from(self.shadow_rays)
+    }
+
+    /// Where a queue of rays is put in order, of those in the buffer.
+    pub(crate) fn region_ordered(self) -> usize {
+        self.count()
+    }
+
+    /// How often the pool there is room for.
+    pub(crate) fn regions(self) -> usize {
+        self.count() + if self.ordered { 3 } else { 0 }
+    }
+
+    pub(crate) fn constants(self) -> String {
+        let mut out = format!(
+            "const QUEUE_NEW_PATH: u32 = {}u;\nconst QUEUE_EXTENSION: u32 = {}u;\n",
+            Self::NEW_PATH,
+            self.extension()
+        );
+        if self.shadow_rays {
+            let _ = writeln!(out, "const QUEUE_SHADOW: u32 = {}u;", self.shadow());
+        }
+        if self.ordered {
+            for (at, name) in (self.count()..).zip(["ORDERED", "BINS", "RANKS"]) {
+                let _ = writeln!(out, "const REGION_{name}: u32 = {at}u;");
+            }
+        }
+        out
+    }
+}
+
+/// A single counter of the buffer `counters`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scalar {
+    /// Requests that found a queue full.
+    Overflow,
+    /// Samples above what the film holds.
+    FilmClamped,
+    /// The first pixel and sample that no slot was given yet.
+    NextPixel,
+    NextSample,
+    /// The first pixel and sample for the slots that start paths in this iteration.
+    WorkPixel,
+    WorkSample,
+    /// Items of the work handed out that threads of a megakernel have fetched.
+    Fetched,
+    /// Slots that found no work left.
+    Retired,
+    /// Media that paths entered while in as many as a stack holds.
+    MediaOverflow,
+    /// Paths that crossed too many boundaries in a row that were none.
+    LostPaths,
+}
+
+const SCALARS: [(Scalar, &str); 10] = [
+    (Scalar::Overflow, "OVERFLOW"),
+    (Scalar::FilmClamped, "FILM_CLAMPED"),
+    (Scalar::NextPixel, "NEXT_PIXEL"),
+    (Scalar::NextSample, "NEXT_SAMPLE"),
+    (Scalar::WorkPixel, "WORK_PIXEL"),
+    (Scalar::WorkSample, "WORK_SAMPLE"),
+    (Scalar::Fetched, "FETCHED"),
+    (Scalar::Retired, "RETIRED"),
+    (Scalar::MediaOverflow, "MEDIA_OVERFLOW"),
+    (Scalar::LostPaths, "LOST_PATHS"),
+];
+
+/// Words between the lengths of queues: as far apart as the parts of a GPU's cache that work
+/// on atomic operations independently, since all threads of the logic kernel add to these.
+const PUSHED_STRIDE: usize = 64;
+
+/// Where between those lengths is the number of items that threads have fetched from the queue.
+const FETCHED_OF: usize = PUSHED_STRIDE / 2;
+
+/// The layout of the buffer `counters`, in words: the scalars, then for each queue its length
+/// when it was consumed, if a kernel is binned the first of its workgroups that works on that queue,
+/// then items consumed in 64 bits, then a row of dropped samples for
+/// each material and one for the film; in a profiling build lanes at work and lanes in all for
+/// each kernel, in 64 bits; then, apart from each other, the lengths of queues so
+/// far and, between those, how much threads have fetched of each; at last, if hits are counted, for
+/// each material its hits and the blocks of slots with any, both in 64 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Counters {
+    /// Number of queues; 0 in a megakernel.
+    pub queues: usize,
+    /// Whether a kernel works on several queues.
+    pub binned: bool,
+    /// Number of materials.
+    pub materials: usize,
+    /// Number of kernels whose lanes are counted.
+    pub profiled: usize,
+    /// Number of materials whose hits are counted.
+    pub hits: usize,
+}
+
+impl Counters {
+    /// The first words, which are the scalars, whatever the plan.
+    pub(crate) const SCALARS: usize = SCALARS.len();
+
+    fn taken(self) -> usize {
+        Self::SCALARS
+    }
+
+    fn first_groups(self) -> usize {
+        self.taken() + self.queues
+    }
+
+    fn items(self) -> usize {
+        self.first_groups() + if self.binned { self.queues } else { 0 }
+    }
+
+    /// The first row of dropped samples.
+    fn dropped(self) -> usize {
+        self.items() + 2 * self.queues
+    }
+
+    /// The row of those found when they were to be added to the film, after that of the last material.
+    pub(crate) fn film_row(self) -> usize {
+        self.materials
+    }
+
+    /// What one of those rows counted, in the words read back; `None` if nothing.
+    pub(crate) fn dropped_row(self, words: &[u32], row: usize) -> Option<Row> {
+        let at = self.dropped() + dropped::ROW_WORDS * row;
+        Row::read(words.get(at..at + dropped::ROW_WORDS)?)
+    }
+
+    /// The words that count the lanes of the `kernel`-th kernel.
+    pub(crate) fn lanes(self, kernel: usize) -> usize {
+        self.dropped() + dropped::ROW_WORDS * (self.materials + 1) + 4 * kernel
+    }
+
+    fn pushed(self) -> usize {
+        self.lanes(self.profiled).next_multiple_of(PUSHED_STRIDE)
+    }
+
+    fn hits(self) -> usize {
+        self.pushed() + PUSHED_STRIDE * self.queues
+    }
+
+    /// Words in all.
+    pub(crate) fn len(self) -> usize {
+        self.hits() + PUSHED_STRIDE * self.hits
+    }
+
+    pub(crate) fn constants(self) -> String {
+        let scalars = SCALARS
+            .iter()
+            .enumerate()
+            .map(|(at, (_, name))| (*name, at));
+        let arrays = [
+            ("PUSHED", self.pushed()),
+            ("PUSHED_STRIDE", PUSHED_STRIDE),
+            ("FETCHED_OF", self.pushed() + FETCHED_OF),
+            ("TAKEN", self.taken()),
+            ("FIRST_GROUP", self.first_groups()),
+            ("ITEMS", self.items()),
+            ("HITS", self.hits()),
+            ("HITS_STRIDE", PUSHED_STRIDE),
+        ];
+        let exists = |name: &str| match name {
+            "FIRST_GROUP" => self.binned,
+            "HITS" | "HITS_STRIDE" => self.hits > 0,
+            _ => true,
+        };
+        let arrays = arrays.into_iter().filter(|(name, _)| exists(name));
+        let mut out = String::new();
+        for (name, at) in scalars.chain(arrays) {
+            let _ = writeln!(out, "const COUNTER_{name}: u32 = {at}u;");
+        }
+        out + &dropped::constants(self.dropped(), self.materials)
+    }
+
+    /// The word that a scalar is kept in.
+    pub(crate) fn index(self, scalar: Scalar) -> usize {
+        // The table holds every scalar, which a test asserts.
+        let at = SCALARS.iter().position(|(s, _)| *s == scalar);
+        at.unwrap_or(0)
+    }
+
+    /// A scalar's value in the words read back.
+    pub(crate) fn scalar(self, words: &[u32], scalar: Scalar) -> u32 {
+        words.get(self.index(scalar)).copied().unwrap_or(0)
+    }
+
+    /// All samples dropped because a value was no number or below zero.
+    pub(crate) fn all_dropped(self, words: &[u32]) -> u64 {
+        let rows = (0..=self.film_row()).filter_map(|row| self.dropped_row(words, row));
+        rows.map(|row| row.samples()).sum()
+    }
+
+    /// The length of `queue` when it was consumed last, in the words read back.
+    pub(crate) fn taken_of(self, words: &[u32], queue: usize) -> u32 {
+        words.get(self.taken() + queue).copied().unwrap_or(0)
+    }
+
+    /// How many items of `queue` were consumed, in the words read back.
+    pub(crate) fn items_of(self, words: &[u32], queue: usize) -> u64 {
+        long(words, self.items() + 2 * queue)
+    }
+
+    /// Hits of a material, and blocks of slots with any, if they are counted.
+    pub(crate) fn hits_of(self, words: &[u32], material: usize) -> [u64; 2] {
+        let at = self.hits() + PUSHED_STRIDE * material;
+        [long(words, at), long(words, at + 2)]
+    }
+
+    /// The share of lanes at work in the statements of the `kernel`-th kernel, if it was profiled
+    /// and ran.
+    pub(crate) fn utilisation(self, words: &[u32], kernel: usize) -> Option<f64> {
+        let at = self.lanes(kernel);
+        let all = long(words, at + 2);
+        (kernel < self.profiled && all > 0).then(|| long(words, at) as f64 / all as f64)
+    }
+}
+
+/// A counter of two words, the low one first.
+fn long(words: &[u32], at: usize) -> u64 {
+    let word = |i: usize| words.get(i).copied().map_or(0, u64::from);
+    word(at) | word(at + 1) << 32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use impasto_compiler::partition::{PlanKernel, Strategy};
+
+    #[test]
+    fn regions_do_not_overlap() {
+        let queues = Queues {
+            materials: 3,
+            shadow_rays: true,
+            ordered: false,
+        };
+        assert_eq!(queues.shadow() + 1, queues.count());
+        let counters = Counters {
+            queues: queues.count(),
+            binned: false,
+            materials: 4,
+            profiled: 2,
+            hits: 0,
+        };
+        let mut words: Vec<u32> = (0..counters.len() as u32).collect();
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
+        assert_eq!(counters.dropped(), 10 + 3 * 6);
+        let rows = dropped::ROW_WORDS * 5;
+        assert_eq!(counters.lanes(0), counters.dropped() + rows);
+        assert!(counters.pushed() >= counters.lanes(2));
+        let last = counters.dropped_row(&words, counters.film_row());
+        assert_eq!(
+            last.map(|row| row.nonfinite as usize),
+            Some(counters.lanes(0) - dropped::ROW_WORDS)
+        );
+        assert_eq!(counters.dropped_row(&words[..30], 0), None);
+        assert_eq!(counters.utilisation(&words, 2), None);
+        assert_eq!(counters.len(), counters.pushed() + 6 * PUSHED_STRIDE);
+        let binned = Counters {
+            binned: true,
+            ..counters
+        };
+        assert_eq!(binned.items(), counters.items() + 6);
+        let counted = Counters {
+            hits: 3,
+            ..counters
+        };
+        assert_eq!(counted.len(), counters.len() + 3 * PUSHED_STRIDE);
+        words[counters.items() + 2] = 5;
+        words[counters.items() + 3] = 1;
+        assert_eq!(counters.items_of(&words, 1), (1 << 32) + 5);
+    }
+
+    #[test]
+    fn a_binned_kernel_has_a_queue_for_each_member() {
+        let names: Vec<String> = ["a", "b", "c", "d", "e"].map(String::from).to_vec();
+        let kernel = |form, members: &[usize]| PlanKernel::new(form, members.to_vec(), &names);
+        let plan = Plan {
+            kernels: vec![
+                kernel(Form::Mixed, &[1, 4]),
+                kernel(Form::Inline, &[2]),
+                kernel(Form::Binned, &[0, 3]),
+            ],
+            ..Strategy::Own.plan(&names)
+        };
+        assert_eq!(Queues::of_kernels(&plan), [1..2, 2..2, 2..4]);
+    }
+}

@@ -1,0 +1,294 @@
+//! Shells: the WGSL around a stage that makes a kernel of the wavefront of it. A shell finds the
+//! thread's items, runs the stage, and appends what the stage asked for to queues.
+
+use std::collections::BTreeMap;
+
+use impasto_compiler::partition::Form;
+use impasto_compiler::partition::workload::BLOCK;
+
+use crate::kernels::modules::Composer;
+use crate::kernels::queues::Queues;
+use crate::technique::{Append, Leaves};
+use crate::wgsl;
+use crate::wgsl::text::{case_labels, preprocess};
+use crate::world::bvh;
+use crate::world::needs::Need;
+
+/// What kernels know of subgroups if their threads work together.
+pub(crate) const SUBGROUP: &str = include_str!("subgroup.wgsl");
+
+/// A subgroup fetches rays when more than this share of its lanes has none (Aila and Laine 2009);
+/// measured on an H200, as what follows (docs/measurements.md).
+const FETCH_PERCENT: u32 = 25;
+/// Triangles wait while less than this share of the lanes with a ray has any (Ylitie et al. 2017).
+const TRIANGLE_PERCENT: u32 = 35;
+
+/// What a wavefront kernel does around its stage.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Shell {
+    /// The call of the stage.
+    pub run: String,
+    /// The queue it reads; every slot if `None`.
+    pub consumes: Option<Consumed>,
+    /// How many consecutive queues it reads from that one on, if several: each workgroup one.
+    pub binned: Option<usize>,
+    /// Whether it pushes to the queues of new paths and materials.
+    pub sorts: bool,
+    /// Whether it pushes to the queue of extension rays.
+    pub casts: bool,
+    /// Whether it pushes to the queue of shadow rays.
+    pub casts_shadows: bool,
+    /// Whether it traces rays.
+    pub traverses: bool,
+    /// Whether it counts hits of each material.
+    pub counts_hits: bool,
+}
+
+/// A queue that a kernel reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Consumed {
+    /// The queue, whose length counts.
+    pub queue: usize,
+    /// The region of memory its items are in: another than its own if they were put in order.
+    pub region: usize,
+}
+
+impl Consumed {
+    /// A queue whose items are where they were put.
+    pub(crate) fn unordered(queue: usize) -> Self {
+        Self {
+            queue,
+            region: queue,
+        }
+    }
+
+    pub(crate) fn constants(self) -> String {
+        wgsl::constants_u32(&[
+            ("CONSUMED_QUEUE", self.queue as u32),
+            ("CONSUMED_REGION", self.region as u32),
+        ])
+    }
+}
+
+/// The entry point of a kernel whose threads work on one item each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct EntryPoint {
+    /// Whether items are those of a queue; all slots of the pool otherwise.
+    pub queued: bool,
+    /// Whether each workgroup reads another of several queues.
+    pub binned: bool,
+    /// Whether items are slots, and not rays in buffers of their own.
+    pub slots: bool,
+    /// Whether it appends to queues.
+    pub pushes: bool,
+    /// Whether paths keep the places of their rays.
+    pub keeps: bool,
+    /// Whether it counts hits of each material.
+    pub counts_hits: bool,
+    /// Whether threads must know their place in the subgroup.
+    pub subgroups: bool,
+    /// Whether traversal must know the thread's place in the workgroup.
+    pub walk_lane: bool,
+}
+
+impl EntryPoint {
+    /// For slots in a queue, and nothing else.
+    pub(crate) fn of_slots_in_queue() -> Self {
+        Self {
+            queued: true,
+            slots: true,
+            ..Self::default()
+        }
+    }
+
+    pub(crate) fn wgsl(self) -> String {
+        let flags = [
+            ("queued", self.queued),
+            ("binned", self.binned),
+            ("slots", self.slots),
+            ("pushes", self.pushes),
+            ("keeps", self.keeps),
+            ("counts_hits", self.counts_hits),
+            ("subgroups", self.subgroups),
+            ("walk_lane", self.walk_lane),
+        ];
+        preprocess(include_str!("shell.wgsl"), &flags)
+    }
+}
+
+/// A kernel whose threads stay, and fetch one ray of a queue after another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FetchShell<'a> {
+    /// The queue of rays.
+    pub queue: u32,
+    /// WGSL of the index of the counter of rays fetched.
+    pub counter: &'a str,
+    /// The rays that a thread fetches on average, at most.
+    pub limit: u32,
+    /// Whether items are slots, and not rays in buffers of their own.
+    pub slots: bool,
+    /// Whether triangles wait until enough lanes have any.
+    pub together: bool,
+    /// Whether traversal must know the thread's place in the workgroup.
+    pub walk_lane: bool,
+}
+
+impl FetchShell<'_> {
+    pub(crate) fn wgsl(self) -> String {
+        let flags = [
+            ("slots", self.slots),
+            ("walk_lane", self.walk_lane),
+            ("together", self.together),
+        ];
+        wgsl::constants_u32(&[
+            ("CONSUMED_QUEUE", self.queue),
+            ("FETCH_LIMIT", self.limit),
+            ("FETCH_PERCENT", FETCH_PERCENT),
+            ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
+        ]) + &format!("const COUNTER_RAYS_FETCHED: u32 = {};\n", self.counter)
+            + SUBGROUP
+            + &preprocess(include_str!("fetch.wgsl"), &flags)
+    }
+}
+
+impl Composer<'_> {
+    /// Constants, request functions and entry point of a kernel whose threads work on one item each.
+    pub(crate) fn shell(&self, shell: &Shell) -> String {
+        let pushes = shell.sorts || shell.casts;
+        let requests = self.layout.needs.has(Need::Requests);
+        let entry = EntryPoint {
+            queued: shell.consumes.is_some(),
+            binned: shell.binned.is_some(),
+            slots: !(shell.traverses && requests),
+            pushes,
+            keeps: shell.casts && requests,
+            counts_hits: shell.counts_hits,
+            subgroups: pushes && self.technique.append == Append::Subgroup,
+            walk_lane: shell.traverses && bvh::asks_for_lane(&self.world.parts.bvh),
+        };
+        let mut out = self.layout.queues.constants();
+        if let Some(consumed) = shell.consumes {
+            out += &consumed.constants();
+        }
+        if let Some(count) = shell.binned {
+            out += &wgsl::constant_u32("CONSUMED_QUEUES", count as u32);
+        }
+        if pushes {
+            out += &self.pushes(shell);
+        }
+        if shell.sorts {
+            out += &self.material_queue();
+        }
+        if shell.counts_hits {
+            out += &self.hits();
+        }
+        out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
+        out + &entry.wgsl()
+    }
+
+    /// What counts hits of each material.
+    fn hits(&self) -> String {
+        let materials = self.layout.counters.hits as u32;
+        wgsl::constants_u32(&[
+            ("MATERIALS", materials),
+            ("BLOCK", BLOCK),
+            ("BLOCK_WORDS", materials.div_ceil(32)),
+        ]) + include_str!("hits.wgsl")
+    }
+
+    /// The functions by which a stage asks for work, and how they append to queues.
+    fn pushes(&self, shell: &Shell) -> String {
+        let queues = self.layout.queues;
+        let rays = queues.extension();
+        let first = if shell.sorts { Queues::NEW_PATH } else { rays };
+        let end = if shell.casts { queues.count() } else { rays };
+        let requests = self.layout.needs.has(Need::Requests);
+        let keeps = shell.casts && requests;
+        let flags = [
+            ("sorts", shell.sorts),
+            ("casts", shell.casts),
+            ("casts_shadows", shell.casts_shadows),
+            ("requests", requests),
+            ("keeps", keeps),
+            ("keeps_shadows", keeps && shell.casts_shadows),
+            ("subgroups", self.technique.append == Append::Subgroup),
+        ];
+        let one_by_one = preprocess(include_str!("append/one_by_one.wgsl"), &flags);
+        let append = match self.technique.append {
+            Append::Workgroup => preprocess(include_str!("append/workgroup.wgsl"), &flags),
+            Append::Subgroup => one_by_one + include_str!("append/subgroup.wgsl") + SUBGROUP,
+            Append::Thread => one_by_one + include_str!("append/thread.wgsl"),
+        };
+        wgsl::constants_u32(&[
+            ("FIRST_PUSHED", first as u32),
+            ("PUSHED_QUEUES", (end - first) as u32),
+        ]) + &preprocess(include_str!("queue.wgsl"), &flags)
+            + &append
+    }
+
+    /// Constants and entry point of a kernel whose threads fetch the rays of a queue.
+    pub(crate) fn fetch_shell(&self, consumed: Consumed) -> String {
+        let fetch = FetchShell {
+            queue: consumed.queue as u32,
+            counter: "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE",
+            limit: self.sizes.fetch_limit,
+            slots: !self.layout.needs.has(Need::Requests),
+            together: self.technique.leaves == Leaves::Together,
+            walk_lane: bvh::asks_for_lane(&self.world.parts.bvh),
+        };
+        wgsl::constant_u32("CONSUMED_REGION", consumed.region as u32) + &fetch.wgsl()
+    }
+
+    /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.
+    fn material_queue(&self) -> String {
+        if self.queue_table {
+            return "fn material_queue(instance: u32) -> u32 { \
+                    return queue_table[material_of(instance)]; }\n"
+                .to_string();
+        }
+        let queues = self.queues_of_materials();
+        let all = queues.len() == self.planned().len();
+        let body = match queues.first() {
+            None => "return NOTHING;".to_string(),
+            Some((_, sole)) if all && queues.iter().all(|(_, queue)| queue == sole) => {
+                format!("return {sole}u;")
+            }
+            Some((_, first)) if all && queues.iter().all(|(m, queue)| *queue == first + m) => {
+                format!("return {first}u + material_of(instance);")
+            }
+            Some(_) => by_material(&queues),
+        };
+        format!("fn material_queue(instance: u32) -> u32 {{ {body} }}\n")
+    }
+
+    /// The materials that have a queue, ascending, each with that.
+    pub(crate) fn queues_of_materials(&self) -> Vec<(usize, usize)> {
+        let kernels = self.plan.kernels.iter().zip(Queues::of_kernels(self.plan));
+        let mut pairs: Vec<(usize, usize)> = kernels
+            .filter(|(kernel, _)| kernel.form != Form::Inline)
+            .flat_map(|(kernel, queues)| {
+                let last = queues.end - 1;
+                let queues = queues.chain(std::iter::repeat(last));
+                kernel.materials.iter().copied().zip(queues)
+            })
+            .collect();
+        pairs.sort_unstable();
+        pairs
+    }
+}
+
+/// A `switch` over materials that returns the queue of those that have one, ascending by material.
+fn by_material(queues: &[(usize, usize)]) -> String {
+    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (material, queue) in queues {
+        members.entry(*queue).or_default().push(*material);
+    }
+    let case = |(queue, members): (&usize, &Vec<usize>)| {
+        format!("case {}: {{ return {queue}u; }}", case_labels(members))
+    };
+    let cases: Vec<String> = members.iter().map(case).collect();
+    format!(
+        "switch material_of(instance) {{ {} default: {{ return NOTHING; }} }}",
+        cases.join(" ")
+    )
+}

@@ -1,0 +1,204 @@
+//! How much work at a time: the paths in flight, and the iterations of a submission.
+
+use std::time::{Duration, Instant};
+
+use crate::error::RuntimeError;
+use crate::film;
+use crate::gpu::Gpu;
+use crate::kernels::layout::Layout;
+use crate::kernels::modules::Sizes;
+use crate::options::{Progress, RenderOptions};
+use crate::technique::Technique;
+use crate::world::World;
+
+/// Paths in flight by default, as in Laine et al. 2013. In a megakernel they are those of one
+/// dispatch, whose time this bounds.
+const POOL: u32 = 1 << 20;
+/// The same for the wavefront on GPUs with memory of their own: each kernel drains the machine
+/// once an iteration, so that an H200 renders 1.4 to 1.5 times as fast as with the paper's.
+const LARGE_POOL: u32 = 1 << 23;
+/// What a default pool may take, in bytes.
+const LARGE_POOL_BYTES: u64 = 2 << 30;
+/// Paths of a dispatch of a megakernel there: at its end threads idle.
+const LARGE_BATCH: u32 = 1 << 22;
+/// The same for GPUs in software, to stay responsive.
+const SOFTWARE_POOL: u32 = 1 << 16;
+/// Threads of a workgroup (docs/measurements.md).
+const WORKGROUP: u32 = 256;
+/// Threads that fetch their work: about as many as an H200 holds at once.
+const THREADS: u32 = 1 << 18;
+/// Items that each of them may fetch; with few threads and large pools a dispatch takes long.
+const FETCH_LIMIT: u32 = 64;
+/// The same for GPUs in software: Mesa's ends all loops of a thread after 65,535 turns in sum.
+const SOFTWARE_FETCH_LIMIT: u32 = 2;
+
+/// A submission is made longer below the first and shorter above the second.
+const SHORT: Duration = Duration::from_millis(20);
+const LONG: Duration = Duration::from_millis(100);
+/// Iterations in a submission: at most, and at least when the end is near.
+pub(crate) const MAX_ITERATIONS: u32 = 64;
+const LAST_ITERATIONS: u64 = 8;
+
+/// Chooses the pool, within what the GPU can bind.
+pub(crate) fn sizes(
+    gpu: &Gpu,
+    world: &World,
+    layout: &Layout,
+    options: &RenderOptions,
+) -> Result<Sizes, RuntimeError> {
+    let limits = gpu.device.limits();
+    let pixels = u64::from(world.width) * u64::from(world.height);
+    let film = pixels * film::PLANES as u64 * 4;
+    gpu.check_binding_size("the film", film)?;
+    // State and queues are one buffer each.
+    let state_bytes = layout.path_bytes();
+    let queue_bytes = 4 * layout.queue_words();
+    let slot_bytes = state_bytes.max(queue_bytes).max(1);
+    if let Some(pool) = options.pool {
+        let bytes = u64::from(pool) * slot_bytes;
+        gpu.check_binding_size("a pool of that size", bytes)
+            .map_err(|error| error.with_hint("use a smaller pool (`--pool`)"))?;
+    }
+    let most = limits
+        .max_buffer_size
+        .min(limits.max_storage_buffer_binding_size);
+    let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
+    let default = default_pool(gpu, layout, state_bytes + queue_bytes);
+    let rendered = options.pixel_count(world.width, world.height);
+    let paths = rendered.saturating_mul(u64::from(options.samples));
+    let enough = u32::try_from(paths).unwrap_or(u32::MAX);
+    let pool = options
+        .pool
+        .unwrap_or(default)
+        .min(enough)
+        .min(fits)
+        .clamp(1, 1 << 30);
+    dispatch_sizes(gpu, pool, &options.technique)
+}
+
+/// The sizes of dispatches over `items` slots.
+pub(crate) fn dispatch_sizes(
+    gpu: &Gpu,
+    items: u32,
+    technique: &Technique,
+) -> Result<Sizes, RuntimeError> {
+    let limits = gpu.device.limits();
+    let fetch_limit = match gpu.is_software() {
+        true => SOFTWARE_FETCH_LIMIT,
+        false => FETCH_LIMIT,
+    };
+    Ok(Sizes {
+        pool: items,
+        workgroup: workgroup_size(&limits, technique.workgroup)?,
+        threads: technique
+            .threads
+            .unwrap_or(THREADS)
+            .min(items)
+            .max(items.div_ceil(fetch_limit)),
+        fetch_limit,
+        row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
+    })
+}
+
+/// Threads of a workgroup, within the GPU's limits.
+fn workgroup_size(limits: &wgpu::Limits, wanted: Option<u32>) -> Result<u32, RuntimeError> {
+    let most = limits
+        .max_compute_invocations_per_workgroup
+        .min(limits.max_compute_workgroup_size_x);
+    match wanted {
+        Some(threads) if threads == 0 || threads > most => Err(RuntimeError::Setting {
+            setting: "workgroup",
+            value: threads.to_string(),
+            expected: format!("1 to {most} threads"),
+        }),
+        Some(threads) => Ok(threads),
+        None => Ok(WORKGROUP.min(most)),
+    }
+}
+
+fn default_pool(gpu: &Gpu, layout: &Layout, slot_bytes: u64) -> u32 {
+    if gpu.is_software() {
+        return SOFTWARE_POOL;
+    }
+    if !gpu.has_own_memory() {
+        return POOL;
+    }
+    if !layout.wavefront {
+        return LARGE_BATCH;
+    }
+    let affordable = LARGE_POOL_BYTES / slot_bytes.max(1);
+    LARGE_POOL.min(u32::try_from(affordable).unwrap_or(u32::MAX))
+}
+
+/// How many iterations a submission has.
+pub(crate) struct Pace {
+    iterations: u32,
+    /// The most that will be asked for.
+    pub max: u32,
+    last: Instant,
+}
+
+impl Pace {
+    /// At most `max` iterations, starting with one.
+    pub(crate) fn new(max: u32) -> Self {
+        Self {
+            iterations: 1,
+            max: max.clamp(1, MAX_ITERATIONS),
+            last: Instant::now(),
+        }
+    }
+
+    /// Asks for at most `max` iterations from now on.
+    pub(crate) fn limit(&mut self, max: u32) {
+        self.max = max.clamp(1, MAX_ITERATIONS);
+        self.iterations = self.iterations.min(self.max);
+    }
+
+    /// Called whenever a submission is done.
+    pub(crate) fn adapt(&mut self) {
+        let took = self.last.elapsed();
+        self.last = Instant::now();
+        if took < SHORT {
+            self.iterations = (2 * self.iterations).min(self.max);
+        } else if took > LONG {
+            self.iterations = (self.iterations / 2).max(1);
+        }
+    }
+
+    /// Iterations of the next submission, when `progress` took `done` iterations and `ahead`
+    /// more are submitted: not many more than the rest will take at that rate.
+    pub(crate) fn next(&self, progress: &Progress, done: u64, ahead: u64) -> u32 {
+        let rest = u128::from(progress.total - progress.paths.min(progress.total));
+        let needed = match progress.paths {
+            0 => u64::MAX,
+            paths => u64::try_from(rest * u128::from(done) / u128::from(paths)).unwrap_or(u64::MAX),
+        };
+        let useful = needed.saturating_sub(ahead).max(LAST_ITERATIONS);
+        self.iterations
+            .min(u32::try_from(useful).unwrap_or(u32::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_submission_asks_for_what_is_left() {
+        let pace = Pace {
+            iterations: 64,
+            max: 64,
+            last: Instant::now(),
+        };
+        let after = |paths| Progress {
+            paths,
+            total: 1000,
+            elapsed: Duration::ZERO,
+        };
+        assert_eq!(pace.next(&after(0), 10, 20), 64);
+        assert_eq!(pace.next(&after(100), 10, 20), 64);
+        assert_eq!(pace.next(&after(500), 50, 20), 30);
+        assert_eq!(pace.next(&after(999), 50, 20), 8);
+        assert_eq!(pace.next(&after(1000), 50, 0), 8);
+    }
+}

@@ -1,0 +1,388 @@
+//! The report of a render: what ran, on what, how long, and what was dropped. Scripts read it
+//! as JSON; the names of fields are a promise.
+
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
+use impasto_compiler::partition::{Organisation, Plan, Workload, text};
+use serde::Serialize;
+
+use crate::film::Film;
+use crate::gpu::GpuInfo;
+use crate::kernels::dropped::Dropped;
+use crate::kernels::layout::Layout;
+use crate::kernels::modules::{Feed, Kernel, Recipe};
+use crate::kernels::queues::Scalar;
+use crate::kernels::stages::StageId;
+use crate::options::RenderOptions;
+use crate::render::status::Status;
+use crate::render::until::{Check, Ending};
+use crate::technique::Technique;
+use crate::world::GeometryCounts;
+
+/// What a render did. Times are in seconds, sizes in bytes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// The GPU.
+    pub adapter: AdapterReport,
+    /// The plan's strategy.
+    pub strategy: String,
+    /// The plan: groups of materials with their forms, as `impasto render --partition` takes it;
+    /// `mega` for a megakernel.
+    pub plan: String,
+    /// How the plan was renewed while rendering; absent if it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replanned: Option<ReplanReport>,
+    /// How the work was done.
+    pub technique: Technique,
+    /// Columns of the picture.
+    pub width: u32,
+    /// Rows of the picture.
+    pub height: u32,
+    /// Samples asked for in each pixel.
+    pub samples_per_pixel: u32,
+    /// Index of each pixel's first sample.
+    pub first_sample: u32,
+    /// The seed of all random numbers.
+    pub seed: u32,
+    /// Triangles that are stored.
+    pub triangles: u64,
+    /// Triangles that rays can hit: those of an object count once for each of its placements.
+    pub placed_triangles: u64,
+    /// Objects that are stored once and placed any number of times.
+    pub objects: u64,
+    /// Placements of objects.
+    pub placements: u64,
+    /// Materials: each is a shader, compiled once.
+    pub material_count: usize,
+    /// Instances of materials: what the scene binds to geometry, each with its own parameters.
+    pub instance_count: usize,
+    /// The materials, in the order of the program.
+    pub materials: Vec<MaterialReport>,
+    /// Samples in each pixel that were taken over from a checkpoint.
+    pub resumed_samples: u32,
+    /// Paths finished, those taken over included. Fewer than pixels times samples if the render
+    /// was stopped.
+    pub paths: u64,
+    /// Time the GPU was busy, without building pipelines.
+    pub gpu_seconds: f64,
+    /// Where GPU times come from: `timestamps`, or `wall` on GPUs without them, where
+    /// `gpu_seconds` is the time waited and kernels have none.
+    pub timing: &'static str,
+    /// Time from the first submission to the finished film.
+    pub wall_seconds: f64,
+    /// Time to compose and build the pipelines; callers add what they spent on materials.
+    pub compile_seconds: f64,
+    /// Paths finished in a second of `gpu_seconds`.
+    pub paths_per_second: f64,
+    /// The same while the mixture of paths was steady, from a quarter to nine tenths of them; absent
+    /// if the render was too short to tell, or the GPU has no timestamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steady_paths_per_second: Option<f64>,
+    /// Memory for the state of one path; 0 in a megakernel.
+    pub path_state_bytes: u64,
+    /// Paths in flight.
+    pub pool_size: u32,
+    /// Times every kernel was dispatched.
+    pub iterations: u64,
+    /// The kernels in the order of an iteration; of a renewed plan what they did since then.
+    pub kernels: Vec<KernelReport>,
+    /// What paths hit, on average over the iterations; absent if that was not counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workload: Option<Workload>,
+    /// Samples dropped because a value was no finite number, or below zero: those that
+    /// kernels dropped at a material, and those found when a path ended.
+    pub nonfinite_samples: u64,
+    /// Those of them that this run found to be below zero, and finite.
+    pub negative_samples: u64,
+    /// The ones that this run found, by kernel and material, each with an example.
+    pub dropped: Vec<Dropped>,
+    /// Estimates of the error while rendering, if it was rendered until a goal; absent otherwise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub convergence: Vec<Check>,
+    /// Why such a render ended: `relmse`, `rmse`, `time`, `samples` or `interrupt`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended_by: Option<Ending>,
+    /// Samples cut to what the film holds.
+    pub clamped_samples: u64,
+    /// Requests lost because a queue was full; anything but 0 is a defect.
+    pub queue_overflow: u64,
+    /// Media that paths entered while in as many as they can follow, and then ignored.
+    pub media_overflow: u64,
+    /// Paths given up because they crossed too many hidden boundaries in a row.
+    pub lost_paths: u64,
+}
+
+/// A material of a report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct MaterialReport {
+    /// Its name.
+    pub name: String,
+    /// Its lobes, after layering.
+    pub lobes: usize,
+    /// The names of its instances.
+    pub instances: Vec<String>,
+}
+
+impl MaterialReport {
+    pub(crate) fn of(materials: &[MaterialInfo], instances: &[InstanceInfo]) -> Vec<Self> {
+        let report = |material: &MaterialInfo| Self {
+            name: material.name.clone(),
+            lobes: material.lobes,
+            instances: Vec::new(),
+        };
+        let mut reports: Vec<Self> = materials.iter().map(report).collect();
+        for instance in instances {
+            if let Some(report) = reports.get_mut(instance.material) {
+                report.instances.push(instance.name.clone());
+            }
+        }
+        reports
+    }
+}
+
+/// The GPU of a report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
+pub struct AdapterReport {
+    /// Its name.
+    pub name: String,
+    /// The interface it was reached through.
+    pub backend: String,
+    /// The driver's name and version.
+    pub driver: String,
+}
+
+impl From<GpuInfo> for AdapterReport {
+    fn from(info: GpuInfo) -> Self {
+        Self {
+            name: info.name,
+            backend: info.backend,
+            driver: info.driver,
+        }
+    }
+}
+
+/// What one kernel did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KernelReport {
+    /// Its name.
+    pub name: String,
+    /// How it treats its materials (`own`, `mixed`, `binned`, `inline`); absent if it evaluates none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<impasto_compiler::partition::Form>,
+    /// The names of the materials it evaluates.
+    pub materials: Vec<String>,
+    /// Items it worked on: of its queue, or slots, or for a megakernel paths.
+    pub items: u64,
+    /// GPU time; 0 without timestamps.
+    pub gpu_seconds: f64,
+    /// In a profiling build the share of a subgroup's lanes that are at work, on average over the
+    /// statements it executes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utilisation: Option<f64>,
+    /// Samples that its materials gave a value that is no finite number, or below zero.
+    pub nonfinite_samples: u64,
+}
+
+/// How a plan was renewed while rendering.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReplanReport {
+    /// Iterations that the first plan ran.
+    pub at_iteration: u64,
+    /// Time from the first submission until then.
+    pub at_seconds: f64,
+    /// Time that planning took, while the GPU went on.
+    pub planning_seconds: f64,
+    /// Time that compiling the new kernels took, while the GPU went on.
+    pub compile_seconds: f64,
+    /// The first plan.
+    pub from: String,
+    /// The new plan; absent if none was made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+    /// Why the first plan went on, if it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<String>,
+    /// GPU time of the first plan.
+    pub gpu_seconds: f64,
+    /// GPU time that counting hits took: by how much the logic kernel got faster without. Absent if
+    /// the new plan's logic kernel evaluates materials, or there are no timestamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counting_seconds: Option<f64>,
+    /// What the first plan's kernels did; empty where they went on.
+    pub kernels: Vec<KernelReport>,
+}
+
+/// What a render took over from an earlier run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Resumed {
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// Of which no number were so many.
+    pub nonfinite: u64,
+    /// And cut were so many.
+    pub clamped: u64,
+}
+
+/// What a report is made of.
+pub(crate) struct Inputs<'a> {
+    pub resumed: Resumed,
+    pub gpu: GpuInfo,
+    pub options: &'a RenderOptions,
+    pub layout: &'a Layout,
+    pub kernels: &'a [Kernel],
+    pub timed: bool,
+    pub strategy: &'a str,
+    pub plan: &'a Plan,
+    pub replanned: Option<ReplanReport>,
+    pub geometry: GeometryCounts,
+    pub pool: u32,
+    pub materials: &'a [MaterialReport],
+    pub workload: Option<Workload>,
+    pub compile_seconds: f64,
+    pub wall_seconds: f64,
+}
+
+impl Inputs<'_> {
+    pub(crate) fn report(self, status: &Status, film: &Film) -> Report {
+        let pixels = self.options.pixel_count(film.width, film.height);
+        let all_paths = film.total_samples();
+        let paths = all_paths.saturating_sub(pixels * u64::from(self.resumed.samples));
+        let gpu_seconds = if self.timed {
+            status.gpu_seconds
+        } else {
+            self.wall_seconds
+        };
+        let ran = Ran {
+            layout: self.layout,
+            kernels: self.kernels,
+            materials: self.materials,
+            pool: self.pool,
+        };
+        let kernels = ran.report(status, paths);
+        let scalar = |s| u64::from(self.layout.counters.scalar(&status.counters, s));
+        let before = status.before.dropped.iter().cloned();
+        let dropped = before.chain(ran.dropped(status, film.width, self.options.seed));
+        let dropped = Dropped::merged(dropped);
+        Report {
+            strategy: self.strategy.to_string(),
+            plan: partition(self.plan, self.materials),
+            replanned: self.replanned,
+            technique: self.options.technique,
+            width: film.width,
+            height: film.height,
+            samples_per_pixel: self.options.samples,
+            first_sample: self.options.first_sample,
+            seed: self.options.seed,
+            triangles: self.geometry.triangles,
+            placed_triangles: self.geometry.placed_triangles,
+            objects: self.geometry.objects,
+            placements: self.geometry.placements,
+            material_count: self.materials.len(),
+            instance_count: self.materials.iter().map(|m| m.instances.len()).sum(),
+            materials: self.materials.to_vec(),
+            resumed_samples: self.resumed.samples,
+            paths: all_paths,
+            gpu_seconds,
+            timing: if self.timed { "timestamps" } else { "wall" },
+            wall_seconds: self.wall_seconds,
+            compile_seconds: self.compile_seconds,
+            paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
+            steady_paths_per_second: status
+                .steady_rate(pixels * u64::from(self.options.samples - self.resumed.samples)),
+            path_state_bytes: self.layout.memory(),
+            pool_size: self.pool,
+            iterations: status.iterations,
+            kernels,
+            workload: self.workload,
+            nonfinite_samples: self.resumed.nonfinite
+                + dropped.iter().map(Dropped::samples).sum::<u64>(),
+            negative_samples: dropped.iter().map(|d| d.negative).sum(),
+            dropped,
+            convergence: Vec::new(),
+            ended_by: None,
+            clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
+            queue_overflow: scalar(Scalar::Overflow),
+            media_overflow: scalar(Scalar::MediaOverflow),
+            lost_paths: scalar(Scalar::LostPaths),
+            adapter: self.gpu.into(),
+        }
+    }
+}
+
+/// A plan as a string, for materials of some reports.
+pub(crate) fn partition(plan: &Plan, materials: &[MaterialReport]) -> String {
+    let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+    match plan.organisation {
+        Organisation::Wavefront => text::print(plan, &names),
+        Organisation::Mega => "mega".to_string(),
+    }
+}
+
+/// The kernels of a plan that ran.
+pub(crate) struct Ran<'a> {
+    pub layout: &'a Layout,
+    pub kernels: &'a [Kernel],
+    pub materials: &'a [MaterialReport],
+    pub pool: u32,
+}
+
+impl Ran<'_> {
+    /// What each did since the plan began; a megakernel finished `paths`.
+    pub(crate) fn report(&self, status: &Status, paths: u64) -> Vec<KernelReport> {
+        let kernels = self.kernels.iter().zip(&status.step_seconds).enumerate();
+        let report = kernels.map(|(index, (kernel, seconds))| KernelReport {
+            utilisation: self.layout.counters.utilisation(&status.counters, index),
+            ..self.kernel(kernel, *seconds, status, paths)
+        });
+        report.collect()
+    }
+
+    fn kernel(&self, kernel: &Kernel, seconds: f64, status: &Status, paths: u64) -> KernelReport {
+        let iterations = status.iterations - status.before.iterations;
+        let (recipe, counters) = (&kernel.recipe, self.layout.counters);
+        let name = |index: &usize| self.materials.get(*index).map(|m| m.name.clone());
+        KernelReport {
+            name: recipe.name.clone(),
+            form: recipe.form,
+            materials: recipe.members.iter().filter_map(name).collect(),
+            items: match recipe.feed {
+                Feed::Queue(queue) | Feed::FetchedQueue(queue) => {
+                    counters.items_of(&status.counters, queue)
+                }
+                Feed::Queues { first, count } => (first..first + count)
+                    .map(|queue| counters.items_of(&status.counters, queue))
+                    .sum(),
+                Feed::Pool if self.layout.wavefront => iterations * u64::from(self.pool),
+                Feed::Pool | Feed::Fetched => paths,
+                Feed::Once | Feed::Groups(_) => iterations,
+            },
+            gpu_seconds: seconds,
+            utilisation: None,
+            nonfinite_samples: rows(recipe)
+                .filter_map(|row| counters.dropped_row(&status.counters, row))
+                .map(|row| row.samples())
+                .sum(),
+        }
+    }
+
+    /// What each dropped for every material, and the one that fills the film for none. The picture is
+    /// `width` pixels wide.
+    pub(crate) fn dropped(&self, status: &Status, width: u32, seed: u32) -> Vec<Dropped> {
+        let counters = self.layout.counters;
+        let mut out = Vec::new();
+        for Kernel { recipe, .. } in self.kernels {
+            let fills = recipe.stages.contains(&StageId::Logic);
+            for row in rows(recipe).chain(fills.then_some(counters.film_row())) {
+                let material = self.materials.get(row).map(|m| m.name.as_str());
+                if let Some(found) = counters.dropped_row(&status.counters, row) {
+                    out.push(Dropped::new(&recipe.name, material, &found, width, seed));
+                }
+            }
+        }
+        out
+    }
+}
+
+/// The rows of the samples that a kernel drops at materials: it alone evaluates those.
+fn rows(recipe: &Recipe) -> impl Iterator<Item = usize> {
+    recipe.members.iter().copied()
+}

@@ -1,0 +1,265 @@
+//! Rendering until a picture is good enough: what to reach, how the error is estimated while rendering, and
+//! how many samples to take before looking again.
+//!
+//! Samples are taken in two halves by two seeds, whose sums are kept apart. The halves A and B are
+//! independent, whatever the sampler, so that (A - B)^2 / 4 is an unbiased estimate of the variance of
+//! their mean, pixel by pixel, even where the samples of a half depend on each other. Ranges of one
+//! scrambled sequence would not do: they fill each other's gaps.
+
+mod course;
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::film::Sums;
+use crate::kernels::random::hash_seed;
+
+/// Samples a pixel before which no error is trusted: a light that few paths find looks like darkness.
+pub const LEAST_SAMPLES: u32 = 16;
+/// The longest time between two looks at the error.
+const LONGEST: Duration = Duration::from_secs(10);
+/// Keeps relative errors of dark pixels finite, as in `impasto converge`.
+const RELATIVE_FLOOR: f64 = 0.01;
+
+/// When a render ends; what is reached first counts. Samples a pixel are the last limit
+/// ([`RenderOptions::samples`](crate::options::RenderOptions::samples)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Goals {
+    /// The relative mean squared error to reach.
+    pub relmse: Option<f64>,
+    /// The root of the mean squared error to reach.
+    pub rmse: Option<f64>,
+    /// Time of rendering to take, from the first submission on.
+    pub time: Option<Duration>,
+}
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ending {
+    /// The relative mean squared error was reached.
+    Relmse,
+    /// The root of the mean squared error was reached.
+    Rmse,
+    /// The time was over.
+    Time,
+    /// All samples were taken.
+    Samples,
+    /// It was interrupted.
+    Interrupt,
+}
+
+/// The error at some point of a render, as it is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// Samples a pixel, of both halves.
+    pub samples: u32,
+    /// Seconds since the first submission.
+    pub seconds: f64,
+    /// Seconds that the GPU was busy.
+    pub gpu_seconds: f64,
+    /// Estimated relative mean squared error.
+    pub relmse: f64,
+    /// Root of the estimated mean squared error.
+    pub rmse: f64,
+}
+
+impl Goals {
+    /// Which error, if one, is small enough.
+    pub(crate) fn reached(&self, check: &Check) -> Option<Ending> {
+        let below = |goal: Option<f64>, error: f64| goal.is_some_and(|goal| error <= goal);
+        if check.samples < LEAST_SAMPLES {
+            None
+        } else if below(self.relmse, check.relmse) {
+            Some(Ending::Relmse)
+        } else if below(self.rmse, check.rmse) {
+            Some(Ending::Rmse)
+        } else {
+            None
+        }
+    }
+
+    /// How many times as many samples are needed as at `check`, by the error's course: squared errors
+    /// fall as samples^-`slope`. `None` without a goal for the error.
+    fn factor(&self, check: &Check, slope: f64) -> Option<f64> {
+        let relmse = self.relmse.map(|goal| check.relmse / goal);
+        let rmse = self.rmse.map(|goal| (check.rmse / goal).powi(2));
+        let factor = [relmse, rmse].into_iter().flatten().reduce(f64::min)?;
+        Some(factor.max(0.0).powf(1.0 / slope))
+    }
+}
+
+/// The seed of the second half of a render by `seed`: both halves can be rendered by themselves.
+pub fn second_seed(seed: u32) -> u32 {
+    let other = hash_seed(hash_seed(seed));
+    // Any other will do for a seed that is hashed to itself.
+    if other == seed { !seed } else { other }
+}
+
+/// Sums of the samples of two independent halves.
+pub(crate) struct Halves {
+    /// Of the first half.
+    first: Sums,
+    /// Of both.
+    all: Sums,
+}
+
+impl Halves {
+    /// Of pictures like `empty`, which has no samples.
+    pub(crate) fn new(empty: Sums) -> Self {
+        Self {
+            first: empty.clone(),
+            all: empty,
+        }
+    }
+
+    /// Takes note of the film after samples were added by one of the halves.
+    pub(crate) fn update(&mut self, half: usize, film: &Sums) {
+        if half == 0 {
+            // What the film has gained is the first half's.
+            self.first.add(film);
+            self.first.subtract(&self.all);
+        }
+        self.all = film.clone();
+    }
+
+    /// The estimated mean squared error of the mean of all samples, and the relative one. `None` while a
+    /// half has no samples.
+    ///
+    /// With a and b samples in the halves, whose means are A and B, the variance of their common mean is
+    /// a b / (a + b)^2 (A - B)^2: a quarter of the square if both have as many. That is unbiased.
+    ///
+    /// What an error is relative to is not known, and must not depend on it: a pixel that is bright by
+    /// chance, divided by its own brightness, would hide that it is wrong. The median of A, B and the mean of
+    /// the pixels around is near the truth even then, and becomes the truth with more samples.
+    pub(crate) fn errors(&self) -> Option<[f64; 2]> {
+        let (width, height) = self.all.size();
+        let means = Means::of(&self.all, width as usize);
+        let (mut sums, mut counted) = ([0.0; 2], 0.0);
+        for pixel in 0..width as usize * height as usize {
+            let (first, all) = (self.first.count(pixel), self.all.count(pixel));
+            let [a, b] = [f64::from(first), f64::from(all.saturating_sub(first))];
+            if a == 0.0 || b == 0.0 {
+                continue;
+            }
+            counted += 3.0;
+            let around = means.around(pixel);
+            for (channel, around) in around.into_iter().enumerate() {
+                let sum = self.first.radiance(channel, pixel);
+                let first = sum / a;
+                let second = (self.all.radiance(channel, pixel) - sum) / b;
+                let error = a * b / (a + b).powi(2) * (first - second).powi(2);
+                let truth = median(first, second, around);
+                sums[0] += error;
+                sums[1] += error / (truth * truth + RELATIVE_FLOOR);
+            }
+        }
+        (counted > 0.0).then(|| sums.map(|sum| sum / counted))
+    }
+}
+
+/// The means of a picture's pixels; none where there are no samples.
+struct Means {
+    width: usize,
+    pixels: Vec<Option<[f64; 3]>>,
+}
+
+impl Means {
+    fn of(sums: &Sums, width: usize) -> Self {
+        let (_, height) = sums.size();
+        let mean = |pixel: usize| {
+            let count = sums.count(pixel);
+            let channel = |c| sums.radiance(c, pixel) / f64::from(count);
+            (count > 0).then(|| [0, 1, 2].map(channel))
+        };
+        Self {
+            width,
+            pixels: (0..width * height as usize).map(mean).collect(),
+        }
+    }
+
+    /// The mean of the up to eight pixels around one; of a pixel alone its own.
+    fn around(&self, pixel: usize) -> [f64; 3] {
+        let (x, y) = (pixel % self.width, pixel / self.width);
+        let height = self.pixels.len() / self.width;
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for y in y.saturating_sub(1)..(y + 2).min(height) {
+            for x in x.saturating_sub(1)..(x + 2).min(self.width) {
+                let at = y * self.width + x;
+                if let Some(mean) = self.pixels[at].filter(|_| at != pixel) {
+                    sum = [0, 1, 2].map(|c: usize| sum[c] + mean[c]);
+                    count += 1.0;
+                }
+            }
+        }
+        match count > 0.0 {
+            true => sum.map(|s| s / count),
+            false => self.pixels[pixel].unwrap_or_default(),
+        }
+    }
+}
+
+fn median(a: f64, b: f64, c: f64) -> f64 {
+    a.min(b).max(a.max(b).min(c))
+}
+
+/// How many samples each half takes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Next {
+    /// Of each half.
+    pub samples: u32,
+    /// Of both, until the render is expected to end.
+    pub expected: u32,
+}
+
+/// Plans passes: they double, but end where the error is expected to be small enough or the time to be
+/// over.
+pub(crate) fn next(goals: &Goals, checks: &[Check], done: u32, limit: u32) -> Next {
+    let left = (limit - done.min(limit)).max(2);
+    let Some(last) = checks.last() else {
+        return Next {
+            samples: 1,
+            expected: LEAST_SAMPLES.min(done + left),
+        };
+    };
+    let here = f64::from(last.samples);
+    // A little more than needed, so that chance seldom demands another pass.
+    let enough = goals
+        .factor(last, slope(checks))
+        .map(|factor| 1.05 * factor * here);
+    let enough = enough.map(|samples| samples.max(f64::from(LEAST_SAMPLES)));
+    let each = last.seconds / here.max(1.0);
+    let in_time = |time: f64| here + (time / each.max(1e-9)).max(0.0);
+    let over = goals
+        .time
+        .map(|time| in_time(time.as_secs_f64() - last.seconds));
+    let ends = [enough, over, Some(f64::from(done + left))];
+    let expected = ends.into_iter().flatten().fold(f64::INFINITY, f64::min);
+    let steps = [2.0 * here, in_time(LONGEST.as_secs_f64()), expected];
+    let until = steps.into_iter().fold(f64::INFINITY, f64::min);
+    // Conversions saturate.
+    let samples = (0.5 * (until - f64::from(done))).ceil() as u32;
+    Next {
+        samples: samples.clamp(1, left / 2),
+        expected: (expected.ceil() as u32).clamp(done + 1, done + left),
+    }
+}
+
+/// How fast the squared error falls with samples, by the last looks at it: 1 for independent samples, more
+/// for sequences.
+fn slope(checks: &[Check]) -> f64 {
+    let [.., before, last] = checks else {
+        return 1.0;
+    };
+    let samples = f64::from(last.samples) / f64::from(before.samples);
+    let slope = (before.rmse / last.rmse).powi(2).ln() / samples.ln();
+    if slope.is_finite() {
+        slope.clamp(0.7, 1.6)
+    } else {
+        1.0
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+//! What a render tells the time model of plans: how paths hit materials, what a hit reads and
+//! writes, and what the kernels take that evaluate none.
+
+use impasto_compiler::abi::MaterialInfo;
+use impasto_compiler::partition::workload::BLOCK;
+use impasto_compiler::partition::{Hits, Workload};
+
+use crate::kernels::layout::Layout;
+use crate::kernels::modules::Kernel;
+use crate::kernels::stages::StageId;
+use crate::kernels::state;
+use crate::render::status::Status;
+use crate::world::World;
+use crate::world::needs::{Need, Needs};
+
+/// Bytes of a triangle's corners, with what they carry beside positions.
+const TRIANGLE_BYTES: u64 = 48;
+/// The bytes that a hit reads of the buffers of vertices, if materials ask for them.
+const VERTEX_BYTES: [(&str, u64); 2] = [("vertex_normals", 16), ("vertex_uvs", 24)];
+
+/// The part of a workload that is known before anything is rendered.
+pub(crate) fn before_rendering(
+    world: &World,
+    materials: &[MaterialInfo],
+    layout: &Layout,
+    pool: u32,
+) -> Workload {
+    let unbound = &world.parts.unbound;
+    let geometry = geometry_bytes(world, materials);
+    let hits = |(index, material): (usize, &MaterialInfo)| Hits {
+        material: material.name.clone(),
+        on_surface: !unbound.contains(&index),
+        share: 0.0,
+        present: 0.0,
+        loads: (traffic(layout.needs, material)[0] + geometry) as f64,
+        stores: traffic(layout.needs, material)[1] as f64,
+    };
+    Workload {
+        pool,
+        materials: materials.iter().enumerate().map(hits).collect(),
+        logic_seconds: 0.0,
+        other_seconds: 0.0,
+    }
+}
+
+/// Bytes of state that a hit of a material loads and stores: none is asked for a light sample where light
+/// cannot be sampled.
+fn traffic(needs: Needs, material: &MaterialInfo) -> [u64; 2] {
+    let needs = match material.delta_only {
+        true => needs.without(Need::ShadowRays),
+        false => needs,
+    };
+    state::traffic(needs, StageId::Material)
+}
+
+/// Bytes of the triangle that was hit, as far as some material asks for it.
+fn geometry_bytes(world: &World, materials: &[MaterialInfo]) -> u64 {
+    let has = |name: &str| world.parts.surface.buffers.iter().any(|b| b.name == name);
+    let asked = |name: &str| match name {
+        "vertex_normals" => materials.iter().any(|m| m.inputs.normal),
+        _ => materials.iter().any(|m| m.inputs.uv || m.inputs.tangent),
+    };
+    let read = VERTEX_BYTES.iter().filter(|(n, _)| has(n) && asked(n));
+    TRIANGLE_BYTES + read.map(|(_, bytes)| bytes).sum::<u64>()
+}
+
+/// What was known when the iterations began that are to be looked at.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Mark {
+    counters: Vec<u32>,
+    step_seconds: Vec<f64>,
+    gpu_seconds: f64,
+    pub iterations: u64,
+}
+
+impl Mark {
+    /// The present.
+    pub(crate) fn of(status: &Status) -> Self {
+        Self {
+            counters: status.counters.clone(),
+            step_seconds: status.step_seconds.clone(),
+            gpu_seconds: status.gpu_seconds,
+            iterations: status.iterations,
+        }
+    }
+
+    /// The workload of the mean iteration since then, of a plan that runs `kernels`; `before` is
+    /// what was known before rendering. `None` if hits were not counted, or nothing was rendered.
+    pub(crate) fn workload(
+        &self,
+        status: &Status,
+        layout: &Layout,
+        kernels: &[Kernel],
+        before: &Workload,
+    ) -> Option<Workload> {
+        let iterations = status.iterations.checked_sub(self.iterations)?;
+        if iterations == 0 || layout.counters.hits == 0 {
+            return None;
+        }
+        let mut workload = before.clone();
+        let slots = iterations as f64 * f64::from(before.pool);
+        let blocks = iterations as f64 * f64::from(before.pool.div_ceil(BLOCK));
+        for (index, hits) in workload.materials.iter_mut().enumerate() {
+            let now = layout.counters.hits_of(&status.counters, index);
+            let then = layout.counters.hits_of(&self.counters, index);
+            hits.share = now[0].saturating_sub(then[0]) as f64 / slots;
+            hits.present = now[1].saturating_sub(then[1]) as f64 / blocks;
+        }
+        let seconds = self.seconds(status, kernels);
+        let all = (status.gpu_seconds - self.gpu_seconds) / iterations as f64;
+        workload.logic_seconds = seconds.logic / iterations as f64;
+        workload.other_seconds =
+            (all - (seconds.logic + seconds.materials) / iterations as f64).max(0.0);
+        Some(workload)
+    }
+
+    /// GPU seconds since then of the logic kernel, and of those that evaluate materials.
+    fn seconds(&self, status: &Status, kernels: &[Kernel]) -> Seconds {
+        let mut sum = Seconds::default();
+        let begin = self.step_seconds.iter().copied();
+        let begin = begin.chain(std::iter::repeat(0.0));
+        for ((kernel, end), begin) in kernels.iter().zip(&status.step_seconds).zip(begin) {
+            let recipe = &kernel.recipe;
+            if recipe.stages.contains(&StageId::Logic) {
+                sum.logic += end - begin;
+            } else if recipe.form.is_some() {
+                sum.materials += end - begin;
+            }
+        }
+        sum
+    }
+}
+
+#[derive(Default)]
+struct Seconds {
+    logic: f64,
+    materials: f64,
+}

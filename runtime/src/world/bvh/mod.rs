@@ -1,0 +1,135 @@
+//! The acceleration structures of ray casts, which are all made of one binary tree.
+//!
+//! obvhs builds it; `wide` and `binary` lay it out for kernels, and `text` puts the WGSL of a
+//! cast together. Triangles are stored in the order of the leaves, so that a leaf is a
+//! contiguous range and a *primitive* is an index in that order.
+
+mod binary;
+mod levels;
+mod text;
+mod wide;
+
+use glam::Vec3A;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
+
+use crate::scene::Mesh;
+use crate::technique::{Stack, Technique, Traversal};
+use crate::wgsl::{BufferData, ShaderPart};
+
+pub use levels::{Levels, ObjectTree};
+pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
+
+/// The builder's settings. Which of several triangles at one distance a ray hits depends on
+/// them, and so do pictures: never change them by what a scene looks like.
+const PRESET: BvhBuildParams = BvhBuildParams::medium_build();
+
+/// The parent of the root, which nobody asks for.
+const NO_PARENT: u32 = 0;
+
+/// A BVH over the triangles of a mesh, as kernels read it.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    traversal: Traversal,
+    nodes: Vec<[u32; 4]>,
+    parents: Vec<u32>,
+    order: Vec<u32>,
+    root: u32,
+    depth: usize,
+}
+
+impl Bvh {
+    /// Builds the structure that `traversal` names. Equal meshes give equal trees.
+    pub fn build(mesh: &Mesh, traversal: Traversal) -> Bvh {
+        let boxes: Vec<Aabb> = mesh.positions.iter().map(bounds).collect();
+        tree_over(&boxes, traversal, wide::LEAF_SIZE)
+    }
+
+    /// For each primitive, the index of its triangle in the mesh.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Number of inner nodes on the longest path from the root, which bounds the stack: each
+    /// node on the way leaves at most one entry, the rest of its children.
+    pub fn depth(&self) -> usize {
+        self.depth
+    }
+
+    /// `trace_closest`, `trace_any` and the steps they are made of, as `technique` says; needs the
+    /// geometry part.
+    pub fn part(&self, technique: &Technique) -> ShaderPart {
+        self.part_of(technique, false)
+    }
+
+    /// The same, where the tree is one of placements if it is `placed`.
+    fn part_of(&self, technique: &Technique, placed: bool) -> ShaderPart {
+        let mut buffers = vec![BufferData::new(
+            "bvh_nodes",
+            "array<vec4<u32>>",
+            &self.nodes,
+        )];
+        if technique.stack == Stack::Trail {
+            buffers.push(BufferData::new("bvh_parents", "array<u32>", &self.parents));
+        }
+        ShaderPart {
+            wgsl: text::casts(self.traversal, technique, self.root, self.depth, placed),
+            buffers,
+        }
+    }
+
+    /// Adds the nodes of another tree, whose leaves count from `first`; returns the reference to
+    /// its root.
+    fn append(&mut self, other: &mut Bvh, first: u32) -> u32 {
+        let words = match self.traversal {
+            Traversal::Cwbvh => wide::NODE_WORDS,
+            Traversal::Bvh2 => binary::NODE_WORDS,
+        };
+        let whole = self.nodes.len().next_multiple_of(words);
+        self.nodes.resize(whole, [0; 4]);
+        let node = (whole / words) as u32;
+        let root = match self.traversal {
+            Traversal::Cwbvh => {
+                wide::relocate(&mut other.nodes, node, first);
+                other.root + node
+            }
+            Traversal::Bvh2 => {
+                binary::relocate(&mut other.nodes, node, first);
+                binary::relocated(other.root, node, first)
+            }
+        };
+        self.nodes.append(&mut other.nodes);
+        root
+    }
+}
+
+/// A tree over boxes, with at most `leaf_size` of them in a leaf of the wide layout.
+fn tree_over(boxes: &[Aabb], traversal: Traversal, leaf_size: u32) -> Bvh {
+    match traversal {
+        Traversal::Cwbvh => wide::layout(&binary_tree(boxes), leaf_size),
+        Traversal::Bvh2 => binary::layout(binary_tree(boxes)),
+    }
+}
+
+/// The tree with one triangle a leaf.
+pub(crate) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        PRESET.ploc_search_distance,
+        boxes,
+        indices,
+        PRESET.sort_precision,
+        PRESET.search_depth_threshold,
+    );
+    let batch_ratio = PRESET.reinsertion_batch_ratio;
+    ReinsertionOptimizer::default().run(&mut tree, batch_ratio, None);
+    tree
+}
+
+pub(crate) fn bounds(corners: &[glam::Vec3; 3]) -> Aabb {
+    let [a, b, c] = corners.map(Vec3A::from);
+    Aabb::new(a.min(b).min(c), a.max(b).max(c))
+}

@@ -1,0 +1,318 @@
+//! Which material each pixel of a picture sees first, found on the host.
+//!
+//! Rays go where the camera's do, from the centre of its lens, through four places of a pixel; the material
+//! that most of them meet is the pixel's. Placed objects are not copied: a ray is taken to where they are.
+
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::ray::{INVALID_ID, Ray, RayHit};
+use obvhs::triangle::Triangle;
+use rayon::prelude::*;
+
+use crate::scene::{Mesh, NO_MATERIAL, Placement, Scene, Transform};
+use crate::world::bvh;
+use crate::world::camera::CameraFrame;
+
+/// Where rays go through a pixel, in parts of its sides.
+const PLACES: [(f32, f32); 4] = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
+
+/// For each pixel of the scene's picture, row by row, the index into [`Scene::materials`] of what it sees
+/// first; `None` where that is a light, or what surrounds everything.
+pub fn materials(scene: &Scene) -> Vec<Option<u32>> {
+    let caster = Caster::new(scene);
+    let (width, height) = (scene.film.width, scene.film.height);
+    let frame = CameraFrame::new(&scene.camera, width as f32 / height as f32);
+    let seen = |pixel: u32| {
+        let found = PLACES.map(|(x, y)| {
+            let column = (pixel % width) as f32 + x;
+            let row = (pixel / width) as f32 + y;
+            let across = 2.0 * column / width as f32 - 1.0;
+            let up = 1.0 - 2.0 * row / height as f32;
+            caster.material(
+                frame.position,
+                frame.forward + across * frame.right + up * frame.up,
+            )
+        });
+        most_frequent(found)
+    };
+    (0..width * height).into_par_iter().map(seen).collect()
+}
+
+/// The value that occurs most often, the first of several.
+fn most_frequent(found: [Option<u32>; 4]) -> Option<u32> {
+    let count = |value: &Option<u32>| found.iter().filter(|f| *f == value).count();
+    let mut best = found[0];
+    for value in found {
+        if count(&value) > count(&best) {
+            best = value;
+        }
+    }
+    best
+}
+
+/// What rays are cast through.
+struct Caster<'s> {
+    scene: &'s Scene,
+    world: Tree<'s>,
+    objects: Vec<Tree<'s>>,
+    /// Over the placements.
+    upper: Bvh2,
+    /// From the world to each placement's object.
+    inverses: Vec<Inverse>,
+}
+
+/// A mesh, with a tree over its triangles.
+struct Tree<'s> {
+    mesh: &'s Mesh,
+    bvh: Bvh2,
+}
+
+/// A hit: how far along the ray, and the index of the triangle in its mesh.
+struct Hit {
+    t: f32,
+    triangle: u32,
+}
+
+/// The way back from where an object is placed.
+struct Inverse {
+    matrix: glam::DMat3,
+    translation: DVec3,
+}
+
+impl<'s> Caster<'s> {
+    fn new(scene: &'s Scene) -> Self {
+        let objects: Vec<Tree<'s>> = scene
+            .objects
+            .par_iter()
+            .map(|o| Tree::new(&o.mesh))
+            .collect();
+        let boxes: Vec<Aabb> = scene
+            .placements
+            .iter()
+            .map(|p| placed_box(scene, p))
+            .collect();
+        let inverse = |p: &Placement| Inverse {
+            matrix: p.transform.matrix.inverse(),
+            translation: p.transform.translation,
+        };
+        Self {
+            scene,
+            world: Tree::new(&scene.mesh),
+            objects,
+            upper: bvh::binary_tree(&boxes),
+            inverses: scene.placements.iter().map(inverse).collect(),
+        }
+    }
+
+    /// The material that a ray meets first.
+    fn material(&self, origin: Vec3, direction: Vec3) -> Option<u32> {
+        let mut ray = Ray::new_inf(origin.into(), direction.normalize_or_zero().into());
+        let mut material = None;
+        if let Some(hit) = self.world.closest(&ray) {
+            ray.tmax = hit.t;
+            material = self
+                .world
+                .mesh
+                .materials
+                .get(hit.triangle as usize)
+                .copied();
+        }
+        let meet = |ray: &Ray, place: usize| {
+            let index = self.upper.primitive_indices[place] as usize;
+            let found = self.meet(ray, index);
+            let (t, met) = found.unwrap_or((f32::INFINITY, None));
+            if t < ray.tmax {
+                material = met;
+            }
+            t
+        };
+        self.upper.ray_traverse(ray, &mut RayHit::none(), meet);
+        material.filter(|m| *m != NO_MATERIAL)
+    }
+
+    /// Where a ray meets a placement, and what.
+    fn meet(&self, ray: &Ray, index: usize) -> Option<(f32, Option<u32>)> {
+        let placement = &self.scene.placements[index];
+        let tree = self.objects.get(placement.object as usize)?;
+        let inverse = &self.inverses[index];
+        let origin = Vec3::from(ray.origin).as_dvec3() - inverse.translation;
+        let direction = inverse.matrix * Vec3::from(ray.direction).as_dvec3();
+        // Boxes are met by unit directions.
+        let scale = direction.length();
+        let local = Ray::new(
+            Vec3A::from((inverse.matrix * origin).as_vec3()),
+            Vec3A::from((direction / scale).as_vec3()),
+            0.0,
+            (f64::from(ray.tmax) * scale) as f32,
+        );
+        let hit = tree.closest(&local)?;
+        let own = *tree.mesh.materials.get(hit.triangle as usize)?;
+        let t = (f64::from(hit.t) / scale) as f32;
+        Some((t, placement.materials.get(own as usize).copied()))
+    }
+}
+
+impl<'s> Tree<'s> {
+    fn new(mesh: &'s Mesh) -> Self {
+        let boxes: Vec<Aabb> = mesh.positions.iter().map(bvh::bounds).collect();
+        Self {
+            mesh,
+            bvh: bvh::binary_tree(&boxes),
+        }
+    }
+
+    fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let order = &self.bvh.primitive_indices;
+        let meet = |ray: &Ray, place: usize| {
+            let [v0, v1, v2] = self.mesh.positions[order[place] as usize].map(Vec3A::from);
+            Triangle { v0, v1, v2 }.intersect(ray)
+        };
+        let mut hit = RayHit::none();
+        self.bvh.ray_traverse(*ray, &mut hit, meet);
+        let found = hit.primitive_id != INVALID_ID;
+        found.then(|| Hit {
+            t: hit.t,
+            triangle: order[hit.primitive_id as usize],
+        })
+    }
+}
+
+/// A box around an object where it is placed.
+fn placed_box(scene: &Scene, placement: &Placement) -> Aabb {
+    let object = scene.objects.get(placement.object as usize);
+    let [low, high] = object.map_or([Vec3::ZERO; 2], |o| o.mesh.bounds());
+    let corner = |i: u32| {
+        let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 1 { high } else { low };
+        let corner = Vec3::new(
+            pick(0, low.x, high.x),
+            pick(1, low.y, high.y),
+            pick(2, low.z, high.z),
+        );
+        let transform: &Transform = &placement.transform;
+        Vec3A::from(transform.point(corner))
+    };
+    let corners = (0..8).map(corner);
+    let start = Aabb::new(Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+    corners.fold(start, |b, p| Aabb::new(b.min.min(p), b.max.max(p)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::{Camera, FilmSettings, Integrator, Object};
+
+    /// A square of the plane z = `z`, from -1 to 1 in x and y but for what `right` leaves out.
+    fn square(z: f32, left: f32, material: u32) -> Mesh {
+        let corner = |x, y| Vec3::new(x, y, z);
+        let [a, b, c, d] = [
+            corner(left, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(left, 1.0),
+        ];
+        Mesh {
+            positions: vec![[a, b, c], [a, c, d]],
+            materials: vec![material; 2],
+            lights: vec![None; 2],
+            ..Mesh::default()
+        }
+    }
+
+    /// An orthogonal view of -1..1 would be squares; the camera is far away with a narrow field.
+    fn scene(mesh: Mesh) -> Scene {
+        Scene {
+            name: String::new(),
+            base: Default::default(),
+            origin: Default::default(),
+            camera: Camera {
+                position: Vec3::new(0.0, 0.0, 10.0),
+                look_at: Vec3::ZERO,
+                up: Vec3::Y,
+                fov: 2.0 * 0.2f32.atan().to_degrees(),
+                aperture: 0.0,
+                focus: 1.0,
+            },
+            camera_media: Vec::new(),
+            film: FilmSettings {
+                width: 4,
+                height: 4,
+            },
+            integrator: Integrator {
+                max_depth: 1,
+                roulette_start: 1,
+            },
+            mesh,
+            objects: Vec::new(),
+            placements: Vec::new(),
+            materials: Vec::new(),
+            lights: Vec::new(),
+            environment: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The picture reaches from -2 to 2, so that a pixel is a unit wide.
+    #[test]
+    fn pixels_see_what_is_nearest() {
+        let mut mesh = square(0.0, -1.0, 7);
+        let near = square(1.0, 0.0, 9);
+        mesh.positions.extend(near.positions);
+        mesh.materials.extend(near.materials);
+        let seen = materials(&scene(mesh));
+        let none = None;
+        let expected = [
+            [none; 4],
+            [none, Some(7), Some(9), none],
+            [none, Some(7), Some(9), none],
+            [none; 4],
+        ];
+        assert_eq!(seen, expected.concat());
+    }
+
+    #[test]
+    fn lights_are_no_material() {
+        let mut mesh = square(0.0, -1.0, 7);
+        let light = square(1.0, 0.0, NO_MATERIAL);
+        mesh.positions.extend(light.positions);
+        mesh.materials.extend(light.materials);
+        let seen = materials(&scene(mesh));
+        assert_eq!(seen[4..8], [None, Some(7), None, None]);
+    }
+
+    /// An object that is placed before a wall, half as large as it was made, and behind it, twice as large.
+    /// Distances are those of the world, not of the object.
+    #[test]
+    fn placements_are_seen_where_they_are() {
+        let mut scene = scene(square(0.0, -1.0, 3));
+        let mut mesh = square(0.0, 0.0, 1);
+        mesh.positions.iter_mut().flatten().for_each(|p| *p *= 2.0);
+        scene.objects = vec![Object {
+            name: String::new(),
+            mesh,
+        }];
+        let place = |scale: f32, z: f32, materials: [u32; 2]| Placement {
+            object: 0,
+            transform: Transform::new(Vec3::splat(scale), Vec3::ZERO, Vec3::new(0.0, 0.0, z)),
+            materials: Arc::from(materials),
+        };
+        scene.placements = vec![place(0.5, 0.5, [0, 5]), place(2.0, -0.5, [0, 6])];
+        let seen = materials(&scene);
+        let expected = [
+            [None, None, Some(6), Some(6)],
+            [None, Some(3), Some(5), Some(6)],
+            [None, Some(3), Some(5), Some(6)],
+            [None, None, Some(6), Some(6)],
+        ];
+        assert_eq!(seen, expected.concat());
+    }
+
+    #[test]
+    fn the_majority_of_a_pixel_counts_and_the_first_of_equals() {
+        assert_eq!(most_frequent([Some(1), Some(2), Some(2), None]), Some(2));
+        assert_eq!(most_frequent([Some(1), None, None, Some(1)]), Some(1));
+        assert_eq!(most_frequent([None, Some(1), Some(1), None]), None);
+    }
+}

@@ -1,0 +1,228 @@
+//! What surrounds the scene: the same radiance everywhere, or a lat-long picture whose texels
+//! are sampled by the light they send.
+
+use std::f64::consts::PI;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::alias::PackedAlias;
+use super::{Context, Kind, Sampled, luminance};
+use crate::scene::{Environment, EnvironmentMap, EnvironmentSource};
+use crate::wgsl;
+use crate::wgsl::BufferData;
+use crate::world::needs::Need;
+
+pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
+    let environment = context.scene.environment.as_ref()?;
+    match &environment.source {
+        EnvironmentSource::Uniform(radiance) => uniform(context, environment, *radiance, first),
+        EnvironmentSource::Map(map) => mapped(context, environment, map, first),
+    }
+}
+
+/// A kind without lights.
+fn without_lights(serves: &'static [Need], wgsl: String) -> Kind {
+    Kind {
+        serves,
+        idle: false,
+        rows: Vec::new(),
+        lights: Vec::new(),
+        wgsl,
+        buffers: Vec::new(),
+        sample: "sample_environment",
+        hit: None,
+        escape: Some("environment_escape"),
+        chooses: false,
+    }
+}
+
+/// The kind with its one light, if sampled, of `irradiance` W/m^2 summed over all directions.
+fn environment_kind(
+    context: &Context,
+    (need, what): (&'static [Need; 1], &str),
+    irradiance: Option<f64>,
+    wgsl: String,
+) -> Kind {
+    let sampled = irradiance.map(|irradiance| Sampled {
+        power: irradiance * context.cross_section(),
+        ..Sampled::default()
+    });
+    Kind {
+        rows: vec![(need[0], what.to_owned())],
+        lights: sampled.into_iter().collect(),
+        ..without_lights(need, wgsl)
+    }
+}
+
+const UNIFORM: (&[Need; 1], &str) = (
+    &[Need::UniformEnvironment],
+    "`[environment]` has the same color everywhere",
+);
+const MAP: (&[Need; 1], &str) = (&[Need::EnvironmentMap], "`[environment]` names a picture");
+
+/// The kind of a black environment that is not in the table of lights.
+pub(super) fn empty_uniform() -> Kind {
+    without_lights(UNIFORM.0, uniform_text(Vec3::ZERO, 0))
+}
+
+/// The same with a picture of one texel.
+pub(super) fn empty_map() -> Kind {
+    let map = EnvironmentMap {
+        width: 1,
+        height: 1,
+        texels: vec![Vec3::ZERO],
+    };
+    let table = Importance::new(&map);
+    let text = map_text(&map, 0.0)
+        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", 0)
+        + include_str!("environment_map_sampled.wgsl");
+    Kind {
+        buffers: map_buffers(&map, &table),
+        ..without_lights(MAP.0, text)
+    }
+}
+
+fn uniform(
+    context: &Context,
+    environment: &Environment,
+    radiance: Vec3,
+    first: u32,
+) -> Option<Kind> {
+    if luminance(radiance) <= 0.0 {
+        return None;
+    }
+    if !environment.sample {
+        let text = wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
+            + include_str!("environment_uniform.wgsl");
+        return Some(environment_kind(context, UNIFORM, None, text));
+    }
+    let text = uniform_text(radiance, first);
+    let irradiance = 4.0 * PI * luminance(radiance);
+    Some(environment_kind(context, UNIFORM, Some(irradiance), text))
+}
+
+fn uniform_text(radiance: Vec3, light: u32) -> String {
+    wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
+        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", light)
+        + include_str!("environment_uniform_sampled.wgsl")
+}
+
+fn mapped(
+    context: &Context,
+    environment: &Environment,
+    map: &EnvironmentMap,
+    first: u32,
+) -> Option<Kind> {
+    let table = Importance::new(map);
+    if table.irradiance <= 0.0 {
+        return None;
+    }
+    let mut text = map_text(map, environment.rotate);
+    if !environment.sample {
+        text += include_str!("environment_map_unsampled.wgsl");
+        let mut kind = environment_kind(context, MAP, None, text);
+        kind.buffers = vec![texel_buffer(map, &[])];
+        return Some(kind);
+    }
+    text += &wgsl::constant_u32("ENVIRONMENT_LIGHT", first);
+    text += include_str!("environment_map_sampled.wgsl");
+    Some(Kind {
+        buffers: map_buffers(map, &table),
+        chooses: true,
+        ..environment_kind(context, MAP, Some(table.irradiance), text)
+    })
+}
+
+/// What samples of a map and rays that escape have in common; it is turned by `rotate` degrees.
+fn map_text(map: &EnvironmentMap, rotate: f32) -> String {
+    let (sine, cosine) = f64::from(rotate).to_radians().sin_cos();
+    wgsl::constant_u32("ENVIRONMENT_WIDTH", map.width)
+        + &wgsl::constant_u32("ENVIRONMENT_HEIGHT", map.height)
+        + &wgsl::constant_f32("ENVIRONMENT_SINE", sine as f32)
+        + &wgsl::constant_f32("ENVIRONMENT_COSINE", cosine as f32)
+        + include_str!("environment_map.wgsl")
+}
+
+fn map_buffers(map: &EnvironmentMap, table: &Importance) -> Vec<BufferData> {
+    let alias = BufferData::new("environment_alias", "array<u32>", &table.alias);
+    vec![texel_buffer(map, &table.densities), alias]
+}
+
+fn texel_buffer(map: &EnvironmentMap, densities: &[f32]) -> BufferData {
+    let densities = densities.iter().copied().chain(std::iter::repeat(0.0));
+    let texels: Vec<[f32; 4]> = map
+        .texels
+        .iter()
+        .zip(densities)
+        .map(|(rgb, density)| rgb.extend(density).to_array())
+        .collect();
+    BufferData::new("environment_texels", "array<vec4<f32>>", &texels)
+}
+
+/// Tables for sampling a map in proportion to the light of each texel.
+struct Importance {
+    /// One word a texel, then one a row; see `environment_map_sampled.wgsl`.
+    alias: Vec<u32>,
+    /// Density of each texel by solid angle.
+    densities: Vec<f32>,
+    /// Luminance integrated over all directions.
+    irradiance: f64,
+}
+
+impl Importance {
+    fn new(map: &EnvironmentMap) -> Importance {
+        let means = mean_luminances(map);
+        let width = map.width as usize;
+        let solid_angles: Vec<f64> = (0..map.height).map(|row| solid_angle(map, row)).collect();
+        let rows: Vec<PackedAlias> = means.par_chunks(width).map(PackedAlias::new).collect();
+        let row_weights: Vec<f64> = means
+            .chunks(width)
+            .zip(&solid_angles)
+            .map(|(row, solid_angle)| row.iter().sum::<f64>() * solid_angle)
+            .collect();
+        let choice = PackedAlias::new(&row_weights);
+        let mut densities = Vec::with_capacity(means.len());
+        for (row, columns) in rows.iter().enumerate() {
+            let factor = choice.probabilities[row] / solid_angles[row];
+            densities.extend(columns.probabilities.iter().map(|p| (p * factor) as f32));
+        }
+        let mut alias: Vec<u32> = rows.iter().flat_map(|r| &r.words).copied().collect();
+        alias.extend(&choice.words);
+        Importance {
+            alias,
+            densities,
+            irradiance: row_weights.iter().sum(),
+        }
+    }
+}
+
+/// Solid angle of a texel of `row`.
+fn solid_angle(map: &EnvironmentMap, row: u32) -> f64 {
+    let edge = |row: u32| (PI * f64::from(row) / f64::from(map.height)).cos();
+    2.0 * PI / f64::from(map.width) * (edge(row) - edge(row + 1))
+}
+
+/// The mean over each texel of what a bilinear lookup gives there: in each direction an eighth of
+/// either neighbour and three quarters of the texel itself. It is zero only where the lookup is.
+fn mean_luminances(map: &EnvironmentMap) -> Vec<f64> {
+    let (width, height) = (map.width as usize, map.height as usize);
+    let blend = |before: f64, here: f64, after: f64| (before + 6.0 * here + after) / 8.0;
+    let along_rows: Vec<f64> = map
+        .texels
+        .par_chunks(width)
+        .flat_map_iter(|row| {
+            let at = move |x: usize| luminance(row[x % width]);
+            (0..width).map(move |x| blend(at(x + width - 1), at(x), at(x + 1)))
+        })
+        .collect();
+    (0..height)
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let row = |y: usize| &along_rows[y * width..(y + 1) * width];
+            let (above, here) = (row(y.saturating_sub(1)), row(y));
+            let below = row((y + 1).min(height - 1));
+            (0..width).map(move |x| blend(above[x], here[x], below[x]))
+        })
+        .collect()
+}

@@ -1,0 +1,406 @@
+//! Every kind of light as one shader part: a table to choose a light from, and what each kind
+//! contributes to a light sample, a hit and an escaping ray.
+//!
+//! A kind is a file here, a file in `kernels/lights` and a row in `KINDS`. Kinds that a scene
+//! lacks leave no trace in its WGSL.
+
+use glam::Vec3;
+use impasto_compiler::abi::{Emission, InstanceInfo};
+
+use crate::error::SceneError;
+use crate::scene::{Mesh, Scene};
+use crate::wgsl;
+use crate::wgsl::text::{Flag, preprocess};
+use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::media::Media;
+use crate::world::needs::facts::SceneFacts;
+use crate::world::needs::{Need, Needs};
+
+mod alias;
+mod distant;
+mod environment;
+mod mesh;
+mod quad;
+
+use alias::WordAlias;
+
+/// Index in the light table of triangles that are no sampled light: beyond any table.
+pub const NO_LIGHT: u32 = u32::MAX;
+
+/// Every kind of light, in the order of the light table.
+const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
+    [mesh::kind, quad::kind, distant::kind, environment::kind];
+
+/// The lights of a scene.
+#[derive(Clone, Debug)]
+pub struct Lights {
+    /// `sample_light`, `light_hit` and `light_escape`; needs the surface part and [`mis`].
+    pub part: ShaderPart,
+    /// For each triangle of the world its index in the light table, or [`NO_LIGHT`].
+    pub of_triangle: Vec<u32>,
+    /// Can any light be sampled?
+    pub has_sampled: bool,
+    /// What the part is made of.
+    pub(crate) kinds: Kinds,
+}
+
+impl Lights {
+    /// The lights of `scene`, whose triangles in the world are those of `mesh`, the first
+    /// primitives in `order`, and which reaches from corner to corner of `bounds`. Its bindings
+    /// compiled to `instances` with `media`.
+    pub fn build(
+        scene: &Scene,
+        mesh: &Mesh,
+        bounds: [Vec3; 2],
+        order: &[u32],
+        instances: &[InstanceInfo],
+        media: &Media,
+    ) -> Lights {
+        let context = Context::new(scene, mesh, bounds, order, instances, media);
+        let mut kinds = Kinds::default();
+        for kind in KINDS {
+            kinds.0.extend(kind(&context, kinds.count()));
+        }
+        let mut of_triangle = vec![NO_LIGHT; mesh.len()];
+        for (index, light) in kinds.0.iter().flat_map(|k| &k.lights).enumerate() {
+            for &triangle in &light.triangles {
+                of_triangle[triangle as usize] = index as u32;
+            }
+        }
+        Lights {
+            part: kinds.part(kinds.possible_needs()),
+            of_triangle,
+            has_sampled: kinds.is_any_sampled(),
+            kinds,
+        }
+    }
+}
+
+/// Weights of light samples against scattered rays: `power_heuristic`.
+pub fn mis() -> ShaderPart {
+    ShaderPart {
+        wgsl: include_str!("mis.wgsl").to_owned(),
+        buffers: Vec::new(),
+    }
+}
+
+/// Is there anything in the scene that could give light? An all-black picture is hardly meant.
+pub fn check(scene: &Scene, instances: &[InstanceInfo]) -> Result<(), SceneError> {
+    let emissive = instances.iter().any(|i| i.emission != Emission::None);
+    if emissive || !scene.lights.is_empty() || scene.environment.is_some() {
+        return Ok(());
+    }
+    let error = SceneError::new(format!("the scene `{}` has no light", scene.name));
+    Err(error.hint(
+        "add [environment], a [[lights]] entry, or a material that assigns `emission` \
+         to some of the geometry",
+    ))
+}
+
+/// What the kinds read.
+struct Context<'a> {
+    scene: &'a Scene,
+    mesh: &'a Mesh,
+    instances: &'a [InstanceInfo],
+    media: &'a Media,
+    /// Triangle of the mesh to primitive.
+    primitives: Vec<u32>,
+    /// Radius of a sphere around everything: what a light at infinity shines on.
+    radius: f64,
+}
+
+impl<'a> Context<'a> {
+    fn new(
+        scene: &'a Scene,
+        mesh: &'a Mesh,
+        bounds: [Vec3; 2],
+        order: &[u32],
+        instances: &'a [InstanceInfo],
+        media: &'a Media,
+    ) -> Self {
+        let mut primitives = vec![0; order.len()];
+        for (primitive, &triangle) in order.iter().enumerate() {
+            primitives[triangle as usize] = primitive as u32;
+        }
+        Context {
+            scene,
+            mesh,
+            instances,
+            media,
+            primitives,
+            radius: bounding_radius(bounds),
+        }
+    }
+
+    /// Watts that a light at infinity sends through the scene, per W/m^2 facing it.
+    fn cross_section(&self) -> f64 {
+        std::f64::consts::PI * self.radius * self.radius
+    }
+}
+
+/// One kind of light as a scene has it.
+#[derive(Clone, Debug)]
+struct Kind {
+    /// The rows of the table of needs that its code is for.
+    serves: &'static [Need],
+    /// Is its code there in vain?
+    idle: bool,
+    /// The rows that its lights are, and which of them they are.
+    rows: Vec<(Need, String)>,
+    /// Those of the light table.
+    lights: Vec<Sampled>,
+    /// The kind's functions and constants, with `#if` lines.
+    wgsl: String,
+    buffers: Vec<BufferData>,
+    /// `fn NAME(pick: LightPick, position: vec3<f32>) -> LightSample`
+    sample: &'static str,
+    /// `fn NAME(light: u32, primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`,
+    /// for lights with a surface.
+    hit: Option<&'static str>,
+    /// `fn NAME(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`, for lights at infinity.
+    escape: Option<&'static str>,
+    /// Is there more to choose in one of its lights?
+    chooses: bool,
+}
+
+/// A row of the light table.
+#[derive(Clone, Debug, Default)]
+struct Sampled {
+    /// Emitted power in W (by luminance), more than 0.
+    power: f64,
+    /// Radiance of lights with a surface.
+    radiance: Vec3,
+    /// The primitive that light samples read, of lights with a surface.
+    primitive: u32,
+    /// Is it found by scattering alone?
+    by_chance: bool,
+    /// Is it seen in a single direction, where scattering cannot find it?
+    is_discrete: bool,
+    /// The kind's own use.
+    flag: u32,
+    /// Triangles of the mesh that belong to it.
+    triangles: Vec<u32>,
+}
+
+/// The kinds of lights that a scene has, from which its shader part is made.
+#[derive(Clone, Debug, Default)]
+pub struct Kinds(Vec<Kind>);
+
+impl Kinds {
+    /// How many lights there are.
+    fn count(&self) -> u32 {
+        self.0.iter().map(|k| k.lights.len() as u32).sum()
+    }
+
+    fn sampled(&self) -> impl Iterator<Item = (&Kind, &Sampled)> {
+        let all = self
+            .0
+            .iter()
+            .flat_map(|k| k.lights.iter().map(move |l| (k, l)));
+        all.filter(|(_, light)| !light.by_chance)
+    }
+
+    fn is_any_sampled(&self) -> bool {
+        self.sampled().next().is_some()
+    }
+
+    /// What the table of needs has to know.
+    pub(crate) fn facts(&self) -> SceneFacts {
+        let chooses = self.sampled().any(|(kind, _)| kind.chooses);
+        SceneFacts {
+            lights: self.0.iter().flat_map(|k| k.rows.clone()).collect(),
+            weighted: self.sampled().any(|(_, light)| !light.is_discrete),
+            far: self.sampled().any(|(kind, _)| kind.hit.is_none()),
+            choice: self.count() > 1 || chooses,
+            hit: self.0.iter().any(|k| k.hit.is_some()),
+            escape: self.0.iter().any(|k| k.escape.is_some()),
+            ..SceneFacts::default()
+        }
+    }
+
+    /// The rows that these lights may need, whatever the materials.
+    fn possible_needs(&self) -> Needs {
+        let rows = self.0.iter().flat_map(|k| &k.rows);
+        let of_kinds = rows.fold(Needs::default(), |needs, (row, _)| needs.with(*row));
+        of_kinds.or(Needs::of_rows(&[
+            Need::Mis,
+            Need::LightChoice,
+            Need::HitLights,
+            Need::EscapeLights,
+        ]))
+    }
+
+    /// The part with the functions that `needs` asks for. Kinds that it asks for in vain have their code and
+    /// no light.
+    pub(crate) fn part(&self, needs: Needs) -> ShaderPart {
+        let has = |kind: &Kind| self.0.iter().any(|k| k.sample == kind.sample);
+        let idle = empty_kinds(needs).into_iter();
+        let idle = idle.filter(|k| needs.any(k.serves) && !has(k));
+        let idle = idle.map(|kind| Kind { idle: true, ..kind });
+        let kinds: Vec<Kind> = self.0.iter().cloned().chain(idle).collect();
+        part(&kinds, self.count(), needs)
+    }
+
+    /// The same without the contents of buffers.
+    pub(crate) fn text(&self) -> Self {
+        let text = |kind: &Kind| Kind {
+            buffers: kind.buffers.iter().map(BufferData::text).collect(),
+            ..kind.clone()
+        };
+        Self(self.0.iter().map(text).collect())
+    }
+}
+
+/// Every kind without a light, as `needs` asks for it.
+fn empty_kinds(needs: Needs) -> [Kind; 5] {
+    [
+        mesh::empty(),
+        quad::empty(),
+        distant::empty(needs.has(Need::DiscLights)),
+        environment::empty_map(),
+        environment::empty_uniform(),
+    ]
+}
+
+/// The part of some kinds, which have `count` lights.
+fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
+    let flags: Vec<Flag> = needs.flags().collect();
+    let text = |text: &str| preprocess(text, &flags);
+    let mut part = ShaderPart {
+        wgsl: text(include_str!("common.wgsl")),
+        buffers: Vec::new(),
+    };
+    let sampled = kinds.iter().flat_map(|k| &k.lights).any(|l| !l.by_chance);
+    part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {sampled};\n");
+    if count > 0 || kinds.iter().any(|k| k.idle) {
+        part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count.max(1));
+        part.wgsl += &text(include_str!("select.wgsl"));
+        part.buffers.push(light_table(kinds));
+    }
+    if kinds.iter().any(|k| k.hit.is_some()) {
+        part.wgsl += &text(include_str!("area.wgsl"));
+    }
+    for kind in kinds {
+        part.wgsl += &text(&kind.wgsl);
+        part.buffers.extend(kind.buffers.iter().cloned());
+    }
+    part.wgsl += &sample_function(kinds);
+    part.wgsl += &hit_function(kinds);
+    part.wgsl += &escape_function(kinds);
+    part
+}
+
+/// Two rows of words a light; see `kernels/lights/select.wgsl`.
+fn light_table(kinds: &[Kind]) -> BufferData {
+    let weights = selection_weights(kinds);
+    let alias = WordAlias::new(&weights);
+    let mut rows: Vec<[[u32; 4]; 2]> = kinds
+        .iter()
+        .flat_map(|k| &k.lights)
+        .enumerate()
+        .map(|(i, light)| {
+            let threshold = alias.thresholds[i];
+            let probability = (alias.probabilities[i] as f32).to_bits();
+            let [r, g, b] = light.radiance.to_array().map(f32::to_bits);
+            [
+                [threshold, alias.aliases[i], probability, light.primitive],
+                [r, g, b, light.flag],
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        rows.push([[0; 4]; 2]);
+    }
+    BufferData::new("light_table", "array<vec4<u32>>", &rows)
+}
+
+/// Half of the choice goes by power over all lights. The other half goes in equal parts to the
+/// kinds, so that a bright sky over a large ground plane leaves samples for a lamp, and then by
+/// power within the kind. Lights that are found by chance have none, which gives hits full weight.
+fn selection_weights(kinds: &[Kind]) -> Vec<f64> {
+    let of_light = |l: &Sampled| if l.by_chance { 0.0 } else { l.power };
+    let power = |k: &Kind| k.lights.iter().map(of_light).sum::<f64>();
+    let total: f64 = kinds.iter().map(power).sum();
+    let present = kinds.iter().filter(|k| power(k) > 0.0).count() as f64;
+    let weights = kinds.iter().flat_map(|kind| {
+        let share = power(kind) * present;
+        kind.lights.iter().map(move |light| match of_light(light) {
+            power if power > 0.0 => power / total + power / share,
+            _ => 0.0,
+        })
+    });
+    weights.collect()
+}
+
+fn sample_function(kinds: &[Kind]) -> String {
+    let mut text =
+        String::from("fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {\n");
+    let sampled: Vec<&Kind> = kinds.iter().filter(|k| !k.lights.is_empty()).collect();
+    let idle: Vec<&Kind> = kinds.iter().filter(|k| k.idle).collect();
+    if !(sampled.is_empty() && idle.is_empty()) {
+        text += "    let pick = pick_light(bits);\n";
+    }
+    for name in idle.iter().map(|k| k.sample) {
+        text += &format!("    if pick.light < {NONE} {{ return {name}(pick, position); }}\n");
+    }
+    let Some((last, others)) = sampled.split_last() else {
+        return text + "    return no_light_sample();\n}\n";
+    };
+    let mut end = 0;
+    for kind in others {
+        end += kind.lights.len();
+        let name = kind.sample;
+        text += &format!("    if pick.light < {end}u {{ return {name}(pick, position); }}\n");
+    }
+    text + &format!("    return {}(pick, position);\n}}\n", last.sample)
+}
+
+/// A number of lights that is zero, and that compilers do not know to be.
+const NONE: &str = "run.none";
+
+fn hit_function(kinds: &[Kind]) -> String {
+    let mut text = String::from(
+        "fn light_hit(primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {\n",
+    );
+    if kinds.iter().any(|k| k.hit.is_some()) {
+        text += "    let light = primitive_light(primitive);\n";
+    }
+    let mut end = 0;
+    for kind in kinds {
+        end += kind.lights.len();
+        if let Some(name) = kind.hit {
+            let call = format!("{name}(light, primitive, t, direction, bsdf_pdf)");
+            let bound = match kind.idle {
+                true => NONE.to_owned(),
+                false => format!("{end}u"),
+            };
+            text += &format!("    if light < {bound} {{ return {call}; }}\n");
+        }
+    }
+    text + "    return vec3<f32>(0.0);\n}\n"
+}
+
+fn escape_function(kinds: &[Kind]) -> String {
+    let calls = kinds.iter().filter_map(|k| k.escape);
+    let terms: String = calls
+        .map(|n| format!(" + {n}(direction, bsdf_pdf)"))
+        .collect();
+    format!(
+        "fn light_escape(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32> {{\n    \
+         return vec3<f32>(0.0){terms};\n}}\n"
+    )
+}
+
+/// Luminance of linear RGB with Rec. 709 primaries.
+fn luminance(rgb: Vec3) -> f64 {
+    rgb.as_dvec3().dot(glam::dvec3(0.2126, 0.7152, 0.0722))
+}
+
+fn area([a, b, c]: [Vec3; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+    0.5 * (b - a).cross(c - a).length()
+}
+
+fn bounding_radius([low, high]: [Vec3; 2]) -> f64 {
+    (0.5 * (high.as_dvec3() - low.as_dvec3()).length()).max(f64::MIN_POSITIVE)
+}

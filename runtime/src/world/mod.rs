@@ -1,0 +1,179 @@
+//! What the renderer renders, without knowing where it came from: the camera, and shader
+//! parts that answer questions about geometry, lights and materials.
+//!
+//! This is the boundary of the GPU side. A scene becomes a [`World`]; tests build small ones
+//! by hand, from a few lines of WGSL.
+
+pub mod bvh;
+pub mod camera;
+pub mod first_hit;
+pub mod lights;
+pub mod media;
+pub mod needs;
+mod parts;
+mod placed;
+mod split;
+pub mod surface;
+pub mod texture;
+
+pub use parts::{SceneParts, Sources};
+pub use placed::Placed;
+pub use split::{GeometryCounts, Split};
+
+use impasto_compiler::Program;
+use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
+use impasto_compiler::partition::{Plan, Strategy};
+
+use crate::error::SceneError;
+use crate::scene::Scene;
+use crate::technique::Technique;
+use crate::wgsl::ShaderPart;
+use crate::world::camera::CameraFrame;
+use crate::world::media::Media;
+use crate::world::needs::{Facts, Needs};
+
+/// A scene as the kernels see it.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Columns of the picture.
+    pub width: u32,
+    /// Rows of the picture.
+    pub height: u32,
+    /// Where it is seen from.
+    pub camera: CameraFrame,
+    /// Longest path in segments; 1 shows lights alone.
+    pub max_depth: u32,
+    /// The segment from whose end on a path may be ended at random.
+    pub roulette_start: u32,
+    /// What kernels ask geometry, lights and textures through.
+    pub parts: SceneParts,
+}
+
+impl World {
+    /// The world of `scene`, whose materials compiled to `program`; rays are cast as `technique` says.
+    ///
+    /// # Errors
+    /// If the scene has what cannot be rendered.
+    pub fn of_program(
+        scene: &Scene,
+        program: &Program,
+        technique: &Technique,
+    ) -> Result<Self, SceneError> {
+        Self::new(
+            scene,
+            &program.infos(),
+            &MaterialSource::instances(program),
+            &program.textures(),
+            technique,
+        )
+    }
+
+    /// The plan that gives a kernel to each of `materials` that is on some surface.
+    pub(crate) fn own_plan(&self, materials: &[MaterialInfo]) -> Plan {
+        let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
+        Strategy::Own.plan(&names).leaving_out(&self.parts.unbound)
+    }
+
+    /// The world of a scene whose bindings compiled to `instances` of `materials`, reading
+    /// `textures`; rays are cast as `technique` says.
+    pub fn new(
+        scene: &Scene,
+        materials: &[MaterialInfo],
+        instances: &[InstanceInfo],
+        textures: &[TextureRef],
+        technique: &Technique,
+    ) -> Result<Self, SceneError> {
+        lights::check(scene, instances)?;
+        let (width, height) = (scene.film.width, scene.film.height);
+        let world = Self {
+            width,
+            height,
+            camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
+            max_depth: scene.integrator.max_depth,
+            roulette_start: scene.integrator.roulette_start,
+            parts: SceneParts::build(scene, materials, instances, textures, technique)?,
+        };
+        let needs = world.needs(materials, technique);
+        Ok(world.specialised(needs))
+    }
+}
+
+impl World {
+    /// What it needs in a wavefront, and what the technique adds to that.
+    fn needs(&self, materials: &[MaterialInfo], technique: &Technique) -> Needs {
+        let facts = Facts {
+            world: self,
+            materials,
+            technique,
+            wavefront: true,
+        };
+        let natural = Needs::of(&facts, Needs::default());
+        Needs::of(&facts, technique.features.forced(natural))
+    }
+
+    /// The world with the texts that some needs ask for.
+    pub(crate) fn specialised(mut self, needs: Needs) -> Self {
+        self.parts.specialise(needs);
+        self
+    }
+
+    /// All that kernels are composed of, without the contents of buffers.
+    pub(crate) fn texts(&self) -> World {
+        let parts = &self.parts;
+        World {
+            parts: SceneParts {
+                geometry: parts.geometry.text(),
+                bvh: parts.bvh.text(),
+                surface: parts.surface.text(),
+                lights: parts.lights.text(),
+                media: Media {
+                    part: parts.media.part.as_ref().map(ShaderPart::text),
+                    of_instance: Vec::new(),
+                    ..parts.media
+                },
+                texture: parts.texture.as_ref().map(ShaderPart::text),
+                unbound: parts.unbound.clone(),
+                facts: parts.facts.clone(),
+                sources: parts.sources.as_ref().map(Sources::text),
+                ..*parts
+            },
+            ..*self
+        }
+    }
+}
+
+/// Compiled materials, each the code of any number of instances.
+pub trait MaterialSource {
+    /// What the runtime must know of each material, in program order.
+    fn infos(&self) -> Vec<MaterialInfo>;
+    /// What it must know of each instance, in the order of the scene's bindings.
+    fn instances(&self) -> Vec<InstanceInfo>;
+    /// The buffers that the materials' code reads.
+    fn tables(&self) -> Vec<Table>;
+    /// WGSL that evaluates any instance of the materials with the given indices, ascending.
+    fn wgsl(&self, members: &[usize]) -> String;
+    /// WGSL of `material_of`, the material of an instance.
+    fn lookup_wgsl(&self) -> String;
+}
+
+impl MaterialSource for impasto_compiler::Program {
+    fn infos(&self) -> Vec<MaterialInfo> {
+        self.infos()
+    }
+
+    fn instances(&self) -> Vec<InstanceInfo> {
+        self.instances().iter().map(|i| i.info.clone()).collect()
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        self.tables()
+    }
+
+    fn wgsl(&self, members: &[usize]) -> String {
+        self.wgsl(members)
+    }
+
+    fn lookup_wgsl(&self) -> String {
+        self.lookup_wgsl()
+    }
+}

@@ -1,0 +1,350 @@
+//! The shader parts of a scene with placed objects, which take the place of those in `surface`:
+//! the same functions, for primitives that stand for a triangle of a placement.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
+
+use super::split::Split;
+use super::surface::{offset_constants, pack_normals};
+use crate::error::SceneError;
+use crate::scene::{Mesh, NO_MATERIAL, Placement, Transform};
+use crate::technique::Traversal;
+use crate::wgsl;
+use crate::wgsl::text::preprocess;
+use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::bvh::{Levels, ObjectTree};
+use crate::world::lights::NO_LIGHT;
+
+/// The largest number that may stand for a primitive, and the one that leaves room for
+/// rounding up blocks generously.
+const MAX_PRIMITIVES: u64 = u32::MAX as u64 - 1;
+const AMPLE_PRIMITIVES: u64 = 1 << 31;
+
+/// Everything that is placed, the world's own triangles included, which are where they are.
+pub struct Placed<'s> {
+    meshes: Vec<&'s Mesh>,
+    placements: Vec<Placement>,
+    levels: Levels,
+    blocks: Blocks,
+    bounds: [Vec3; 2],
+    has_world: bool,
+}
+
+impl<'s> Placed<'s> {
+    /// The trees and tables of `split`, whose scene binds `materials` materials.
+    ///
+    /// # Errors
+    /// There are more triangles than primitives can be told apart.
+    pub fn build(
+        split: &'s Split,
+        materials: usize,
+        traversal: Traversal,
+    ) -> Result<Placed<'s>, SceneError> {
+        let has_world = !split.world.is_empty();
+        let world = has_world.then_some(&*split.world).into_iter();
+        let meshes: Vec<&Mesh> = world.chain(split.objects.iter().map(|o| &**o)).collect();
+        let shift = u32::from(has_world);
+        let at_home = Placement {
+            object: 0,
+            transform: Transform::default(),
+            materials: (0..materials as u32).chain([NO_MATERIAL]).collect(),
+        };
+        let others = split.placements.iter().cloned().map(|p| Placement {
+            object: p.object + shift,
+            transform: p.transform.rounded(),
+            ..p
+        });
+        let at_home = has_world.then_some(at_home).into_iter();
+        let placements: Vec<Placement> = at_home.chain(others).collect();
+        let sizes = placements
+            .iter()
+            .map(|p| meshes[p.object as usize].len() as u64);
+        let blocks = Blocks::new(&sizes.collect::<Vec<_>>()).ok_or_else(too_many)?;
+        let places: Vec<(usize, Transform)> = placements
+            .iter()
+            .map(|p| (p.object as usize, p.transform))
+            .collect();
+        Ok(Placed {
+            levels: Levels::build(&meshes, &places, traversal),
+            meshes,
+            placements,
+            blocks,
+            bounds: split.bounds,
+            has_world,
+        })
+    }
+
+    /// The trees.
+    pub fn levels(&self) -> &Levels {
+        &self.levels
+    }
+
+    /// For each of the first primitives the triangle of the world that it stands for.
+    pub fn world_order(&self) -> &[u32] {
+        match self.levels.objects().first() {
+            Some(world) if self.has_world => &world.order,
+            _ => &[],
+        }
+    }
+
+    /// `triangle_vertices`, `primitive_instance` and so on; `lights` gives the index in the light
+    /// table of each triangle of the world, `media` the word of each instance's medium, or
+    /// nothing where paths follow none.
+    pub fn geometry_part(&self, lights: &[u32], media: &[u32]) -> ShaderPart {
+        let flags = [("placed", true)];
+        let text = include_str!("geometry.wgsl");
+        let placed = include_str!("geometry_placed.wgsl");
+        let table = MaterialTable::new(&self.placements);
+        ShaderPart {
+            wgsl: wgsl::constant_u32("BLOCK_SHIFT", self.blocks.shift)
+                + &preprocess(text, &flags)
+                + &preprocess(placed, &flags),
+            buffers: vec![
+                self.triangles(lights),
+                self.rows(&table),
+                table.buffer(media),
+                self.block_table(),
+            ],
+        }
+    }
+
+    /// `hit_position` and the other functions of a hit. Texture coordinates are left out unless
+    /// `reads_uv`. Needs the geometry part.
+    pub fn surface_part(&self, reads_uv: bool) -> ShaderPart {
+        let flags = [("placed", true)];
+        let mut part = ShaderPart {
+            wgsl: offset_constants(self.bounds) + include_str!("surface.wgsl"),
+            buffers: Vec::new(),
+        };
+        if self.meshes.iter().all(|m| m.normals.is_empty()) {
+            part.wgsl += include_str!("surface_flat.wgsl");
+        } else {
+            let text = include_str!("surface_smooth.wgsl");
+            part.wgsl += &preprocess(text, &flags);
+            let rows = self.gather(|mesh, t| pack_normals(mesh.normals.get(t).copied().flatten()));
+            part.buffers
+                .push(BufferData::new("vertex_normals", "array<vec4<u32>>", &rows));
+        }
+        if !reads_uv || self.meshes.iter().all(|m| m.uvs.is_empty()) {
+            part.wgsl += include_str!("surface_no_uv.wgsl");
+        } else {
+            part.wgsl += &preprocess(include_str!("surface_uv.wgsl"), &flags);
+            let rows: Vec<[Vec2; 3]> =
+                self.gather(|mesh, t| mesh.uvs.get(t).copied().unwrap_or_default());
+            part.buffers
+                .push(BufferData::new("vertex_uvs", "array<vec2<f32>>", &rows));
+        }
+        part
+    }
+
+    /// Something of every triangle, in the order of all.
+    fn gather<T>(&self, of: impl Fn(&Mesh, usize) -> T) -> Vec<T> {
+        let objects = self.meshes.iter().zip(self.levels.objects());
+        let each = objects.flat_map(|(mesh, tree)| tree.order.iter().map(|&t| (*mesh, t as usize)));
+        each.map(|(mesh, triangle)| of(mesh, triangle)).collect()
+    }
+
+    fn triangles(&self, lights: &[u32]) -> BufferData {
+        let nothing = self.placements.first().map_or(0, |p| p.materials.len()) as u32;
+        let world = self.meshes.first().filter(|_| self.has_world);
+        let rows: Vec<[[u32; 4]; 3]> = self.gather(|mesh, t| {
+            let at_home = world.is_some_and(|world| std::ptr::eq(*world, mesh));
+            let light = if at_home { lights[t] } else { NO_LIGHT };
+            let material = match mesh.materials[t] {
+                // The last row of the world's.
+                NO_MATERIAL => nothing.saturating_sub(1),
+                material => material,
+            };
+            let extra = [material, light, 0];
+            [0, 1, 2].map(|k| {
+                let [x, y, z] = mesh.positions[t][k].to_array().map(f32::to_bits);
+                [x, y, z, extra[k]]
+            })
+        });
+        BufferData::new("triangles", "array<vec4<u32>>", &rows)
+    }
+
+    fn rows(&self, table: &MaterialTable) -> BufferData {
+        let reaches: Vec<DVec3> = self.meshes.iter().map(|m| farthest(m)).collect();
+        let rows = self.levels.order().iter().map(|&index| {
+            let placement = &self.placements[index as usize];
+            let object = placement.object as usize;
+            let tree = &self.levels.objects()[object];
+            let first = self.blocks.first[index as usize];
+            row(
+                placement,
+                tree,
+                reaches[object],
+                first,
+                table.first(placement),
+            )
+        });
+        let rows: Vec<[[u32; 4]; 7]> = rows.collect();
+        BufferData::new("placements", "array<vec4<u32>>", &rows)
+    }
+
+    fn block_table(&self) -> BufferData {
+        let mut rows = vec![0u32; self.levels.order().len()];
+        for (row, &index) in (0..).zip(self.levels.order()) {
+            rows[index as usize] = row;
+        }
+        let table: Vec<u32> = (self.blocks.counts.iter().zip(&rows))
+            .flat_map(|(&count, &row)| std::iter::repeat_n(row, count as usize))
+            .collect();
+        BufferData::new("placement_blocks", "array<u32>", &table)
+    }
+}
+
+/// The words of a placement; see `kernels/geometry_placed.wgsl`.
+fn row(
+    placement: &Placement,
+    tree: &ObjectTree,
+    farthest: DVec3,
+    first: u32,
+    materials: u32,
+) -> [[u32; 4]; 7] {
+    let Transform {
+        matrix,
+        translation,
+    } = placement.transform;
+    let inverse = matrix.inverse();
+    let bits = |v: DVec3, word: u32| {
+        let [x, y, z] = v.as_vec3().to_array().map(f32::to_bits);
+        [x, y, z, word]
+    };
+    let ends = matrix.abs() * farthest + translation.abs();
+    let extent = (ends.length() as f32).max(f32::MIN_POSITIVE);
+    let signed = if placement.transform.is_mirrored() {
+        -extent
+    } else {
+        extent
+    };
+    let place = translation.as_vec3().to_array().map(f32::to_bits);
+    [
+        bits(matrix.row(0), place[0]),
+        bits(matrix.row(1), place[1]),
+        bits(matrix.row(2), place[2]),
+        bits(inverse.row(0), first.wrapping_sub(tree.first_triangle)),
+        bits(inverse.row(1), tree.root),
+        bits(inverse.row(2), materials),
+        bits(DMat3::abs(&inverse) * DVec3::ONE, signed.to_bits()),
+    ]
+}
+
+/// The largest magnitude of each coordinate.
+fn farthest(mesh: &Mesh) -> DVec3 {
+    let corners = mesh.positions.iter().flatten();
+    corners.fold(Vec3::ZERO, |m, p| m.max(p.abs())).as_dvec3()
+}
+
+/// The lists of materials that placements have, each once, one after the other.
+struct MaterialTable {
+    firsts: BTreeMap<Arc<[u32]>, u32>,
+    rows: Vec<u32>,
+}
+
+impl MaterialTable {
+    fn new(placements: &[Placement]) -> MaterialTable {
+        let mut table = MaterialTable {
+            firsts: BTreeMap::new(),
+            rows: Vec::new(),
+        };
+        for list in placements.iter().map(|p| &p.materials) {
+            if !table.firsts.contains_key(list) {
+                let first = table.rows.len() as u32;
+                table.firsts.insert(Arc::clone(list), first);
+                table.rows.extend(list.iter());
+            }
+        }
+        table
+    }
+
+    fn first(&self, placement: &Placement) -> u32 {
+        self.firsts.get(&placement.materials).copied().unwrap_or(0)
+    }
+
+    /// Instance and word of the medium.
+    fn buffer(&self, media: &[u32]) -> BufferData {
+        let medium = |instance: u32| media.get(instance as usize).copied().unwrap_or(0);
+        let rows: Vec<[u32; 2]> = self.rows.iter().map(|&i| [i, medium(i)]).collect();
+        BufferData::new("placement_materials", "array<vec2<u32>>", &rows)
+    }
+}
+
+/// Which numbers stand for the triangles of which placement: whole blocks of them, so that a
+/// small table finds the placement.
+#[derive(Debug, PartialEq, Eq)]
+struct Blocks {
+    /// A block has 2^shift numbers.
+    shift: u32,
+    /// Blocks of each placement.
+    counts: Vec<u64>,
+    /// The first number of each placement.
+    first: Vec<u32>,
+}
+
+impl Blocks {
+    /// The largest blocks that leave half of all numbers unused, or else those that fit. `None`
+    /// if there are not enough numbers.
+    fn new(sizes: &[u64]) -> Option<Blocks> {
+        let numbers = |shift: u32| {
+            let rounded = sizes
+                .iter()
+                .map(|size| u128::from(size.div_ceil(1 << shift)) << shift);
+            rounded.sum::<u128>()
+        };
+        let largest = |limit: u64| (0..=31).rev().find(|&s| numbers(s) <= u128::from(limit));
+        let shift = largest(AMPLE_PRIMITIVES).or_else(|| largest(MAX_PRIMITIVES))?;
+        let counts: Vec<u64> = sizes.iter().map(|s| s.div_ceil(1 << shift)).collect();
+        let first = counts.iter().scan(0u64, |next, count| {
+            let first = *next;
+            *next += count << shift;
+            Some(first as u32)
+        });
+        Some(Blocks {
+            shift,
+            first: first.collect(),
+            counts,
+        })
+    }
+}
+
+fn too_many() -> SceneError {
+    SceneError::new("the scene's placements have more than 2^32 triangles in all")
+        .hint("place fewer or coarser objects")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_have_room_for_all_and_more_than_there_are_is_an_error() {
+        let blocks = Blocks::new(&[1000, 1, 70_000]).expect("they fit");
+        assert!(blocks.shift >= 17, "one block each: {blocks:?}");
+        assert_eq!(blocks.counts, [1; 3]);
+        for (sizes, fits) in [
+            (vec![100_000; 10_000], true),
+            (vec![100_000; 42_949], true),
+            (vec![100_000; 42_950], false),
+            (vec![u64::from(u32::MAX) - 1], true),
+            (vec![u64::from(u32::MAX)], false),
+            (vec![1; 1 << 20], true),
+        ] {
+            let Some(blocks) = Blocks::new(&sizes) else {
+                assert!(!fits, "{} placements", sizes.len());
+                continue;
+            };
+            assert!(fits, "{} placements", sizes.len());
+            let ends = sizes.iter().zip(&blocks.first);
+            let mut end = 0;
+            for (size, &first) in ends {
+                assert!(u64::from(first) >= end && first & ((1 << blocks.shift) - 1) == 0);
+                end = u64::from(first) + size;
+            }
+            assert!(end <= MAX_PRIMITIVES);
+        }
+    }
+}

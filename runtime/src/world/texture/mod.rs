@@ -1,0 +1,166 @@
+//! The textures that materials read, as one storage buffer of half floats.
+//!
+//! It begins with a pair of words a texture: where its texels begin, and its size. Levels, which only
+//! textures have that are looked up with a width, stand behind the picture's own texels, and the pairs
+//! of these levels before them, in reverse: the pair of level n lies n before the first texel.
+
+use std::path::Path;
+
+use half::f16;
+use impasto_compiler::abi::{Lookups, TextureRef, TextureSpace};
+use impasto_compiler::codegen;
+use rayon::prelude::*;
+
+use crate::error::SceneError;
+use crate::image_file::{self, Picture};
+use crate::wgsl::{BufferData, ShaderPart};
+
+mod levels;
+
+/// Texels of all textures of a scene, levels not counted: 32 pictures of 4096 x 4096, 4 GiB.
+const MAX_TEXELS: u64 = 1 << 29;
+
+/// Texels of pictures that are decoded at a time: each takes up to 36 bytes meanwhile.
+const DECODED_AT_ONCE: u64 = 1 << 25;
+
+/// `texture_fetch`, and what else is asked of `textures`, whose order gives their slots and whose
+/// paths are relative to `base`; `None` if there are none.
+///
+/// # Errors
+/// If a picture cannot be read or is too large, or all together are.
+pub fn part(textures: &[TextureRef], base: &Path) -> Result<Option<ShaderPart>, SceneError> {
+    if textures.is_empty() {
+        return Ok(None);
+    }
+    let packed = load_all(textures, base)?;
+    let mut data: Vec<[u32; 2]> = Vec::with_capacity(packed.iter().map(Packed::pairs).sum());
+    let mut at = packed.len() as u32;
+    for texture in &packed {
+        let first = at + texture.levels.len() as u32 - 1;
+        data.push([first, texture.levels[0].size]);
+        at += texture.pairs() as u32 - 1;
+    }
+    for (slot, texture) in packed.into_iter().enumerate() {
+        texture.write(data[slot][0], &mut data);
+    }
+    let all = textures.iter().map(|texture| texture.lookups);
+    let all = all.fold(Lookups::default(), Lookups::and);
+    let mut wgsl = include_str!("../texture.wgsl").to_owned();
+    if !all.is_plain() {
+        wgsl += include_str!("../texture_levels.wgsl");
+        wgsl += &codegen::lookups(all);
+    }
+    Ok(Some(ShaderPart {
+        wgsl,
+        buffers: vec![BufferData::new("texture_data", "array<vec2<u32>>", &data)],
+    }))
+}
+
+/// Loads textures, as many at a time as memory is meant for. Sizes are looked at first, so that too
+/// many are refused before any is decoded.
+fn load_all(textures: &[TextureRef], base: &Path) -> Result<Vec<Packed>, SceneError> {
+    let sizes: Vec<u64> = textures
+        .par_iter()
+        .map(|t| image_file::texels(&base.join(&t.path), "texture"))
+        .collect::<Result<_, _>>()?;
+    let total: u64 = sizes.iter().sum();
+    if total > MAX_TEXELS {
+        let message = format!("the scene's textures have {total} texels in all");
+        let hint = format!("at most {MAX_TEXELS} fit; use smaller pictures");
+        return Err(SceneError::new(message).hint(hint));
+    }
+    let mut packed = Vec::with_capacity(textures.len());
+    let mut first = 0;
+    while first < textures.len() {
+        let mut texels = sizes[first];
+        let mut end = first + 1;
+        while end < textures.len() && texels + sizes[end] <= DECODED_AT_ONCE {
+            texels += sizes[end];
+            end += 1;
+        }
+        let loaded = textures[first..end].par_iter().map(|t| load(t, base));
+        packed.extend(loaded.collect::<Result<Vec<_>, _>>()?);
+        first = end;
+    }
+    Ok(packed)
+}
+
+/// One texture as the kernel reads it.
+struct Packed {
+    /// The picture, and the levels after it.
+    levels: Vec<Level>,
+}
+
+struct Level {
+    /// Width in the low half, height in the high half.
+    size: u32,
+    /// Four half floats each.
+    texels: Vec<[u32; 2]>,
+}
+
+impl Packed {
+    /// Pairs of words that it takes.
+    fn pairs(&self) -> usize {
+        self.levels.iter().map(|level| 1 + level.texels.len()).sum()
+    }
+
+    /// Adds everything but the first pair, where `first` is the place of the first texel.
+    fn write(self, first: u32, data: &mut Vec<[u32; 2]>) {
+        let mut at = first;
+        let mut pairs = Vec::new();
+        for level in &self.levels {
+            pairs.push([at, level.size]);
+            at += level.texels.len() as u32;
+        }
+        data.extend(pairs[1..].iter().rev());
+        for level in self.levels {
+            data.extend(level.texels);
+        }
+    }
+}
+
+fn load(texture: &TextureRef, base: &Path) -> Result<Packed, SceneError> {
+    let path = base.join(&texture.path);
+    let is_color = texture.space == TextureSpace::Color;
+    let picture = image_file::load(&path, "texture", is_color)?;
+    check_range(&picture, &path)?;
+    let coverage = is_color && texture.lookups.alpha;
+    let holes = |picture: &Picture| picture.texels.iter().any(|texel| texel[3] < 1.0);
+    let mut levels = match texture.lookups.levels || (coverage && holes(&picture)) {
+        true => levels::pyramid(picture, coverage),
+        false => vec![picture],
+    };
+    if !texture.lookups.levels {
+        levels.truncate(1);
+    }
+    Ok(Packed {
+        levels: levels.into_iter().map(pack).collect(),
+    })
+}
+
+fn pack(picture: Picture) -> Level {
+    let pair = |[x, y]: [f32; 2]| {
+        let [x, y] = [x, y].map(|v| u32::from(f16::from_f32(v).to_bits()));
+        x | y << 16
+    };
+    let texels = picture.texels.iter();
+    Level {
+        size: picture.width | picture.height << 16,
+        texels: texels
+            .map(|&[r, g, b, a]| [pair([r, g]), pair([b, a])])
+            .collect(),
+    }
+}
+
+fn check_range(picture: &Picture, path: &Path) -> Result<(), SceneError> {
+    let largest = f16::MAX.to_f32();
+    let outside = |texel: &[f32; 4]| !texel.iter().all(|v| v.abs() <= largest);
+    let Some(index) = picture.texels.iter().position(outside) else {
+        return Ok(());
+    };
+    let (x, y) = (index as u32 % picture.width, index as u32 / picture.width);
+    let value = picture.texels[index];
+    let message = format!("the texel in column {x}, row {y} is {value:?}");
+    Err(SceneError::in_file(path, message)
+        .hint(format!("textures hold finite values up to {largest}")))
+}
