@@ -7,9 +7,6 @@
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::gpu::Gpu;
-use crate::world::needs::Needs;
-
 /// A choice between techniques, each with a name on the command line.
 pub trait Choice: Copy + PartialEq + 'static {
     /// Every value with its name and what it means; the default is first.
@@ -215,20 +212,11 @@ pub struct Technique {
     pub features: Features,
 }
 
-impl Features {
-    /// The rows that are on for a scene that needs `natural` by itself.
-    pub(crate) fn forced(self, natural: Needs) -> Needs {
-        match self {
-            Features::Scene => Needs::default(),
-            Features::All => Needs::everything(natural),
-        }
-    }
-}
-
 impl Technique {
-    /// The technique with what a GPU lacks replaced by the next best; reports say what ran.
-    pub(crate) fn within(self, gpu: &Gpu) -> Self {
-        if gpu.has_subgroups() {
+    /// The technique that a GPU can run: what needs subgroups is replaced by the next best where it has
+    /// none. Reports say what ran.
+    pub(crate) fn within(self, has_subgroups: bool) -> Self {
+        if has_subgroups {
             return self;
         }
         Self {

@@ -17,7 +17,7 @@ use impasto::runtime::render::Replanning;
 use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::FilmSettings;
-use impasto::runtime::world::media::MAX_NESTED;
+use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
     FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files, plan,
 };

@@ -131,7 +131,7 @@ pub fn kernels(
         wavefront: true,
     };
     let natural = Needs::of(&facts, Needs::default());
-    let forced = technique.features.forced(natural);
+    let forced = Needs::forced(technique.features, natural);
     let (_, kernels) = compose(&world, source, technique, forced)?;
     let text = |kernel: Kernel| KernelText {
         name: kernel.recipe.name,

@@ -42,7 +42,7 @@ impl Layout {
         plan: &Plan,
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
-        let forced = |natural| technique.features.forced(natural);
+        let forced = |natural| Needs::forced(technique.features, natural);
         Self::with_forced(world, materials, plan, technique, forced)
     }
 

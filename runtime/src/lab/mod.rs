@@ -132,7 +132,7 @@ impl<'a> Lab<'a> {
         let mut render = RenderOptions {
             samples: ENDLESS,
             pool: options.pool,
-            technique: options.technique.within(gpu),
+            technique: options.technique.within(gpu.has_subgroups()),
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;

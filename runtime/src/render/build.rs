@@ -74,7 +74,7 @@ impl<'g> Renderer<'g> {
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
         let mut options = options.clone();
-        options.technique = options.technique.within(gpu);
+        options.technique = options.technique.within(gpu.has_subgroups());
         settings::check(world, &options)?;
         let mut makings = Makings::new(gpu.subgroup_size(), world, source, options.technique);
         makings.some_pixels = options.pixels.is_some();
@@ -135,7 +135,7 @@ pub fn identity(
         gpu.subgroup_size(),
         world,
         source,
-        options.technique.within(gpu),
+        options.technique.within(gpu.has_subgroups()),
     );
     let plan = world.own_plan(&makings.materials);
     let layout = makings.layout(&plan)?;

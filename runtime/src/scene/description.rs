@@ -7,9 +7,10 @@ use toml::de::DeValue;
 use super::document::{Document, Table, Value, numbers};
 use super::mtl::MtlValue;
 use super::placements::{self, PlacesSpec};
-use super::{Camera, DistantLight, FilmSettings, Integrator, Light, QuadLight, Transform};
+use super::{
+    Camera, DistantLight, FilmSettings, Integrator, Light, MAX_NESTED, QuadLight, Transform,
+};
 use crate::error::SceneError;
-use crate::world::media::MAX_NESTED;
 
 /// Pixels a side of the largest film.
 const MAX_FILM: u32 = 16_384;

@@ -26,6 +26,9 @@ pub(crate) use mesh::MAX_TRIANGLES;
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use transform::Transform;
 
+/// How many media a path can be in at once; a state field holds as many words.
+pub const MAX_NESTED: usize = 4;
+
 /// Everything a scene file names, loaded and checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {

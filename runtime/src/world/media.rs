@@ -11,11 +11,10 @@ use std::collections::BTreeMap;
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Medium};
 
 use crate::error::SceneError;
+use crate::scene::MAX_NESTED;
 use crate::wgsl::constant_u32;
 use crate::wgsl::{BufferData, ShaderPart};
 
-/// How many media a path can be in at once; a state field holds as many words.
-pub const MAX_NESTED: usize = 4;
 /// How many distinct media, and how many priorities, a scene can have: a word's halves hold them.
 const MAX_MEDIA: usize = 0xffff;
 /// How many boundaries in a row that are none (of media overlapped by another of higher priority)

@@ -108,7 +108,7 @@ impl World {
             wavefront: true,
         };
         let natural = Needs::of(&facts, Needs::default());
-        Needs::of(&facts, technique.features.forced(natural))
+        Needs::of(&facts, Needs::forced(technique.features, natural))
     }
 
     /// The world with the texts that some needs ask for.

@@ -61,7 +61,7 @@ pub struct RayRate {
 /// Every technique of casting rays that a GPU can run. Threads that do not fetch rays test
 /// triangles at once.
 pub fn techniques(gpu: &Gpu) -> Vec<Technique> {
-    let mut all = vec![Technique::default().within(gpu)];
+    let mut all = vec![Technique::default().within(gpu.has_subgroups())];
     for (traversal, ..) in Traversal::ALL {
         for (stack, ..) in Stack::ALL {
             for (ray_fetch, leaves) in [
@@ -76,7 +76,7 @@ pub fn techniques(gpu: &Gpu) -> Vec<Technique> {
                     ray_fetch,
                     ..Technique::default()
                 };
-                all.push(technique.within(gpu));
+                all.push(technique.within(gpu.has_subgroups()));
             }
         }
     }
@@ -99,7 +99,7 @@ pub fn measure(
     check(options)?;
     // What is measured is one level; two take the same steps.
     let scene = &*scene.flattened()?;
-    let default = Technique::default().within(gpu);
+    let default = Technique::default().within(gpu.has_subgroups());
     let reference = Bvh::build(&scene.mesh, default.traversal);
     let caster = Caster::new(gpu, scene, &reference, &default)?;
     let mut sets = Vec::new();

@@ -5,6 +5,7 @@
 //! pays for what it uses. Rows can be forced, to measure what a scene saves by not having them
 //! ([`crate::audit`]), and to test that they change no picture.
 
+use crate::technique::Features;
 use crate::wgsl::text::Flag;
 
 pub mod facts;
@@ -57,6 +58,14 @@ impl Needs {
             }
         }
         needs
+    }
+
+    /// The rows that `features` put on in a scene that needs `natural` by itself.
+    pub(crate) fn forced(features: Features, natural: Needs) -> Needs {
+        match features {
+            Features::Scene => Needs::default(),
+            Features::All => Needs::everything(natural),
+        }
     }
 
     /// Everything that can be on at once for a scene that needs `natural` by itself.
