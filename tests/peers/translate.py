@@ -9,9 +9,9 @@ import numpy as np
 from geometry import load_obj, transformed, write_ply
 from impasto import Impasto, bound_material, load_mtl
 
-NEAREST = """Materials become their lobes at one point, seen from 37 degrees: patterns, noise and
-flakes are constant, a picture on a diffuse lobe is kept. Lobes that lie over each other become a
-`blendbsdf` by their shares. Blinn-Phong lobes become rough conductors of the same width."""
+NEAREST = """Each material becomes its lobes at one point, seen from 37 degrees: patterns, noise and
+flakes become constants; a picture on a diffuse lobe stays. Layered lobes become a `blendbsdf`
+weighted by their shares. Blinn-Phong lobes become rough conductors of the same width."""
 
 
 def translate(scene: dict, impasto: Impasto, size: tuple[int, int] | None = None) -> dict:
