@@ -65,15 +65,15 @@ codes! {
     Unterminated = "E0104", Error, "unterminated text",
         "A string must end on the line it starts on, and a block comment `/* ... */` must be closed.";
     InvalidNumber = "E0105", Error, "invalid number",
-        "Integers fit 32 bits (hexadecimal ones may fill them), and floats are finite in 32-bit precision.";
+        "An integer must fit into 32 bits (hexadecimal ones may use all of them), and a float must be finite in 32-bit precision.";
     NestedTooDeep = "E0106", Error, "nested too deeply",
         "Brackets, operators and else-if chains may nest at most 256 levels in all, and the blocks of a function 126. Name parts of the expression with `let`, or move inner blocks to a function.";
     Syntax = "E0107", Error, "syntax error",
-        "The parser met something else than what the grammar allows at this place. See docs/language.md for the grammar.";
+        "The source does not follow the grammar at this place. See docs/language.md for the grammar.";
     Unclosed = "E0108", Error, "unbalanced brackets",
         "Every `(`, `[` and `{` needs its partner of the same kind.";
     NoMaterial = "E0109", Error, "no material",
-        "The file defines no material (or not the one that was asked for), so there is nothing to render.";
+        "The file does not define a material (or not the requested one), so there is nothing to render.";
     // E02xx: names and modules
     UnknownName = "E0201", Error, "unknown name",
         "No variable, parameter, function or closure of that name is in scope. Names from other modules need a `use`.";
@@ -84,9 +84,9 @@ codes! {
     UnknownImport = "E0204", Error, "nothing of that name in the module",
         "The module exists but defines no item of that name.";
     ImportCycle = "E0205", Error, "import cycle",
-        "Modules may not import each other in a circle. Move what both need into a third module.";
+        "Modules may not import each other in a circle. Move shared definitions to a third module.";
     Duplicate = "E0206", Error, "defined twice",
-        "A name may be defined once in its scope. Inner blocks may shadow outer names. Functions are not overloaded: two of one name are an error even if they take different arguments.";
+        "A name may be defined once in its scope. Inner blocks may shadow outer names. Functions cannot be overloaded: two functions with the same name are an error, even with different parameters.";
     Recursion = "E0207", Error, "recursion",
         "GPUs run without a call stack: functions and materials may not call themselves, directly or through others. Use a bounded loop.";
     UnknownField = "E0208", Error, "unknown field",
@@ -104,10 +104,10 @@ codes! {
     UnknownParameter = "E0214", Error, "unknown material parameter",
         "A scene sets a parameter that the material does not declare.";
     PrivateItem = "E0215", Error, "private to its module",
-        "A definition that is marked `private` is for its own file only. Remove the mark there to import it.";
+        "Only its own file can use a definition marked `private`. Remove `private` there to import it.";
     // E03xx: types and values
     TypeMismatch = "E0301", Error, "wrong type",
-        "The value has another type than this place needs. An int becomes a float, and a float a grey color, by itself; everything else is converted by calling the type: `color(v)`, `float(l)`.";
+        "The value does not have the type that this place needs. An int converts to a float implicitly, and a float to a grey color; everything else is converted by calling the type: `color(v)`, `float(l)`.";
     NoOperator = "E0302", Error, "operator does not apply",
         "The operator is not defined for these types. Colors and directions do not mix; lengths add to lengths only.";
     NeedsUnit = "E0303", Error, "a unit is needed",
@@ -131,15 +131,15 @@ codes! {
     TooManyLobes = "E0312", Error, "too many lobes",
         "A material may have at most 64 lobes after layering, not counting those whose weight is the constant zero; 1024 counting them.";
     Unsupported = "E0313", Error, "not supported here",
-        "The construct is part of the language's plan but cannot be used in this place yet.";
+        "The construct is planned but not yet supported here.";
     NotFinite = "E0314", Error, "not a finite number",
         "Parameters and constants must be finite numbers.";
     TooLarge = "E0315", Error, "material too large",
-        "Functions are put in line on the GPU. A material may grow to at most 400,000 operations that way. Calls of materials and of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions a material; closures lie at most 256 levels within each other.";
-    VaryingMedium = "E0316", Error, "a medium that varies",
-        "What fills an object is the same everywhere in it: `interior` depends on parameters and constants only, not on the point of the surface or on textures.";
-    Metadata = "E0317", Error, "metadata that does not fit",
-        "The block behind a parameter tells user interfaces its `label` and `group` (texts), its `soft` range (of a slider, within the range of the parameter, around the default) and its `unit` (of a length or an angle). Bools and textures have no ranges.";
+        "Functions are inlined for the GPU, and a material may grow to at most 400,000 operations. Calls of materials and of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions per material; closures nest at most 256 levels deep.";
+    VaryingMedium = "E0316", Error, "varying medium",
+        "The medium inside an object is uniform: `interior` may depend on parameters and constants only, not on the point of the surface or on textures.";
+    Metadata = "E0317", Error, "contradictory metadata",
+        "The block after a parameter gives user interfaces its `label` and `group` (texts), its `soft` range (of a slider, within the range of the parameter, around the default) and its `unit` (of a length or an angle). Bools and textures have no ranges.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";
@@ -149,7 +149,7 @@ codes! {
     WeightAboveOne = "W0002", Warning, "weight above one",
         "A closure weighted by more than one can reflect more light than it receives.";
     Unused = "W0003", Warning, "never used",
-        "The name is defined and never used. Start it with an underscore to say that this is meant.";
+        "The name is defined and never used. If that is intended, start it with an underscore.";
     LobesNeverSampled = "W0004", Warning, "weight is always zero",
         "The closure's weight is the constant zero, so it never contributes.";
 }

@@ -20,7 +20,8 @@ pub(super) struct CalibrateArgs {
     /// exhaustive --format json`
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["data", "quick", "pool", "repetitions", "gpu", "checked", "validate_indirect"])]
     from: Vec<PathBuf>,
-    /// Fit nothing: say what this profile predicts of those measurements, and which plans it would choose
+    /// Fit nothing; print this profile's predictions for those measurements and the plans that it would
+    /// choose
     #[arg(
         long,
         value_name = "NAME|FILE",
@@ -34,7 +35,7 @@ pub(super) struct CalibrateArgs {
     /// Measure less, for a first impression
     #[arg(long)]
     quick: bool,
-    /// Paths in flight; give it several times to measure with each. Chosen by the kind of GPU otherwise
+    /// Paths in flight; repeat the option for several pools. By default chosen by the kind of GPU
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(64..))]
     pool: Vec<u32>,
     /// How often each kernel is timed; the median counts

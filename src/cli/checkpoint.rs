@@ -14,10 +14,10 @@ use super::{Failure, Global};
 
 #[derive(Args)]
 pub(super) struct CheckpointArgs {
-    /// Keeps what is done in this film file; goes on from it if it is there
+    /// Keep a checkpoint in this film file; resume from it if it exists
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Seconds between two checkpoints, which is what an interruption loses at most
+    /// Seconds between two checkpoints; an interruption loses at most that
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = parse_seconds)]
     checkpoint_every: f64,
 }

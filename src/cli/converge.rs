@@ -24,34 +24,34 @@ pub(super) struct ConvergeArgs {
     /// The scenes, TOML files
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// The folder of results; a study that was ended goes on from what is in it
+    /// The folder of results; an interrupted study resumes from it
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// How materials share kernels: names as of `impasto render --strategy`
     #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = parse_strategy)]
     strategies: Vec<Wanted>,
-    /// Where random numbers come from: sobol, owen, independent
+    /// Samplers: sobol, owen, independent
     #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = parse_sampler)]
     samplers: Vec<Sampler>,
     /// Renders of each number of samples, which differ in their seeds
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
     seeds: u32,
-    /// The most samples a pixel; those below are a quarter of the next each
+    /// Maximum samples per pixel; each smaller number is a quarter of the next
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     max_spp: u32,
-    /// The fewest samples a pixel
+    /// Minimum samples per pixel
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_spp: u32,
-    /// Width and height in pixels, as in 640x480; each scene's own otherwise
+    /// Width and height in pixels, as in 640x480; each scene's own by default
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// Takes this picture for the truth instead of making one
+    /// Use this picture as the reference instead of rendering one
     #[arg(long, value_name = "R.exr")]
     reference: Option<PathBuf>,
-    /// The most samples a pixel of a reference that is made; 4096 times the renders' otherwise
+    /// Maximum samples per pixel of the reference; 4096 times those of the renders by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..1 << 32))]
     reference_spp: Option<u64>,
-    /// Seconds for a scene, after which nothing new is begun
+    /// Time limit per scene in seconds; nothing new starts after it
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time: Option<f64>,
     /// The first seed
@@ -60,7 +60,7 @@ pub(super) struct ConvergeArgs {
     /// Removes results that are in the folder
     #[arg(long)]
     fresh: bool,
-    /// Paths in flight; chosen by the size of the picture otherwise
+    /// Paths in flight; by default chosen by the size of the picture
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     #[command(flatten)]

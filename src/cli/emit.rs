@@ -30,15 +30,15 @@ pub(super) struct EmitArgs {
     /// Which material of the file; needed for IR and WGSL where it has several
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
-    /// With `--what ir`: the evaluate functions of materials once the passes up to this one
-    /// have gone over them for the first time; `lowering` is before all of them
+    /// With `--what ir`: the evaluate functions of materials after the first run of the passes up to
+    /// this one; `lowering` is before all passes
     #[arg(long, value_name = "PASS", value_parser = passes())]
     after: Option<String>,
     /// What the WGSL is for
     #[arg(long, default_value = "native")]
     target: TargetName,
-    /// Keep parameters as values of a table, as instances with different values share them, in
-    /// place of their defaults
+    /// Keep parameters in a table, as for instances with different values, instead of using their
+    /// defaults
     #[arg(long)]
     table: bool,
     /// Where to write it; `-` is standard output

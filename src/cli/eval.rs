@@ -16,15 +16,15 @@ use super::{Failure, Global, Outcome, print};
 pub(super) struct EvalArgs {
     /// A material file or module of the library, such as `std::bsdf::diffuse`; `-` is standard input
     file: String,
-    /// Which material, closure or function of the file; without, all materials, or where there is
-    /// none, everything
+    /// The material, closure or function to evaluate; by default all materials, or everything if there
+    /// are none
     #[arg(long, visible_alias = "item", value_name = "NAME")]
     material: Option<String>,
     /// A parameter and its value, as in a source: `coat_ior=1.33`, `flake_size="0.2 mm"`
     #[arg(long = "param", value_name = "NAME=VALUE", value_parser = setting)]
     params: Vec<(String, String)>,
-    /// Where: `position=(x, y, z), normal=(..), tangent=(..), uv=(u, v), wo=(..), wi=(..), u=(..)`;
-    /// what is left out has a default
+    /// The point: `position=(x, y, z), normal=(..), tangent=(..), uv=(u, v), wo=(..), wi=(..), u=(..)`;
+    /// keys that are left out have defaults
     #[arg(long, value_name = "POINT", default_value = "")]
     at: At,
     /// In which precision; `both` also says where they differ most

@@ -8,7 +8,7 @@ use super::{Failure, Global, Outcome, print};
 /// Which GPU to use, and how.
 #[derive(Args)]
 pub(super) struct GpuArgs {
-    /// Use the GPU whose name contains this; the most capable one otherwise
+    /// Use the GPU whose name contains this; by default the most capable one
     #[arg(long, value_name = "NAME")]
     gpu: Option<String>,
     /// Keep the checks of array bounds and loops in all kernels (slower)

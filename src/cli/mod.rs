@@ -41,7 +41,7 @@ mod trace;
 mod trace_text;
 mod until;
 
-/// A material language, and the wavefront path tracer its compiler feeds.
+/// A material language and a wavefront path tracer for it.
 #[derive(Parser)]
 #[command(
     name = "impasto",
@@ -61,13 +61,13 @@ struct Global {
     /// Color diagnostics
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     color: ColorChoice,
-    /// Form of diagnostics and results: text for people, JSON on standard output for programs
+    /// Format of diagnostics and results: text, or JSON on standard output
     #[arg(long, global = true, default_value = "text")]
     format: Format,
-    /// Say more
+    /// Print more
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
-    /// Say nothing but errors and results
+    /// Print only errors and results
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 }
@@ -86,11 +86,11 @@ enum Command {
     New(new::NewArgs),
     /// Format sources, keeping every comment
     Fmt(fmt::FmtArgs),
-    /// Print what the compiler makes of a material file
+    /// Print a stage of the compilation of a material file
     Emit(emit::EmitArgs),
-    /// Count the operations that one evaluation of materials takes
+    /// Count the operations of one evaluation of each material
     Cost(cost::CostArgs),
-    /// Fit the time model to this GPU, by kernels that are timed
+    /// Fit the time model to this GPU by timing kernels
     Calibrate(Box<calibrate::CalibrateArgs>),
     /// Explain which materials share a kernel in a scene, and why
     Plan(Box<plan::PlanCommandArgs>),
@@ -98,7 +98,7 @@ enum Command {
     Eval(eval::EvalArgs),
     /// Render a scene
     Render(Box<render::RenderArgs>),
-    /// Measure how fast renders come near the truth: error against run time
+    /// Measure how fast renders converge: error against run time
     Converge(Box<converge::ConvergeArgs>),
     /// Replay the path of one sample, and print every vertex
     Trace(trace::TraceArgs),
@@ -106,7 +106,7 @@ enum Command {
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
     Merge(merge::MergeArgs),
-    /// Show the GPU that would be rendered on, and its limits
+    /// Show the GPU that renders would use, and its limits
     Info(info::GpuArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
     Explain(explain::ExplainArgs),

@@ -19,21 +19,21 @@ use super::{Failure, Global, Outcome, compiled_scene, print, read_text};
 pub(super) struct PlanCommandArgs {
     /// The scene, a TOML file
     scene: PathBuf,
-    /// Says what the scene needs and why, and what leaving out the rest saves, in place of a plan
+    /// Instead of a plan, print what the scene needs and why, and what leaving out the rest saves
     /// (docs/needs.md); needs no GPU
     #[arg(long)]
     needs: bool,
     #[command(flatten)]
     wanted: PlanArgs,
-    /// How paths hit materials, from a file that `--save-workload` wrote; otherwise a few iterations are
+    /// How paths hit materials, from a file that `--save-workload` wrote; by default a few iterations are
     /// rendered
     #[arg(long, value_name = "FILE")]
     workload: Option<PathBuf>,
-    /// What the GPU's operations take: a profile that is part of the program (h200, llvmpipe), or a file
-    /// that `impasto calibrate` wrote; otherwise the one that fits the GPU best
+    /// Device profile: a built-in one (h200, llvmpipe) or a file from `impasto calibrate`; by default the
+    /// one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// Paths in flight; as in a render, or as in the workload, otherwise
+    /// Paths in flight; by default as in a render, or as in the workload
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     /// At how many points each material is evaluated

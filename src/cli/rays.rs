@@ -23,7 +23,7 @@ pub(super) struct RaysArgs {
     /// Threads of a workgroup
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
-    /// Threads of kernels that fetch rays; as many as fill the GPU otherwise
+    /// Threads of kernels that fetch rays; by default as many as fill the GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     threads: Option<u32>,
     /// Seed of scattered directions

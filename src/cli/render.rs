@@ -41,17 +41,17 @@ pub(super) struct RenderArgs {
     /// for a part that `impasto merge` takes
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// Samples per pixel: 64 otherwise
+    /// Samples per pixel; 64 by default
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     #[command(flatten)]
     until: UntilArgs,
-    /// Index of the first sample: ranges that do not overlap can be rendered apart and merged
+    /// Index of the first sample; disjoint ranges can be rendered separately and merged
     #[arg(long, value_name = "INDEX", default_value_t = 0)]
     samples_from: u32,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
-    /// Width and height in pixels, as in 640x480; the scene's own otherwise
+    /// Width and height in pixels, as in 640x480; the scene's own by default
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(super) size: Option<(u32, u32)>,
     /// Seed of all random numbers: equal seeds give equal pictures
@@ -59,8 +59,8 @@ pub(super) struct RenderArgs {
     seed: u32,
     #[command(flatten)]
     plan: PlanArgs,
-    /// What the GPU's operations take, for the automatic plan: a profile that is part of the program
-    /// (h200, llvmpipe), or a file that `impasto calibrate` wrote; otherwise the one that fits best
+    /// Device profile for the automatic plan: a built-in one (h200, llvmpipe) or a file from
+    /// `impasto calibrate`; by default the one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE")]
     device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
@@ -69,7 +69,7 @@ pub(super) struct RenderArgs {
     /// Brightens the PNG by this many stops; the EXR stays as it is
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
-    /// Paths in flight; chosen by the size of the picture otherwise
+    /// Paths in flight; by default chosen by the size of the picture
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     #[command(flatten)]

@@ -47,10 +47,10 @@ pub(super) struct TechniqueArgs {
     /// What kernels can do that the scene may not ask for
     #[arg(long, value_name = "NAME", default_value = default_name::<Features>(), value_parser = named::<Features>())]
     features: Features,
-    /// Threads of a workgroup; chosen by the kind of plan and GPU otherwise
+    /// Threads of a workgroup; by default chosen by the kind of plan and GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
-    /// Threads of kernels that fetch one item after another; as many as fill the GPU otherwise
+    /// Threads of kernels that fetch one item after another; by default as many as fill the GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     threads: Option<u32>,
     /// Count the lanes at work in every kernel (`utilisation` in the report; much slower)

@@ -27,7 +27,7 @@ pub(super) struct TraceArgs {
     /// Where the render's random numbers came from
     #[arg(long, value_name = "NAME", default_value = default_name::<Sampler>(), value_parser = named::<Sampler>())]
     sampler: Sampler,
-    /// Width and height of the render in pixels, as in 640x480; the scene's own otherwise
+    /// Width and height of the render in pixels, as in 640x480; the scene's own by default
     #[arg(long, value_name = "WxH", value_parser = super::render::parse_size)]
     size: Option<(u32, u32)>,
     /// In which precision; `both` also says where the two part
