@@ -4,14 +4,14 @@
 //! Hits are those of `plans/NAME.workload.json`, so that no GPU is needed. `cargo xtask bless`
 //! accepts changes.
 
-mod generated;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use impasto::compiler::partition::explain::{Subject, explain};
 use impasto::compiler::partition::{Calibrated, DeviceProfile, Wanted, Workload};
 use impasto::plan::Facts;
+
+use crate::generated;
 
 /// Points at which each material is evaluated: fewer than the command takes, to save time.
 const SAMPLES: usize = 256;

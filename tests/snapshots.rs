@@ -4,8 +4,6 @@
 //! library file has no material: a probe is written that uses everything it defines.
 //! `cargo xtask bless` accepts changes; nothing else writes snapshots.
 
-mod probe;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -13,29 +11,40 @@ use impasto::FileLoader;
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Program, parser};
 
+use crate::probe;
+
 #[test]
 fn materials() {
+    let _kept = named();
     insta::glob!("../materials", "*.impasto", |path| {
-        insta::assert_snapshot!("material_ast", ast(path));
+        insta::assert_snapshot!("snapshots__material_ast", ast(path));
         let name = file_name(path);
         let mut loader = FileLoader::new(root().join("materials"));
         let program = compile(&name, &mut loader);
-        insta::assert_snapshot!("material_ir", ir(path));
-        insta::assert_snapshot!("material_wgsl", wgsl(&program));
+        insta::assert_snapshot!("snapshots__material_ir", ir(path));
+        insta::assert_snapshot!("snapshots__material_wgsl", wgsl(&program));
     });
 }
 
 #[test]
 fn standard_library() {
+    let _kept = named();
     insta::glob!("../stdlib", "*/*.impasto", |path| {
-        insta::assert_snapshot!("std_ast", ast(path));
-        insta::assert_snapshot!("std_ir", ir(path));
+        insta::assert_snapshot!("snapshots__std_ast", ast(path));
+        insta::assert_snapshot!("snapshots__std_ir", ir(path));
         let Some(source) = probe::source(path) else {
             return;
         };
         let program = compile("probe.impasto", &mut Text(&source));
-        insta::assert_snapshot!("std_wgsl", wgsl(&program));
+        insta::assert_snapshot!("snapshots__std_wgsl", wgsl(&program));
     });
+}
+
+/// Files are called what the tests call them.
+fn named() -> insta::internals::SettingsBindDropGuard {
+    let mut settings = insta::Settings::clone_current();
+    settings.set_prepend_module_to_snapshot(false);
+    settings.bind_to_scope()
 }
 
 /// A snapshot whose source was renamed or removed would be kept, and believed, for ever.

@@ -11,10 +11,7 @@ use impasto::trace::MaterialCode;
 use impasto::trace::path::{End, Float, Path, Replayer, parting, with_room};
 use impasto::{Gpu, GpuOptions, Program, RenderOptions, Renderer, Scene, Strategy};
 
-#[path = "generated/mod.rs"]
-mod generated;
-#[path = "../compiler/tests/common/record.rs"]
-mod record;
+use crate::{generated, record};
 
 const WIDTH: u32 = 16;
 const HEIGHT: u32 = 12;

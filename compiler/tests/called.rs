@@ -1,9 +1,7 @@
 //! Materials that call materials: a call means what the callee's statements mean in its place, an
 //! argument is what it was given, and what a caller leaves at its default costs nothing.
 
-mod common;
-
-use common::asked::{Asked, direction, near, point4};
+use crate::common::asked::{Asked, direction, near, point4};
 use impasto_compiler::abi::{Emission, Medium};
 use impasto_compiler::ir::{Closure, Expr, ExprKind, parse, print};
 use impasto_compiler::ops::Op;

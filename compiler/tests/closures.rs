@@ -1,11 +1,9 @@
 //! Functions that return closures, and the outputs of a material, seen from outside: a call means
 //! what its body would mean if it were written there, and no call can make the compiler hang.
 
-mod common;
-
 use std::time::{Duration, Instant};
 
-use common::{codes, compilation, program};
+use crate::common::{codes, compilation, program};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprId, ExprKind, Material};

@@ -1,8 +1,6 @@
 //! What reaches the WGSL, what does not, and that the text is legal whatever names an author uses.
 
-mod common;
-
-use common::{codes, compilation, program, wgsl};
+use crate::common::{codes, compilation, program, wgsl};
 use impasto_compiler::abi::{Emission, TextureSpace};
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::{Local, Type};
@@ -314,7 +312,7 @@ fn matrices_can_be_chosen() {
 #[test]
 fn comparisons_that_face_each_other_are_no_template_list() {
     // Compiling includes validation. In WGSL `select` takes the value for false first.
-    common::program(
+    crate::common::program(
         "use std::bsdf::diffuse;
         fn faces(h: float, t: bool) -> bool = select(t, h > 0.0, h < 0.0);
         material m { surface = diffuse(select(faces(uv.x, uv.y > 0.0), 1.0, 0.0)); }",

@@ -1,7 +1,6 @@
 //! `impasto fmt`: it keeps the meaning and every comment, changes nothing twice, and lays sources
 //! out as the library is.
 
-#[path = "format/generate.rs"]
 mod generate;
 
 use std::fs;

@@ -4,9 +4,7 @@
 //! a closed form. A lobe that is lost, chosen with another probability than its density says, or
 //! weighted wrongly fails here.
 
-mod common;
-
-use common::asked::{Asked, direction, near, point4};
+use crate::common::asked::{Asked, direction, near, point4};
 
 const USES: &str = "use std::bsdf::{diffuse, specular, mirror, blinn_phong};";
 

@@ -1,8 +1,6 @@
 //! The random walks between layers against what is known in closed form.
 
-mod common;
-
-use common::asked::near;
+use crate::common::asked::near;
 use impasto_compiler::oracle::{Estimate, Stack};
 use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile};
 

@@ -1,9 +1,7 @@
 //! What a material assigns beside its surface: opacity, emission under a coat, and an interior; as
 //! the compiled functions answer and as the renderer is told.
 
-mod common;
-
-use common::asked::{Asked, direction, near, point4};
+use crate::common::asked::{Asked, direction, near, point4};
 use impasto_compiler::MaterialRequest;
 use impasto_compiler::abi::{Emission, Medium};
 use impasto_compiler::ir::interp::Interpreter;

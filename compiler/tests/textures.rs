@@ -1,9 +1,7 @@
 //! Lookups of textures in sources: what they become, which textures must be loaded and how, and the
 //! patterns of the library that look pictures up.
 
-mod common;
-
-use common::{codes, compilation, program, wgsl};
+use crate::common::{codes, compilation, program, wgsl};
 use impasto_compiler::abi::{Lookups, TextureSpace, texture_mode};
 use impasto_compiler::codegen::{self, Target};
 use impasto_compiler::ir::interp::{Interpreter, TextureRequest};

@@ -1,13 +1,11 @@
 //! Ray casts on the GPU against brute force in f64 on the CPU.
 
-mod support;
-
+use crate::support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 use glam::{DVec3, EulerRot, Quat, Vec3};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
 use impasto_runtime::world::bvh::Bvh;
 use impasto_runtime::world::surface::{geometry_part, surface_part};
-use support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 
 #[derive(Clone, Copy, Debug)]
 struct Hit {

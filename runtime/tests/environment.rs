@@ -1,15 +1,11 @@
 //! Environment maps: where their texels are, and how often each is sampled.
 
-#[path = "../../compiler/tests/common/record.rs"]
-mod record;
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::record::{Bound, Row, effort};
+use crate::support::light_scenes::{map_scene, met, parts, sample, turned};
 use glam::{DVec3, Vec3};
 use impasto_runtime::scene::{EnvironmentSource, Scene};
-use record::{Bound, Row, effort};
-use support::light_scenes::{map_scene, met, parts, sample, turned};
 
 #[test]
 fn environment_texels_are_chosen_by_their_density() {

@@ -1,18 +1,16 @@
 //! Light samples against what rays run into, and both against closed forms.
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::light_scenes::{
+    Sample, dark_scene, distant, emissive, evaluate, map_scene, met, mixed_scene, parts, push_quad,
+    push_triangle, quad, sample, sample_with, scenes, uniform_environment,
+};
+use crate::support::{Random, Row, floats, row};
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::Scene;
 use impasto_runtime::world::lights;
-use support::light_scenes::{
-    Sample, dark_scene, distant, emissive, evaluate, map_scene, met, mixed_scene, parts, push_quad,
-    push_triangle, quad, sample, sample_with, scenes, uniform_environment,
-};
-use support::{Random, Row, floats, row};
 
 /// Mean and standard error.
 fn statistics(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {

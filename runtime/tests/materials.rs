@@ -4,15 +4,13 @@
 //! One definition of each BSDF and noise gives both sides, so a difference is a defect of code
 //! generation, of an op's WGSL, or of a driver.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::{Random, Row, floats, row, run};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::{Loader, MaterialRequest, Program, compile, diag};
 use impasto_runtime::wgsl::ShaderPart;
-use support::{Random, Row, floats, row, run};
 
 const QUERIES: usize = 400;
 /// Rows of input and output a query.

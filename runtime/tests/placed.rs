@@ -1,8 +1,8 @@
 //! Objects that are placed against the same triangles copied: what rays hit and what kernels see
 //! there. Rays are cast on the GPU; copies are searched by brute force in f64 on the CPU.
 
-mod support;
-
+use crate::support::light_scenes::dark_scene;
+use crate::support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 use glam::{DVec3, Vec2, Vec3};
 use impasto_compiler::abi::{Emission, InstanceInfo, Medium};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL, Object, Placement, Scene, Transform};
@@ -13,8 +13,6 @@ use impasto_runtime::world::Split;
 use impasto_runtime::world::bvh::Bvh;
 use impasto_runtime::world::lights::NO_LIGHT;
 use impasto_runtime::world::surface::{geometry_part, surface_part};
-use support::light_scenes::dark_scene;
-use support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 
 /// A ball around the origin with normals, texture coordinates and two materials.
 fn ball(n: usize) -> Mesh {

@@ -1,9 +1,8 @@
 //! What materials see of a hit: normals, tangents, coordinates and textures.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::{Random, Row, floats, row, run};
 use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 use impasto_compiler::abi::{TextureRef, TextureSpace};
@@ -13,7 +12,6 @@ use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 use impasto_runtime::wgsl::ShaderPart;
 use impasto_runtime::world::surface::{geometry_part, surface_part};
 use impasto_runtime::world::texture;
-use support::{Random, Row, floats, row, run};
 
 /// A mesh with one entry a triangle: corners, vertex normals, texture coordinates.
 type Triangle = ([Vec3; 3], Option<[Vec3; 3]>, [Vec2; 3]);

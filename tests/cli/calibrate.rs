@@ -1,7 +1,7 @@
 //! `plan --strategy exhaustive` and `calibrate`: kernels are measured, the constants of the model
 //! fitted to them, and a plan made with those.
 
-use crate::common::{folder, impasto, write};
+use crate::cli::common::{folder, impasto, write};
 
 /// A scene with a floor, a wall and a post of a material each, and one that nothing binds.
 fn scene(at: &std::path::Path) -> String {

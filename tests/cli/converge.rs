@@ -8,7 +8,7 @@ use impasto::runtime::film::Film;
 use impasto::runtime::film::output;
 use serde_json::Value;
 
-use crate::common::{Run, SCENE, command, folder, impasto, names, write};
+use crate::cli::common::{Run, SCENE, command, folder, impasto, names, write};
 
 /// Studies a scene, `{}` standing for the folder, small and by one kernel a material.
 fn study(scene: &str, folder: &Path, arguments: &str) -> Run {

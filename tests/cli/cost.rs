@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{folder, impasto, write};
+use crate::cli::common::{folder, impasto, write};
 use crate::generated::{generate, generated};
 
 /// The operations of a material's only evaluation class, from JSON.

@@ -1,6 +1,6 @@
 //! `cost`: the lines of the source that it shows, and what it says of an edit.
 
-use crate::common::{folder, impasto, write};
+use crate::cli::common::{folder, impasto, write};
 
 /// Two materials; the first calls a noise twice, once in each of two lines.
 const TWO: &str = "use std::bsdf::diffuse;
@@ -14,7 +14,7 @@ material flat { surface = diffuse(color(0.5)); }
 ";
 
 /// What `cost --diff` says of two texts, with more arguments.
-fn compared(old: &str, new: &str, more: &[&str]) -> crate::common::Run {
+fn compared(old: &str, new: &str, more: &[&str]) -> crate::cli::common::Run {
     let folder = folder();
     let old = write(folder.path(), "old.impasto", old);
     let new = write(folder.path(), "new.impasto", new);

@@ -1,6 +1,6 @@
 //! `check`, `emit`, `explain`, `completions`, and arguments in general.
 
-use crate::common::{GOOD, command, folder, impasto, impasto_with, names, write};
+use crate::cli::common::{GOOD, command, folder, impasto, impasto_with, names, write};
 
 #[test]
 fn help_and_version_are_results() {
@@ -292,7 +292,7 @@ fn a_full_standard_output_exits_with_2() {
         .stdout(full)
         .output()
         .expect("the command starts");
-    crate::common::Run::from(output)
+    crate::cli::common::Run::from(output)
         .exits(2)
         .says("standard output")
         .says("no space left");

@@ -7,7 +7,7 @@ use impasto::compiler::parser;
 use impasto::compiler::source::FileId;
 use serde_json::Value;
 
-use crate::common::{GOOD, Run, impasto, impasto_with, root};
+use crate::cli::common::{GOOD, Run, impasto, impasto_with, root};
 
 /// Every source below a folder of the repository, as a path relative to its root.
 fn sources(folder: &str) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! `impasto explain`: a code with its examples, the list, the page of the documentation.
 
-use crate::common::{impasto, root};
+use crate::cli::common::{impasto, root};
 
 #[test]
 fn a_code_is_explained_with_a_source_that_provokes_it() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{folder, impasto, impasto_with, names, root, write};
+use crate::cli::common::{folder, impasto, impasto_with, names, root, write};
 
 const UGLY: &str = "fn f(x:float)->float=x*2.0; // twice\n";
 const NEAT: &str = "fn f(x: float) -> float = x * 2.0; // twice\n";

@@ -1,6 +1,6 @@
 //! Renders at the ends of what can be asked for: a clear error or the right picture.
 
-use crate::common::{Run, SCENE, folder, impasto, names, write};
+use crate::cli::common::{Run, SCENE, folder, impasto, names, write};
 
 /// Renders a scene into a folder that must stay as it is if that fails.
 fn render(scene: &str, arguments: &str) -> Run {

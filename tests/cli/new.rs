@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{Run, command, folder, impasto, names};
+use crate::cli::common::{Run, command, folder, impasto, names};
 
 const TEMPLATES: [&str; 5] = ["matte", "layered", "paint", "bsdf", "scene"];
 

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::common::{Run, SCENE, folder, impasto, root, write};
+use crate::cli::common::{Run, SCENE, folder, impasto, root, write};
 
 const WORKLOAD: &str = "tests/plans/cornell.workload.json";
 

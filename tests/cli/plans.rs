@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::common::{Run, SCENE, command, folder, impasto, root, write};
+use crate::cli::common::{Run, SCENE, command, folder, impasto, root, write};
 
 /// Renders the example, small and with few samples, into a film file.
 fn film(folder: &Path, more: &[&str]) -> (Vec<u8>, serde_json::Value, Run) {

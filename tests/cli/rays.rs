@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::common::{SCENE, impasto};
+use crate::cli::common::{SCENE, impasto};
 
 #[test]
 fn every_technique_is_timed_and_finds_what_the_others_find() {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::common::{SCENE, command, folder, impasto, names, write};
+use crate::cli::common::{SCENE, command, folder, impasto, names, write};
 
 /// Renders the example quickly with more arguments.
-fn render(out: &Path, more: &[&str]) -> crate::common::Run {
+fn render(out: &Path, more: &[&str]) -> crate::cli::common::Run {
     let out = out.display().to_string();
     let mut args = vec![
         "render", SCENE, "--size", "16x16", "--spp", "2", "--out", &out,
@@ -76,7 +76,7 @@ const REPORT_FIELDS: [&str; 19] = [
 
 #[test]
 fn the_documentation_explains_every_field_of_the_report() {
-    let page = std::fs::read_to_string(crate::common::root().join("docs/report.md"));
+    let page = std::fs::read_to_string(crate::cli::common::root().join("docs/report.md"));
     let page = page.expect("docs/report.md");
     let missing = REPORT_FIELDS
         .iter()
@@ -120,10 +120,10 @@ fn a_full_disk_leaves_no_half_a_picture() {
     let run = std::process::Command::new("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_impasto"), "render", SCENE])
         .args(["--size", "64x64", "--spp", "1", "--out", &out])
-        .current_dir(crate::common::root())
+        .current_dir(crate::cli::common::root())
         .output()
         .expect("sh starts");
-    crate::common::Run::from(run)
+    crate::cli::common::Run::from(run)
         .exits(2)
         .says("cannot write")
         .says("p.exr");
@@ -145,7 +145,7 @@ fn without_an_adapter_it_says_what_to_install() {
             .env("VK_ICD_FILENAMES", "/nonexistent")
             .output()
             .expect("the command starts");
-        crate::common::Run::from(output)
+        crate::cli::common::Run::from(output)
             .exits(2)
             .prints_nothing()
             .says("no GPU")

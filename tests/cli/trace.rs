@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use crate::common::{GOOD, SCENE, folder, impasto, write};
+use crate::cli::common::{GOOD, SCENE, folder, impasto, write};
 
-fn trace(more: &[&str]) -> crate::common::Run {
+fn trace(more: &[&str]) -> crate::cli::common::Run {
     let mut args = vec!["trace", SCENE, "--pixel", "200,250", "--sample", "3"];
     args.extend(more);
     impasto(&args)

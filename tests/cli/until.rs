@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::common::{Run, SCENE, command, folder, impasto, names, write};
+use crate::cli::common::{Run, SCENE, command, folder, impasto, names, write};
 
 /// Renders the example into a folder with more arguments, `{}` standing for the folder.
 fn render(folder: &Path, arguments: &str) -> Run {

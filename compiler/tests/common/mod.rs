@@ -1,6 +1,8 @@
 //! Compiling texts in tests.
 
 pub mod asked;
+pub mod listed;
+pub mod record;
 
 use impasto_compiler::{Compilation, MaterialRequest, MemoryLoader, Program, compile, diag};
 

@@ -4,8 +4,7 @@
 //! `IMPASTO_EFFORT=full` has the same tests look at more directions, samples and restarts; there is
 //! no second list of cases. `IMPASTO_STRESS_ROWS` names a folder: each `Row` noted becomes a line
 //! of a file there, written at once, so that a test which fails later does not lose it. A test
-//! notes what it measured before it asserts. Test targets of other crates include this file by
-//! `#[path]`.
+//! notes what it measured before it asserts. Tests of other crates include this file by `#[path]`.
 
 #![allow(dead_code)]
 

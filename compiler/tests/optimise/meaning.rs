@@ -3,7 +3,7 @@
 use impasto_compiler::ir::{Const, Function, Module, print, verify};
 use impasto_compiler::passes::{self, PIPELINE};
 
-use crate::corpus::{Numbers, Subject, answer, library, materials};
+use super::corpus::{Numbers, Subject, answer, library, materials};
 
 /// Calls of each function.
 const CALLS: usize = 24;

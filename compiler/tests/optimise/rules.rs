@@ -7,7 +7,7 @@ use impasto_compiler::ir::{Function, Module, Type, print};
 use impasto_compiler::passes::PIPELINE;
 use impasto_compiler::{MemoryLoader, passes};
 
-use crate::corpus::{Numbers, checked};
+use super::corpus::{Numbers, checked};
 
 /// What a rule promises of its result in single precision.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@ use impasto_compiler::MemoryLoader;
 use impasto_compiler::ir::print;
 use impasto_compiler::passes;
 
-use crate::corpus::{checked, evaluation};
+use super::corpus::{checked, evaluation};
 
 /// The optimised evaluation of the material `m` whose surface is `surface`.
 fn code(surface: &str) -> String {

@@ -6,8 +6,8 @@ use impasto_compiler::ir::{Closure, Const, Function, Material, Module, verify};
 use impasto_compiler::passes::prune;
 use impasto_compiler::{Checked, MemoryLoader};
 
-use crate::lowered::{checked, evaluate};
-use crate::meaning::{Numbers, near};
+use super::lowered::{checked, evaluate};
+use super::meaning::{Numbers, near};
 
 /// Surfaces, with the number of lobes that are left of each. `t` and `c` are parameters.
 const SURFACES: [(&str, usize); 10] = [

@@ -7,7 +7,7 @@ use impasto_compiler::ir::{Function, Module, print, verify};
 use impasto_compiler::passes::{Hoisted, PIPELINE, Widths, hoist, prune, widths};
 use impasto_compiler::source::FileId;
 
-use crate::{RULE, meaning};
+use super::{RULE, meaning};
 
 /// A file of `cases/`.
 pub struct Case {

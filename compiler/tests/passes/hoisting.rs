@@ -5,8 +5,8 @@ use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, Function, Material, Module, verify};
 use impasto_compiler::passes::{self, hoist};
 
-use crate::lowered::{Files, checked, evaluate, material_files};
-use crate::meaning::{Numbers, near};
+use super::lowered::{Files, checked, evaluate, material_files};
+use super::meaning::{Numbers, near};
 
 /// Values for a material's parameters: the defaults, or others within their ranges.
 fn parameters(m: &Material, numbers: &mut Numbers) -> Vec<Const> {

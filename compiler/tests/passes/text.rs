@@ -5,7 +5,7 @@ use impasto_compiler::ir::parse::{MAX_NESTING, parse};
 use impasto_compiler::ir::print;
 use impasto_compiler::source::FileId;
 
-use crate::lowered::{Files, checked, material_files};
+use super::lowered::{Files, checked, material_files};
 
 #[test]
 fn text_of_every_material_survives_reading() {

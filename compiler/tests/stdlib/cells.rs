@@ -6,8 +6,8 @@
 
 use std::f64::consts::TAU;
 
-use super::record::effort;
 use super::statistics::direction;
+use crate::common::record::effort;
 
 /// A rectangle in z and azimuth.
 #[derive(Clone, Copy, Debug)]

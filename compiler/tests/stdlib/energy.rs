@@ -3,11 +3,11 @@
 //! reflects. Searches go by a rough sum over few samples; what they find is integrated.
 
 use super::library::{Bsdf, Case, bsdf_with, bsdfs};
-use super::record::{Bound, Row, effort};
 use super::sampling::{Distribution, albedo, distribution, examine};
 use super::search::{Worst, climb};
 use super::space::{LEAST_COSINE, Space};
 use super::statistics::Numbers;
+use crate::common::record::{Bound, Row, effort};
 
 /// By how much integration may be off, relative.
 const QUADRATURE: f64 = 2e-3;

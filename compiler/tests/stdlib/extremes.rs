@@ -30,11 +30,11 @@ use impasto_compiler::{MaterialRequest, MemoryLoader, compile, diag};
 
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case, bsdf_with};
-use super::record::{Bound, Row};
 use super::sampling::{albedo, distribution, view};
 use super::statistics::{Numbers, direction};
 use super::text::Text;
 use super::vectors::{dot, length, reflect};
+use crate::common::record::{Bound, Row};
 
 const FUNCTIONS: &str = "
     use std::noise::{perlin, cell, fractal};

@@ -6,11 +6,11 @@ use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, 
 
 use super::cells::Measures;
 use super::lanes::{self, Lanes};
-use super::record::{Bound, effort};
 use super::sampling::{AGAIN, Distribution, Outcome, examine, faults, tell, view};
 use super::search::errors;
 use super::statistics::{Numbers, direction};
 use super::tally::Tally;
+use crate::common::record::{Bound, effort};
 
 /// Directions drawn for each material and view.
 fn samples() -> usize {

@@ -7,12 +7,12 @@ use impasto_compiler::ir::value::{Real, Value};
 
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case, bsdf_with};
-use super::record::{Bound, Row, effort};
 use super::region::Regions;
 use super::search::{errors, measure};
 use super::space::Space;
 use super::statistics::{Numbers, direction};
 use super::tally::Tally;
+use crate::common::record::{Bound, Row, effort};
 
 /// Pairs of directions for each case.
 fn pairs() -> usize {

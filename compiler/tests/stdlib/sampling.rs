@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use super::cells::{self, Measures};
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case};
-use super::record::{Bound, effort};
 use super::statistics::{Numbers, chi_squared_tail, direction, sidak};
 use super::tally::Tally;
+use crate::common::record::{Bound, effort};
 
 /// Directions drawn for each case and view; a quarter decides on the cells. At full effort that is
 /// over ten million for every BSDF.

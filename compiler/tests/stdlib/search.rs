@@ -8,10 +8,10 @@ use impasto_compiler::ir::value::Real;
 
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, bsdfs};
-use super::record::{Bound, Row, effort, full};
 use super::region::{FINE, Regions};
 use super::space::{LEAST_COSINE, Space};
 use super::statistics::Numbers;
+use crate::common::record::{Bound, Row, effort, full};
 
 /// Points evaluated together.
 const BATCH: usize = 2048;

@@ -8,8 +8,8 @@ use impasto_compiler::source::FileId;
 use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag, parser};
 
 use super::materials::{point, reflected};
-use super::record::effort;
 use super::sampling::view;
+use crate::common::record::effort;
 
 /// A parameter and its value, as scenes write them.
 pub type Setting = (String, String);

@@ -2,9 +2,9 @@
 
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case};
-use super::record::{Bound, effort};
 use super::statistics::Numbers;
 use super::tally::Tally;
+use crate::common::record::{Bound, effort};
 
 /// Pairs of directions for each case: half of them drawn by the BSDF, half anywhere.
 fn pairs() -> usize {

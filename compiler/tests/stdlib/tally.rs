@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use super::record::{Bound, Row};
+use crate::common::record::{Bound, Row};
 
 /// Which table, of what, and what was measured.
 type Key = (&'static str, String, &'static str);

@@ -1,6 +1,6 @@
 //! What code comes of widths: little, and none where nothing asks.
 
-use super::common::{codes, program, wgsl};
+use crate::common::{codes, program, wgsl};
 use impasto_compiler::abi::InputSet;
 
 fn emitting(x: &str) -> String {

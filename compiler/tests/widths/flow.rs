@@ -4,7 +4,7 @@
 use impasto_compiler::ir::interp::{Interpreter, TextureRequest};
 use impasto_compiler::ir::value::Value;
 
-use super::common::program;
+use crate::common::program;
 
 /// How position and uv change along both directions of the footprint.
 const AXES: [([f64; 3], [f64; 2]); 2] = [

@@ -5,8 +5,8 @@ use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal};
 
-use crate::scene::{load, render, room};
-use crate::stub::{gpu, samples};
+use crate::gpu::scene::{load, render, room};
+use crate::gpu::stub::{gpu, samples};
 
 /// Renders with `technique`. There are more paths than a pool holds and more of them in the pool
 /// than threads that fetch rays.

@@ -1,6 +1,6 @@
 //! A random number depends on (pixel, sample, draw, seed) and on nothing else.
 
-use crate::stub::{Kind, Materials, Room, materials, red, render, samples};
+use crate::gpu::stub::{Kind, Materials, Room, materials, red, render, samples};
 use impasto_runtime::film::Film;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::technique::{Choice, Sampler, Technique};
@@ -106,7 +106,7 @@ fn ranges_of_samples_add_up() {
     let range = |first_sample, samples| {
         film(RenderOptions {
             first_sample,
-            ..crate::stub::samples(samples)
+            ..crate::gpu::stub::samples(samples)
         })
     };
     let (all, low, high) = (range(0, 8), range(0, 4), range(4, 4));

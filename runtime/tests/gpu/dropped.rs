@@ -1,7 +1,7 @@
 //! Samples that are no light: never in the picture, and counted by kernel and material, each with an
 //! example of where it was.
 
-use crate::stub::{Kind, Materials, Room, materials, plan, red, render_plan, samples};
+use crate::gpu::stub::{Kind, Materials, Room, materials, plan, red, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::kernels::dropped::Dropped;
 use impasto_runtime::options::RenderOptions;

@@ -1,6 +1,6 @@
 //! The film's sums: exact over both words, clamped and counted at their ends.
 
-use crate::stub::{Kind, Room, materials, red, render, samples};
+use crate::gpu::stub::{Kind, Room, materials, red, render, samples};
 use impasto_runtime::render::Rendering;
 use impasto_runtime::wgsl::BufferData;
 

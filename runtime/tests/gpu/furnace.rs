@@ -1,7 +1,9 @@
 //! Closed rooms whose radiance is known: every wall emits E and reflects a, so that a path of
 //! at most D segments gathers E (1 + a + ... + a^(D-1)), whatever the camera sees.
 
-use crate::stub::{Kind, Room, Strategies, assert_mean, materials, mean, red, render, samples};
+use crate::gpu::stub::{
+    Kind, Room, Strategies, assert_mean, materials, mean, red, render, samples,
+};
 
 fn series(albedo: f64, depth: i32) -> f64 {
     (0..depth).map(|k| albedo.powi(k)).sum()

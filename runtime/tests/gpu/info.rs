@@ -2,7 +2,7 @@
 
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 
-use crate::stub::gpu;
+use crate::gpu::stub::gpu;
 
 #[test]
 fn the_gpu_is_described_as_text_and_as_json() {

@@ -1,7 +1,7 @@
 //! The laboratory: kernels are timed on the hits of one iteration, whichever plan they belong to.
 
-use crate::plans::{room, surfaces};
-use crate::stub::{Materials, gpu, plan};
+use crate::gpu::plans::{room, surfaces};
+use crate::gpu::stub::{Materials, gpu, plan};
 use impasto_compiler::partition::{Form, Strategy};
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};

@@ -1,6 +1,8 @@
 //! Light sampling against scattering: a lamp on the ceiling, a plate that throws a shadow.
 
-use crate::stub::{Kind, Room, Strategies, assert_same_picture, materials, red, render, samples};
+use crate::gpu::stub::{
+    Kind, Room, Strategies, assert_same_picture, materials, red, render, samples,
+};
 use impasto_runtime::options::RenderOptions;
 
 fn lamp(strategies: Strategies) -> Room {

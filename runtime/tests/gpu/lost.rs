@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::stub::{Kind, Room, materials, plan, samples};
+use crate::gpu::stub::{Kind, Room, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::gpu::{Gpu, GpuOptions};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use crate::stub::{assert_same_picture, gpu, samples};
+use crate::gpu::stub::{assert_same_picture, gpu, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile};
 use impasto_runtime::render::{Renderer, Rendering};

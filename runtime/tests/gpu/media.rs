@@ -5,9 +5,9 @@ use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 
-use crate::planes::{Light, Plane, Planes, Solid, Solids, Surface, planned, render, slab};
+use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, planned, render, slab};
+use crate::gpu::stub::{gpu, mean};
 use crate::record::{Bound, Row};
-use crate::stub::{gpu, mean};
 
 const CLEAR: [f32; 3] = [0.0; 3];
 

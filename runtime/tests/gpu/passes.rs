@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
+use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::file::{FilmFile, Range};

@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
+use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering, Samples};

@@ -5,8 +5,8 @@ use impasto_runtime::render::Rendering;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Copies, Leaves, RayFetch, Stack, Technique, Traversal};
 
-use crate::scene::{load, render, room};
-use crate::stub::{assert_mean, samples};
+use crate::gpu::scene::{load, render, room};
+use crate::gpu::stub::{assert_mean, samples};
 
 /// Pictures of a scene with its objects placed and copied, of the same paths.
 fn both(toml: &str, spp: u32, technique: Technique) -> [Rendering; 2] {

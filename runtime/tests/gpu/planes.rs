@@ -16,7 +16,7 @@ use impasto_runtime::world::needs::facts::SceneFacts;
 use impasto_runtime::world::{MaterialSource, World};
 use std::ops::ControlFlow;
 
-use crate::stub::{IDENTITY, gpu};
+use crate::gpu::stub::{IDENTITY, gpu};
 
 /// What a solid's surface does.
 #[derive(Clone, Copy, Debug, PartialEq)]

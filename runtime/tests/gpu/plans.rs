@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
+use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
 use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel, Strategy};
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Film;

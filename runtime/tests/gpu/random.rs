@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::stub::{Kind, Room, materials, red, render};
+use crate::gpu::stub::{Kind, Room, materials, red, render};
 use crate::support::{Row, run};
 use impasto_runtime::kernels::random::{self, Demand, hash_seed};
 use impasto_runtime::options::RenderOptions;

@@ -15,14 +15,14 @@ use impasto_runtime::render::report::{KernelReport, Report};
 use impasto_runtime::render::until::Goals;
 use impasto_runtime::render::{Planner, Renderer, Rendering, Replanning};
 
-use crate::plans::custom;
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
+use crate::gpu::plans::custom;
+use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
 
 fn room() -> Room {
     Room {
         width: 8,
         height: 8,
-        ..crate::plans::room()
+        ..crate::gpu::plans::room()
     }
 }
 

@@ -13,8 +13,8 @@ use impasto_runtime::scene::{self, Scene};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::World;
 
-use crate::media::{Layer, assert_channel, stack};
-use crate::stub::{assert_mean, gpu, mean, red, samples};
+use crate::gpu::media::{Layer, assert_channel, stack};
+use crate::gpu::stub::{assert_mean, gpu, mean, red, samples};
 
 /// A cube from -1 to 1 whose faces look inwards.
 const ROOM: &str = "

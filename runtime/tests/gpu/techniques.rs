@@ -3,8 +3,8 @@
 
 use std::fmt::Debug;
 
-use crate::plans::{room, surfaces};
-use crate::stub::{gpu, plan, render_plan, samples};
+use crate::gpu::plans::{room, surfaces};
+use crate::gpu::stub::{gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;

@@ -5,9 +5,9 @@ use impasto_compiler::abi::Medium;
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::render::Rendering;
 
-use crate::media::assert_channel;
-use crate::planes::{Light, Plane, Planes, Solid, Solids, Surface, render, slab};
-use crate::stub::gpu;
+use crate::gpu::media::assert_channel;
+use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, render, slab};
+use crate::gpu::stub::gpu;
 
 /// A solid with smooth surfaces.
 fn cloudy(medium: Medium) -> Solid {
@@ -187,7 +187,7 @@ fn light_is_counted_once_however_it_is_found() {
     }
     for channel in 0..3 {
         let values = chance.film.pixels.iter().map(|p| f64::from(p[channel]));
-        assert_channel(&sampled, channel, crate::stub::mean(values).0);
+        assert_channel(&sampled, channel, crate::gpu::stub::mean(values).0);
     }
 }
 
@@ -215,7 +215,7 @@ fn a_hidden_medium_does_not_scatter() {
         // Light that comes back passes the clear part at an angle, and some of what it meets there
         // is lost: followed in the direction of the sky of 0.3 it is bounded by both ends.
         let values = rendering.film.pixels.iter().map(|p| f64::from(p[channel]));
-        let (mean, error) = crate::stub::mean(values);
+        let (mean, error) = crate::gpu::stub::mean(values);
         let most = through * (passed + 0.3 * reflected * through);
         let least = through * passed;
         assert!(

@@ -7,8 +7,8 @@ use impasto_runtime::render::report::Report;
 use impasto_runtime::render::{Rendering, profile_workload};
 use impasto_runtime::technique::{Append, Sampler, Technique};
 
-use crate::plans::{custom, room, surfaces};
-use crate::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
+use crate::gpu::plans::{custom, room, surfaces};
+use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, render_plan, samples};
 
 fn counting(samples_a_pixel: u32) -> RenderOptions {
     RenderOptions {

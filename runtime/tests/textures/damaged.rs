@@ -4,9 +4,9 @@
 use image::{ImageBuffer, ImageFormat, Luma, Rgb, Rgba};
 use impasto_compiler::abi::{Lookups, TextureSpace};
 
-use crate::formats::texels;
 use crate::support::Random;
-use crate::{encode, part};
+use crate::textures::formats::texels;
+use crate::textures::{encode, part};
 
 fn load(name: &str, bytes: &[u8]) -> Result<(), String> {
     let file = (

@@ -6,7 +6,7 @@ use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 use impasto_compiler::abi::{Lookups, TextureSpace};
 use impasto_runtime::wgsl::ShaderPart;
 
-use crate::{encode, part};
+use crate::textures::{encode, part};
 
 /// The texels of the picture in a slot, as kernels find them.
 pub fn texels(part: &ShaderPart, slot: usize) -> Vec<[f32; 4]> {

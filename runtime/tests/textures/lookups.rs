@@ -5,7 +5,7 @@ use impasto_compiler::abi::{Lookups, TextureSpace, texture_mode};
 use impasto_runtime::wgsl::ShaderPart;
 
 use crate::support::{Row, floats, run};
-use crate::{encode, part};
+use crate::textures::{encode, part};
 
 /// Everything that a lookup can be.
 const ALL: Lookups = Lookups {

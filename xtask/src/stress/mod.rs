@@ -16,10 +16,10 @@ use clap::Args;
 use crate::adapter;
 use crate::shell::{self, Result, cargo};
 
-/// A test target and which of its tests measure stability; all of them if it says none.
+/// Tests that measure stability: what they are called together, their package, and the beginnings of their names.
 struct Target {
     package: &'static str,
-    target: &'static str,
+    name: &'static str,
     filters: &'static [&'static str],
     needs_adapter: bool,
 }
@@ -27,32 +27,32 @@ struct Target {
 const TARGETS: &[Target] = &[
     Target {
         package: "impasto-compiler",
-        target: "stdlib",
-        filters: &[],
+        name: "stdlib",
+        filters: &["stdlib::"],
         needs_adapter: false,
     },
     Target {
         package: "impasto-compiler",
-        target: "materials",
-        filters: &[],
+        name: "materials",
+        filters: &["materials::", "--skip", "stdlib::"],
         needs_adapter: false,
     },
     Target {
         package: "impasto",
-        target: "trace",
-        filters: &["examples"],
+        name: "trace",
+        filters: &["trace::examples"],
         needs_adapter: false,
     },
     Target {
         package: "impasto-runtime",
-        target: "gpu",
-        filters: &["extremes", "media::"],
+        name: "gpu",
+        filters: &["gpu::extremes", "gpu::media::"],
         needs_adapter: true,
     },
     Target {
         package: "impasto-runtime",
-        target: "environment",
-        filters: &[],
+        name: "environment",
+        filters: &["environment::"],
         needs_adapter: false,
     },
 ];
@@ -65,7 +65,7 @@ pub(crate) struct StressArgs {
     /// Leave out what needs an adapter
     #[arg(long)]
     no_gpu: bool,
-    /// Only test targets of this name (can be given several times)
+    /// Only the group of this name (can be given several times)
     #[arg(long)]
     only: Vec<String>,
     /// Run nothing, and make the page of rows that the tests kept on another machine, in this folder
@@ -123,7 +123,7 @@ fn tested_all(args: &StressArgs) -> Result<(std::path::PathBuf, Vec<Ended>)> {
     if !args.no_gpu {
         adapter::prepare()?;
     }
-    let wanted = |t: &&Target| args.only.is_empty() || args.only.iter().any(|o| o == t.target);
+    let wanted = |t: &&Target| args.only.is_empty() || args.only.iter().any(|o| o == t.name);
     let targets = TARGETS.iter().filter(wanted);
     let targets = targets.filter(|t| !(args.no_gpu && t.needs_adapter));
     let ended = targets.map(|t| tested(t, args, &folder)).collect();
@@ -148,7 +148,7 @@ fn command(args: &StressArgs) -> String {
 
 /// Runs one target. A failure is kept, not returned: the others' rows are wanted all the same.
 fn tested(target: &Target, args: &StressArgs, folder: &Path) -> Ended {
-    let name = format!("{} {}", target.package, target.target);
+    let name = format!("{} {}", target.package, target.name);
     shell::section(&format!("Testing {name}"));
     let mut test = cargo();
     test.args([
@@ -156,7 +156,7 @@ fn tested(target: &Target, args: &StressArgs, folder: &Path) -> Ended {
         "-p",
         target.package,
         "--test",
-        target.target,
+        "it",
         "--no-fail-fast",
     ]);
     test.arg("--").args(target.filters);

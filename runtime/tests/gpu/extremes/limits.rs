@@ -3,9 +3,9 @@
 
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile, diag};
 
+use crate::gpu::scene::{load_with, render};
+use crate::gpu::stub::{mean, red, samples};
 use crate::record::{Bound, Row};
-use crate::scene::{load_with, render};
-use crate::stub::{mean, red, samples};
 
 /// What compiling a material with these parameters says, as text.
 fn problems(source: &str, params: &[(&str, &str)]) -> String {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use impasto_runtime::technique::{Choice, Sampler};
 
-use crate::random::{correlation, over_pixels, samples_of};
+use crate::gpu::random::{correlation, over_pixels, samples_of};
 use crate::record::{Bound, Row, effort};
 use crate::support::{Random, Row as Words, floats, row, run};
 

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 use impasto_compiler::abi::Emission;
 use impasto_runtime::render::Rendering;
 
+use crate::gpu::scene::{load, load_with, render, room};
+use crate::gpu::stub::{Kind, Room, materials, mean, red, samples};
 use crate::record::{Bound, Row, effort};
-use crate::scene::{load, load_with, render, room};
-use crate::stub::{Kind, Room, materials, mean, red, samples};
 
 /// Samples a pixel, fewer or many.
 fn spp(fast: u32, full: u32) -> u32 {
@@ -64,9 +64,10 @@ fn roulette_is_fair_at_throughputs_over_one_and_near_none() {
             let place = format!("albedo {albedo}, {depth} segments, from segment {start}");
             let options = samples(spp(64, 4096));
             let expected = series(f64::from(albedo as f32), depth);
-            let both = crate::stub::render(&room.world(), &surfaces, &options);
+            let both = crate::gpu::stub::render(&room.world(), &surfaces, &options);
             hold_mean("25", "roulette in a closed room", &place, &both, expected);
-            let scattered = crate::stub::render(&room.scattering().world(), &surfaces, &options);
+            let scattered =
+                crate::gpu::stub::render(&room.scattering().world(), &surfaces, &options);
             hold_mean(
                 "25",
                 "roulette in a closed room, by scattering",

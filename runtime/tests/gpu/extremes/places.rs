@@ -8,9 +8,9 @@ use impasto_compiler::Program;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::scene::Scene;
 
+use crate::gpu::scene::{load_with, render};
+use crate::gpu::stub::{gpu, red, samples};
 use crate::record::{Bound, Row};
-use crate::scene::{load_with, render};
-use crate::stub::{gpu, red, samples};
 
 /// How large a scene is and where.
 #[derive(Clone, Copy)]
@@ -207,7 +207,7 @@ fn differences(a: &Rendering, b: &Rendering) -> (f64, f64) {
     let pairs: Vec<(f64, f64)> = red(a).zip(red(b)).collect();
     let part = |(a, b): &&(f64, f64)| (a - b).abs() > 1e-4 * a.abs().max(1e-3);
     let parted = pairs.iter().filter(part).count() as f64 / pairs.len() as f64;
-    let (mean, error) = crate::stub::mean(pairs.iter().map(|(a, b)| a - b));
+    let (mean, error) = crate::gpu::stub::mean(pairs.iter().map(|(a, b)| a - b));
     (parted, mean.abs() / error.max(1e-7))
 }
 

@@ -4,6 +4,3 @@
 mod code;
 mod flow;
 mod ops;
-
-#[path = "../common/mod.rs"]
-mod common;

@@ -23,8 +23,6 @@ mod octaves;
 mod open_pbr;
 mod precision;
 mod promises;
-#[path = "../common/record.rs"]
-mod record;
 mod region;
 mod sampling;
 mod scattered;

@@ -12,9 +12,6 @@ mod film;
 mod furnace;
 mod info;
 mod lab;
-#[allow(dead_code)] // the rest is for tests of the library itself
-#[path = "../../../compiler/tests/stdlib/library.rs"]
-mod library;
 mod lights;
 mod lost;
 mod many_lights;
@@ -26,13 +23,9 @@ mod placed;
 mod planes;
 mod plans;
 mod random;
-#[path = "../../../compiler/tests/common/record.rs"]
-mod record;
 mod replan;
 mod scene;
 mod stub;
-#[path = "../support/mod.rs"]
-mod support;
 mod techniques;
 mod volume;
 mod workload;

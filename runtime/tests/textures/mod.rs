@@ -3,8 +3,6 @@
 mod damaged;
 mod formats;
 mod lookups;
-#[path = "../support/mod.rs"]
-mod support;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use impasto_compiler::abi::{Lookups, TextureRef, TextureSpace};

@@ -11,8 +11,6 @@ mod eval;
 mod explain;
 mod film;
 mod fmt;
-#[path = "../generated/mod.rs"]
-mod generated;
 mod limits;
 mod new;
 mod plan;

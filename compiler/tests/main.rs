@@ -1,0 +1,34 @@
+//! All tests of the compiler but those of `limits.rs`, in one program: it is linked once, and what one test has
+//! prepared the next one finds.
+
+mod bad_input;
+mod called;
+mod closures;
+mod codegen;
+mod common;
+mod cost;
+mod effort;
+mod explain;
+mod format;
+mod inspect;
+mod instances;
+mod interface;
+mod interpreter;
+mod layering;
+mod materials;
+mod mutations;
+mod optimise;
+mod oracle;
+mod outputs;
+mod parser;
+mod passes;
+mod reference;
+mod render;
+mod stdlib;
+mod textures;
+mod widths;
+
+#[test]
+fn every_file_of_tests_is_in_the_program() {
+    common::listed::check(concat!(env!("CARGO_MANIFEST_DIR"), "/tests"), &["limits"]);
+}

@@ -1,0 +1,26 @@
+//! The tests that see the whole line, in one program: it is linked once.
+
+mod cli;
+mod diagnostics;
+mod documentation;
+mod filtering;
+mod generated;
+mod instances;
+mod needs;
+mod plans;
+mod probe;
+mod render;
+mod snapshots;
+mod textures;
+mod trace;
+mod until;
+
+#[path = "../compiler/tests/common/listed.rs"]
+mod listed;
+#[path = "../compiler/tests/common/record.rs"]
+mod record;
+
+#[test]
+fn every_file_of_tests_is_in_the_program() {
+    listed::check(concat!(env!("CARGO_MANIFEST_DIR"), "/tests"), &[]);
+}
