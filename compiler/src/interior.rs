@@ -28,7 +28,7 @@ pub fn medium(
         let args = f.params.iter().map(|p| Value::zero(p.ty, &module.structs));
         let args = args.collect();
         Interpreter::new(module, passes::HOIST_FUEL)
-            .with_uniforms(values)
+            .with_params(values)
             .run(&f, args)
     };
     if let Some(when) = interior.when

@@ -124,7 +124,7 @@ impl<'p> Stack<'p> {
         let instance = &self.program.instances()[instance];
         Layer {
             evaluate: &self.program.compiled()[instance.info.material].evaluate,
-            run: Interpreter::new(self.program.ir(), FUEL).with_uniforms(&instance.uniforms),
+            run: Interpreter::new(self.program.ir(), FUEL).with_table(&instance.values),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The parameter table: where the values lie that instances of one material may differ in.
 //!
-//! A value is what [`ExprKind::Uniform`](crate::ir::ExprKind::Uniform) names in a compiled material:
+//! A value is what [`ExprKind::TableValue`](crate::ir::ExprKind::TableValue) names in a compiled material:
 //! not a parameter as the author declared it, but what is left once all work that depends on
 //! parameters only has moved to the host (`passes::hoist`). Values are packed into rows of four
 //! words; the rows of an instance lie together.

@@ -2,7 +2,7 @@
 //! both; and the builder that takes checked materials there.
 //!
 //! Instances of one material share its code. A parameter on which all of them agree is a constant
-//! in it; the others are uniforms, and what depends on uniforms only is computed here, once an
+//! in it; what depends on nothing but the others is computed here, once an
 //! instance, and read by the kernel from the parameter table (see [`crate::parameters`]).
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,7 +49,7 @@ pub struct CompiledMaterial {
     pub evaluate: Function,
     /// `(point, wo) -> radiance`, when it emits.
     pub emission: Option<Function>,
-    /// Where the uniforms of both functions lie in the rows of an instance.
+    /// Where the values lie that both functions read of the rows of an instance.
     pub layout: Layout,
 }
 
@@ -58,8 +58,8 @@ pub struct CompiledMaterial {
 pub struct Instance {
     /// What the renderer must know.
     pub info: InstanceInfo,
-    /// The values of the material's uniforms.
-    pub uniforms: Vec<Const>,
+    /// What it has in the parameter table.
+    pub values: Vec<Const>,
     /// Its first row in the parameter table.
     pub row: u32,
 }
@@ -168,7 +168,7 @@ impl Program {
     fn row_words(&self, instance: &Instance) -> Vec<u32> {
         self.materials[instance.info.material]
             .layout
-            .pack(&instance.uniforms)
+            .pack(&instance.values)
     }
 
     /// The slot of texture `t` read in one way; the first where it is not read so.
@@ -440,7 +440,7 @@ impl ProgramBuilder {
         let mut hoisted = vec![passes::hoist(module, &mut evaluate)];
         if let Some(f) = &mut emission {
             let own = passes::hoist(module, f);
-            shift_uniforms(f, hoisted[0].values.len() as u32);
+            shift_table(f, hoisted[0].values.len() as u32);
             hoisted.push(own);
         }
         Ok(Lowered {
@@ -462,15 +462,15 @@ impl ProgramBuilder {
     ) -> Result<Vec<Instance>, Diagnostic> {
         let mut instances = Vec::with_capacity(settings.len());
         for setting in settings {
-            let mut uniforms = Vec::new();
+            let mut table = Vec::new();
             for part in &lowered.hoisted {
                 let values = part.evaluate(&self.module, &setting.values);
-                uniforms.extend(values.map_err(|_| too_long(material, &setting.name))?);
+                table.extend(values.map_err(|_| too_long(material, &setting.name))?);
             }
             let medium = interior::medium(&self.module, material, &setting.values);
             let medium = medium.map_err(|_| too_long(material, &setting.name))?;
             let emission =
-                closure::emission_kind(&self.module, lowered.emission.as_ref(), &uniforms);
+                closure::emission_kind(&self.module, lowered.emission.as_ref(), &table);
             instances.push(Instance {
                 info: InstanceInfo {
                     name: setting.name.clone(),
@@ -478,7 +478,7 @@ impl ProgramBuilder {
                     emission,
                     medium,
                 },
-                uniforms,
+                values: table,
                 row: 0,
             });
         }
@@ -569,17 +569,17 @@ impl ProgramBuilder {
 struct Lowered {
     evaluate: Function,
     emission: Option<Function>,
-    /// What the host computes for the uniforms of `evaluate`, then for those of `emission`.
+    /// What the host computes for `evaluate`, then for `emission`.
     hoisted: Vec<Hoisted>,
     crosses: bool,
     delta_only: bool,
     lobes: usize,
 }
 
-/// Makes room for `first` uniforms before those of a function.
-fn shift_uniforms(f: &mut Function, first: u32) {
+/// Makes room for `first` values of the table before those of a function.
+fn shift_table(f: &mut Function, first: u32) {
     for e in &mut f.exprs {
-        if let ExprKind::Uniform(i) = &mut e.kind {
+        if let ExprKind::TableValue(i) = &mut e.kind {
             *i += first;
         }
     }

@@ -59,7 +59,7 @@ fn paints(params: &[&str]) -> Program {
 fn answers(program: &Program, instance: usize) -> Vec<f64> {
     let instance = &program.instances()[instance];
     let evaluate = &program.compiled()[instance.info.material].evaluate;
-    let mut run = Interpreter::<f64>::new(program.ir(), 1 << 30).with_uniforms(&instance.uniforms);
+    let mut run = Interpreter::<f64>::new(program.ir(), 1 << 30).with_table(&instance.values);
     let mut out = Vec::new();
     for i in 0..20 {
         let t = f64::from(i);

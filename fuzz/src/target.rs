@@ -43,7 +43,7 @@ pub fn source(input: &[u8]) {
         return;
     };
     for m in program.compiled() {
-        execute(program.ir(), &m.evaluate, &[]);
+        execute(program.ir(), &m.evaluate, &[], &[]);
     }
 }
 
@@ -67,16 +67,21 @@ pub fn ir(input: &[u8]) {
     let mut module = parsed.module;
     for i in 0..module.functions.len() {
         let mut f = module.functions[i].clone();
-        let uniforms = uniforms(&f);
-        execute(&module, &f, &uniforms);
+        let params = params(&f);
+        execute(&module, &f, &params, &[]);
         passes::run(&module, &mut f);
-        execute(&module, &f, &uniforms);
+        execute(&module, &f, &params, &[]);
         module.functions[i] = f.clone();
+        let was_hoisted_from = f.reads_table();
         let hoisted = passes::hoist(&module, &mut f);
-        well_formed(verify::function(&module, &f));
+        well_formed(if was_hoisted_from {
+            verify::function(&module, &f)
+        } else {
+            verify::hoisted(&module, &f, &hoisted.types())
+        });
         well_formed(verify::function(&module, &hoisted.prelude));
-        if let Ok(values) = hoisted.evaluate(&module, &uniforms) {
-            execute(&module, &f, &values);
+        if let Ok(values) = hoisted.evaluate(&module, &params) {
+            execute(&module, &f, &params, &values);
         }
     }
     for mut m in parsed.materials {
@@ -93,18 +98,19 @@ fn well_formed(result: Result<(), verify::Problem>) {
 }
 
 /// Runs a function on zeros.
-fn execute(module: &Module, f: &Function, uniforms: &[Const]) {
-    let params = f.params.iter();
-    let args = params.map(|p| Value::zero(p.ty, &module.structs)).collect();
-    let mut run = Interpreter::<f64>::new(module, FUEL).with_uniforms(uniforms);
+fn execute(module: &Module, f: &Function, params: &[Const], table: &[Const]) {
+    let args = f.params.iter();
+    let args = args.map(|p| Value::zero(p.ty, &module.structs)).collect();
+    let run = Interpreter::<f64>::new(module, FUEL);
+    let mut run = run.with_params(params).with_table(table);
     let _ = run.run(f, args);
 }
 
-/// Zeros for the uniforms that a function mentions, unless there are very many.
-fn uniforms(f: &Function) -> Vec<Const> {
+/// Zeros for the parameters of its material that a function mentions.
+fn params(f: &Function) -> Vec<Const> {
     let mut out: Vec<Const> = Vec::new();
     for e in &f.exprs {
-        if let ExprKind::Uniform(i) = e.kind {
+        if let ExprKind::MaterialParam(i) = e.kind {
             let i = i as usize;
             out.resize(out.len().max(i + 1), Const::Bool(false));
             out[i] = zero(e.ty);

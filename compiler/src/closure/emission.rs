@@ -73,19 +73,19 @@ impl View<'_> {
     }
 }
 
-/// How an instance with the given uniforms emits, from its material's emission function.
+/// How an instance with the given values of the table emits, from its material's emission function.
 ///
 /// It is uniform if nothing it reads differs over the surface, and every direction of the front
 /// sees one radiance and every one of the back none. The former is seen from the code, the
 /// latter is tried on directions of every elevation.
-pub fn emission_kind(module: &Module, function: Option<&Function>, uniforms: &[Const]) -> Emission {
+pub fn emission_kind(module: &Module, function: Option<&Function>, values: &[Const]) -> Emission {
     let Some(f) = function else {
         return Emission::None;
     };
     if reads_point(module, f) {
         return Emission::Varying;
     }
-    let radiance = |z: f64, azimuth: f64| radiance(module, f, uniforms, z, azimuth);
+    let radiance = |z: f64, azimuth: f64| radiance(module, f, values, z, azimuth);
     let front = radiance(1.0, 0.0);
     let same = |z: f64, azimuth: f64, expected: [f32; 3]| radiance(z, azimuth) == Some(expected);
     let Some(expected) = front else {
@@ -120,7 +120,7 @@ fn reads_point(module: &Module, f: &Function) -> bool {
 fn radiance(
     module: &Module,
     f: &Function,
-    uniforms: &[Const],
+    values: &[Const],
     z: f64,
     azimuth: f64,
 ) -> Option<[f32; 3]> {
@@ -137,7 +137,7 @@ fn radiance(
         Value::float(1.0),
     ]);
     let value = Interpreter::<f64>::new(module, 1 << 20)
-        .with_uniforms(uniforms)
+        .with_table(values)
         .run(f, vec![point, wo])
         .ok()?;
     match value.to_f64().as_slice() {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use super::helpers::Helpers;
 use super::names::unique;
-use super::walk::{counters, stored, used_uniforms};
+use super::walk::{counters, stored, table_values};
 use super::{inliner, type_name};
 use crate::Program;
 use crate::abi::{self, PARAMETERS, TextureSpace};
@@ -18,7 +18,7 @@ use crate::ops::{Op, Shape, Wgsl};
 use crate::parameters::{Layout, Place};
 use crate::source::Span;
 
-/// Prints a function under a name. One that reads uniforms gets the first row of its instance
+/// Prints a function under a name. One that reads the parameter table gets the first row of its instance
 /// as its first parameter, and `layout` tells where they lie.
 pub fn print(
     program: &Program,
@@ -121,7 +121,7 @@ impl Printer<'_> {
             }
         }
         if let Some((row, layout)) = table {
-            self.uniforms(row, layout);
+            self.table(row, layout);
         }
         self.block(&self.f.body, 1);
         let value = self.operand(self.f.value);
@@ -129,12 +129,12 @@ impl Printer<'_> {
         self.out.push_str("}\n\n");
     }
 
-    /// Reads the uniforms that the function uses from the table.
-    fn uniforms(&mut self, row: &str, layout: &Layout) {
+    /// Reads what the function uses of the parameter table.
+    fn table(&mut self, row: &str, layout: &Layout) {
         let mut read: BTreeMap<u32, String> = BTreeMap::new();
-        for id in used_uniforms(self.f) {
+        for id in table_values(self.f) {
             let e = self.f.expr(id);
-            let ExprKind::Uniform(i) = e.kind else {
+            let ExprKind::TableValue(i) = e.kind else {
                 continue;
             };
             let Some(place) = layout.places.get(i as usize) else {
@@ -144,7 +144,7 @@ impl Printer<'_> {
                 Some(name) => name.clone(),
                 None => {
                     let name = unique(&mut self.taken, e.name.as_deref().unwrap_or("given"));
-                    let text = uniform(row, *place, type_name(self.program, place.ty));
+                    let text = table_value(row, *place, type_name(self.program, place.ty));
                     self.line_of(id, 1, &format!("let {name} = {text};"));
                     read.insert(i, name.clone());
                     name
@@ -319,7 +319,7 @@ impl Printer<'_> {
         let f = self.f;
         let expr = f.expr(id);
         match &expr.kind {
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => {
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => {
                 self.operand(id).into_owned()
             }
             ExprKind::Load(local) => self.locals[local.index()].clone(),
@@ -418,7 +418,7 @@ impl Printer<'_> {
 }
 
 /// A value of the parameter table.
-fn uniform(row: &str, place: Place, ty: &str) -> String {
+fn table_value(row: &str, place: Place, ty: &str) -> String {
     let row = match place.row {
         0 => row.to_owned(),
         n => format!("{row} + {n}u"),

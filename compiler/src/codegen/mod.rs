@@ -26,7 +26,7 @@ pub(crate) use inliner::decide as inlined;
 pub use lookups::lookups;
 pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
-pub(crate) use walk::used_uniforms;
+pub(crate) use walk::table_values;
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {
@@ -66,7 +66,7 @@ pub fn module(program: &Program, members: &[usize]) -> String {
 
 /// The WGSL of functions that no material calls, under their own names: operations by themselves,
 /// for comparing what a GPU makes of them with what the interpreter does. They use neither structs
-/// nor calls nor uniforms.
+/// nor calls nor the parameter table.
 pub fn functions(program: &Program, functions: &[Function]) -> String {
     let mut helpers = Helpers::default();
     let mut body = String::new();
@@ -82,7 +82,7 @@ pub fn functions(program: &Program, functions: &[Function]) -> String {
 struct Root<'p> {
     function: &'p Function,
     name: String,
-    /// Where its uniforms lie.
+    /// Where the values that it reads of the parameter table lie.
     layout: &'p Layout,
 }
 

@@ -1,5 +1,5 @@
-//! What the text of a function must know of it beforehand: its loop variables, the uniforms it
-//! reads, the variables it stores.
+//! What the text of a function must know of it beforehand: its loop variables, the values of the
+//! parameter table it reads, the variables it stores.
 
 use std::collections::BTreeSet;
 
@@ -25,11 +25,11 @@ pub fn counters(block: &Block) -> BTreeSet<LocalId> {
     found
 }
 
-/// The uniforms that statements read, each expression once.
-pub fn used_uniforms(f: &Function) -> BTreeSet<ExprId> {
+/// The values of the parameter table that statements read, each expression once.
+pub fn table_values(f: &Function) -> BTreeSet<ExprId> {
     let mut used = BTreeSet::from([f.value]);
     read_by(f, &f.body, &mut used);
-    used.retain(|&id| matches!(f.expr(id).kind, ExprKind::Uniform(_)));
+    used.retain(|&id| matches!(f.expr(id).kind, ExprKind::TableValue(_)));
     used
 }
 

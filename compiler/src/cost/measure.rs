@@ -73,7 +73,7 @@ impl<'p> Measured<'p> {
         for (instance, at) in inputs {
             if set != Some(*instance) {
                 self.run
-                    .set_uniforms(&self.program.instances()[*instance].uniforms);
+                    .set_table(&self.program.instances()[*instance].values);
                 set = Some(*instance);
             }
             self.evaluate(at)?;
@@ -169,9 +169,9 @@ fn here(f: &Function, module: &Module, at: &At) -> Value<f32> {
 fn rows(material: &CompiledMaterial) -> f64 {
     let functions = std::iter::once(&material.evaluate).chain(varying(material));
     let read = functions.flat_map(|f| {
-        let used = codegen::used_uniforms(f).into_iter();
+        let used = codegen::table_values(f).into_iter();
         used.filter_map(|id| match f.expr(id).kind {
-            ExprKind::Uniform(i) => Some(material.layout.places.get(i as usize)?.row),
+            ExprKind::TableValue(i) => Some(material.layout.places.get(i as usize)?.row),
             _ => None,
         })
     });

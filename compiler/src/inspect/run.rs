@@ -117,7 +117,7 @@ pub(super) fn material<F: Real>(
     let structs = &program.ir().structs;
     let compiled = &program.compiled()[0];
     let mut run =
-        Interpreter::<F>::new(program.ir(), FUEL).with_uniforms(&program.instances()[0].uniforms);
+        Interpreter::<F>::new(program.ir(), FUEL).with_table(&program.instances()[0].values);
     let here = |f: &Function, module: &Module| match f.params.first().map(|p| p.ty) {
         Some(Type::Struct(id)) => point::<F>(at, &module.structs[id.index()]),
         _ => Value::float(0.0),

@@ -10,6 +10,7 @@ mod lower;
 mod profile;
 
 use self::code::{Code, Ins, Numbers, Place};
+use self::lower::Outside;
 pub use self::profile::{Origin, Part};
 use super::value::{Real, Value};
 use super::{Const, ExprId, Function, FunctionId, Module};
@@ -36,8 +37,8 @@ pub type TextureLookup<'a> = dyn Fn(&TextureRequest) -> [f64; 4] + 'a;
 /// Runs functions of one module. Keep it for many calls: the code it makes of a function stays.
 pub struct Interpreter<'a, F> {
     module: &'a Module,
-    /// Values of the material's parameters.
-    uniforms: Vec<Value<F>>,
+    /// What functions read from outside.
+    outside: Outside<F>,
     texture: Option<&'a TextureLookup<'a>>,
     /// Expressions that may still be evaluated.
     fuel: u64,
@@ -94,7 +95,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
     pub fn new(module: &'a Module, fuel: u64) -> Self {
         Self {
             module,
-            uniforms: Vec::new(),
+            outside: Outside::default(),
             texture: None,
             fuel,
             executed: 0,
@@ -107,9 +108,20 @@ impl<'a, F: Real> Interpreter<'a, F> {
         }
     }
 
-    /// Sets the material's parameters; zero without them.
-    pub fn with_uniforms(mut self, uniforms: &[Const]) -> Self {
-        self.uniforms = uniforms.iter().map(Value::constant).collect();
+    /// Sets the material's parameters, which functions read before hoisting; zero without them.
+    pub fn with_params(mut self, params: &[Const]) -> Self {
+        self.outside.params = params.iter().map(Value::constant).collect();
+        self.forget_code()
+    }
+
+    /// Sets the values of the parameter table, which functions read after hoisting; zero without
+    /// them.
+    pub fn with_table(mut self, values: &[Const]) -> Self {
+        self.outside.table = values.iter().map(Value::constant).collect();
+        self.forget_code()
+    }
+
+    fn forget_code(mut self) -> Self {
         // Their values are part of the code.
         self.codes.clear();
         self.sources.clear();
@@ -166,7 +178,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
     /// Runs a function without parameters once, for the values of some of its expressions, which
     /// stand in no block within another.
     pub fn values(&mut self, f: &Function, of: &[ExprId]) -> Result<Vec<Value<F>>, OutOfFuel> {
-        let (code, places) = lower::lower(self.module, f, &self.uniforms, of, self.apart);
+        let (code, places) = lower::lower(self.module, f, &self.outside, of, self.apart);
         self.codes.push(code);
         self.sources.push(None);
         self.execute(self.codes.len() - 1)?;
@@ -204,7 +216,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
     }
 
     fn lower(&mut self, f: &'a Function) -> usize {
-        let (code, _) = lower::lower(self.module, f, &self.uniforms, &[], self.apart);
+        let (code, _) = lower::lower(self.module, f, &self.outside, &[], self.apart);
         self.codes.push(code);
         self.sources.push(Some(f));
         self.codes.len() - 1

@@ -2,7 +2,7 @@
 //!
 //! A [`Module`] holds structs, functions and closure definitions. A [`Function`] is an arena of
 //! pure expressions plus structured statements that say in which order they are evaluated:
-//! every expression that is not a constant, a parameter or a uniform stands in exactly one
+//! every expression that is not a constant, a parameter or a value of the parameter table stands in exactly one
 //! [`Stmt::Eval`], which dominates its uses. Surface types (color, point, length, ...) are gone;
 //! what is left are the machine's types.
 //!
@@ -178,6 +178,18 @@ impl Function {
         }
     }
 
+    /// Does it mention a parameter of its material, as functions do before hoisting?
+    pub fn reads_material_params(&self) -> bool {
+        let mut exprs = self.exprs.iter();
+        exprs.any(|e| matches!(e.kind, ExprKind::MaterialParam(_)))
+    }
+
+    /// Does it mention a value of the parameter table, as functions do after hoisting?
+    pub fn reads_table(&self) -> bool {
+        let mut exprs = self.exprs.iter();
+        exprs.any(|e| matches!(e.kind, ExprKind::TableValue(_)))
+    }
+
     /// The calls that put something here, from the innermost out.
     pub fn calls_to(&self, mut via: Option<SiteId>) -> impl Iterator<Item = CallSite> {
         std::iter::from_fn(move || {
@@ -221,8 +233,10 @@ pub enum ExprKind {
     Const(Const),
     /// Parameter of the function.
     Param(u32),
-    /// Parameter of the material: the same for a whole render.
-    Uniform(u32),
+    /// Parameter of the material, before uniform hoisting.
+    MaterialParam(u32),
+    /// Value of the parameter table, after it: what the host computed from the parameters.
+    TableValue(u32),
     /// The present value of a variable.
     Load(LocalId),
     /// An operation of the op table.
@@ -244,7 +258,7 @@ impl ExprKind {
     pub fn operands(&self) -> &[ExprId] {
         use ExprKind::*;
         match self {
-            Const(_) | Param(_) | Uniform(_) | Load(_) => &[],
+            Const(_) | Param(_) | MaterialParam(_) | TableValue(_) | Load(_) => &[],
             Op(_, args) | Compose(args) | Call(_, args) | Make(_, args) => args,
             Swizzle(arg, _) | Field(arg, _) => std::slice::from_ref(arg),
         }
@@ -254,7 +268,10 @@ impl ExprKind {
     pub fn is_free(&self) -> bool {
         matches!(
             self,
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_)
+            ExprKind::Const(_)
+                | ExprKind::Param(_)
+                | ExprKind::MaterialParam(_)
+                | ExprKind::TableValue(_)
         )
     }
 }
@@ -441,7 +458,7 @@ pub struct Material {
     pub name: String,
     /// Its documentation.
     pub docs: Vec<String>,
-    /// Its parameters, in the order of [`ExprKind::Uniform`].
+    /// Its parameters, in the order of [`ExprKind::MaterialParam`].
     pub params: Vec<MaterialParam>,
     /// Computes the patterns. Its parameters are `point: SurfacePoint`; its value is not used.
     pub body: Function,

@@ -28,7 +28,7 @@ pub(super) struct Table {
     known: HashMap<u64, ExprId, Hashed>,
     /// What each entry made since replaced, to close blocks.
     undo: Vec<(u64, Option<ExprId>)>,
-    /// Constants, parameters and uniforms: available everywhere, so never removed.
+    /// Constants, parameters and values of the table: available everywhere, so never removed.
     leaves: HashMap<u64, ExprId, Hashed>,
     /// Room for the operands of two expressions that are compared.
     operands: [Vec<ExprId>; 2],
@@ -58,7 +58,7 @@ impl Hasher for Itself {
 }
 
 impl Table {
-    /// The one expression that stands, in keys, for all equal constants, parameters or uniforms.
+    /// The one expression that stands, in keys, for all equal expressions that need no evaluation.
     /// Elsewhere each keeps its own place in the source.
     fn leaf(&mut self, f: &Function, id: ExprId) -> ExprId {
         let e = f.expr(id);
@@ -178,7 +178,8 @@ fn hash(kind: &ExprKind, operands: &[ExprId], ty: Type) -> u64 {
             );
         }
         ExprKind::Param(i) => h.all(0x400, [u64::from(*i)]),
-        ExprKind::Uniform(i) => h.all(0x500, [u64::from(*i)]),
+        ExprKind::MaterialParam(i) => h.all(0x500, [u64::from(*i)]),
+        ExprKind::TableValue(i) => h.all(0xe00, [u64::from(*i)]),
         ExprKind::Load(local) => h.all(0x600, [u64::from(local.0)]),
         ExprKind::Op(op, _) => h.all(0x700, [ordered(*op) as u64]),
         ExprKind::Compose(_) => h.add(0x800),

@@ -107,7 +107,7 @@ pub struct Body<'c, 'l> {
     pub outputs: Vec<(&'static str, Operand, Span)>,
     /// What called materials assign, in the order of [`OUTPUTS`].
     pub called: Vec<[Option<Operand>; OUTPUTS.len()]>,
-    /// The ranges of a material's parameters, by their uniforms.
+    /// The ranges of a material's parameters, by their numbers.
     pub ranges: Vec<Option<(f64, f64)>>,
 }
 

@@ -222,7 +222,7 @@ impl Body<'_, '_> {
                 all.reduce(hull)
             }
             ExprKind::Const(Const::Int(i)) => Some((f64::from(*i), f64::from(*i))),
-            ExprKind::Uniform(index) => *self.ranges.get(*index as usize)?,
+            ExprKind::MaterialParam(index) => *self.ranges.get(*index as usize)?,
             ExprKind::Swizzle(base, _) => of(*base),
             ExprKind::Compose(parts) => {
                 let parts: Option<Vec<_>> = parts.iter().map(|p| of(*p)).collect();

@@ -257,9 +257,9 @@ impl Body<'_, '_> {
     fn own_param(&mut self, declared: &Declared, p: &ast::MaterialParam) -> Option<Operand> {
         match &declared.origin {
             Origin::Settable(param) => {
-                let uniform = ExprKind::Uniform(self.ranges.len() as u32);
+                let kind = ExprKind::MaterialParam(self.ranges.len() as u32);
                 self.ranges.push(param.range);
-                let id = self.builder.add(uniform, param.ty, p.name.span);
+                let id = self.builder.add(kind, param.ty, p.name.span);
                 self.builder.name(id, &p.name.node);
                 Some(Operand::Value(id, declared.ty))
             }

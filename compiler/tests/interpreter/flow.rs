@@ -270,34 +270,34 @@ fn outer(v: vec3, n: int) -> float {
 }
 
 #[test]
-fn uniforms_and_textures_come_from_outside() {
+fn parameters_and_textures_come_from_outside() {
     let m = Module::default();
     let mut b = Builder::new("f", Vec::new(), HERE);
-    let tint = b.add(ExprKind::Uniform(1), Type::Vec3, HERE);
-    let slot = b.add(ExprKind::Uniform(0), Type::Int, HERE);
+    let tint = b.add(ExprKind::MaterialParam(1), Type::Vec3, HERE);
+    let slot = b.add(ExprKind::MaterialParam(0), Type::Int, HERE);
     let uv = b.constant(Const::Float(vec![0.25, 0.75]), HERE);
     let texel = b.op(Op::Image, &[slot, uv], HERE);
     let value = b.op(Op::Mul, &[tint, texel], HERE);
     let f = b.finish(value);
-    let uniforms = [Const::Int(3), Const::Float(vec![2.0, 3.0, 4.0])];
+    let params = [Const::Int(3), Const::Float(vec![2.0, 3.0, 4.0])];
     let texture = |of: &TextureRequest| {
         assert_eq!((of.texture, of.op), (3, Op::Image));
         assert_eq!((of.width, of.mode), ([0.0; 2], 0));
         [of.uv[0], of.uv[1], 10.0, 99.0]
     };
     let mut run = Interpreter::<f64>::new(&m, 100)
-        .with_uniforms(&uniforms)
+        .with_params(&params)
         .with_texture(&texture);
     let found = run.run(&f, Vec::new()).expect("fuel");
     assert_eq!(found.to_f64(), [0.5, 2.25, 40.0]);
     assert_eq!(run.counts().texture, 1);
     // Other values for the same function.
-    let mut run = run.with_uniforms(&[Const::Int(3), Const::Float(vec![1.0; 3])]);
+    let mut run = run.with_params(&[Const::Int(3), Const::Float(vec![1.0; 3])]);
     assert_eq!(
         run.run(&f, Vec::new()).expect("fuel").to_f64(),
         [0.25, 0.75, 10.0]
     );
-    let mut bare = Interpreter::<f64>::new(&m, 100).with_uniforms(&uniforms);
+    let mut bare = Interpreter::<f64>::new(&m, 100).with_params(&params);
     assert_eq!(
         bare.run(&f, Vec::new()).expect("fuel").to_f64(),
         [1.0, 1.5, 2.0]

@@ -19,7 +19,7 @@ pub struct Subject {
     pub module: Module,
     pub function: Function,
     /// Values of the material's parameters.
-    pub uniforms: Vec<Const>,
+    pub params: Vec<Const>,
 }
 
 /// Checks a source that must be free of errors.
@@ -51,7 +51,7 @@ pub fn library() -> Vec<Subject> {
                     name,
                     module: module.clone(),
                     function: function.clone(),
-                    uniforms: Vec::new(),
+                    params: Vec::new(),
                 });
             }
         }
@@ -68,7 +68,7 @@ impl Loader for Files {
     }
 }
 
-/// The evaluation of every material in `materials/`, with its parameters as uniforms and, a
+/// The evaluation of every material in `materials/`, with its parameters open and, a
 /// second time, as constants.
 pub fn materials() -> Vec<Subject> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../materials");
@@ -105,7 +105,7 @@ pub fn evaluation(module: &Module, material: &Material, baked: bool) -> Subject 
         name: format!("{}, {how}", m.name),
         function: closure::evaluate(module, &core(module), &m, "evaluate", &lobes),
         module: module.clone(),
-        uniforms: defaults,
+        params: defaults,
     }
 }
 
@@ -140,10 +140,10 @@ fn core(module: &Module) -> closure::Core {
 pub fn answer(
     module: &Module,
     f: &Function,
-    uniforms: &[Const],
+    params: &[Const],
     args: &[Value<f64>],
 ) -> Option<(Vec<f64>, u64)> {
-    let mut run = Interpreter::<f64>::new(module, FUEL).with_uniforms(uniforms);
+    let mut run = Interpreter::<f64>::new(module, FUEL).with_params(params);
     let value = run.run(f, args.to_vec()).ok()?;
     let mut flat = Vec::new();
     flatten(&value, &mut flat);

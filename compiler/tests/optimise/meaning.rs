@@ -12,11 +12,11 @@ const CALLS: usize = 24;
 const SIMPLIFIED: f64 = 1e-9;
 
 /// What a function answers to a fixed list of calls.
-fn answers(module: &Module, f: &Function, uniforms: &[Const]) -> Vec<Option<(Vec<f64>, u64)>> {
+fn answers(module: &Module, f: &Function, params: &[Const]) -> Vec<Option<(Vec<f64>, u64)>> {
     let mut numbers = Numbers(1);
     let each = (0..CALLS).map(|_| {
         let args = numbers.args(module, f);
-        answer(module, f, uniforms, &args)
+        answer(module, f, params, &args)
     });
     each.collect()
 }
@@ -33,14 +33,14 @@ fn agree(old: &[f64], new: &[f64], tolerance: f64) -> bool {
 fn check_passes(s: &Subject) -> Vec<String> {
     let mut problems = Vec::new();
     let mut f = s.function.clone();
-    let mut before = answers(&s.module, &f, &s.uniforms);
+    let mut before = answers(&s.module, &f, &s.params);
     for pass in PIPELINE {
         pass.run(&s.module, &mut f);
         if let Err(e) = verify::function(&s.module, &f) {
             problems.push(format!("{}: after {}: {e}", s.name, pass.name));
             return problems;
         }
-        let after = answers(&s.module, &f, &s.uniforms);
+        let after = answers(&s.module, &f, &s.params);
         // Inlining simplifies as it copies.
         let algebra = matches!(pass.name, "simplify" | "inline");
         let tolerance = if algebra { SIMPLIFIED } else { 0.0 };
@@ -111,8 +111,8 @@ fn materials_mean_the_same_and_take_fewer_operations() {
     for s in materials() {
         let (module, f) = optimised(&s);
         let (mut spent, mut spends) = (0, 0);
-        let before = answers(&s.module, &s.function, &s.uniforms);
-        let after = answers(&module, &f, &s.uniforms);
+        let before = answers(&s.module, &s.function, &s.params);
+        let after = answers(&module, &f, &s.params);
         for (old, new) in before.iter().zip(&after) {
             let (Some((old, cost)), Some((new, costs))) = (old, new) else {
                 continue;

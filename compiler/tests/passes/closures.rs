@@ -35,8 +35,8 @@ fn lobes(m: &Material) -> usize {
 }
 
 /// The light that comes from a direction, by the numbers.
-fn reflected(module: &Module, f: &Function, uniforms: &[Const], args: &[Value<f64>]) -> Value<f64> {
-    let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
+fn reflected(module: &Module, f: &Function, params: &[Const], args: &[Value<f64>]) -> Value<f64> {
+    let mut run = Interpreter::<f64>::new(module, 1 << 22).with_params(params);
     let sample = run.run(f, args.to_vec()).expect("fuel");
     let structs = module.structs.iter();
     let fields = &structs
@@ -95,16 +95,16 @@ fn compare(surface: &str, before: (&Module, &Material), after: (&Module, &Materi
     let (f, g) = (evaluate(before.0, before.1), evaluate(after.0, after.1));
     let (mut numbers, mut lit) = (Numbers(3), 0);
     for _ in 0..50 {
-        let uniforms = [
+        let params = [
             Const::Float(vec![numbers.unit()]),
             Const::Float([(); 3].map(|()| numbers.unit()).to_vec()),
         ];
         let args = view(before.0, &f, &mut numbers);
-        let old = reflected(before.0, &f, &uniforms, &args);
-        let new = reflected(after.0, &g, &uniforms, &args);
+        let old = reflected(before.0, &f, &params, &args);
+        let new = reflected(after.0, &g, &params, &args);
         assert!(
             near(&old, &new),
-            "{surface}: {uniforms:?} was {old:?} and is {new:?}"
+            "{surface}: {params:?} was {old:?} and is {new:?}"
         );
         lit += usize::from(old.to_f64().iter().any(|&x| x > 0.0));
     }

@@ -102,7 +102,11 @@ impl Outcome {
             let mut f = module.functions[i].clone();
             run(module, &mut f);
             let text = print::function(module, &f);
-            verify::function(module, &f).map_err(|e| format!("after {pass}: {e}\n{text}"))?;
+            match self.hoisted.last() {
+                Some(h) => verify::hoisted(module, &f, &h.types()),
+                None => verify::function(module, &f),
+            }
+            .map_err(|e| format!("after {pass}: {e}\n{text}"))?;
             module.functions[i] = f;
         }
         for h in &self.hoisted {
@@ -140,7 +144,7 @@ impl Outcome {
             prelude.name += "_prelude";
             let values = h.values.iter().enumerate();
             let values: Vec<String> = values
-                .map(|(k, &v)| format!("${k} = {}", print::operand(module, &prelude, v)))
+                .map(|(k, &v)| format!("#{k} = {}", print::operand(module, &prelude, v)))
                 .collect();
             let values = values.join(", ");
             let text = print::function(module, &prelude);

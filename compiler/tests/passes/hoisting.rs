@@ -29,7 +29,7 @@ fn parameters(m: &Material, numbers: &mut Numbers) -> Vec<Const> {
 fn compare(module: &Module, m: &Material, f: &Function) -> usize {
     let mut g = f.clone();
     let hoisted = hoist(module, &mut g);
-    verify::function(module, &g).expect("well-formed");
+    verify::hoisted(module, &g, &hoisted.types()).expect("well-formed");
     verify::function(module, &hoisted.prelude).expect("well-formed");
     let mut numbers = Numbers(11);
     for _ in 0..8 {
@@ -39,11 +39,12 @@ fn compare(module: &Module, m: &Material, f: &Function) -> usize {
         for _ in 0..4 {
             let params = f.params.iter();
             let args: Vec<Value<f64>> = params.map(|p| numbers.value(module, p.ty)).collect();
-            let run = |f, uniforms: &[Const]| {
-                let mut run = Interpreter::<f64>::new(module, 1 << 22).with_uniforms(uniforms);
+            let run = |f| {
+                let run = Interpreter::<f64>::new(module, 1 << 22);
+                let mut run = run.with_params(&given).with_table(&values);
                 run.run(f, args.clone()).expect("fuel")
             };
-            let (old, new) = (run(f, &given), run(&g, &values));
+            let (old, new) = (run(f), run(&g));
             assert!(
                 near(&old, &new),
                 "{}{args:?} with {given:?} was {old:?} and is {new:?}",

@@ -65,18 +65,20 @@ pub fn same(before: &Module, after: &Module, hoisted: &[Hoisted]) -> Result<(), 
     for (i, (f, g)) in before.functions.iter().zip(&after.functions).enumerate() {
         let mut numbers = Numbers(7);
         for _ in 0..64 {
-            let params = f.params.iter();
-            let args: Vec<Value<f64>> = params.map(|p| numbers.value(before, p.ty)).collect();
-            let given = uniforms(f, &mut numbers);
+            let args = f.params.iter();
+            let args: Vec<Value<f64>> = args.map(|p| numbers.value(before, p.ty)).collect();
+            let given = params(f, &mut numbers);
             let values = match hoisted.get(i) {
                 Some(h) => h.evaluate(before, &given).map_err(|_| "too long")?,
-                None => given.clone(),
+                None => Vec::new(),
             };
-            let run = |module, f, uniforms: &[Const]| {
-                let mut run = Interpreter::<f64>::new(module, 1 << 20).with_uniforms(uniforms);
-                run.run(f, args.clone())
+            let run = |module, f| {
+                let run = Interpreter::<f64>::new(module, 1 << 20);
+                run.with_params(&given)
+                    .with_table(&values)
+                    .run(f, args.clone())
             };
-            let (old, new) = (run(before, f, &given), run(after, g, &values));
+            let (old, new) = (run(before, f), run(after, g));
             let equal = match (&old, &new) {
                 (Ok(old), Ok(new)) => near(old, new),
                 (old, _) => old.is_err(),
@@ -90,11 +92,11 @@ pub fn same(before: &Module, after: &Module, hoisted: &[Hoisted]) -> Result<(), 
     Ok(())
 }
 
-/// Values for the uniforms that a function mentions.
-pub fn uniforms(f: &Function, numbers: &mut Numbers) -> Vec<Const> {
+/// Values for the parameters of its material that a function mentions.
+pub fn params(f: &Function, numbers: &mut Numbers) -> Vec<Const> {
     let mut out: Vec<Const> = Vec::new();
     for e in &f.exprs {
-        if let ExprKind::Uniform(i) = e.kind {
+        if let ExprKind::MaterialParam(i) = e.kind {
             let i = i as usize;
             out.resize(out.len().max(i + 1), Const::Bool(false));
             out[i] = numbers.constant(e.ty);

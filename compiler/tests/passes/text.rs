@@ -200,6 +200,24 @@ fn what_is_no_ir_is_refused_with_its_place() {
             "the default of `a`",
         ),
         (
+            "fn f() -> float { uniform $0: float table #0: float %0: float = add $0, #0 return %0 }",
+            1,
+            1,
+            "what hoisting made of them",
+        ),
+        (
+            "fn f() -> float { return #0 }",
+            1,
+            26,
+            "unknown table `#0`",
+        ),
+        (
+            "material m() { table #0: float opacity = #0 }",
+            1,
+            16,
+            "unexpected `table`",
+        ),
+        (
             "material m() { opacity = 1.0 opacity = 1.0 }",
             1,
             30,

@@ -57,8 +57,8 @@ impl<'p, F: Float> Oracle<'p, F> {
             return Err(unknown(instance));
         };
         let interpreter = place.get_or_insert_with(|| {
-            let uniforms = &program.instances()[instance].uniforms;
-            let run = Interpreter::new(program.ir(), 0).with_uniforms(uniforms);
+            let values = &program.instances()[instance].values;
+            let run = Interpreter::new(program.ir(), 0).with_table(values);
             match self.texture {
                 Some(texture) => run.with_texture(texture),
                 None => run,

@@ -43,7 +43,7 @@ pub fn live(module: &Module, f: &Function) -> u32 {
         f,
         own: walk.reserve(shape.own),
         locals: walk.reserve(shape.locals),
-        uniforms: walk.reserve(shape.uniforms),
+        table: walk.reserve(shape.table),
         params: (params..params + shape.params).map(Some).collect(),
         shape,
     };
@@ -75,7 +75,7 @@ struct Frame<'a> {
     /// The first names of its numbers.
     own: u32,
     locals: u32,
-    uniforms: u32,
+    table: u32,
     /// The names of its arguments' numbers; none of constants.
     params: Vec<Option<u32>>,
 }
@@ -87,7 +87,7 @@ impl Frame<'_> {
             Number::Own(i) => Some(self.own + i),
             Number::Param(i) => self.params[i as usize],
             Number::Local(i) => Some(self.locals + i),
-            Number::Uniform(i) => Some(self.uniforms + i),
+            Number::Table(i) => Some(self.table + i),
         }
     }
 
@@ -310,7 +310,7 @@ impl<'a> Walk<'a> {
             f,
             own: self.reserve(shape.own),
             locals: self.reserve(shape.locals),
-            uniforms: self.reserve(shape.uniforms),
+            table: self.reserve(shape.table),
             params: args.iter().flat_map(|&arg| caller.names(arg)).collect(),
             shape,
         };

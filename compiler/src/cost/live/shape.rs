@@ -25,7 +25,7 @@ pub(super) enum Number {
     /// Part of a variable.
     Local(u32),
     /// Part of a value of the parameter table.
-    Uniform(u32),
+    Table(u32),
 }
 
 /// What a function's values consist of.
@@ -39,7 +39,7 @@ pub(super) struct Shape {
     /// Numbers that its expressions make, those of its arguments, and of what it reads of the table.
     pub own: u32,
     pub params: u32,
-    pub uniforms: u32,
+    pub table: u32,
     /// Is an expression evaluated where it is used?
     pub inlined: Vec<bool>,
     /// Where its variables are zero.
@@ -57,7 +57,7 @@ impl Shape {
             structs,
             changes: Positions::of(f, &inlined),
             first_param,
-            first_uniform: BTreeMap::new(),
+            first_of_table: BTreeMap::new(),
             shape: Shape {
                 ranges: vec![0..0; f.exprs.len()],
                 numbers: Vec::new(),
@@ -65,7 +65,7 @@ impl Shape {
                 locals,
                 own: 0,
                 params,
-                uniforms: 0,
+                table: 0,
                 inlined,
                 unset: unset::statements(&f.body, f.locals.len()),
             },
@@ -105,7 +105,7 @@ struct Build<'a> {
     structs: &'a [Struct],
     changes: Positions,
     first_param: Vec<u32>,
-    first_uniform: BTreeMap<u32, u32>,
+    first_of_table: BTreeMap<u32, u32>,
     shape: Shape,
 }
 
@@ -121,13 +121,13 @@ impl Build<'_> {
                 let first = self.first_param[*i as usize];
                 self.shape.numbers.extend(row(first, Number::Param));
             }
-            ExprKind::Uniform(i) => {
-                let next = &mut self.shape.uniforms;
-                let first = *self.first_uniform.entry(*i).or_insert_with(|| {
+            ExprKind::MaterialParam(i) | ExprKind::TableValue(i) => {
+                let next = &mut self.shape.table;
+                let first = *self.first_of_table.entry(*i).or_insert_with(|| {
                     *next += count;
                     *next - count
                 });
-                self.shape.numbers.extend(row(first, Number::Uniform));
+                self.shape.numbers.extend(row(first, Number::Table));
             }
             ExprKind::Load(local) if self.changes.stays(id, *local) => {
                 let first = self.shape.first_local[local.index()];

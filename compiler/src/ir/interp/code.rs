@@ -201,8 +201,8 @@ pub(super) struct Code<F> {
     /// Where the image goes: behind the parameters.
     pub image_at: Place,
     pub image: Numbers<F>,
-    /// Values of the material's parameters: which, where they are in the image, their types.
-    pub uniforms: Vec<(u32, Place, Type)>,
+    /// Values of the parameter table: which, where they are in the image, their types.
+    pub table: Vec<(u32, Place, Type)>,
     /// Size of the frame.
     pub size: Place,
     /// Where the result is, and its size.

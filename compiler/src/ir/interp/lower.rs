@@ -10,13 +10,31 @@ use crate::ir::value::{Real, Value};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, LocalId, Module, Stmt, Type};
 use crate::ops::{self, Counts, Op};
 
+/// What functions read from outside.
+#[derive(Debug)]
+pub(super) struct Outside<F> {
+    /// Values of the material's parameters.
+    pub params: Vec<Value<F>>,
+    /// Values of the parameter table.
+    pub table: Vec<Value<F>>,
+}
+
+impl<F> Default for Outside<F> {
+    fn default() -> Self {
+        Self {
+            params: Vec::new(),
+            table: Vec::new(),
+        }
+    }
+}
+
 /// The code of `f`, a function over `module`, and where it leaves the values of the expressions
 /// `kept`, which stand in no block within another. `in_parts`: the code knows what its runs of
 /// operations are made of.
 pub(super) fn lower<F: Real>(
     module: &Module,
     f: &Function,
-    uniforms: &[Value<F>],
+    outside: &Outside<F>,
     kept: &[ExprId],
     in_parts: bool,
 ) -> (Code<F>, Vec<Place>) {
@@ -27,7 +45,7 @@ pub(super) fn lower<F: Real>(
         runs: Vec::new(),
         parts: in_parts.then(Vec::new),
         calls: Vec::new(),
-        uniforms: Vec::new(),
+        table: Vec::new(),
         in_run: false,
         places: vec![Place::default(); f.exprs.len()],
         locals: Vec::with_capacity(f.locals.len()),
@@ -37,7 +55,7 @@ pub(super) fn lower<F: Real>(
     };
     let params: Vec<Place> = f.params.iter().map(|p| l.reserve(p.ty)).collect();
     let image_at = l.top;
-    let image = l.image(&params, uniforms, kept);
+    let image = l.image(&params, outside, kept);
     l.block(&f.body);
     l.emit(Ins::Return);
     let result = (l.place(f.value), l.size_of(f.ty(f.value)));
@@ -45,7 +63,7 @@ pub(super) fn lower<F: Real>(
     let code = Code {
         image_at,
         image,
-        uniforms: l.uniforms,
+        table: l.table,
         size: l.size,
         result,
         runs: l.runs,
@@ -72,7 +90,7 @@ struct Lowering<'a, F> {
     /// What runs are made of, if that is asked for.
     parts: Option<Vec<Part>>,
     calls: Vec<Call>,
-    uniforms: Vec<(u32, Place, Type)>,
+    table: Vec<(u32, Place, Type)>,
     /// Does the last run go on?
     in_run: bool,
     places: Vec<Place>,
@@ -85,8 +103,8 @@ struct Lowering<'a, F> {
 }
 
 impl<F: Real> Lowering<'_, F> {
-    /// Places variables, constants and uniforms behind the parameters.
-    fn image(&mut self, params: &[Place], uniforms: &[Value<F>], kept: &[ExprId]) -> Numbers<F> {
+    /// Places variables, constants and what comes from outside behind the parameters.
+    fn image(&mut self, params: &[Place], outside: &Outside<F>, kept: &[ExprId]) -> Numbers<F> {
         let mut image = Numbers::new();
         let base = self.top;
         for local in &self.f.locals {
@@ -106,10 +124,14 @@ impl<F: Real> Lowering<'_, F> {
                     self.places[i] = base.plus(image.len());
                     image.push_const(c);
                 }
-                ExprKind::Uniform(u) => {
+                ExprKind::MaterialParam(p) => {
                     self.places[i] = base.plus(image.len());
-                    self.uniforms.push((*u, image.len(), e.ty));
-                    image.push(uniforms.get(*u as usize), e.ty, &self.module.structs);
+                    image.push(outside.params.get(*p as usize), e.ty, &self.module.structs);
+                }
+                ExprKind::TableValue(v) => {
+                    self.places[i] = base.plus(image.len());
+                    self.table.push((*v, image.len(), e.ty));
+                    image.push(outside.table.get(*v as usize), e.ty, &self.module.structs);
                 }
                 ExprKind::Param(p) => self.places[i] = params[*p as usize],
                 _ => {}
@@ -378,7 +400,7 @@ impl<F: Real> Lowering<'_, F> {
                 to
             }
             ExprKind::Field(value, i) => self.field(*value, *i as usize),
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => self.place(id),
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => self.place(id),
         };
     }
 

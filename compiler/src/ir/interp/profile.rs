@@ -36,14 +36,14 @@ impl<'a, F: Real> Interpreter<'a, F> {
         self
     }
 
-    /// Goes on with other values of the material's parameters. Numbers of runs stay.
-    pub fn set_uniforms(&mut self, uniforms: &[Const]) {
-        self.uniforms = uniforms.iter().map(Value::constant).collect();
+    /// Goes on with other values of the parameter table. Numbers of runs stay.
+    pub fn set_table(&mut self, values: &[Const]) {
+        self.outside.table = values.iter().map(Value::constant).collect();
         let structs = &self.module.structs;
         for code in &mut self.codes {
-            for &(uniform, place, ty) in &code.uniforms {
+            for &(value, place, ty) in &code.table {
                 let mut numbers = Numbers::new();
-                numbers.push(self.uniforms.get(uniform as usize), ty, structs);
+                numbers.push(self.outside.table.get(value as usize), ty, structs);
                 code.image.put(place, &numbers);
             }
         }

@@ -1,14 +1,48 @@
 //! The inside of a function or material: variables and statements.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use super::expr::components;
 use super::{MAX_NESTING, Parser, Result, Token, Wrong};
-use crate::ir::{Block, ExprId, Function, Local, LocalId, Stmt, Type};
+use crate::ir::{Block, ExprId, ExprKind, Function, Local, LocalId, Stmt, Type};
 use crate::source::Span;
 
-/// Uniforms are numbered below this.
-const MAX_UNIFORMS: u32 = 1 << 16;
+/// Parameters of materials, and values of the table, are numbered below this.
+const MAX_DECLARED: u32 = 1 << 16;
+
+/// What a body reads from outside, and so declares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Declared {
+    /// `$0`: a parameter of the material.
+    Param(u32),
+    /// `#0`: a value of the parameter table.
+    Table(u32),
+}
+
+impl Declared {
+    pub(super) fn number(self) -> u32 {
+        match self {
+            Declared::Param(n) | Declared::Table(n) => n,
+        }
+    }
+
+    fn kind(self) -> ExprKind {
+        match self {
+            Declared::Param(n) => ExprKind::MaterialParam(n),
+            Declared::Table(n) => ExprKind::TableValue(n),
+        }
+    }
+}
+
+impl fmt::Display for Declared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Declared::Param(n) => write!(f, "`${n}`"),
+            Declared::Table(n) => write!(f, "`#{n}`"),
+        }
+    }
+}
 
 /// A body while it is read.
 pub(super) struct Body<'p> {
@@ -16,9 +50,10 @@ pub(super) struct Body<'p> {
     /// What is known of the function so far.
     pub(super) function: Function,
     pub(super) params: BTreeMap<String, u32>,
-    /// What `%n` and `$n` are.
+    /// What `%n` are.
     pub(super) values: BTreeMap<u32, ExprId>,
-    pub(super) uniforms: BTreeMap<u32, Type>,
+    /// The types of `$n` and `#n`, by their tokens.
+    pub(super) declared: BTreeMap<Declared, Type>,
     depth: usize,
 }
 
@@ -43,7 +78,7 @@ impl<'p> Body<'p> {
             },
             params: names,
             values: BTreeMap::new(),
-            uniforms: BTreeMap::new(),
+            declared: BTreeMap::new(),
             depth: 0,
         }
     }
@@ -51,12 +86,8 @@ impl<'p> Body<'p> {
     /// `{` and the declarations of a function.
     pub(super) fn open(&mut self) -> Result<()> {
         self.p.expect("{")?;
-        while self.p.eat_word("uniform") {
-            let (at, index) = self.uniform_index()?;
-            self.p.expect(":")?;
-            let ty = self.p.ty()?;
-            self.declare_uniform(at, index, ty)?;
-        }
+        self.declarations("uniform", Self::param_index)?;
+        self.declarations("table", Self::table_index)?;
         self.variables()
     }
 
@@ -75,25 +106,60 @@ impl<'p> Body<'p> {
         Ok(())
     }
 
+    /// `uniform $0: type`, or `table #0: type`, as often as it is there.
+    fn declarations(
+        &mut self,
+        word: &str,
+        name: fn(&mut Self) -> Result<(Span, Declared)>,
+    ) -> Result<()> {
+        while self.p.eat_word(word) {
+            let (at, what) = name(self)?;
+            self.p.expect(":")?;
+            let ty = self.p.ty()?;
+            self.declare(at, what, ty)?;
+        }
+        Ok(())
+    }
+
     /// `$3` in a declaration.
-    pub(super) fn uniform_index(&mut self) -> Result<(Span, u32)> {
+    pub(super) fn param_index(&mut self) -> Result<(Span, Declared)> {
         let at = self.p.here();
-        let Token::Uniform(index) = *self.p.peek() else {
+        let Token::MaterialParam(index) = *self.p.peek() else {
             return self.p.unexpected("a uniform such as `$0`");
         };
         self.p.next();
-        Ok((at, index))
+        Ok((at, Declared::Param(index)))
     }
 
-    pub(super) fn declare_uniform(&mut self, at: Span, index: u32, ty: Type) -> Result<()> {
-        if index >= MAX_UNIFORMS {
-            let far = Wrong::new(at, "the number of the uniform is too large");
-            return Err(far.expected(format!("a number below {MAX_UNIFORMS}")));
+    /// `#3` in a declaration.
+    fn table_index(&mut self) -> Result<(Span, Declared)> {
+        let at = self.p.here();
+        let Token::TableValue(index) = *self.p.peek() else {
+            return self.p.unexpected("a value of the table such as `#0`");
+        };
+        self.p.next();
+        Ok((at, Declared::Table(index)))
+    }
+
+    pub(super) fn declare(&mut self, at: Span, what: Declared, ty: Type) -> Result<()> {
+        if what.number() >= MAX_DECLARED {
+            let far = Wrong::new(at, format!("the number of {what} is too large"));
+            return Err(far.expected(format!("a number below {MAX_DECLARED}")));
         }
-        match self.uniforms.insert(index, ty) {
+        match self.declared.insert(what, ty) {
             None => Ok(()),
-            Some(_) => Err(Wrong::new(at, format!("`${index}` is declared twice"))),
+            Some(_) => Err(Wrong::new(at, format!("{what} is declared twice"))),
         }
+    }
+
+    /// What was declared by this name, as an expression.
+    pub(super) fn outside(&mut self, at: Span, what: Declared, word: &str) -> Result<ExprId> {
+        let ty = self.declared.get(&what).copied().ok_or_else(|| {
+            Wrong::new(at, format!("unknown {word} {what}"))
+                .expected(format!("one declared by `{word}` at the top"))
+        })?;
+        self.p.next();
+        Ok(self.add(what.kind(), ty, at))
     }
 
     /// Statements into the function's body, up to where `end` holds.

@@ -125,7 +125,7 @@ impl Body<'_> {
         part.ok_or_else(|| Wrong::new(at, format!("there is no `{name}`")).expected(expected))
     }
 
-    /// A value that is there: `%3`, `$0`, a parameter or a constant.
+    /// A value that is there: `%3`, `$0`, `#0`, a parameter or a constant.
     pub(super) fn operand(&mut self) -> Result<ExprId> {
         let at = self.p.here();
         match self.p.peek().clone() {
@@ -136,14 +136,8 @@ impl Body<'_> {
                 self.p.next();
                 Ok(id)
             }
-            Token::Uniform(index) => {
-                let ty = self.uniforms.get(&index).copied().ok_or_else(|| {
-                    Wrong::new(at, format!("unknown uniform `${index}`"))
-                        .expected("a uniform declared by `uniform` at the top")
-                })?;
-                self.p.next();
-                Ok(self.add(ExprKind::Uniform(index), ty, at))
-            }
+            Token::MaterialParam(index) => self.outside(at, Declared::Param(index), "uniform"),
+            Token::TableValue(index) => self.outside(at, Declared::Table(index), "table"),
             Token::Ident(name) if name != "true" && name != "false" => {
                 let index = self.params.get(&name).copied().ok_or_else(|| {
                     Wrong::new(at, format!("unknown name `{name}`"))

@@ -9,8 +9,10 @@ pub(super) enum Token {
     Ident(String),
     /// `%3`: an evaluated expression.
     Value(u32),
-    /// `$3`: a uniform.
-    Uniform(u32),
+    /// `$3`: a parameter of the material.
+    MaterialParam(u32),
+    /// `#3`: a value of the parameter table.
+    TableValue(u32),
     /// `@3`: a variable.
     Local(u32),
     Int(i64),
@@ -27,7 +29,8 @@ impl Token {
         match self {
             Token::Ident(name) => format!("`{name}`"),
             Token::Value(n) => format!("`%{n}`"),
-            Token::Uniform(n) => format!("`${n}`"),
+            Token::MaterialParam(n) => format!("`${n}`"),
+            Token::TableValue(n) => format!("`#{n}`"),
             Token::Local(n) => format!("`@{n}`"),
             Token::Int(n) => format!("`{n}`"),
             Token::Float(x) => format!("`{x:?}`"),
@@ -110,7 +113,8 @@ impl<'a> Lexer<'a> {
         match c {
             'a'..='z' | 'A'..='Z' | '_' => Ok(Token::Ident(self.take(in_name).to_owned())),
             '%' => self.numbered(Token::Value),
-            '$' => self.numbered(Token::Uniform),
+            '$' => self.numbered(Token::MaterialParam),
+            '#' => self.numbered(Token::TableValue),
             '@' => self.numbered(Token::Local),
             '"' => self.string(),
             _ if signed || c.is_ascii_digit() => self.number(),

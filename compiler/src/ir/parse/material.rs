@@ -78,13 +78,13 @@ impl Body<'_> {
     fn uniform(&mut self, next: usize) -> Result<MaterialParam> {
         self.p.next();
         let start = self.p.here();
-        let (at, index) = self.uniform_index()?;
-        if index as usize != next {
-            let message = format!("`${index}` is not the next uniform");
+        let (at, what) = self.param_index()?;
+        if what.number() as usize != next {
+            let message = format!("{what} is not the next uniform");
             return Err(Wrong::new(at, message).expected(format!("`${next}`")));
         }
         let local = self.p.local()?;
-        self.declare_uniform(at, index, local.ty)?;
+        self.declare(at, what, local.ty)?;
         let surface_type = self.surface_type(local.ty)?;
         self.p.expect("=")?;
         let default = self.p.constant()?;

@@ -31,21 +31,30 @@ fn named_function(names: &Names<'_>, f: &Function, name: &str) -> String {
         let _ = write!(out, " turns {}", f.turns);
     }
     out.push_str(" {\n");
-    for (i, ty) in uniforms(f) {
+    let (params, table) = outside(f);
+    for (i, ty) in params {
         let _ = writeln!(out, "    uniform ${i}: {}", names.ty(ty));
+    }
+    for (i, ty) in table {
+        let _ = writeln!(out, "    table #{i}: {}", names.ty(ty));
     }
     printer.body(&mut out);
     let _ = writeln!(out, "    return {}\n}}", printer.operand(f.value));
     out
 }
 
-/// The uniforms that a function mentions, with their types.
-fn uniforms(f: &Function) -> BTreeMap<u32, Type> {
-    let mentioned = f.exprs.iter().filter_map(|e| match e.kind {
-        ExprKind::Uniform(i) => Some((i, e.ty)),
-        _ => None,
-    });
-    mentioned.collect()
+/// The parameters of its material, and the values of the table, that a function mentions, with
+/// their types.
+fn outside(f: &Function) -> (BTreeMap<u32, Type>, BTreeMap<u32, Type>) {
+    let (mut params, mut table) = (BTreeMap::new(), BTreeMap::new());
+    for e in &f.exprs {
+        match e.kind {
+            ExprKind::MaterialParam(i) => drop(params.insert(i, e.ty)),
+            ExprKind::TableValue(i) => drop(table.insert(i, e.ty)),
+            _ => {}
+        }
+    }
+    (params, table)
 }
 
 /// A constant as text. Floats have a point or an exponent, ints do not; every digit is there.
@@ -285,7 +294,8 @@ impl<'a> Printer<'a> {
         match &e.kind {
             ExprKind::Const(c) => constant(c),
             ExprKind::Param(i) => or_unknown(self.params.get(*i as usize)),
-            ExprKind::Uniform(i) => format!("${i}"),
+            ExprKind::MaterialParam(i) => format!("${i}"),
+            ExprKind::TableValue(i) => format!("#{i}"),
             ExprKind::Load(local) => format!("load {}", self.local(local.index())),
             ExprKind::Op(op, args) => format!("{} {}", op.info().text, self.operands(args)),
             ExprKind::Compose(args) => format!("{}({})", self.names.ty(e.ty), self.operands(args)),

@@ -117,7 +117,7 @@ pub fn material(module: &Module, m: &Material) -> Result<(), Problem> {
         m,
         ready: check(module, &m.body)?,
     };
-    tree.uniforms()?;
+    tree.params()?;
     for (i, node) in m.closures.iter().enumerate() {
         tree.closure(i, node)?;
     }
@@ -149,7 +149,7 @@ impl Tree<'_> {
         problem(span, format!("{}: {message}", self.m.name))
     }
 
-    fn uniforms(&self) -> Result<(), Problem> {
+    fn params(&self) -> Result<(), Problem> {
         for p in &self.m.params {
             if !super::is_constant_of(&p.default, p.ty) {
                 return self.wrong(p.span, &format!("the default of `{}` does not fit", p.name));
@@ -157,10 +157,15 @@ impl Tree<'_> {
         }
         let fits = |i: u32, ty| self.m.params.get(i as usize).map(|p| p.ty) == Some(ty);
         for e in &self.m.body.exprs {
-            if let ExprKind::Uniform(i) = e.kind
-                && !fits(i, e.ty)
-            {
-                return self.wrong(e.span, &format!("there is no uniform ${i} of its type"));
+            match e.kind {
+                ExprKind::MaterialParam(i) if !fits(i, e.ty) => {
+                    return self.wrong(e.span, &format!("there is no uniform ${i} of its type"));
+                }
+                ExprKind::TableValue(i) => {
+                    let early = format!("#{i} of the table is read before hoisting has made it");
+                    return self.wrong(e.span, &early);
+                }
+                _ => {}
             }
         }
         Ok(())

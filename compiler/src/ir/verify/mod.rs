@@ -41,6 +41,28 @@ pub fn function(module: &Module, f: &Function) -> Result<(), Problem> {
     check(module, f).map(|_| ())
 }
 
+/// What is wrong with `f` as hoisting leaves it, if anything: it reads values of a table of the
+/// types `table`, and no parameter of its material.
+///
+/// # Errors
+/// The first problem.
+pub fn hoisted(module: &Module, f: &Function, table: &[Type]) -> Result<(), Problem> {
+    function(module, f)?;
+    let wrong = f.exprs.iter().find_map(|e| match e.kind {
+        ExprKind::MaterialParam(i) => Some((e, format!("reads ${i} of its material"))),
+        ExprKind::TableValue(i) if table.get(i as usize) != Some(&e.ty) => {
+            Some((e, format!("there is no value #{i} of its type in the table")))
+        }
+        _ => None,
+    });
+    wrong.map_or(Ok(()), |(e, message)| {
+        Err(Problem {
+            span: e.span,
+            message: format!("{}: {message}", f.name),
+        })
+    })
+}
+
 /// Checks a function; gives which expressions are available at its end.
 fn check(module: &Module, f: &Function) -> Result<Vec<bool>, Problem> {
     let mut v = Verifier::new(module, f);
@@ -95,6 +117,9 @@ impl<'a> Verifier<'a> {
             self.free(&e.kind, e.ty)?;
         }
         self.at = f.span;
+        if f.reads_material_params() && f.reads_table() {
+            return Err("reads both parameters of the material and what hoisting made of them".into());
+        }
         self.block(&f.body)?;
         self.at = f.span;
         self.used(f.value)?;
@@ -323,7 +348,7 @@ impl<'a> Verifier<'a> {
                     && c.iter().all(|&c| usize::from(c) < width)
             }
             ExprKind::Compose(_) => composes(ty, types),
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) => false,
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => false,
         })
     }
 }

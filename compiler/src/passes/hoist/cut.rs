@@ -38,15 +38,15 @@ impl Cut {
     /// Components of what is there anyway need no value of their own. Fields do: structs are read
     /// by fields, so theirs is the value that is there.
     fn keep_parts(&mut self, f: &Function) {
-        let uniform = |id: &ExprId| match f.expr(*id).kind {
-            ExprKind::Uniform(i) => Some(i),
+        let param = |id: &ExprId| match f.expr(*id).kind {
+            ExprKind::MaterialParam(i) => Some(i),
             _ => None,
         };
-        let read: BTreeSet<u32> = self.values.iter().filter_map(uniform).collect();
+        let read: BTreeSet<u32> = self.values.iter().filter_map(param).collect();
         let there: BTreeSet<ExprId> = self.values.union(&self.kept).copied().collect();
         let is_part = |&id: &ExprId| match f.expr(id).kind {
             ExprKind::Swizzle(of, _) => {
-                there.contains(&of) || uniform(&of).is_some_and(|i| read.contains(&i))
+                there.contains(&of) || param(&of).is_some_and(|i| read.contains(&i))
             }
             _ => false,
         };
@@ -54,13 +54,13 @@ impl Cut {
         for id in parts {
             self.values.remove(&id);
             self.kept.insert(id);
-            // One of several expressions that are this uniform; all are to read the value.
+            // One of several expressions that are this parameter; all are to read the value.
             self.values.extend(
                 f.expr(id)
                     .kind
                     .operands()
                     .iter()
-                    .filter(|o| uniform(o).is_some()),
+                    .filter(|o| param(o).is_some()),
             );
         }
     }

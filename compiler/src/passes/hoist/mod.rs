@@ -30,11 +30,11 @@ pub const HOIST_FUEL: u64 = 1 << 24;
 /// What the host computes for each instance.
 #[derive(Clone, Debug)]
 pub struct Hoisted {
-    /// Computes the values from the material's parameters, its uniforms. It has no branches or
+    /// Computes the values from the material's parameters. It has no branches or
     /// loops of its own, and its expressions are in the order of evaluation.
     pub prelude: Function,
     /// The values, expressions of the prelude of type bool, int, float or vector. The function
-    /// that was hoisted from reads value `k` as its uniform `k`.
+    /// that was hoisted from reads value `k` as [`ExprKind::TableValue`]`(k)`.
     pub values: Vec<ExprId>,
 }
 
@@ -52,15 +52,18 @@ impl Hoisted {
         if self.values.is_empty() {
             return Ok(Vec::new());
         }
-        let mut run = Interpreter::<f64>::new(module, HOIST_FUEL).with_uniforms(parameters);
+        let mut run = Interpreter::<f64>::new(module, HOIST_FUEL).with_params(parameters);
         let values = run.values(&self.prelude, &self.values)?;
         let constant = |v: &Value<f64>| in_range(v.to_const().unwrap_or(Const::Bool(false)));
         Ok(values.iter().map(constant).collect())
     }
 }
 
-/// Hoists from a function in place.
+/// Hoists from a function in place. What reads the table already was hoisted from before, and stays.
 pub fn hoist(module: &Module, f: &mut Function) -> Hoisted {
+    if f.reads_table() {
+        return Prelude::new(f).finish();
+    }
     let uses = Uses::of(module, f);
     let cut = Cut::of(module, f, &uses);
     let mut prelude = Prelude::new(f);
@@ -79,7 +82,7 @@ pub fn hoist(module: &Module, f: &mut Function) -> Hoisted {
     prelude.finish()
 }
 
-/// What a function evaluates, and which of it depends on uniforms and constants only.
+/// What a function evaluates, and which of it depends on parameters of the material and constants only.
 #[derive(Default)]
 struct Uses {
     /// In the order of evaluation.
@@ -104,7 +107,7 @@ impl Uses {
         // Uniform or made of constants.
         let mut fixed = vec![false; f.exprs.len()];
         for (i, e) in f.exprs.iter().enumerate() {
-            uses.uniform[i] = matches!(e.kind, ExprKind::Uniform(_));
+            uses.uniform[i] = matches!(e.kind, ExprKind::MaterialParam(_));
             fixed[i] = uses.uniform[i] || matches!(e.kind, ExprKind::Const(_));
         }
         uses.block(&f.body);
@@ -192,7 +195,7 @@ fn without(block: Block, kept: &dyn Fn(ExprId) -> bool) -> Block {
         .collect()
 }
 
-/// Takes back what no statement reads, so that no uniform of the old numbering is left.
+/// Takes back what no statement reads, so that no parameter of the material is left.
 fn forget_unused(f: &mut Function) {
     let mut uses = Uses::default();
     uses.block(&f.body);

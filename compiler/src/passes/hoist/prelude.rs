@@ -119,7 +119,7 @@ impl Prelude {
                 let fields: Vec<ExprId> = fields.collect();
                 ExprKind::Make(s, self.each(module, f, &fields))
             }
-            _ => ExprKind::Uniform(self.value(whole)),
+            _ => ExprKind::TableValue(self.value(whole)),
         }
     }
 
@@ -171,7 +171,7 @@ fn part_of(f: &Function, whole: ExprId, kind: ExprKind, ty: Type) -> Expr {
 
 fn operands_mut(kind: &mut ExprKind) -> &mut [ExprId] {
     match kind {
-        ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) | ExprKind::Load(_) => {
+        ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) | ExprKind::Load(_) => {
             &mut []
         }
         ExprKind::Op(_, args)

@@ -134,7 +134,7 @@ impl Policy {
 
     fn is_uniform(&self, f: &Function, id: ExprId) -> bool {
         match f.expr(id).kind {
-            ExprKind::Const(_) | ExprKind::Uniform(_) => true,
+            ExprKind::Const(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => true,
             ExprKind::Param(_) => false,
             _ => self.uniform.get(id.index()).copied().unwrap_or(false),
         }

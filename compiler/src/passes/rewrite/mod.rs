@@ -69,9 +69,9 @@ pub(super) struct Rewriter<'a> {
     pub depth: usize,
     /// What stands in place of an expression.
     alias: Vec<Option<ExprId>>,
-    /// The one expression that stands for each parameter and each uniform.
+    /// The one expression that stands for each parameter of the function and of the material.
     params: Vec<Option<ExprId>>,
-    uniforms: Vec<Option<ExprId>>,
+    material_params: Vec<Option<ExprId>>,
     /// What each variable holds here, where that is known.
     held: Vec<Option<ExprId>>,
     /// Evaluated in a block that is open; `evaluated` lists them in order, to close blocks.
@@ -95,7 +95,7 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) -> u64 {
         depth: 0,
         alias: vec![None; exprs],
         params: Vec::new(),
-        uniforms: Vec::new(),
+        material_params: Vec::new(),
         held: vec![None; locals],
         available: vec![false; exprs],
         evaluated: Vec::new(),
@@ -200,12 +200,12 @@ impl Rewriter<'_> {
         }
     }
 
-    /// The expression that stands for a parameter or uniform, of which there may be many, where
+    /// The expression that stands for a parameter, of which there may be many, where
     /// conditions are assumed.
     fn one_of_its_kind(&mut self, id: ExprId) -> ExprId {
         let (known, i) = match self.f.expr(id).kind {
             ExprKind::Param(i) => (&mut self.params, i as usize),
-            ExprKind::Uniform(i) => (&mut self.uniforms, i as usize),
+            ExprKind::MaterialParam(i) => (&mut self.material_params, i as usize),
             _ => return id,
         };
         if known.len() <= i {
@@ -315,7 +315,7 @@ impl Rewriter<'_> {
 pub(super) fn operands_mut(kind: &mut ExprKind) -> &mut [ExprId] {
     use ExprKind::*;
     match kind {
-        Const(_) | Param(_) | Uniform(_) | Load(_) => &mut [],
+        Const(_) | Param(_) | MaterialParam(_) | TableValue(_) | Load(_) => &mut [],
         Op(_, args) | Compose(args) | Call(_, args) | Make(_, args) => args,
         Swizzle(arg, _) | Field(arg, _) => std::slice::from_mut(arg),
     }

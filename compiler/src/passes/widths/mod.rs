@@ -227,7 +227,7 @@ impl Walk<'_> {
                 let fields = self.of_parts(&fields, axis)?;
                 Some(self.b.make(structure, &fields, span))
             }
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_) | ExprKind::Call(..) => {
+            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) | ExprKind::Call(..) => {
                 None
             }
         }
