@@ -4,11 +4,12 @@
 use serde::Serialize;
 
 use crate::ast::{self, Expr, ExprKind, ItemKind, Unit};
+use crate::diag;
 use crate::diag::Diagnostic;
 use crate::ir::Const;
+use crate::loader::Loader;
 use crate::sema::{Checker, Declared, Metadata, Origin};
 use crate::source::SourceMap;
-use crate::{Loader, diag};
 
 /// The version of the format: it grows when a field changes its meaning or goes.
 pub const VERSION: u32 = 1;

@@ -7,10 +7,10 @@
 //! path is its direction and which layer it meets next. It tells how far albedo scaling is off;
 //! renderers do not run it.
 
-use crate::Program;
 use crate::ir::Function;
 use crate::ir::interp::{Interpreter, OutOfFuel};
 use crate::ir::value::Value;
+use crate::program::Program;
 use crate::random::{STEP, SplitMix64};
 
 /// Layers that a walk may meet. What is left by then is a part in thousands even between two

@@ -2,7 +2,7 @@
 //!
 //! A value is what [`ExprKind::TableValue`](crate::ir::ExprKind::TableValue) names in a compiled material:
 //! not a parameter as the author declared it, but what is left once all work that depends on
-//! parameters only has moved to the host (`passes::hoist`). Values are packed into rows of four
+//! parameters only has moved to the host (pass `hoist`). Values are packed into rows of four
 //! words; the rows of an instance lie together.
 
 use crate::ir::{Const, Type};
@@ -23,14 +23,14 @@ pub struct Place {
 
 /// The layout of one material's values.
 #[derive(Clone, Debug, Default)]
-pub struct Layout {
+pub struct TableLayout {
     /// The place of each value, by index.
     pub places: Vec<Place>,
     /// Rows of an instance.
     pub rows: u32,
 }
 
-impl Layout {
+impl TableLayout {
     /// Packs values of the given types: wide ones first, narrow ones into the gaps they leave.
     pub fn new(types: &[Type]) -> Self {
         let mut order: Vec<usize> = (0..types.len()).collect();
@@ -102,7 +102,7 @@ mod tests {
     fn values_share_rows_and_never_words() {
         use Type::*;
         let types = [Float, Vec3, Int, Vec2, Vec4, Vec3, Bool, Vec2, Float];
-        let layout = Layout::new(&types);
+        let layout = TableLayout::new(&types);
         let mut taken = std::collections::BTreeSet::new();
         for place in &layout.places {
             let width = words(place.ty) as u32;
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn words_are_the_bits_of_the_values() {
-        let layout = Layout::new(&[Type::Float, Type::Vec3, Type::Int]);
+        let layout = TableLayout::new(&[Type::Float, Type::Vec3, Type::Int]);
         let values = [
             Const::Float(vec![1e300]),
             Const::Float(vec![0.25, 1e-40, -2.0]),

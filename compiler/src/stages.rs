@@ -53,35 +53,35 @@ impl Stage {
     }
 }
 
-/// Tells somebody which stage a compilation is at, whenever that changes.
+/// Says which stage a compilation is at, whenever that changes, to whoever listens.
 pub struct Progress<'a> {
     now: Stage,
-    told: Option<&'a mut dyn FnMut(Stage)>,
+    listener: Option<&'a mut dyn FnMut(Stage)>,
 }
 
 impl<'a> Progress<'a> {
-    /// Nobody is told.
+    /// Nobody listens.
     pub fn silent() -> Self {
         Self {
             now: Stage::Read,
-            told: None,
+            listener: None,
         }
     }
 
-    /// `told` is called with the stage that begins.
-    pub fn telling(told: &'a mut dyn FnMut(Stage)) -> Self {
+    /// `listener` is called with the stage that begins.
+    pub fn to(listener: &'a mut dyn FnMut(Stage)) -> Self {
         Self {
             now: Stage::Read,
-            told: Some(told),
+            listener: Some(listener),
         }
     }
 
     /// A stage begins; gives the one that it interrupts, for going back to it.
     pub fn enter(&mut self, stage: Stage) -> Stage {
         if stage != self.now
-            && let Some(told) = &mut self.told
+            && let Some(listener) = &mut self.listener
         {
-            told(stage);
+            listener(stage);
         }
         std::mem::replace(&mut self.now, stage)
     }

@@ -3,8 +3,8 @@
 
 use crate::common::asked::{Asked, direction, near, point4};
 use impasto_compiler::abi::{Emission, Medium};
+use impasto_compiler::ir::ops::Op;
 use impasto_compiler::ir::{Closure, Expr, ExprKind, parse, print};
-use impasto_compiler::ops::Op;
 use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag};
 

@@ -3,8 +3,8 @@
 use crate::common::{codes, compilation, program, wgsl};
 use impasto_compiler::abi::{Emission, TextureSpace};
 use impasto_compiler::ir::build::Builder;
+use impasto_compiler::ir::ops::Op;
 use impasto_compiler::ir::{Local, Type};
-use impasto_compiler::ops::Op;
 use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, codegen, compile};
 

@@ -73,7 +73,8 @@ pub fn ir(input: &[u8]) {
         execute(&module, &f, &params, &[]);
         module.functions[i] = f.clone();
         let was_hoisted_from = f.reads_table();
-        let hoisted = passes::hoist(&module, &mut f);
+        let hoist = passes::pass("hoist").expect("a row");
+        let hoisted = hoist.run(&module, &mut f).expect("values");
         well_formed(if was_hoisted_from {
             verify::function(&module, &f)
         } else {
@@ -85,8 +86,11 @@ pub fn ir(input: &[u8]) {
         }
     }
     for mut m in parsed.materials {
-        passes::fold_body(&module, &mut m.body);
-        passes::prune(&module, &mut m);
+        for name in ["fold_body", "prune"] {
+            let pass = passes::pass(name).expect("a row");
+            pass.run_on_material(&module, &mut m, &[])
+                .expect("no problem");
+        }
         well_formed(verify::material(&module, &m));
     }
 }

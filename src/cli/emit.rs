@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use impasto::compiler::codegen::Target;
 use impasto::compiler::interface::{self, MaterialInterface};
 use impasto::compiler::ir;
-use impasto::compiler::passes::{PIPELINE, run_until};
+use impasto::compiler::passes::PIPELINE;
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
 use impasto::files;
@@ -16,9 +16,6 @@ use serde::Serialize;
 
 use super::docs::docs;
 use super::{Failure, Global, Outcome, print};
-
-/// What gives passes their first function.
-const LOWERING: &str = "lowering";
 
 #[derive(Args)]
 pub(super) struct EmitArgs {
@@ -30,8 +27,8 @@ pub(super) struct EmitArgs {
     /// Which material of the file; needed for IR and WGSL where it has several
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
-    /// With `--what ir`: the evaluate functions of materials after the first run of the passes up to
-    /// this one; `lowering` is before all passes
+    /// With `--what ir`: materials after the first run of the passes up to this one; from `lowering`
+    /// on, their evaluate functions
     #[arg(long, value_name = "PASS", value_parser = passes())]
     after: Option<String>,
     /// What the WGSL is for
@@ -79,9 +76,9 @@ impl From<TargetName> for Target {
     }
 }
 
-/// What `--after` takes: the passes, each once, and what comes before them.
+/// What `--after` takes: the passes, each once.
 fn passes() -> PossibleValuesParser {
-    let mut names = vec![LOWERING];
+    let mut names = Vec::new();
     for pass in PIPELINE {
         if !names.contains(&pass.name) {
             names.push(pass.name);
@@ -166,7 +163,8 @@ fn ir(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Strin
     }
 }
 
-/// The evaluate functions of one material, or of all that the file defines, after a pass.
+/// What a pass leaves of one material, or of all that the file defines: its evaluate function, or
+/// before there is one the material.
 fn after(
     args: &EmitArgs,
     pass: &str,
@@ -174,15 +172,15 @@ fn after(
     global: &Global,
 ) -> Result<String, Failure> {
     compiled(args, loader, global)?;
-    let mut functions = Vec::new();
+    let mut texts = Vec::new();
     let requests = requests(args, loader);
-    compiler::before_passes(&requests, loader, |module, mut f| {
-        if pass != LOWERING {
-            run_until(module, &mut f, pass);
-        }
-        functions.push(ir::print::function(module, &f));
+    compiler::after_pass(&requests, loader, pass, |module, state| {
+        texts.push(match state.functions.first() {
+            Some(f) => ir::print::function(module, f),
+            None => ir::print::material(module, &state.material),
+        });
     });
-    Ok(functions.join("\n"))
+    Ok(texts.join("\n"))
 }
 
 /// The WGSL of one material, or of all that the file defines.

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use impasto_compiler::stages::{Progress, Stage};
 use impasto_compiler::{
-    Loader, MaterialRequest, MemoryLoader, Parameters, Program, compile_telling,
+    Loader, MaterialRequest, MemoryLoader, Parameters, Program, compile_with_progress,
 };
 
 use super::Files;
@@ -144,13 +144,13 @@ impl Case {
 fn run(name: &str, request: MaterialRequest, files: &mut dyn Loader) -> (Times, Program) {
     let mut times = Times::new();
     let (mut stage, mut since) = (Stage::Read, Instant::now());
-    let mut told = |next: Stage| {
+    let mut enter = |next: Stage| {
         let now = Instant::now();
         *times.entry(stage).or_default() += (now - since).as_secs_f64();
         (stage, since) = (next, now);
     };
-    let compilation = compile_telling(&[request], files, Progress::telling(&mut told));
-    told(Stage::Validate);
+    let compilation = compile_with_progress(&[request], files, Progress::to(&mut enter));
+    enter(Stage::Validate);
     let program = compilation.program;
     (
         times,

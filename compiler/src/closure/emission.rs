@@ -4,11 +4,11 @@ use super::view::View;
 use super::{Core, children, lobes};
 use crate::abi::Emission;
 use crate::ir::interp::Interpreter;
+use crate::ir::ops::Op;
 use crate::ir::value::Value;
 use crate::ir::{
     Closure, ClosureId, Const, ExprId, ExprKind, Function, Lobe, Material, Methods, Module, Type,
 };
-use crate::ops::Op;
 
 /// The function `(point, wo) -> radiance`, if the material emits.
 pub fn emission(module: &Module, core: &Core, m: &Material, name: &str) -> Option<Function> {

@@ -1,9 +1,9 @@
 //! Builds a material's `evaluate` function: patterns, lobe weights, sampling, value and density.
 
-use super::view::{Ready, View};
+use super::view::{View, ViewedLobe};
 use super::{Core, Path, delta_only};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Function, LocalId, Material, Module, Stmt, Type};
-use crate::ops::Op;
 
 /// Parameters of the function after `point` and `wo`.
 const WL: usize = 2;
@@ -53,11 +53,11 @@ impl View<'_> {
             self.b.store(met, one);
         }
         if let Some(root) = self.m.surface {
-            let (ready, _) = self.lobes(root, paths);
-            if let Some(total) = self.total(&ready) {
-                self.sample(&ready, total, &results);
+            let (lobes, _) = self.lobes(root, paths);
+            if let Some(total) = self.total(&lobes) {
+                self.sample(&lobes, total, &results);
                 if !delta_only(self.module, paths) {
-                    self.directions(&ready, total, &results);
+                    self.directions(&lobes, total, &results);
                 }
             }
         }
@@ -74,8 +74,8 @@ impl View<'_> {
     }
 
     /// The sum of all shares; nothing without lobes.
-    fn total(&mut self, ready: &[Ready<'_>]) -> Option<ExprId> {
-        let shares = ready.iter().map(|lobe| lobe.share);
+    fn total(&mut self, lobes: &[ViewedLobe<'_>]) -> Option<ExprId> {
+        let shares = lobes.iter().map(|lobe| lobe.share);
         let total = shares.reduce(|sum, share| self.op(Op::Add, &[sum, share]))?;
         self.b.name(total, "total");
         Some(total)
@@ -84,26 +84,26 @@ impl View<'_> {
     // ---- Sampling ----------------------------------------------------------------------
 
     /// Chooses a lobe by its share and samples it. A discrete lobe gives its throughput at once.
-    fn sample(&mut self, ready: &[Ready<'_>], total: ExprId, results: &Results) {
+    fn sample(&mut self, lobes: &[ViewedLobe<'_>], total: ExprId, results: &Results) {
         let u = self.param(U);
         let choice = self.b.swizzle(u, &[0], self.span);
         let choice = self.op(Op::Mul, &[choice, total]);
         let rest = self.b.swizzle(u, &[1, 2, 3], self.span);
         self.b.name(choice, "choice");
-        self.sample_from(ready, choice, None, total, rest, results);
+        self.sample_from(lobes, choice, None, total, rest, results);
     }
 
     /// `if choice < sum of shares so far { lobe } else { the lobes after it }`
     fn sample_from(
         &mut self,
-        ready: &[Ready<'_>],
+        lobes: &[ViewedLobe<'_>],
         choice: ExprId,
         before: Option<ExprId>,
         total: ExprId,
         u: ExprId,
         results: &Results,
     ) {
-        let Some((lobe, after)) = ready.split_first() else {
+        let Some((lobe, after)) = lobes.split_first() else {
             return;
         };
         let bound = match before {
@@ -126,7 +126,7 @@ impl View<'_> {
         self.b.stmt(Stmt::If(taken, then, otherwise));
     }
 
-    fn sample_lobe(&mut self, lobe: &Ready<'_>, total: ExprId, u: ExprId, results: &Results) {
+    fn sample_lobe(&mut self, lobe: &ViewedLobe<'_>, total: ExprId, u: ExprId, results: &Results) {
         let [sample, eval, pdf, _] = lobe.methods;
         self.at_lobe(lobe.path.lobe);
         let mut args = lobe.path.lobe.args.clone();
@@ -160,7 +160,7 @@ impl View<'_> {
     }
 
     /// Do the lobe's frame and the geometry agree on reflection or transmission?
-    fn valid(&mut self, lobe: &Ready<'_>, local: ExprId, wi: ExprId) -> ExprId {
+    fn valid(&mut self, lobe: &ViewedLobe<'_>, local: ExprId, wi: ExprId) -> ExprId {
         let (wo, geometric) = (self.wo(), self.point("geometric_normal"));
         self.call(
             self.core.transport_valid,
@@ -172,7 +172,7 @@ impl View<'_> {
 
     /// Value and density of the lobes that have one, for the sampled direction and the light's.
     /// One loop over both keeps the code of the lobes once.
-    fn directions(&mut self, ready: &[Ready<'_>], total: ExprId, results: &Results) {
+    fn directions(&mut self, lobes: &[ViewedLobe<'_>], total: ExprId, results: &Results) {
         let turn = self.b.local("turn", Type::Int);
         let (low, high) = (
             self.b.constant(Const::Int(0), self.span),
@@ -184,7 +184,7 @@ impl View<'_> {
         let (sampled, light) = (self.b.load(results.wi, self.span), self.param(WL));
         let direction = self.op(Op::Select, &[first, sampled, light]);
         self.b.name(direction, "direction");
-        let (value, density) = self.direction(ready, direction, total);
+        let (value, density) = self.direction(lobes, direction, total);
         self.b.open();
         self.store_sampled(value, density, results);
         let then = self.b.close();
@@ -214,7 +214,12 @@ impl View<'_> {
     }
 
     /// Sums of weighted values and of densities over the lobes, for one world direction.
-    fn direction(&mut self, ready: &[Ready<'_>], wi: ExprId, total: ExprId) -> (ExprId, ExprId) {
+    fn direction(
+        &mut self,
+        lobes: &[ViewedLobe<'_>],
+        wi: ExprId,
+        total: ExprId,
+    ) -> (ExprId, ExprId) {
         let value = self.b.local("value", Type::Vec3);
         let density = self.b.local("density", Type::Float);
         let (black, zero) = (
@@ -223,7 +228,7 @@ impl View<'_> {
         );
         self.b.store(value, black);
         self.b.store(density, zero);
-        for lobe in ready.iter().filter(|l| !l.delta) {
+        for lobe in lobes.iter().filter(|l| !l.delta) {
             self.at_lobe(lobe.path.lobe);
             let [_, eval, pdf, _] = lobe.methods;
             let local = self.call(self.core.to_local, &[lobe.frame, wi]);

@@ -24,9 +24,6 @@ pub use evaluate::evaluate;
 pub use opacity::cut_out;
 pub use probe::{Probe, ProbedLobe, probe};
 
-/// Most lobes of a material.
-pub const MAX_LOBES: usize = 64;
-
 /// Functions and structs of `std::core` that lowered code uses.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
@@ -70,6 +67,12 @@ pub fn lobes(material: &Material, root: ClosureId) -> Vec<Path<'_>> {
     let mut found = Vec::new();
     collect(material, root, &mut found);
     found
+}
+
+/// The lobes that a material scatters by.
+pub fn surface_lobes(material: &Material) -> Vec<Path<'_>> {
+    let root = material.surface;
+    root.map_or(Vec::new(), |root| lobes(material, root))
 }
 
 /// How many lobes [`lobes`] would find without leaving any out. A closure that is used twice

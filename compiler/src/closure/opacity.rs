@@ -1,8 +1,8 @@
 //! Opacity: what a material does not cover, light passes as if there were no surface.
 
 use crate::ir::build::Builder;
+use crate::ir::ops::Op;
 use crate::ir::{Closure, ClosureDefId, ClosureId, Const, Expr, ExprId, Lobe, Material};
-use crate::ops::Op;
 
 /// Puts a material's opacity into its closures: `mix(transparent(), surface, opacity)`, and emission
 /// weighted by it.

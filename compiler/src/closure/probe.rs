@@ -4,10 +4,10 @@
 
 use super::view::View;
 use super::{Core, Path, lobes};
+use crate::ir::ops::Op;
 use crate::ir::{
     Expr, ExprId, ExprKind, Function, Local, Material, Module, Stmt, Struct, StructId,
 };
-use crate::ops::Op;
 
 /// The function, and what the fields of its result are.
 #[derive(Clone, Debug)]

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 
 use super::{Core, Path, children};
 use crate::ir::build::Builder;
+use crate::ir::ops::Op;
 use crate::ir::{
     Closure, ClosureId, Const, ExprId, ExprKind, Function, FunctionId, Lobe, Local, Material,
     Methods, Module, Type,
 };
-use crate::ops::Op;
 use crate::source::Span;
 
 /// Least albedo by which a lobe is chosen, so that none that contributes is never sampled.
@@ -23,7 +23,7 @@ const WO: usize = 1;
 type FrameKey = (Option<ExprId>, Option<ExprId>);
 
 /// A lobe as `wo` sees it.
-pub(super) struct Ready<'a> {
+pub(super) struct ViewedLobe<'a> {
     pub path: &'a Path<'a>,
     pub delta: bool,
     /// Sample, eval, pdf and albedo.
@@ -101,12 +101,16 @@ impl<'m> View<'m> {
     }
 
     /// The lobes under a node, of which `paths` are those that contribute, and what the node does.
-    pub fn lobes<'a>(&mut self, root: ClosureId, paths: &'a [Path<'a>]) -> (Vec<Ready<'a>>, Seen) {
-        let mut ready: Vec<Ready<'a>> = paths.iter().filter_map(|p| self.lobe(p)).collect();
+    pub fn lobes<'a>(
+        &mut self,
+        root: ClosureId,
+        paths: &'a [Path<'a>],
+    ) -> (Vec<ViewedLobe<'a>>, Seen) {
+        let mut lobes: Vec<ViewedLobe<'a>> = paths.iter().filter_map(|p| self.lobe(p)).collect();
         self.at_material();
         let white = self.color(1.0);
-        let seen = self.weights(root, white, &mut ready);
-        for lobe in &mut ready {
+        let seen = self.weights(root, white, &mut lobes);
+        for lobe in &mut lobes {
             let least = self.float(LEAST_ALBEDO);
             let floor = self.op(Op::Max, &[lobe.albedo, least]);
             let product = self.op(Op::Mul, &[lobe.weight, floor]);
@@ -115,11 +119,11 @@ impl<'m> View<'m> {
             self.b.name(lobe.weight, &format!("{name}_weight"));
             self.b.name(lobe.share, &format!("{name}_share"));
         }
-        (ready, seen)
+        (lobes, seen)
     }
 
     /// A lobe with its frame and albedo; its weight is not known yet.
-    fn lobe<'a>(&mut self, path: &'a Path<'a>) -> Option<Ready<'a>> {
+    fn lobe<'a>(&mut self, path: &'a Path<'a>) -> Option<ViewedLobe<'a>> {
         let module = self.module;
         let def = &module.closures[path.lobe.def.index()];
         let Methods::Bsdf {
@@ -139,7 +143,7 @@ impl<'m> View<'m> {
         let value = self.share_of_light(albedo, &args);
         self.b.name(value, &format!("{}_albedo", def.name));
         let passed = passes.map(|passes| self.share_of_light(passes, &args));
-        Some(Ready {
+        Some(ViewedLobe {
             path,
             delta: def.delta,
             methods: [sample, eval, pdf, albedo],
@@ -196,11 +200,11 @@ impl<'m> View<'m> {
     }
 
     /// Hands weights down the tree; tells what the node does.
-    fn weights(&mut self, id: ClosureId, weight: ExprId, ready: &mut [Ready<'_>]) -> Seen {
+    fn weights(&mut self, id: ClosureId, weight: ExprId, lobes: &mut [ViewedLobe<'_>]) -> Seen {
         let kept = children(self.m, id);
         let black = Seen::all_else(self.color(0.0));
         match self.m.closures[id.index()].clone() {
-            Closure::Lobe(_) => match ready.iter_mut().find(|l| l.path.id == id) {
+            Closure::Lobe(_) => match lobes.iter_mut().find(|l| l.path.id == id) {
                 Some(lobe) => {
                     lobe.weight = weight;
                     Seen {
@@ -213,17 +217,17 @@ impl<'m> View<'m> {
             _ if kept.is_empty() => black,
             Closure::Weight(w, a) => {
                 let inner = self.op(Op::Mul, &[weight, w]);
-                let a = self.weights(a, inner, ready);
+                let a = self.weights(a, inner, lobes);
                 Seen {
                     albedo: self.op(Op::Mul, &[a.albedo, w]),
                     passed: a.passed.map(|passed| self.weighted_passage(passed, w)),
                 }
             }
             Closure::Layer(a, b) => {
-                let top = self.weights(a, weight, ready);
+                let top = self.weights(a, weight, lobes);
                 let passed = self.passed(top);
                 let under = self.op(Op::Mul, &[weight, passed]);
-                let base = self.weights(b, under, ready);
+                let base = self.weights(b, under, lobes);
                 let lit = self.op(Op::Mul, &[passed, base.albedo]);
                 let through = self.both_passed(top, base);
                 Seen {
@@ -233,8 +237,8 @@ impl<'m> View<'m> {
             }
             Closure::Add(a, b) => {
                 let (a, b) = (
-                    self.weights(a, weight, ready),
-                    self.weights(b, weight, ready),
+                    self.weights(a, weight, lobes),
+                    self.weights(b, weight, lobes),
                 );
                 let sum = self.op(Op::Add, &[a.albedo, b.albedo]);
                 let one = self.float(1.0);
@@ -245,13 +249,13 @@ impl<'m> View<'m> {
                 }
             }
             Closure::Mix(_, _, _) | Closure::Select(..) if kept.len() == 1 => {
-                self.weights(kept[0], weight, ready)
+                self.weights(kept[0], weight, lobes)
             }
-            Closure::Mix(a, b, t) => self.blend(a, b, t, weight, ready),
+            Closure::Mix(a, b, t) => self.blend(a, b, t, weight, lobes),
             Closure::Select(c, a, b) => {
                 let (one, zero) = (self.float(1.0), self.float(0.0));
                 let t = self.op(Op::Select, &[c, zero, one]);
-                self.blend(a, b, t, weight, ready)
+                self.blend(a, b, t, weight, lobes)
             }
         }
     }
@@ -262,7 +266,7 @@ impl<'m> View<'m> {
         b: ClosureId,
         t: ExprId,
         weight: ExprId,
-        ready: &mut [Ready<'_>],
+        lobes: &mut [ViewedLobe<'_>],
     ) -> Seen {
         let one = self.float(1.0);
         let rest = self.op(Op::Sub, &[one, t]);
@@ -270,7 +274,7 @@ impl<'m> View<'m> {
             self.op(Op::Mul, &[weight, rest]),
             self.op(Op::Mul, &[weight, t]),
         );
-        let (a, b) = (self.weights(a, wa, ready), self.weights(b, wb, ready));
+        let (a, b) = (self.weights(a, wa, lobes), self.weights(b, wb, lobes));
         let through = self.both_passed(a, b);
         Seen {
             albedo: self.op(Op::Mix, &[a.albedo, b.albedo, t]),

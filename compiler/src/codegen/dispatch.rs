@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{emission_name, evaluate_name};
-use crate::Program;
 use crate::abi::{EMISSION, EVALUATE, INSTANCES, MATERIAL_OF};
+use crate::program::Program;
 
 /// The functions that the kernels call.
 pub fn dispatch(program: &Program, members: &[usize], out: &mut String) {

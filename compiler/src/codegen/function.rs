@@ -8,14 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use super::helpers::Helpers;
-use super::names::unique;
 use super::walk::{counters, stored, table_values};
 use super::{inliner, type_name};
-use crate::Program;
 use crate::abi::{self, PARAMETERS, TextureSpace};
+use crate::ir::ops::{Op, Shape, Wgsl};
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
-use crate::ops::{Op, Shape, Wgsl};
-use crate::parameters::{Layout, Place};
+use crate::parameters::{Place, TableLayout};
+use crate::program::{Program, identifier, unique};
 use crate::source::Span;
 
 /// Prints a function under a name. One that reads the parameter table gets the first row of its instance
@@ -24,7 +23,7 @@ pub fn print(
     program: &Program,
     f: &Function,
     name: &str,
-    layout: Option<&Layout>,
+    layout: Option<&TableLayout>,
     helpers: &mut Helpers,
     out: &mut String,
 ) {
@@ -97,7 +96,7 @@ impl Printer<'_> {
         &mut self,
         name: &str,
         counters: &BTreeSet<LocalId>,
-        table: Option<(&str, &Layout)>,
+        table: Option<(&str, &TableLayout)>,
     ) {
         let ty = |t| type_name(self.program, t);
         let own = self.params.iter().zip(&self.f.params);
@@ -130,7 +129,7 @@ impl Printer<'_> {
     }
 
     /// Reads what the function uses of the parameter table.
-    fn table(&mut self, row: &str, layout: &Layout) {
+    fn table(&mut self, row: &str, layout: &TableLayout) {
         let mut read: BTreeMap<u32, String> = BTreeMap::new();
         for id in table_values(self.f) {
             let e = self.f.expr(id);
@@ -319,9 +318,10 @@ impl Printer<'_> {
         let f = self.f;
         let expr = f.expr(id);
         match &expr.kind {
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => {
-                self.operand(id).into_owned()
-            }
+            ExprKind::Const(_)
+            | ExprKind::Param(_)
+            | ExprKind::MaterialParam(_)
+            | ExprKind::TableValue(_) => self.operand(id).into_owned(),
             ExprKind::Load(local) => self.locals[local.index()].clone(),
             ExprKind::Op(op, args) => self.op(*op, args, expr.ty),
             ExprKind::Compose(args) => {
@@ -342,7 +342,7 @@ impl Printer<'_> {
             ExprKind::Field(v, i) => match f.ty(*v) {
                 Type::Struct(s) => {
                     let name = &self.program.module.structs[s.index()].fields[*i as usize].0;
-                    format!("{}.{}", self.tight(*v), super::names::identifier(name))
+                    format!("{}.{}", self.tight(*v), identifier(name))
                 }
                 _ => self.operand(*v).into_owned(),
             },

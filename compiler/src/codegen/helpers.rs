@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::type_name;
-use crate::Program;
 use crate::abi::TextureSpace;
 use crate::ir::Type;
-use crate::ops::{Op, Wgsl};
+use crate::ir::ops::{Op, Wgsl};
+use crate::program::Program;
 
 /// The helpers that a module uses.
 #[derive(Default)]

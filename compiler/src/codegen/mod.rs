@@ -6,27 +6,47 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use crate::Program;
 use crate::ir::{ExprKind, Function, StructId, Type};
-use crate::parameters::Layout;
-use crate::stages::{Progress, Stage};
+use crate::parameters::TableLayout;
+use crate::program::{Program, identifier};
 
 mod dispatch;
 mod function;
 mod helpers;
 mod inliner;
 mod lookups;
-mod names;
 mod target;
+mod validate;
 mod walk;
 
 pub use dispatch::lookup;
 use helpers::Helpers;
 pub(crate) use inliner::decide as inlined;
 pub use lookups::lookups;
-pub use names::{Names, identifier, unique as unique_material_name};
 pub use target::{Target, complete, enables};
+pub use validate::validate;
+pub(crate) use validate::{nested_too_deep, validate_with_progress};
 pub(crate) use walk::table_values;
+
+impl Program {
+    /// The WGSL of some materials: structs, the functions they reach, one function a material,
+    /// `evaluate_material`, and `material_emission` if some emission varies.
+    pub fn wgsl(&self, members: &[usize]) -> String {
+        module(self, members)
+    }
+
+    /// The WGSL of `material_of`, which kernels need to sort instances by material.
+    pub fn lookup_wgsl(&self) -> String {
+        lookup(self)
+    }
+
+    /// The WGSL of all materials as a module of its own, with declarations of all that a kernel
+    /// would provide.
+    pub fn complete_wgsl(&self, target: Target) -> String {
+        let all: Vec<usize> = (0..self.materials.len()).collect();
+        complete(self, &all, target)
+    }
+}
 
 /// The WGSL of `members` (indices of the program's materials).
 pub fn module(program: &Program, members: &[usize]) -> String {
@@ -83,7 +103,7 @@ struct Root<'p> {
     function: &'p Function,
     name: String,
     /// Where the values that it reads of the parameter table lie.
-    layout: &'p Layout,
+    layout: &'p TableLayout,
 }
 
 /// The materials' own functions with their WGSL names.
@@ -186,27 +206,6 @@ fn use_struct(program: &Program, ty: Type, used: &mut BTreeSet<StructId>) {
             use_struct(program, *field, used);
         }
     }
-}
-
-/// Checks a module's text with naga, as every kernel that includes it will be checked.
-///
-/// # Errors
-/// What naga says, with the place in the text.
-pub fn validate(wgsl: &str) -> Result<(), String> {
-    validate_telling(wgsl, &mut Progress::silent())
-}
-
-/// [`validate`], telling which stage it is at.
-pub(crate) fn validate_telling(wgsl: &str, progress: &mut Progress<'_>) -> Result<(), String> {
-    progress.enter(Stage::ReadBack);
-    let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| e.emit_to_string(wgsl))?;
-    progress.enter(Stage::Validate);
-    let flags = naga::valid::ValidationFlags::all();
-    let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty());
-    validator
-        .validate(&module)
-        .map(|_| ())
-        .map_err(|e| e.emit_to_string(wgsl))
 }
 
 /// The fields of `SurfacePoint` that a material's functions read.

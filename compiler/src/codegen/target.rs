@@ -7,8 +7,8 @@
 use std::fmt::Write;
 
 use super::{lookups, module};
-use crate::Program;
 use crate::abi::{TEXTURE_FETCH, TEXTURE_FETCH_AS, TEXTURE_FETCH_WIDE, TextureSpace};
+use crate::program::Program;
 
 /// What a module is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

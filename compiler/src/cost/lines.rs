@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Classes, LANES, Measured};
 use crate::ir::interp::{Origin, Part};
+use crate::ir::ops::Counts;
 use crate::ir::{Function, SiteId};
-use crate::ops::Counts;
 use crate::source::{FileId, Span};
 
 /// What a line of the source costs.

@@ -7,9 +7,9 @@ use super::{Classes, Cost, FUEL, Operations, live};
 use crate::codegen;
 use crate::inspect::{self, At};
 use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::ops::Counts;
 use crate::ir::value::Value;
 use crate::ir::{ExprKind, Function, Module, Type};
-use crate::ops::Counts;
 use crate::program::{CompiledMaterial, Program};
 
 /// Bytes of a row of the parameter table.

@@ -6,7 +6,7 @@
 //! An *operation* is what one thread of a GPU does to one number: adding two vectors of three is
 //! three operations, a dot product six, a hash eight. Reading and choosing components, copies, calls
 //! and jumps are none; a turn of a loop is one. The op table says how many operations an op is
-//! and of which class ([`crate::ops::CostClass`]). What is counted is the optimised IR from which
+//! and of which class ([`crate::ir::ops::CostClass`]). What is counted is the optimised IR from which
 //! WGSL is printed; the driver's machine code has more instructions where one operation takes
 //! several (a division, a sine, a guard) and fewer where it fuses two.
 
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::inspect::{self, At};
 use crate::ir::interp::{Interpreter, OutOfFuel};
-use crate::ops::Counts;
+use crate::ir::ops::Counts;
 use crate::program::Program;
 
 mod inputs;

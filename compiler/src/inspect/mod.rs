@@ -7,13 +7,13 @@
 use serde::Serialize;
 
 use crate::diag::{self, Code, Diagnostic};
+use crate::driver::{MaterialRequest, Parameters, check, compile};
 use crate::ir::Module;
-use crate::ops::Counts;
+use crate::ir::ops::Counts;
+use crate::loader::{Loader, MemoryLoader, library_text};
 use crate::passes;
 use crate::source::{FileId, SourceMap};
-use crate::{
-    Loader, MaterialRequest, MemoryLoader, Parameters, check, compile, lexer, library_text, parser,
-};
+use crate::{lexer, parser};
 
 mod at;
 mod difference;

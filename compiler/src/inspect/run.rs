@@ -1,15 +1,17 @@
 //! Runs the functions of what is evaluated and puts names to their numbers.
 
 use super::{At, FUEL, Lobe, Named, Precision, Results, Sampled, Shown, Surface, Toward, items};
+use crate::build::ProgramBuilder;
 use crate::closure::{self, Probe};
+use crate::driver::MaterialRequest;
 use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::ops::Counts;
 use crate::ir::value::{Real, Value};
 use crate::ir::{Const, Function, Material, Module, Struct, Type};
-use crate::ops::Counts;
+use crate::loader::Loader;
 use crate::passes;
-use crate::program::{Program, ProgramBuilder};
+use crate::program::Program;
 use crate::sema::Checker;
-use crate::{Loader, MaterialRequest};
 
 /// A material that can be looked into.
 pub(super) struct Probed {
@@ -35,8 +37,7 @@ pub(super) fn probed(request: &MaterialRequest, loader: &mut dyn Loader) -> Opti
         material.opacity = opacity;
     }
     let given: Vec<Option<Const>> = values.iter().cloned().map(Some).collect();
-    passes::bake(&mut material.body, &given);
-    passes::fold_body(&checker.ir, &mut material.body);
+    passes::run_material_until(&checker.ir, &mut material, &given, "fold_body").ok()?;
     Some(Probed {
         parameters: parameters(&checker.ir, &material, &values),
         probe: closure::probe(&checker.ir, &core, &material),

@@ -8,7 +8,7 @@ use super::{
     Block, CallSite, Const, Expr, ExprId, ExprKind, Function, FunctionId, Local, LocalId, Module,
     SiteId, Stmt, StructId, Type,
 };
-use crate::ops::{self, Op};
+use crate::ir::ops::{self, Op};
 use crate::source::Span;
 
 /// A function under construction.

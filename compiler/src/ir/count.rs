@@ -2,7 +2,7 @@
 //! of code that is not run.
 
 use super::{ExprId, ExprKind, Function, Struct, Type};
-use crate::ops::{Counts, Op};
+use crate::ir::ops::{Counts, Op};
 
 impl Type {
     /// How many numbers of 32 bits a value is made of; a bool is one.

@@ -14,7 +14,7 @@ use self::lower::Outside;
 pub use self::profile::{Origin, Part};
 use super::value::{Real, Value};
 use super::{Const, ExprId, Function, FunctionId, Module};
-use crate::ops::{Counts, Op, Operands};
+use crate::ir::ops::{Counts, Op, Operands};
 
 /// What is asked of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,14 +9,16 @@
 //! A [`Material`] is a function that computes patterns, plus a tree of [`Closure`]s over its
 //! expressions; [`crate::closure`] turns it into ordinary functions.
 
-use crate::ops::Op;
+use self::ops::Op;
 use crate::source::Span;
 
 pub mod build;
 mod count;
 pub mod interp;
+pub mod ops;
 pub mod parse;
 pub mod print;
+pub mod surface;
 pub mod value;
 pub mod verify;
 pub mod walk;
@@ -450,6 +452,9 @@ impl Interior {
         parts.map(|((name, ty), id)| (name, ty, id))
     }
 }
+
+/// Most lobes of a material.
+pub const MAX_LOBES: usize = 64;
 
 /// A checked material, before its closures are lowered.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use super::common::{
 };
 use super::error::{Expected, SyntaxError, Want};
 use super::literal::literal;
-use super::stmt::{self, Wanted};
+use super::stmt::{self, RequiredBlock};
 use crate::ast::{Arg, BinaryOp, Block, Expr, ExprKind, IfExpr, Name, UnaryOp};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
@@ -57,10 +57,10 @@ pub(super) fn if_expression<'t>(
         .repeated()
         .collect::<Vec<_>>();
     let last = just(Token::Else)
-        .ignore_then(stmt::wanted_block(text, block))
-        .map_with(|wanted, e| match wanted {
-            Wanted::Block(block) => block,
-            Wanted::Late(block, error) | Wanted::Missing(block, error) => {
+        .ignore_then(stmt::required_block(text, block))
+        .map_with(|required, e| match required {
+            RequiredBlock::Block(block) => block,
+            RequiredBlock::Late(block, error) | RequiredBlock::Missing(block, error) => {
                 e.emit(error);
                 block
             }
@@ -88,12 +88,12 @@ pub(super) fn headed<'t, H: 't>(
     block: Rule<'t, Block>,
 ) -> Rule<'t, (H, Block)> {
     header
-        .then(stmt::wanted_block(text, block))
-        .map_with(move |(mut head, wanted), e| {
-            let (block, error) = match wanted {
-                Wanted::Block(block) => return (head, block),
-                Wanted::Late(block, error) => (block, error),
-                Wanted::Missing(empty, error) => match take_block(last(&mut head)) {
+        .then(stmt::required_block(text, block))
+        .map_with(move |(mut head, required), e| {
+            let (block, error) = match required {
+                RequiredBlock::Block(block) => return (head, block),
+                RequiredBlock::Late(block, error) => (block, error),
+                RequiredBlock::Missing(empty, error) => match take_block(last(&mut head)) {
                     Some(block) => {
                         let brace = Span {
                             end: block.span.start + 1,

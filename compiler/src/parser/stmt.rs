@@ -40,7 +40,7 @@ pub(super) fn block<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, B
 
 /// A block where one has to be.
 #[derive(Clone)]
-pub(super) enum Wanted {
+pub(super) enum RequiredBlock {
     /// It is there.
     Block(Block),
     /// It is there behind what does not belong.
@@ -50,18 +50,18 @@ pub(super) enum Wanted {
 }
 
 /// A block where one has to be. Never fails.
-pub(super) fn wanted_block<'t>(text: &'t str, block: Rule<'t, Block>) -> Rule<'t, Wanted> {
+pub(super) fn required_block<'t>(text: &'t str, block: Rule<'t, Block>) -> Rule<'t, RequiredBlock> {
     custom(move |inp: &mut Input<'t, '_>| {
         let start = inp.save();
         let error = match inp.parse(&block) {
-            Ok(block) => return Ok(Wanted::Block(block)),
+            Ok(block) => return Ok(RequiredBlock::Block(block)),
             Err(error) => error,
         };
         inp.rewind(start.clone());
         let span = inp.span_since(start.cursor());
         while let Some(token) = inp.peek() {
             if token == Token::LeftBrace {
-                return Ok(Wanted::Late(inp.parse(&block)?, error));
+                return Ok(RequiredBlock::Late(inp.parse(&block)?, error));
             }
             if token == Token::Else || ends_statement(text, token, inp) {
                 break;
@@ -74,7 +74,7 @@ pub(super) fn wanted_block<'t>(text: &'t str, block: Rule<'t, Block>) -> Rule<'t
             value: None,
             span,
         };
-        Ok(Wanted::Missing(empty, error))
+        Ok(RequiredBlock::Missing(empty, error))
     })
     .boxed()
 }

@@ -1,14 +1,20 @@
 //! Puts the values of a material's parameters into its body.
 
-use crate::ir::{Const, ExprKind, Function};
+use crate::diag::Diagnostic;
+use crate::ir::{Const, ExprKind, Material, Module};
 
-/// Replaces every parameter that has a value by it.
-pub fn bake(body: &mut Function, values: &[Option<Const>]) {
-    for expr in &mut body.exprs {
+/// Replaces every parameter whose value is known for good by it.
+pub fn bake(
+    _: &Module,
+    material: &mut Material,
+    values: &[Option<Const>],
+) -> Result<bool, Diagnostic> {
+    for expr in &mut material.body.exprs {
         if let ExprKind::MaterialParam(i) = expr.kind
             && let Some(Some(value)) = values.get(i as usize)
         {
             expr.kind = ExprKind::Const(value.clone());
         }
     }
+    Ok(true)
 }

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::rewrite::Rules;
+use crate::ir::ops::Op;
 use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, Stmt, Type};
-use crate::ops::Op;
 
 /// Removes common subexpressions.
 pub(super) fn cse(_: &Module, _: &Function) -> Rules {

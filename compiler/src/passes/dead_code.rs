@@ -6,6 +6,12 @@
 use super::rewrite::operands_mut;
 use crate::ir::{Block, CallSite, Expr, ExprId, ExprKind, Function, Local, LocalId, SiteId, Stmt};
 
+/// The pass.
+pub fn dead_code(f: &mut Function) -> bool {
+    remove(f);
+    true
+}
+
 /// Removes dead code in place.
 pub fn remove(f: &mut Function) {
     let mut live = Live {

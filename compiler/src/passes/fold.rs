@@ -7,12 +7,13 @@
 //! Calls whose arguments are all constant are run by the interpreter, for a bounded number of
 //! steps; loops of no or one turn and branches on constants are resolved by the shared walk.
 
-use super::rewrite::{New, Rewriter, Rules};
+use super::rewrite::{self, New, Rewriter, Rules};
+use crate::diag::Diagnostic;
 use crate::ir::build::{fold_compose, fold_op, in_range};
 use crate::ir::interp::Interpreter;
+use crate::ir::ops::Op;
 use crate::ir::value::Value;
-use crate::ir::{Const, ExprId, ExprKind, Function, FunctionId, Module, Type};
-use crate::ops::Op;
+use crate::ir::{Const, ExprId, ExprKind, Function, FunctionId, Material, Module, Type};
 use crate::source::Span;
 
 /// Most expressions that are evaluated to make a call with constant arguments a constant.
@@ -21,6 +22,22 @@ const CALL_FUEL: u64 = 4096;
 /// Folds a function in place.
 pub(super) fn fold(_: &Module, _: &Function) -> Rules {
     Rules::default()
+}
+
+/// Makes constants of what is constant in a material's body. Dead code stays, and every
+/// expression keeps its number, since closures refer to them.
+pub fn fold_body(
+    module: &Module,
+    material: &mut Material,
+    _: &[Option<Const>],
+) -> Result<bool, Diagnostic> {
+    let rules = Rules {
+        simplify: true,
+        keep: true,
+        ..Rules::default()
+    };
+    rewrite::run(module, &mut material.body, rules);
+    Ok(true)
 }
 
 /// The constant that an expression always is.

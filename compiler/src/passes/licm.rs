@@ -11,9 +11,10 @@ use super::rewrite::stored_in;
 use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 
 /// Moves invariant work out of loops in place.
-pub fn hoist(f: &mut Function) {
+pub fn licm(f: &mut Function) -> bool {
     let body = std::mem::take(&mut f.body);
     f.body = block(f, body);
+    true
 }
 
 /// Rewrites a block; inner loops first, so that their invariants can go on moving out.

@@ -1,10 +1,20 @@
-//! Passes over functions: each makes a function simpler and keeps its meaning.
+//! Passes: what takes a material from checked IR to what code generation reads.
 //!
-//! A pass is one file and one row of [`PIPELINE`]. In debug builds the verifier runs after each.
-//! The pipeline is repeated until it changes nothing, so what one pass makes possible for an
-//! earlier one is not lost, and running it again gives the same text.
+//! A pass is one file and one row of [`PIPELINE`], which is the whole order: first passes over the
+//! checked material, then the step from its closures to functions, then passes over these, and at
+//! last what the host computes instead of the kernel. Passes over functions that follow each other
+//! are repeated until they change nothing, so what one makes possible for an earlier one is not
+//! lost, and running them again gives the same text. In debug builds the verifier runs after each.
+//!
+//! [`apply`] runs rows on a material; whoever walks the table sees to it that the functions that a
+//! row looks into ([`Pass::callees`]) have been through [`run_callee`].
 
-use crate::ir::{self, Function, Module};
+use std::collections::BTreeSet;
+
+use crate::closure::Core;
+use crate::diag::Diagnostic;
+use crate::ir::{self, Closure, ClosureDefId, Const, FunctionId, Module};
+use crate::stages::Stage;
 
 mod bake;
 mod cse;
@@ -14,207 +24,162 @@ mod hoist;
 mod inline;
 mod join;
 mod licm;
+mod lowering;
 mod prune;
 mod rewrite;
+mod run;
 mod simplify;
 mod widths;
 
+use Callees::{Albedos, Body, Methods, Nothing};
+use Work::{Function, Lowering, Material, MaterialAgain, Split, Walk, WalkAgain};
 use rewrite::Rules;
 
-pub use bake::bake;
 pub use dead_code::remove as drop_dead_code;
-pub use hoist::{HOIST_FUEL, Hoisted, hoist};
-pub use prune::{prune, prune_weights};
-pub use widths::{Widths, widths};
+pub use hoist::{HOIST_FUEL, Hoisted};
+pub use run::{MaterialState, apply, library, run, run_callee, run_material_until, run_until};
 
-/// A pass with its name. It must not change what a function computes.
+/// The passes in the order they run, over every material and every function that reaches code
+/// generation.
+pub const PIPELINE: &[Pass] = &[
+    row("bake", Material(Nothing, bake::bake)),
+    row("fold_body", Material(Body, fold::fold_body)),
+    row("widths", Material(Body, widths::widths)),
+    row("fold_body", MaterialAgain(Body, fold::fold_body)),
+    // First what weights decide, so that the methods of lobes without weight stay untouched.
+    row("prune_weights", Material(Nothing, prune::prune_weights)),
+    row("prune", Material(Albedos, prune::prune)),
+    row("lowering", Lowering(Methods, lowering::lowering)),
+    row("inline", Walk(inline::inline)),
+    row("fold", Walk(fold::fold)),
+    row("simplify", Walk(simplify::simplify)),
+    row("cse", Walk(cse::cse)),
+    row("join", Function(join::join)),
+    // What joined branches have in common, without another round of all.
+    row("cse", WalkAgain(cse::cse)),
+    row("licm", Function(licm::licm)),
+    row("dead_code", Function(dead_code::dead_code)),
+    row("hoist", Split(hoist::hoist)),
+];
+
+/// A pass with its name. It must not change what is computed.
 pub struct Pass {
     /// Its name in messages.
     pub name: &'static str,
-    how: How,
+    work: Work,
 }
 
-/// How a pass goes over a function.
-enum How {
-    /// As the walk of `rewrite`, in evaluation order, with these rules. Walks that follow each other
-    /// are done as one.
-    Walk(fn(&Module, &Function) -> Rules),
-    /// As a walk, if the pass before, which the same rules came before, changed something.
-    Again(fn(&Module, &Function) -> Rules),
-    /// In its own way; false if nothing changed.
-    Own(fn(&mut Function) -> bool),
+const fn row(name: &'static str, work: Work) -> Pass {
+    Pass { name, work }
+}
+
+/// What a pass works on, with its function.
+enum Work {
+    /// A checked material.
+    Material(Callees, OnMaterial),
+    /// A checked material, if the pass before changed something.
+    MaterialAgain(Callees, OnMaterial),
+    /// A checked material, of which it makes functions.
+    Lowering(Callees, Lower),
+    /// A function, as the walk of `rewrite`, in evaluation order, with these rules. Walks that
+    /// follow each other are done as one.
+    Walk(fn(&Module, &ir::Function) -> Rules),
+    /// A walk, if the pass before, which the same rules came before, changed something.
+    WalkAgain(fn(&Module, &ir::Function) -> Rules),
+    /// A function, in its own way; false if nothing changed.
+    Function(fn(&mut ir::Function) -> bool),
+    /// A function, of which it splits off what the host computes.
+    Split(fn(&Module, &mut ir::Function) -> Hoisted),
+}
+
+/// Rewrites a material, whose parameters have these values where they are known for good; false if
+/// nothing changed.
+type OnMaterial = fn(&Module, &mut ir::Material, &[Option<Const>]) -> Result<bool, Diagnostic>;
+
+/// Makes functions of a material: of what it scatters, and of what it emits if it does.
+type Lower = fn(&Module, &Core, &ir::Material) -> Result<Vec<ir::Function>, Diagnostic>;
+
+/// Which functions that a material calls a pass over it looks into.
+#[derive(Clone, Copy)]
+enum Callees {
+    Nothing,
+    /// Those that its body calls.
+    Body,
+    /// What says how much its closures reflect or emit.
+    Albedos,
+    /// All methods of its closures, and what lowered code uses of the library.
+    Methods,
+}
+
+/// The first row of [`PIPELINE`] called `name`.
+pub fn pass(name: &str) -> Option<&'static Pass> {
+    PIPELINE.iter().find(|p| p.name == name)
+}
+
+/// The rows that are repeated until they change nothing: those over functions.
+pub fn function_passes() -> &'static [Pass] {
+    let found = steps().find(|rows| rows[0].is_repeated());
+    found.unwrap_or_default()
+}
+
+/// The rows in the order they run, those that are repeated together.
+pub fn steps() -> impl Iterator<Item = &'static [Pass]> {
+    PIPELINE.chunk_by(|a, b| a.is_repeated() && b.is_repeated())
 }
 
 impl Pass {
-    /// Runs this pass alone.
-    pub fn run(&self, module: &Module, f: &mut Function) {
-        match self.how {
-            How::Walk(rules) | How::Again(rules) => {
-                let rules = rules(module, f);
-                rewrite::run(module, f, rules);
+    /// Is it one of the passes over functions that are repeated until nothing changes?
+    pub fn is_repeated(&self) -> bool {
+        matches!(self.work, Walk(_) | WalkAgain(_) | Function(_))
+    }
+
+    /// Does it work on a checked material, and leave one?
+    pub fn is_on_material(&self) -> bool {
+        matches!(self.work, Material(..) | MaterialAgain(..))
+    }
+
+    /// The stage of a compilation that it belongs to.
+    pub fn stage(&self) -> Stage {
+        match self.work {
+            Material(..) | MaterialAgain(..) | Lowering(..) => Stage::Lower,
+            Walk(_) | WalkAgain(_) | Function(_) | Split(_) => Stage::Passes,
+        }
+    }
+
+    /// The functions that it looks into when it works on a material. They are to be optimised
+    /// before. What functions call has been since they were lowered.
+    pub fn callees(&self, module: &Module, core: &Core, m: &ir::Material) -> Vec<FunctionId> {
+        let (Material(callees, _) | MaterialAgain(callees, _) | Lowering(callees, _)) = self.work
+        else {
+            return Vec::new();
+        };
+        match callees {
+            Nothing => Vec::new(),
+            Body => m.body.calls().collect(),
+            Albedos => methods(module, m, |all| match *all {
+                ir::Methods::Bsdf { albedo, .. } => vec![albedo],
+                ir::Methods::Edf { emit } => vec![emit],
+            }),
+            Methods => {
+                let mut all = methods(module, m, ir::Methods::functions);
+                all.extend(core.functions());
+                all
             }
-            How::Own(change) => drop(change(f)),
         }
     }
 }
 
-/// The passes in the order they run, over every function that reaches code generation.
-pub const PIPELINE: &[Pass] = &[
-    Pass {
-        name: "inline",
-        how: How::Walk(inline::inline),
-    },
-    Pass {
-        name: "fold",
-        how: How::Walk(fold::fold),
-    },
-    Pass {
-        name: "simplify",
-        how: How::Walk(simplify::simplify),
-    },
-    Pass {
-        name: "cse",
-        how: How::Walk(cse::cse),
-    },
-    Pass {
-        name: "join",
-        how: How::Own(join::join),
-    },
-    // What joined branches have in common, without another round of all.
-    Pass {
-        name: "cse",
-        how: How::Again(cse::cse),
-    },
-    Pass {
-        name: "licm",
-        how: How::Own(|f| {
-            licm::hoist(f);
-            true
-        }),
-    },
-    Pass {
-        name: "dead_code",
-        how: How::Own(|f| {
-            dead_code::remove(f);
-            true
-        }),
-    },
-];
-
-/// Most times that the pipeline is run over a function.
-const MAX_ROUNDS: usize = 6;
-
-/// Runs all passes on a function until they change nothing. Gives how many statements they
-/// walked: what that took.
-///
-/// The fewer expressions its callees have, the faster: run [`library`] on the module before.
-///
-/// # Panics
-/// In debug builds, if a pass breaks the function: a defect of the pass.
-pub fn run(module: &Module, function: &mut Function) -> u64 {
-    repeat(module, function, false)
-}
-
-/// The same for a function that others call: what its arguments may rid it of stays apart, so that
-/// little is left where they do.
-///
-/// # Panics
-/// As [`run`].
-pub fn run_callee(module: &Module, function: &mut Function) -> u64 {
-    repeat(module, function, true)
-}
-
-fn repeat(module: &Module, function: &mut Function, callee: bool) -> u64 {
-    verify(module, function, "lowering");
-    let mut walked = 0;
-    let mut before = cse::fingerprint(function);
-    for _ in 0..MAX_ROUNDS {
-        walked += round(module, function, callee);
-        let after = cse::fingerprint(function);
-        // Were two functions with one fingerprint, the second would only be left as it is.
-        if before == after {
-            break;
-        }
-        before = after;
-    }
-    walked
-}
-
-/// Runs the pipeline once; passes that are walks and follow each other in one walk. Gives the
-/// statements that were walked.
-fn round(module: &Module, f: &mut Function, callee: bool) -> u64 {
-    let mut walked = 0;
-    let mut rest = PIPELINE;
-    let mut changed = true;
-    while let [first, ..] = rest {
-        let walks = rest.iter().map_while(|pass| match pass.how {
-            How::Walk(rules) => Some(rules(module, f)),
-            How::Again(_) | How::Own(_) => None,
-        });
-        let rules: Vec<Rules> = walks.collect();
-        let count = rules.len().max(1);
-        match (rules.into_iter().reduce(Rules::and), &first.how) {
-            (Some(mut rules), _) => {
-                if let Some(policy) = rules.inline.as_mut().filter(|_| callee) {
-                    policy.keep_options(f);
-                }
-                walked += rewrite::run(module, f, rules);
-            }
-            (None, How::Own(change)) => changed = change(f),
-            (None, How::Walk(rules) | How::Again(rules)) if changed => {
-                let rules = rules(module, f);
-                walked += rewrite::run(module, f, rules);
-            }
-            (None, _) => {}
-        }
-        verify(module, f, rest[count - 1].name);
-        rest = &rest[count..];
-    }
-    walked
-}
-
-/// Runs the pipeline once, up to and including the pass `name`. False if there is no such pass.
-///
-/// # Panics
-/// As [`run`].
-pub fn run_until(module: &Module, function: &mut Function, name: &str) -> bool {
-    let Some(last) = PIPELINE.iter().position(|p| p.name == name) else {
-        return false;
-    };
-    for pass in &PIPELINE[..=last] {
-        pass.run(module, function);
-        verify(module, function, pass.name);
-    }
-    true
-}
-
-/// Runs all passes on the functions of a module from `first` on, so that callers inline the result.
-pub fn library(module: &mut Module, first: usize) {
-    for i in first..module.functions.len() {
-        // Callees stand before their callers, so they are done already.
-        let mut f = module.functions[i].clone();
-        run_callee(module, &mut f);
-        module.functions[i] = f;
-    }
-}
-
-/// Makes constants of what is constant in a material's body. Dead code stays, and every
-/// expression keeps its number, since closures refer to them.
-pub fn fold_body(module: &Module, body: &mut Function) {
-    let rules = rewrite::Rules {
-        simplify: true,
-        keep: true,
-        ..rewrite::Rules::default()
-    };
-    rewrite::run(module, body, rules);
-    verify(module, body, "fold");
-}
-
-fn verify(module: &Module, function: &Function, after: &str) {
-    if cfg!(debug_assertions)
-        && let Err(problem) = ir::verify::function(module, function)
-    {
-        let text = ir::print::function(module, function);
-        panic!("after {after}: {problem}\n{text}");
-    }
+/// Methods of the closures that a material's outputs are made of.
+fn methods(
+    module: &Module,
+    material: &ir::Material,
+    wanted: impl Fn(&ir::Methods) -> Vec<FunctionId>,
+) -> Vec<FunctionId> {
+    let lobes = material.closures.iter().filter_map(|c| match c {
+        Closure::Lobe(lobe) => Some(lobe.def),
+        _ => None,
+    });
+    let defs: BTreeSet<ClosureDefId> = lobes.collect();
+    let methods = |id: ClosureDefId| wanted(&module.closures[id.index()].methods);
+    defs.into_iter().flat_map(methods).collect()
 }

@@ -11,24 +11,36 @@
 
 use std::collections::BTreeMap;
 
-use crate::closure::{MAX_LOBES, lobe_count};
+use crate::closure::lobe_count;
+use crate::diag::Diagnostic;
 use crate::ir::build::Builder;
 use crate::ir::interp::Interpreter;
+use crate::ir::ops::Op;
 use crate::ir::value::Value;
 use crate::ir::{
-    Closure, ClosureId, Const, Expr, ExprId, Function, Lobe, Local, Material, Methods, Module, Type,
+    Closure, ClosureId, Const, Expr, ExprId, Function, Lobe, Local, MAX_LOBES, Material, Methods,
+    Module, Type,
 };
-use crate::ops::Op;
 
 /// Rewrites the closures of a material. An output of which nothing is left becomes `None`, and so
 /// does an opacity of 1.
-pub fn prune(module: &Module, material: &mut Material) {
+pub fn prune(
+    module: &Module,
+    material: &mut Material,
+    _: &[Option<Const>],
+) -> Result<bool, Diagnostic> {
     run(module, material, true);
+    Ok(true)
 }
 
 /// As [`prune`], by weights alone: no method of a closure is looked at.
-pub fn prune_weights(module: &Module, material: &mut Material) {
+pub fn prune_weights(
+    module: &Module,
+    material: &mut Material,
+    _: &[Option<Const>],
+) -> Result<bool, Diagnostic> {
     run(module, material, false);
+    Ok(true)
 }
 
 fn run(module: &Module, material: &mut Material, albedos: bool) {

@@ -230,7 +230,7 @@ impl<'c, 'l> Body<'c, 'l> {
 
     /// An int as a float.
     pub fn promote(&mut self, id: ExprId, span: Span) -> ExprId {
-        self.builder.op(crate::ops::Op::ToFloat, &[id], span)
+        self.builder.op(crate::ir::ops::Op::ToFloat, &[id], span)
     }
 
     fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: &str) -> Option<T> {

@@ -2,8 +2,8 @@
 
 use crate::ast::{Arg, ItemKind, Name};
 use crate::diag::{self, Code, Diagnostic};
+use crate::ir::ops::{Op, Shape};
 use crate::ir::{self, ExprId};
-use crate::ops::{Op, Shape};
 use crate::source::Span;
 
 use super::body::{Body, Operand};

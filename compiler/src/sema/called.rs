@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use crate::ast::{Arg, ItemKind, Name};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, ExprKind, MaterialParam};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};

@@ -2,8 +2,8 @@
 
 use crate::ast::{self, Expr, ExprKind, UnaryOp};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::Checked;

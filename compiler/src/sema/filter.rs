@@ -1,12 +1,12 @@
 //! `filter_width(x)`: how far `x` varies over what a ray sees of the surface, by component.
 //!
 //! Only a material knows its surface, so only a material may ask; a function is given widths as
-//! arguments. What is checked here stays one operation of the IR until `passes::widths` puts
+//! arguments. What is checked here stays one operation of the IR until the pass `widths` puts
 //! derivatives in its place.
 
 use crate::ast::{Arg, Name};
 use crate::diag::{Code, Diagnostic};
-use crate::ops::Op;
+use crate::ir::ops::Op;
 use crate::source::Span;
 
 use super::body::{Body, Operand, Place};

@@ -6,8 +6,8 @@
 
 use crate::ast::{Arg, Expr, ExprKind, Name};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId, FunctionId, Stmt};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Body, Operand};

@@ -5,8 +5,8 @@
 
 use crate::ast::{Arg, Name};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Function, Interior, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Body, Operand, Place};

@@ -7,10 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::Loader;
 use crate::ast::{self, ItemKind, TypeName};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
+use crate::loader::Loader;
 use crate::source::{SourceMap, Span};
 use crate::stages::{Progress, Stage};
 
@@ -121,11 +121,11 @@ struct Signature {
 impl<'a> Checker<'a> {
     /// A checker that reads files through `loader`.
     pub fn new(loader: &'a mut dyn Loader) -> Self {
-        Self::telling(loader, Progress::silent())
+        Self::with_progress(loader, Progress::silent())
     }
 
-    /// A checker that reads files through `loader` and tells which stage it is at.
-    pub fn telling(loader: &'a mut dyn Loader, progress: Progress<'a>) -> Self {
+    /// A checker that reads files through `loader` and says which stage it is at.
+    pub fn with_progress(loader: &'a mut dyn Loader, progress: Progress<'a>) -> Self {
         let mut checker = Self {
             sources: SourceMap::default(),
             diagnostics: Vec::new(),

@@ -12,7 +12,7 @@ use super::Checker;
 use super::imports::folders;
 use crate::ast::{self, ItemKind, Name};
 use crate::diag::{Code, Diagnostic};
-use crate::library_text;
+use crate::loader::library_text;
 use crate::parser;
 use crate::source::{FileId, Span};
 use crate::stages::Stage;

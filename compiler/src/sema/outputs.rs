@@ -2,8 +2,8 @@
 
 use crate::ast::{self, Expr, Name};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{ClosureId, Const, ExprId, Interior};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};

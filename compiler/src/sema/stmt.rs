@@ -2,8 +2,8 @@
 
 use crate::ast::{self, BinaryOp, ExprKind, Stmt, StmtKind};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};

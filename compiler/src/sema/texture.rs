@@ -6,8 +6,8 @@
 use crate::abi::{FILTERS, WRAPS, texture_mode};
 use crate::ast::{Arg, Name};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 use super::Param;

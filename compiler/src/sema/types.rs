@@ -1,84 +1,12 @@
-//! The types an author sees, how they convert, and how they combine.
+//! How the types an author sees convert, and how they combine.
 //!
 //! The IR knows only machine types; everything that keeps a color from being added to a
 //! direction, or a length to a number, is decided here.
 
 use crate::ast::BinaryOp;
-use crate::ir::{self, StructId};
-
-/// A type of the language.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum Ty {
-    Bool,
-    Int,
-    Float,
-    Length,
-    Angle,
-    Vec2,
-    Vec3,
-    Vec4,
-    Color,
-    Point,
-    Vector,
-    Normal,
-    Mat3,
-    Texture,
-    Struct(StructId),
-    Bsdf,
-    Edf,
-    Medium,
-    /// What a called material assigns; no name means it.
-    Material,
-    /// The type of what did not check; it fits everywhere, so that one mistake is reported once.
-    Error,
-}
-
-/// The types that can be named, with their names.
-pub const NAMED: [(&str, Ty); 17] = [
-    ("bool", Ty::Bool),
-    ("int", Ty::Int),
-    ("float", Ty::Float),
-    ("length", Ty::Length),
-    ("angle", Ty::Angle),
-    ("vec2", Ty::Vec2),
-    ("vec3", Ty::Vec3),
-    ("vec4", Ty::Vec4),
-    ("color", Ty::Color),
-    ("point", Ty::Point),
-    ("vector", Ty::Vector),
-    ("normal", Ty::Normal),
-    ("mat3", Ty::Mat3),
-    ("texture", Ty::Texture),
-    ("bsdf", Ty::Bsdf),
-    ("edf", Ty::Edf),
-    ("medium", Ty::Medium),
-];
-
-/// The name in [`NAMED`] of the type `name`, if its values are stored as `ty`.
-pub fn surface_type(name: &str, ty: ir::Type) -> Option<&'static str> {
-    let mut named = NAMED.iter();
-    named
-        .find(|(n, t)| *n == name && t.ir() == Some(ty))
-        .map(|(n, _)| *n)
-}
+pub use crate::ir::surface::{NAMED, Ty};
 
 impl Ty {
-    /// The machine type of values of this type; closures have none.
-    pub fn ir(self) -> Option<ir::Type> {
-        Some(match self {
-            Ty::Bool => ir::Type::Bool,
-            Ty::Int | Ty::Texture => ir::Type::Int,
-            Ty::Float | Ty::Length | Ty::Angle => ir::Type::Float,
-            Ty::Vec2 => ir::Type::Vec2,
-            Ty::Vec3 | Ty::Color | Ty::Point | Ty::Vector | Ty::Normal => ir::Type::Vec3,
-            Ty::Vec4 => ir::Type::Vec4,
-            Ty::Mat3 => ir::Type::Mat3,
-            Ty::Struct(id) => ir::Type::Struct(id),
-            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => return None,
-        })
-    }
-
     /// Three floats with a geometric meaning; these stand for each other.
     pub fn is_geometric(self) -> bool {
         matches!(self, Ty::Vec3 | Ty::Point | Ty::Vector | Ty::Normal)

@@ -2,9 +2,9 @@
 
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::interp::{Interpreter, OutOfFuel, TextureRequest};
+use impasto_compiler::ir::ops::{Counts, Op};
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprKind, Function, FunctionId, Local, Module, Type};
-use impasto_compiler::ops::{Counts, Op};
 use impasto_compiler::{MemoryLoader, check, diag};
 
 use super::HERE;

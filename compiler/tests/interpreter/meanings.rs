@@ -3,9 +3,9 @@
 
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::ops::{self, Op, Shape};
 use impasto_compiler::ir::value::{Real, Value};
 use impasto_compiler::ir::{Local, Module, Type};
-use impasto_compiler::ops::{self, Op, Shape};
 
 use super::HERE;
 

@@ -94,12 +94,9 @@ pub fn evaluation(module: &Module, material: &Material, baked: bool) -> Subject 
     let defaults: Vec<Const> = m.params.iter().map(|p| p.default.clone()).collect();
     if baked {
         let agreed: Vec<Option<Const>> = defaults.iter().cloned().map(Some).collect();
-        passes::bake(&mut m.body, &agreed);
-        passes::fold_body(module, &mut m.body);
+        passes::run_material_until(module, &mut m, &agreed, "fold_body").expect("no problem");
     }
-    let lobes = m
-        .surface
-        .map_or(Vec::new(), |root| closure::lobes(&m, root));
+    let lobes = closure::surface_lobes(&m);
     let how = if baked { "baked" } else { "tabled" };
     Subject {
         name: format!("{}, {how}", m.name),

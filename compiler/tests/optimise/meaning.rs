@@ -1,7 +1,7 @@
 //! The passes over everything there is: same meaning, no more work, nothing left to do.
 
 use impasto_compiler::ir::{Const, Function, Module, print, verify};
-use impasto_compiler::passes::{self, PIPELINE};
+use impasto_compiler::passes::{self, function_passes};
 
 use super::corpus::{Numbers, Subject, answer, library, materials};
 
@@ -34,7 +34,7 @@ fn check_passes(s: &Subject) -> Vec<String> {
     let mut problems = Vec::new();
     let mut f = s.function.clone();
     let mut before = answers(&s.module, &f, &s.params);
-    for pass in PIPELINE {
+    for pass in function_passes() {
         pass.run(&s.module, &mut f);
         if let Err(e) = verify::function(&s.module, &f) {
             problems.push(format!("{}: after {}: {e}", s.name, pass.name));

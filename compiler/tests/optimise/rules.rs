@@ -4,7 +4,7 @@
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Module, Type, print};
-use impasto_compiler::passes::PIPELINE;
+use impasto_compiler::passes::pass;
 use impasto_compiler::{MemoryLoader, passes};
 
 use super::corpus::{Numbers, checked};
@@ -238,7 +238,7 @@ fn rule(module: &Module, i: usize) -> &Function {
 fn after(module: &Module, f: &Function, names: &[&str]) -> Function {
     let mut f = f.clone();
     for name in names {
-        let pass = PIPELINE.iter().find(|p| p.name == *name).expect("a pass");
+        let pass = pass(name).expect("a pass");
         pass.run(module, &mut f);
     }
     f

@@ -3,7 +3,7 @@
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Closure, Const, Function, Material, Module, verify};
-use impasto_compiler::passes::prune;
+use impasto_compiler::passes::pass;
 use impasto_compiler::{Checked, MemoryLoader};
 
 use super::lowered::{checked, evaluate};
@@ -74,7 +74,9 @@ fn pruning_keeps_what_a_material_reflects() {
     for (surface, left) in SURFACES {
         let checked = with_surface(surface);
         let mut pruned = checked.checked[0].clone();
-        prune(&checked.ir, &mut pruned);
+        let prune = pass("prune").expect("a row");
+        let done = prune.run_on_material(&checked.ir, &mut pruned, &[]);
+        assert!(done.is_ok());
         verify::material(&checked.ir, &pruned).expect("well-formed");
         assert_eq!(lobes(&pruned), left, "{surface}");
         // A closure that is used twice is as if it were written twice.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use impasto_compiler::ir::parse::{Parsed, parse};
-use impasto_compiler::ir::{Function, Module, print, verify};
-use impasto_compiler::passes::{Hoisted, PIPELINE, Widths, hoist, prune, widths};
+use impasto_compiler::ir::{Const, print, verify};
+use impasto_compiler::passes::{Hoisted, Pass, pass};
 use impasto_compiler::source::FileId;
 
 use super::{RULE, meaning};
@@ -86,51 +86,45 @@ struct Outcome {
 
 impl Outcome {
     /// Runs one pass as the compiler does: over every function, callees first, or over every
-    /// material.
-    fn apply(&mut self, pass: &str) -> Result<(), String> {
-        let run: &mut dyn FnMut(&Module, &mut Function) = match pass {
-            "prune" => return self.prune(),
-            "widths" => return self.widths(),
-            "hoist" => &mut |module, f| self.hoisted.push(hoist(module, f)),
-            _ => match PIPELINE.iter().find(|p| p.name == pass) {
-                Some(row) => &mut |module, f| row.run(module, f),
-                None => return Err(format!("there is no pass `{pass}`")),
-            },
-        };
+    /// material, whose parameters have their defaults for values.
+    fn apply(&mut self, name: &str) -> Result<(), String> {
+        let pass = pass(name).ok_or_else(|| format!("there is no pass `{name}`"))?;
+        if pass.is_on_material() {
+            return self.materials(pass);
+        }
+        self.functions(pass)
+    }
+
+    fn functions(&mut self, pass: &Pass) -> Result<(), String> {
         let module = &mut self.parsed.module;
         for i in 0..module.functions.len() {
             let mut f = module.functions[i].clone();
-            run(module, &mut f);
+            let hoisted = pass.run(module, &mut f);
             let text = print::function(module, &f);
-            match self.hoisted.last() {
+            let checked = match &hoisted {
                 Some(h) => verify::hoisted(module, &f, &h.types()),
                 None => verify::function(module, &f),
-            }
-            .map_err(|e| format!("after {pass}: {e}\n{text}"))?;
+            };
+            checked.map_err(|e| format!("after {}: {e}\n{text}", pass.name))?;
             module.functions[i] = f;
-        }
-        for h in &self.hoisted {
-            let text = print::function(module, &h.prelude);
-            verify::function(module, &h.prelude).map_err(|e| format!("prelude: {e}\n{text}"))?;
-        }
-        Ok(())
-    }
-
-    fn prune(&mut self) -> Result<(), String> {
-        for m in &mut self.parsed.materials {
-            prune(&self.parsed.module, m);
-            verify::material(&self.parsed.module, m).map_err(|e| format!("after prune: {e}"))?;
-        }
-        Ok(())
-    }
-
-    fn widths(&mut self) -> Result<(), String> {
-        for m in &mut self.parsed.materials {
-            match widths(&self.parsed.module, &mut m.body) {
-                Widths::Computed => {}
-                other => return Err(format!("{}: {other:?}", m.name)),
+            if let Some(h) = hoisted {
+                let text = print::function(module, &h.prelude);
+                verify::function(module, &h.prelude)
+                    .map_err(|e| format!("prelude: {e}\n{text}"))?;
+                self.hoisted.push(h);
             }
-            verify::material(&self.parsed.module, m).map_err(|e| format!("after widths: {e}"))?;
+        }
+        Ok(())
+    }
+
+    fn materials(&mut self, pass: &Pass) -> Result<(), String> {
+        for m in &mut self.parsed.materials {
+            let defaults = m.params.iter().map(|p| Some(p.default.clone()));
+            let defaults: Vec<Option<Const>> = defaults.collect();
+            pass.run_on_material(&self.parsed.module, m, &defaults)
+                .map_err(|e| e.message)?;
+            verify::material(&self.parsed.module, m)
+                .map_err(|e| format!("after {}: {e}", pass.name))?;
         }
         Ok(())
     }

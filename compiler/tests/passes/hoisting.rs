@@ -3,7 +3,7 @@
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, Function, Material, Module, verify};
-use impasto_compiler::passes::{self, hoist};
+use impasto_compiler::passes;
 
 use super::lowered::{Files, checked, evaluate, material_files};
 use super::meaning::{Numbers, near};
@@ -28,7 +28,8 @@ fn parameters(m: &Material, numbers: &mut Numbers) -> Vec<Const> {
 /// Compares a function with what is left of it after hoisting. Gives how many values there are.
 fn compare(module: &Module, m: &Material, f: &Function) -> usize {
     let mut g = f.clone();
-    let hoisted = hoist(module, &mut g);
+    let hoist = passes::pass("hoist").expect("a row");
+    let hoisted = hoist.run(module, &mut g).expect("values");
     verify::hoisted(module, &g, &hoisted.types()).expect("well-formed");
     verify::function(module, &hoisted.prelude).expect("well-formed");
     let mut numbers = Numbers(11);

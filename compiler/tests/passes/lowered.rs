@@ -37,8 +37,13 @@ pub fn checked(path: &str, loader: &mut dyn Loader) -> Checked {
 
 /// The function `(point, wo, wl, u) -> MaterialSample`.
 pub fn evaluate(module: &Module, m: &Material) -> Function {
-    let lobes = m.surface.map_or(Vec::new(), |root| closure::lobes(m, root));
-    closure::evaluate(module, &core(module), m, &m.name, &lobes)
+    closure::evaluate(
+        module,
+        &core(module),
+        m,
+        &m.name,
+        &closure::surface_lobes(m),
+    )
 }
 
 fn core(module: &Module) -> Core {

@@ -205,12 +205,7 @@ fn what_is_no_ir_is_refused_with_its_place() {
             1,
             "what hoisting made of them",
         ),
-        (
-            "fn f() -> float { return #0 }",
-            1,
-            26,
-            "unknown table `#0`",
-        ),
+        ("fn f() -> float { return #0 }", 1, 26, "unknown table `#0`"),
         (
             "material m() { table #0: float opacity = #0 }",
             1,

@@ -260,7 +260,9 @@ impl<F: Real> Frame<'_, F> {
         match &self.f.expr(id).kind {
             ExprKind::Const(c) => constant(c),
             ExprKind::Param(i) => self.params[*i as usize].clone(),
-            ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => panic!("{}: parameters must be baked", self.f.name),
+            ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => {
+                panic!("{}: parameters must be baked", self.f.name)
+            }
             _ => match &self.values[id.index()] {
                 Some(value) => value.clone(),
                 None => zero(self.module, self.f.ty(id)),
@@ -296,7 +298,10 @@ impl<F: Real> Frame<'_, F> {
                 let start: usize = fields[..*i as usize].iter().map(|(_, ty)| width(*ty)).sum();
                 args[0][start..start + width(e.ty)].to_vec()
             }
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => self.get(id),
+            ExprKind::Const(_)
+            | ExprKind::Param(_)
+            | ExprKind::MaterialParam(_)
+            | ExprKind::TableValue(_) => self.get(id),
         }
     }
 }

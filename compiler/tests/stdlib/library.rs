@@ -287,7 +287,7 @@ fn ior_of(params: &[Local], docs: &str, args: &[Const]) -> f64 {
 
 /// The arguments of `closure`, a lobe of `material` with constant arguments.
 pub fn arguments_of(module: &Module, material: &mut Material, closure: ClosureId) -> Vec<Const> {
-    passes::fold_body(module, &mut material.body);
+    passes::run_material_until(module, material, &[], "fold_body").expect("no problem");
     let Closure::Lobe(lobe) = &material.closures[closure.index()] else {
         panic!("one lobe")
     };

@@ -5,10 +5,12 @@ use std::f64::consts::FRAC_PI_2;
 
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::ops::{Op, STEEPEST, Shape};
 use impasto_compiler::ir::value::{Real, Value};
-use impasto_compiler::ir::{Const, ExprId, Function, Local, Module, Struct, StructId, Type};
-use impasto_compiler::ops::{Op, STEEPEST, Shape};
-use impasto_compiler::passes::{Widths, widths};
+use impasto_compiler::ir::{
+    Const, ExprId, Function, Local, Material, Module, Struct, StructId, Type,
+};
+use impasto_compiler::passes::pass;
 use impasto_compiler::source::{FileId, Span};
 
 const HERE: Span = Span {
@@ -99,10 +101,28 @@ fn derivative<F: Real>(op: Op, types: &[Type], at: &[Vec<f64>], rates: &[Vec<f64
     let steep = case.linear(case.b.ty(value), &vec![0.0; width], &vec![BIAS; width]);
     let sum = case.b.op(Op::Add, &[value, steep], HERE);
     let asked = case.b.op(Op::FilterWidth, &[sum], HERE);
-    let mut f = case.b.finish(asked);
-    assert_eq!(widths(&case.module, &mut f), Widths::Computed);
+    let f = with_widths(&case.module, case.b.finish(asked));
     let found = run::<F>(&case.module, &f, 0.0);
     found.iter().map(|w| w - BIAS).collect()
+}
+
+/// A body as the pass `widths` leaves it.
+fn with_widths(module: &Module, body: Function) -> Function {
+    let mut material = Material {
+        name: "m".into(),
+        docs: Vec::new(),
+        params: Vec::new(),
+        body,
+        closures: Vec::new(),
+        surface: None,
+        emission: None,
+        interior: None,
+        opacity: None,
+        span: HERE,
+    };
+    let widths = pass("widths").expect("a row");
+    assert_eq!(widths.run_on_material(module, &mut material, &[]), Ok(true));
+    material.body
 }
 
 fn operation(

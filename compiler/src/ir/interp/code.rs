@@ -5,9 +5,9 @@
 //! allocated while code runs. A frame begins with the parameters; its image (constants, values
 //! of the material's parameters, zeros for variables) is copied in behind them by the call.
 
+use crate::ir::ops::{Counts, Kernel, Op, Operands};
 use crate::ir::value::{Real, Value};
 use crate::ir::{Const, ExprId, FunctionId, Struct, Type};
-use crate::ops::{Counts, Kernel, Op, Operands};
 
 /// A position in both arrays, or a number of floats and ints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,9 +6,9 @@
 //! begins where the stack ends: whatever lies beyond is computed anew before it is read.
 
 use super::code::{Call, Code, Ins, Numbers, Part, Place, Run};
+use crate::ir::ops::{self, Counts, Op};
 use crate::ir::value::{Real, Value};
 use crate::ir::{Block, ExprId, ExprKind, Function, FunctionId, LocalId, Module, Stmt, Type};
-use crate::ops::{self, Counts, Op};
 
 /// What functions read from outside.
 #[derive(Debug)]
@@ -400,7 +400,10 @@ impl<F: Real> Lowering<'_, F> {
                 to
             }
             ExprKind::Field(value, i) => self.field(*value, *i as usize),
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => self.place(id),
+            ExprKind::Const(_)
+            | ExprKind::Param(_)
+            | ExprKind::MaterialParam(_)
+            | ExprKind::TableValue(_) => self.place(id),
         };
     }
 

@@ -3,9 +3,9 @@
 
 use super::Interpreter;
 use super::code::Numbers;
+use crate::ir::ops::Counts;
 use crate::ir::value::{Real, Value};
 use crate::ir::{Const, ExprId, Function};
-use crate::ops::Counts;
 
 /// A part of a run of operations.
 #[derive(Clone, Copy, Debug)]

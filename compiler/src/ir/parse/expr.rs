@@ -1,10 +1,10 @@
 //! Expressions: what is evaluated, operands and constants.
 
-use super::body::Body;
+use super::body::{Body, Declared};
 use super::{Parser, Result, Token, Wrong};
 use crate::ir::build::const_type;
+use crate::ir::ops::Op;
 use crate::ir::{Const, Expr, ExprId, ExprKind, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 impl Body<'_> {

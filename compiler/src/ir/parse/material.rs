@@ -4,9 +4,8 @@ use super::body::Body;
 use super::{MAX_NESTING, Parser, Result, Token, Wrong};
 use crate::ir::{
     Closure, ClosureId, Const, Expr, ExprId, ExprKind, Function, Interior, Lobe, Material,
-    MaterialParam, Type,
+    MaterialParam, Type, surface,
 };
-use crate::sema::types::surface_type;
 use crate::source::Span;
 
 /// A material's outputs while it is read.
@@ -113,7 +112,7 @@ impl Body<'_> {
             true => self.p.name("a type of the language")?,
             false => format!("{ty:?}").to_lowercase(),
         };
-        surface_type(&written, ty).ok_or_else(|| {
+        surface::surface_type(&written, ty).ok_or_else(|| {
             Wrong::new(at, format!("`{written}` is not a type of such uniforms"))
                 .expected("a type of the language that is stored so, as in `vec3 as color`")
         })

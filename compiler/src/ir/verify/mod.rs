@@ -50,9 +50,10 @@ pub fn hoisted(module: &Module, f: &Function, table: &[Type]) -> Result<(), Prob
     function(module, f)?;
     let wrong = f.exprs.iter().find_map(|e| match e.kind {
         ExprKind::MaterialParam(i) => Some((e, format!("reads ${i} of its material"))),
-        ExprKind::TableValue(i) if table.get(i as usize) != Some(&e.ty) => {
-            Some((e, format!("there is no value #{i} of its type in the table")))
-        }
+        ExprKind::TableValue(i) if table.get(i as usize) != Some(&e.ty) => Some((
+            e,
+            format!("there is no value #{i} of its type in the table"),
+        )),
         _ => None,
     });
     wrong.map_or(Ok(()), |(e, message)| {
@@ -118,7 +119,9 @@ impl<'a> Verifier<'a> {
         }
         self.at = f.span;
         if f.reads_material_params() && f.reads_table() {
-            return Err("reads both parameters of the material and what hoisting made of them".into());
+            return Err(
+                "reads both parameters of the material and what hoisting made of them".into(),
+            );
         }
         self.block(&f.body)?;
         self.at = f.span;
@@ -348,7 +351,10 @@ impl<'a> Verifier<'a> {
                     && c.iter().all(|&c| usize::from(c) < width)
             }
             ExprKind::Compose(_) => composes(ty, types),
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) => false,
+            ExprKind::Const(_)
+            | ExprKind::Param(_)
+            | ExprKind::MaterialParam(_)
+            | ExprKind::TableValue(_) => false,
         })
     }
 }

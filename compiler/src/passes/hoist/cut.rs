@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::Uses;
+use crate::ir::ops::{CostClass, Op};
 use crate::ir::{ExprId, ExprKind, Function, Module};
-use crate::ops::{CostClass, Op};
 
 /// Where uniform work is cut: what becomes a value, and what the kernel makes of values.
 pub(super) struct Cut {

@@ -14,9 +14,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::dead_code;
 use crate::ir::build::in_range;
 use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::ops::CostClass;
 use crate::ir::value::Value;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type};
-use crate::ops::CostClass;
 
 mod cut;
 mod prelude;

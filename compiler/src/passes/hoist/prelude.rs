@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Hoisted, Uses};
+use crate::ir::ops::Op;
 use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, Stmt, Type};
-use crate::ops::Op;
 
 /// The prelude under construction; equal expressions are one.
 pub(super) struct Prelude {
@@ -171,9 +171,11 @@ fn part_of(f: &Function, whole: ExprId, kind: ExprKind, ty: Type) -> Expr {
 
 fn operands_mut(kind: &mut ExprKind) -> &mut [ExprId] {
     match kind {
-        ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) | ExprKind::Load(_) => {
-            &mut []
-        }
+        ExprKind::Const(_)
+        | ExprKind::Param(_)
+        | ExprKind::MaterialParam(_)
+        | ExprKind::TableValue(_)
+        | ExprKind::Load(_) => &mut [],
         ExprKind::Op(_, args)
         | ExprKind::Compose(args)
         | ExprKind::Call(_, args)

@@ -16,8 +16,8 @@
 //! parameters arrives small.
 
 use super::rewrite::{Rewriter, Rules};
+use crate::ir::ops::CostClass;
 use crate::ir::{ExprId, ExprKind, Function, FunctionId, Module, walk};
-use crate::ops::CostClass;
 
 mod decided;
 mod splice;

@@ -1,8 +1,8 @@
 //! Statements, branches and loops of the shared walk, and what is known where they meet.
 
 use super::Rewriter;
+use crate::ir::ops::Op;
 use crate::ir::{Block, Const, ExprId, LocalId, Stmt};
-use crate::ops::Op;
 use crate::passes::{cse, simplify};
 
 impl Rewriter<'_> {

@@ -11,8 +11,8 @@ mod control;
 pub(super) use control::stored_in;
 
 use super::{cse, fold, inline, simplify};
+use crate::ir::ops::Op;
 use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, SiteId, Stmt, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 /// Most times that one expression is rewritten before it is taken as it is.

@@ -1,8 +1,8 @@
 //! Rules for sums, products, quotients and blends.
 
 use super::{New, Site, is, number, op};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Type};
-use crate::ops::Op;
 use crate::passes::rewrite::Rewriter;
 
 /// Exponents of the powers of two whose reciprocals are normal in single precision.

@@ -2,8 +2,8 @@
 
 use super::range::range;
 use super::{New, Site, op, truth};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Type};
-use crate::ops::Op;
 use crate::passes::rewrite::Rewriter;
 
 pub(super) fn not(w: &Rewriter<'_>, a: ExprId) -> Option<New> {

@@ -2,8 +2,8 @@
 
 use super::range::range;
 use super::{New, Site, is, number, op};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, Type};
-use crate::ops::Op;
 use crate::passes::rewrite::Rewriter;
 
 pub(super) fn abs(w: &Rewriter<'_>, a: ExprId) -> Option<New> {

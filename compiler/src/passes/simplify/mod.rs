@@ -9,8 +9,8 @@
 //! random and extreme operands against the expression it replaces.
 
 use super::rewrite::{New, Rewriter, Rules};
+use crate::ir::ops::Op;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Module, Stmt, Type};
-use crate::ops::Op;
 use crate::source::Span;
 
 mod arithmetic;

@@ -2,8 +2,8 @@
 
 use super::range::range;
 use super::{New, Site, is, number, op};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId};
-use crate::ops::Op;
 use crate::passes::rewrite::Rewriter;
 
 /// The square root of 2^127, to which `pow` limits its results.

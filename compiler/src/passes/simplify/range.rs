@@ -4,8 +4,8 @@
 //! only correctly rounded operations get numeric bounds: rounding is monotone, and a rounded
 //! bound bounds what is rounded. Of others no more than the sign is used.
 
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, ExprKind, Function};
-use crate::ops::Op;
 
 /// How deep operands are followed.
 const MAX_DEPTH: u32 = 6;

@@ -4,8 +4,8 @@
 //! function is in line, its lookups are the plain ones again.
 
 use super::{New, Site, is, op};
+use crate::ir::ops::Op;
 use crate::ir::{Const, ExprId, ExprKind, Type};
-use crate::ops::Op;
 use crate::passes::rewrite::Rewriter;
 
 /// A lookup with a mode: without a width where that is zero, and plain where the mode is.

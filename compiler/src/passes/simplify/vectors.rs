@@ -1,8 +1,8 @@
 //! Rules for vectors.
 
 use super::{New, Site, is, op};
+use crate::ir::ops::{Op, Shape};
 use crate::ir::{Const, ExprId, ExprKind, Type};
-use crate::ops::{Op, Shape};
 use crate::passes::rewrite::Rewriter;
 
 pub(super) fn normalize(w: &Rewriter<'_>, a: ExprId) -> Option<New> {

@@ -16,25 +16,15 @@
 mod calls;
 mod slice;
 
+use crate::diag::{Code, Diagnostic};
 use crate::ir::build::Builder;
-use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Module, Stmt, Type};
-use crate::ops::{Op, Rule, STEEPEST, Tangent};
+use crate::ir::ops::{Op, Rule, STEEPEST, Tangent};
+use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Material, Module, Stmt, Type};
 use crate::source::Span;
 use slice::Slice;
 
 /// Expressions that calls put in line may add to one material.
 const MAX_GROWTH: usize = 50_000;
-
-/// What [`widths`] found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Widths {
-    /// Nothing asks for a width; nothing was changed.
-    None,
-    /// All are computed now.
-    Computed,
-    /// What they depend on grows too large, by the call here.
-    TooLarge(Span),
-}
 
 /// The inputs that vary over a footprint, each with the fields that say how.
 const INPUTS: [(&str, [&str; 2]); 2] = [
@@ -42,23 +32,44 @@ const INPUTS: [(&str, [&str; 2]); 2] = [
     ("uv", ["footprint_uv_x", "footprint_uv_y"]),
 ];
 
-/// Computes every width in a body whose first parameter is the surface point. Expressions keep their
-/// numbers, since closures refer to them.
-pub fn widths(module: &Module, body: &mut Function) -> Widths {
-    if !asks(body) {
-        return Widths::None;
+/// Computes every width in a material's body, whose first parameter is the surface point. Expressions
+/// keep their numbers, since closures refer to them.
+pub fn widths(
+    module: &Module,
+    material: &mut Material,
+    _: &[Option<Const>],
+) -> Result<bool, Diagnostic> {
+    let asks = asks(&material.body);
+    if asks {
+        compute(module, &mut material.body).map_err(|call| too_large(material, call))?;
     }
+    Ok(asks)
+}
+
+/// A material whose widths depend on too much.
+fn too_large(material: &Material, call: Span) -> Diagnostic {
+    let message = format!(
+        "what the widths of `{}` depend on grows too large",
+        material.name
+    );
+    Diagnostic::new(Code::TooLarge, call, message)
+        .expected("`filter_width` of what takes few operations")
+        .hint("ask for the width of the coordinate, and pass it to the function as an argument")
+}
+
+/// Computes every width in a body; an error is the call by which it grows too large.
+fn compute(module: &Module, body: &mut Function) -> Result<(), Span> {
     let mut room = MAX_GROWTH;
     loop {
         let slice = Slice::of(module, body);
         let calls = calls::in_slice(body, &slice);
         let Some(first) = calls.first() else {
             differentiate(module, body, &slice);
-            return Widths::Computed;
+            return Ok(());
         };
         match room.checked_sub(calls::growth(module, body, &calls)) {
             Some(left) => room = left,
-            None => return Widths::TooLarge(body.expr(*first).span),
+            None => return Err(body.expr(*first).span),
         }
         calls::put_in_line(module, body, &slice);
     }
@@ -227,9 +238,11 @@ impl Walk<'_> {
                 let fields = self.of_parts(&fields, axis)?;
                 Some(self.b.make(structure, &fields, span))
             }
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::MaterialParam(_) | ExprKind::TableValue(_) | ExprKind::Call(..) => {
-                None
-            }
+            ExprKind::Const(_)
+            | ExprKind::Param(_)
+            | ExprKind::MaterialParam(_)
+            | ExprKind::TableValue(_)
+            | ExprKind::Call(..) => None,
         }
     }
 

@@ -4,8 +4,8 @@
 use std::rc::Rc;
 
 use impasto_compiler::ir::Type;
+use impasto_compiler::ir::ops::{self, Op};
 use impasto_compiler::ir::value::{Real, Value};
-use impasto_compiler::ops::{self, Op};
 
 use super::{Column, Lanes, at, floats};
 

@@ -3,8 +3,8 @@
 //! for quotients and roots, absolute bounds for trigonometry. Results are finite everywhere.
 
 use impasto_compiler::ir::Type;
+use impasto_compiler::ir::ops::{Op, Shape};
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::ops::{Op, Shape};
 
 use crate::support::{Row, floats};
 

@@ -10,9 +10,9 @@ mod operands;
 
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::interp::Interpreter;
+use impasto_compiler::ir::ops::Op;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Local, Type};
-use impasto_compiler::ops::Op;
 use impasto_compiler::source::{FileId, Span};
 use impasto_compiler::{MaterialRequest, MemoryLoader, Program, codegen, compile};
 use impasto_runtime::wgsl::ShaderPart;

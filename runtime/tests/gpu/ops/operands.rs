@@ -4,8 +4,8 @@
 //! arithmetic stay where its results are finite; ops that define their result everywhere get all.
 
 use impasto_compiler::ir::Type;
+use impasto_compiler::ir::ops::{Op, Shape};
 use impasto_compiler::ir::value::Value;
-use impasto_compiler::ops::{Op, Shape};
 
 /// Floats of the whole range, a denormal one among them.
 const ALL: [f32; 30] = [

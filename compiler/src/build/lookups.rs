@@ -3,19 +3,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::CompiledMaterial;
 use crate::abi::{Lookups, TextureSpace};
 use crate::ir::{Const, ExprKind, Function, Module, Type};
+use crate::program::{CompiledMaterial, Slot};
 
 /// How textures are looked up that are known, and those that are chosen at run time.
 #[derive(Default)]
-struct Found {
+struct Reads {
     known: BTreeMap<(usize, TextureSpace), Lookups>,
     chosen: BTreeMap<TextureSpace, Lookups>,
 }
-
-/// A texture as it is read: its index, in which space, and by which lookups.
-pub(super) type Slot = (usize, TextureSpace, Lookups);
 
 /// What materials look up: every texture with how, in the order of slots. Each material's `textures`,
 /// which are those that it may read, become the slots that it does read.
@@ -23,7 +20,7 @@ pub(super) type Slot = (usize, TextureSpace, Lookups);
 /// A lookup whose texture is not known before the code runs may be of any of them.
 pub(super) fn slots(module: &Module, materials: &mut [CompiledMaterial]) -> Vec<Slot> {
     let of = |m: &CompiledMaterial| {
-        let mut found = Found::default();
+        let mut found = Reads::default();
         reached(module, m)
             .into_iter()
             .for_each(|f| found.function(f));
@@ -34,7 +31,7 @@ pub(super) fn slots(module: &Module, materials: &mut [CompiledMaterial]) -> Vec<
         found.known
     };
     let own: Vec<_> = materials.iter().map(of).collect();
-    let mut all = Found::default();
+    let mut all = Reads::default();
     for (&(t, space), &lookups) in own.iter().flatten() {
         all.note(t, space, lookups);
     }
@@ -47,7 +44,7 @@ pub(super) fn slots(module: &Module, materials: &mut [CompiledMaterial]) -> Vec<
     slots.map(|((t, space), l)| (t, space, l)).collect()
 }
 
-impl Found {
+impl Reads {
     fn note(&mut self, texture: usize, space: TextureSpace, lookups: Lookups) {
         let slot = self.known.entry((texture, space)).or_default();
         *slot = slot.and(lookups);

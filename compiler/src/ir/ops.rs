@@ -260,7 +260,7 @@ ops! {
         Helper("luminance", "(c: T) -> f32 { return dot(c, vec3<f32>(0.2126, 0.7152, 0.0722)); }"), None,
         |a| reduce1(a, |v| sum(&v, &[F::of(0.2126), F::of(0.7152), F::of(0.0722)])), linear;
     MatVec "transform" operator MatVec, Alu(5), Infix("*"), None, mat_vec, product;
-    // Differentiation: of what is left after `passes::widths`, nothing varies
+    // Differentiation: of what is left after the pass `widths`, nothing varies
     FilterWidth "filter_width" operator Float(1), Alu(1), Helper("filter_width", "(x: T) -> T { return T(0); }"), None,
         |a| all(a, 0.0), zero;
     // Choice

@@ -1,0 +1,27 @@
+//! What may be wrong with a material that checked: it takes too much.
+
+use crate::diag::{Code, Diagnostic};
+use crate::ir::Material;
+use crate::passes::HOIST_FUEL;
+
+/// Most expressions of a material after its calls are put in line, as a GPU driver does.
+pub(super) const MAX_SIZE: u64 = 400_000;
+
+/// A material whose calls multiply beyond what a driver can compile.
+pub(super) fn too_large(material: &Material, size: u64) -> Diagnostic {
+    let message = format!(
+        "`{}` grows to {size} operations once its calls are expanded",
+        material.name
+    );
+    Diagnostic::new(Code::TooLarge, material.span, message)
+        .expected(format!("at most {MAX_SIZE}"))
+        .hint("call functions in a loop instead of writing the calls out, or share results with `let`")
+}
+
+/// A material whose parameters take too long to work with.
+pub(super) fn too_long(material: &Material, instance: &str) -> Diagnostic {
+    let message = format!("what depends only on the parameters of `{instance}` takes too long");
+    Diagnostic::new(Code::TooLarge, material.span, message)
+        .expected(format!("at most {HOIST_FUEL} operations"))
+        .hint("shorten loops whose length depends on a parameter")
+}

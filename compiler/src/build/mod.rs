@@ -1,0 +1,237 @@
+//! Makes a program of checked materials: walks each through the table of passes, and puts values
+//! to its instances.
+
+use std::collections::BTreeMap;
+
+use crate::abi::{Emission, MaterialInfo};
+use crate::closure::{self, Core};
+use crate::codegen;
+use crate::diag::Diagnostic;
+use crate::ir::{self, Function, Module};
+use crate::parameters::TableLayout;
+use crate::passes::{self, MaterialState, Pass};
+use crate::program::{CompiledMaterial, Instance, Names, Program, unique};
+use crate::sema::Checker;
+use crate::stages::{Progress, Stage};
+
+mod errors;
+mod functions;
+mod instances;
+mod interior;
+mod lookups;
+
+use functions::Functions;
+pub(crate) use instances::Setting;
+
+/// Collects lowered materials.
+pub(crate) struct ProgramBuilder {
+    core: Core,
+    functions: Functions,
+    materials: Vec<CompiledMaterial>,
+    instances: Vec<Instance>,
+    names: BTreeMap<String, u32>,
+}
+
+impl ProgramBuilder {
+    pub(crate) fn new(checker: &mut Checker) -> Option<Self> {
+        let core = Core {
+            valid_normal: checker.core_function("valid_normal")?,
+            frame: checker.core_function("frame")?,
+            to_local: checker.core_function("to_local")?,
+            to_world: checker.core_function("to_world")?,
+            transport_valid: checker.core_function("transport_valid")?,
+            surface_point: checker.core_struct("SurfacePoint")?,
+            material_sample: checker.core_struct("MaterialSample")?,
+            transparent: None,
+        };
+        Some(Self {
+            core,
+            functions: Functions::default(),
+            materials: Vec::new(),
+            instances: Vec::new(),
+            names: BTreeMap::from([("material".to_owned(), 1)]),
+        })
+    }
+
+    /// What lowered code uses of the library.
+    pub(crate) fn core(&self) -> Core {
+        self.core
+    }
+
+    /// Lowers a material, with the given settings as its instances.
+    pub(crate) fn add(
+        &mut self,
+        checker: &mut Checker,
+        material: ir::Material,
+        settings: &[Setting],
+    ) {
+        let Some(state) = self.start(checker, material, settings) else {
+            return;
+        };
+        if let Err(problem) = self.lower(checker, state, settings) {
+            checker.diagnostics.push(problem);
+        }
+    }
+
+    /// What passes get of a material: cut out by its opacity, with what it calls at hand.
+    fn start(
+        &mut self,
+        checker: &mut Checker,
+        mut material: ir::Material,
+        settings: &[Setting],
+    ) -> Option<MaterialState> {
+        if material.opacity.is_some() {
+            let transparent = checker.library_closure("bsdf", "transparent")?;
+            self.core.transparent = Some(transparent);
+            closure::cut_out(&mut material, transparent);
+        }
+        self.functions.take_over(&checker.ir);
+        Some(MaterialState::new(material, instances::agreed(settings)))
+    }
+
+    /// Takes a material through all passes.
+    fn lower(
+        &mut self,
+        checker: &mut Checker,
+        mut state: MaterialState,
+        settings: &[Setting],
+    ) -> Result<(), Diagnostic> {
+        for rows in passes::steps() {
+            self.step(rows, &mut state, &mut checker.progress)?;
+        }
+        let module = &self.functions.module;
+        let textures = instances::textures(&state.material, settings, &checker.literal_textures);
+        let instances = instances::instances(module, &state, settings, self.materials.len())?;
+        self.finish_material(state, textures, &instances);
+        self.instances.extend(instances);
+        Ok(())
+    }
+
+    /// Takes a material through passes that belong together, and before them what it calls.
+    fn step(
+        &mut self,
+        rows: &[Pass],
+        state: &mut MaterialState,
+        progress: &mut Progress<'_>,
+    ) -> Result<(), Diagnostic> {
+        let callees = rows[0].callees(&self.functions.module, &self.core, &state.material);
+        if !callees.is_empty() {
+            progress.enter(Stage::Functions);
+            self.functions.optimise(callees);
+        }
+        progress.enter(rows[0].stage());
+        let walked = passes::apply(rows, &self.functions.module, &self.core, state)?;
+        self.functions.effort += walked;
+        let evaluate = state.functions.first().filter(|_| rows[0].is_repeated());
+        let size = evaluate.map_or(0, |f| self.functions.size(f));
+        if size > errors::MAX_SIZE {
+            return Err(errors::too_large(&state.material, size));
+        }
+        Ok(())
+    }
+
+    /// A material when the pass `name` has gone over it for the first time, with the module that it
+    /// calls into; none if it does not get there, or has no surface to be lowered.
+    pub(crate) fn after_pass(
+        &mut self,
+        checker: &mut Checker,
+        material: ir::Material,
+        settings: &[Setting],
+        name: &str,
+    ) -> Option<(&Module, MaterialState)> {
+        let mut state = self.start(checker, material, settings)?;
+        for rows in passes::steps() {
+            let here = rows.iter().any(|pass| pass.name == name);
+            if here && rows[0].is_repeated() {
+                for f in &mut state.functions {
+                    passes::run_until(&self.functions.module, f, name);
+                }
+            } else {
+                self.step(rows, &mut state, &mut checker.progress).ok()?;
+            }
+            if here {
+                break;
+            }
+        }
+        let shown = state.functions.is_empty() || state.material.surface.is_some();
+        shown.then_some((&self.functions.module, state))
+    }
+
+    /// Adds what became of a material, for the instances that it has.
+    fn finish_material(
+        &mut self,
+        state: MaterialState,
+        textures: Vec<usize>,
+        instances: &[Instance],
+    ) {
+        let module = &self.functions.module;
+        let varying = instances
+            .iter()
+            .any(|i| i.info.emission == Emission::Varying);
+        let layout = TableLayout::new(&state.table());
+        let name = unique(&mut self.names, &state.material.name);
+        let mut functions = state.functions;
+        for f in &mut functions {
+            f.name.clone_from(&name);
+        }
+        let read = functions.iter().take(if varying { 2 } else { 1 });
+        let read: Vec<&Function> = read.collect();
+        let lobes = closure::surface_lobes(&state.material);
+        let crosses = closure::transmissive(module, &state.material, &lobes);
+        let info = MaterialInfo {
+            name,
+            delta_only: closure::delta_only(module, &lobes),
+            crosses,
+            transmissive: crosses && instances.iter().any(|i| i.info.medium.is_some()),
+            varying_emission: varying,
+            inputs: codegen::inputs(&module.structs, &read),
+            textures,
+            lobes: lobes.len(),
+        };
+        let mut functions = functions.into_iter();
+        if let Some(evaluate) = functions.next() {
+            self.materials.push(CompiledMaterial {
+                info,
+                evaluate,
+                emission: functions.next(),
+                layout,
+            });
+        }
+    }
+
+    /// Puts the instance that was added as number `i` at `places[i]`.
+    pub(crate) fn order_instances(&mut self, places: &[usize]) {
+        let mut placed: Vec<(usize, Instance)> = places
+            .iter()
+            .copied()
+            .zip(self.instances.drain(..))
+            .collect();
+        placed.sort_by_key(|(place, _)| *place);
+        self.instances.extend(placed.into_iter().map(|(_, i)| i));
+    }
+
+    pub(crate) fn finish(mut self, checker: &Checker) -> Program {
+        self.functions.take_over(&checker.ir);
+        let mut row = 0;
+        for instance in &mut self.instances {
+            instance.row = row;
+            row += self.materials[instance.info.material].layout.rows;
+        }
+        let Functions { module, effort, .. } = self.functions;
+        let textures = lookups::slots(&module, &mut self.materials);
+        Program {
+            names: Names::new(
+                &module,
+                &checker.sources,
+                &[self.core.surface_point, self.core.material_sample],
+            ),
+            module,
+            core: self.core,
+            materials: self.materials,
+            instances: self.instances,
+            textures,
+            sources: checker.sources.clone(),
+            effort,
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! Compiling from end to end: requests in, a program with diagnostics out.
+
+use std::collections::BTreeMap;
+
+use crate::build::{ProgramBuilder, Setting};
+use crate::diag::{self, Code, Diagnostic};
+use crate::ir::{self, Module};
+use crate::loader::Loader;
+use crate::passes::MaterialState;
+use crate::program::Program;
+use crate::sema::Checker;
+use crate::source::SourceMap;
+use crate::stages::{Progress, Stage};
+use crate::{ast, codegen};
+
+/// A material to compile: which, under what name, with which parameters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MaterialRequest {
+    /// What the scene calls it.
+    pub name: String,
+    /// The file that defines it.
+    pub file: String,
+    /// Which material of the file; its only one when absent.
+    pub material: Option<String>,
+    /// Parameters that differ from their defaults: name, and value as source text.
+    pub params: Vec<(String, String)>,
+    /// Where the values of parameters go.
+    pub parameters: Parameters,
+}
+
+/// Where the values of an instance's parameters go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Parameters {
+    /// Those on which all instances of the material agree into the code, the others into a table.
+    #[default]
+    Agreed,
+    /// All into code of its own, which only instances with the same values share.
+    Baked,
+    /// All into the table: the code holds for any values.
+    Table,
+}
+
+impl MaterialRequest {
+    /// The only material of `file` with its defaults.
+    pub fn new(name: impl Into<String>, file: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            file: file.into(),
+            material: None,
+            params: Vec::new(),
+            parameters: Parameters::default(),
+        }
+    }
+}
+
+/// What compiling gave.
+pub struct Compilation {
+    /// The texts that diagnostics point into.
+    pub sources: SourceMap,
+    /// Everything that was found, in order of discovery.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The program, unless there were errors.
+    pub program: Option<Program>,
+}
+
+/// What checking one file gave.
+pub struct Checked {
+    /// The texts that diagnostics point into.
+    pub sources: SourceMap,
+    /// Everything that was found.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Names of the materials that the file defines.
+    pub materials: Vec<String>,
+    /// The IR of everything that the file defines and reaches.
+    pub ir: Module,
+    /// Its materials, before layering is lowered.
+    pub checked: Vec<ir::Material>,
+}
+
+/// Compiles materials into one program.
+///
+/// Requests are the program's instances, in their order. Those that ask for one material share
+/// its code; parameters on which they agree become constants of it, the others are read from a
+/// table. There is a program only if there is no error; warnings do not count.
+pub fn compile(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compilation {
+    compile_with_progress(requests, loader, Progress::silent())
+}
+
+/// [`compile`], which says the stage it is at.
+pub fn compile_with_progress<'a>(
+    requests: &[MaterialRequest],
+    loader: &'a mut dyn Loader,
+    progress: Progress<'a>,
+) -> Compilation {
+    let mut checker = Checker::with_progress(loader, progress);
+    let program = compile_all(&mut checker, requests);
+    let program = program.filter(|_| !diag::has_errors(&checker.diagnostics));
+    drop_unsure(&mut checker.diagnostics);
+    Compilation {
+        program,
+        sources: checker.sources,
+        diagnostics: checker.diagnostics,
+    }
+}
+
+/// Checks everything that a file defines, and compiles each of its materials with defaults.
+pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
+    let mut checker = Checker::new(loader);
+    let mut materials = Vec::new();
+    let mut checked = Vec::new();
+    // First, so that the ABI's structs get their names before the file's own.
+    let builder = ProgramBuilder::new(&mut checker);
+    if let Some(module) = checker.load(path) {
+        checker.check_items(module);
+        let ast = checker.ast(module);
+        for (index, item) in ast.items.iter().enumerate() {
+            if let ast::ItemKind::Material(_) = item.kind {
+                materials.push(item.name.node.clone());
+                checked.extend(checker.material(module, index));
+            }
+        }
+        checker.report_unused_items(module);
+    }
+    if !diag::has_errors(&checker.diagnostics) {
+        generate_all(&mut checker, builder, &checked);
+    }
+    drop_unsure(&mut checker.diagnostics);
+    let Checker {
+        sources,
+        diagnostics,
+        ir,
+        ..
+    } = checker;
+    Checked {
+        sources,
+        diagnostics,
+        materials,
+        ir,
+        checked,
+    }
+}
+
+/// Shows `look` each material when the pass `name` of [`crate::passes::PIPELINE`] has gone over it for
+/// the first time, with the module that it calls into. What is wrong with the requests, [`compile`]
+/// says.
+pub fn after_pass(
+    requests: &[MaterialRequest],
+    loader: &mut dyn Loader,
+    name: &str,
+    mut look: impl FnMut(&Module, &MaterialState),
+) {
+    let mut checker = Checker::new(loader);
+    let Some(mut builder) = ProgramBuilder::new(&mut checker) else {
+        return;
+    };
+    for requested in requested(&mut checker, requests) {
+        let settings: Vec<Setting> = requested.settings.into_iter().map(|(_, s)| s).collect();
+        let state = builder.after_pass(&mut checker, requested.material, &settings, name);
+        if let Some((module, state)) = state {
+            look(module, &state);
+        }
+    }
+}
+
+/// Drops the warnings that an error may be the cause of: what did not check uses nothing.
+fn drop_unsure(diagnostics: &mut Vec<Diagnostic>) {
+    if diag::has_errors(diagnostics) {
+        diagnostics.retain(|d| d.code != Code::Unused);
+    }
+}
+
+/// Takes checked materials through the rest of the compiler, for the errors found only there.
+fn generate_all(
+    checker: &mut Checker,
+    builder: Option<ProgramBuilder>,
+    materials: &[ir::Material],
+) {
+    let Some(mut builder) = builder else { return };
+    for m in materials {
+        let defaults = m.params.iter().map(|p| p.default.clone()).collect();
+        let setting = Setting {
+            name: m.name.clone(),
+            values: defaults,
+            open: false,
+        };
+        builder.add(checker, m.clone(), &[setting]);
+    }
+    validate(checker, &builder.finish(checker));
+}
+
+/// A material that requests ask for, with the settings they ask for it in.
+struct Requested {
+    material: ir::Material,
+    /// Settings with their places in the list of requests.
+    settings: Vec<(usize, Setting)>,
+}
+
+fn compile_all(checker: &mut Checker, requests: &[MaterialRequest]) -> Option<Program> {
+    let mut builder = ProgramBuilder::new(checker)?;
+    let requested = requested(checker, requests);
+    if diag::has_errors(&checker.diagnostics) {
+        return None;
+    }
+    let mut order = Vec::new();
+    for Requested { material, settings } in requested {
+        let (places, settings): (Vec<usize>, Vec<Setting>) = settings.into_iter().unzip();
+        builder.add(checker, material, &settings);
+        order.extend(places);
+    }
+    if diag::has_errors(&checker.diagnostics) {
+        return None;
+    }
+    builder.order_instances(&order);
+    let program = builder.finish(checker);
+    validate(checker, &program);
+    Some(program)
+}
+
+/// The materials that requests ask for, in the order of their first requests.
+fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Requested> {
+    let mut found: Vec<Requested> = Vec::new();
+    let mut known: BTreeMap<(&str, usize), Option<ir::Material>> = BTreeMap::new();
+    let mut places: BTreeMap<(&str, usize, Option<String>), usize> = BTreeMap::new();
+    for (place, request) in requests.iter().enumerate() {
+        let Some(module) = checker.load(&request.file) else {
+            continue;
+        };
+        let Some(index) = checker.find_material(module, request.material.as_deref()) else {
+            continue;
+        };
+        let key = (request.file.as_str(), index);
+        let material = known
+            .entry(key)
+            .or_insert_with(|| checker.material(module, index));
+        let Some(material) = material else { continue };
+        let origin = format!("material `{}`", request.name);
+        let values = checker.parameter_values(module, material, &request.params, &origin);
+        let Some(values) = values else { continue };
+        // Requests for constants share code with those for the same constants.
+        let baked = request.parameters == Parameters::Baked;
+        let constants = baked.then(|| format!("{values:?}"));
+        let at = *places.entry((key.0, key.1, constants)).or_insert_with(|| {
+            found.push(Requested {
+                material: material.clone(),
+                settings: Vec::new(),
+            });
+            found.len() - 1
+        });
+        let setting = Setting {
+            name: request.name.clone(),
+            values,
+            open: request.parameters == Parameters::Table,
+        };
+        found[at].settings.push((place, setting));
+    }
+    found
+}
+
+/// Materials whose code is checked as one module. The memory that naga takes grows with it.
+const CHECKED_TOGETHER: usize = 50;
+
+/// Has naga check the code of all materials.
+fn validate(checker: &mut Checker, program: &Program) {
+    let all: Vec<usize> = (0..program.materials.len()).collect();
+    for members in all.chunks(CHECKED_TOGETHER) {
+        checker.progress.enter(Stage::Generate);
+        let text = codegen::complete(program, members, codegen::Target::Native);
+        if let Err(problem) = codegen::validate_with_progress(&text, &mut checker.progress) {
+            let deep = codegen::nested_too_deep(program, members);
+            let rejected = || Diagnostic::without_span(Code::InvalidWgsl, problem);
+            return checker.diagnostics.push(deep.unwrap_or_else(rejected));
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The types an author sees, as far as the IR must know them: what they are called, and which
+//! machine type their values are stored as. How they convert and combine is for the checker.
+
+use super::{StructId, Type};
+
+/// A type of the language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Ty {
+    Bool,
+    Int,
+    Float,
+    Length,
+    Angle,
+    Vec2,
+    Vec3,
+    Vec4,
+    Color,
+    Point,
+    Vector,
+    Normal,
+    Mat3,
+    Texture,
+    Struct(StructId),
+    Bsdf,
+    Edf,
+    Medium,
+    /// What a called material assigns; no name means it.
+    Material,
+    /// The type of what did not check; it fits everywhere, so that one mistake is reported once.
+    Error,
+}
+
+/// The types that can be named, with their names.
+pub const NAMED: [(&str, Ty); 17] = [
+    ("bool", Ty::Bool),
+    ("int", Ty::Int),
+    ("float", Ty::Float),
+    ("length", Ty::Length),
+    ("angle", Ty::Angle),
+    ("vec2", Ty::Vec2),
+    ("vec3", Ty::Vec3),
+    ("vec4", Ty::Vec4),
+    ("color", Ty::Color),
+    ("point", Ty::Point),
+    ("vector", Ty::Vector),
+    ("normal", Ty::Normal),
+    ("mat3", Ty::Mat3),
+    ("texture", Ty::Texture),
+    ("bsdf", Ty::Bsdf),
+    ("edf", Ty::Edf),
+    ("medium", Ty::Medium),
+];
+
+/// The name in [`NAMED`] of the type `name`, if its values are stored as `ty`.
+pub fn surface_type(name: &str, ty: Type) -> Option<&'static str> {
+    let mut named = NAMED.iter();
+    named
+        .find(|(n, t)| *n == name && t.ir() == Some(ty))
+        .map(|(n, _)| *n)
+}
+
+impl Ty {
+    /// The machine type of values of this type; closures have none.
+    pub fn ir(self) -> Option<Type> {
+        Some(match self {
+            Ty::Bool => Type::Bool,
+            Ty::Int | Ty::Texture => Type::Int,
+            Ty::Float | Ty::Length | Ty::Angle => Type::Float,
+            Ty::Vec2 => Type::Vec2,
+            Ty::Vec3 | Ty::Color | Ty::Point | Ty::Vector | Ty::Normal => Type::Vec3,
+            Ty::Vec4 => Type::Vec4,
+            Ty::Mat3 => Type::Mat3,
+            Ty::Struct(id) => Type::Struct(id),
+            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => return None,
+        })
+    }
+}
