@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use impasto_compiler::partition::{Form, Plan};
+use impasto_compiler::partition::Plan;
 
 use crate::kernels::dropped::{self, Row};
 

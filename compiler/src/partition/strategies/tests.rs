@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::super::text::print;
-use super::super::{DeviceProfile, Hits, PlanInputs, Strategy, Workload};
+use super::super::{DeviceProfile, Hits, Plan, PlanInputs, Strategy, Workload};
 use super::*;
 use crate::cost::{Classes, LANES, Operations};
 
