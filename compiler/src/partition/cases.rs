@@ -7,7 +7,7 @@ use crate::random::SplitMix64;
 
 /// The strategies that must know nothing but names.
 pub(super) fn by_names() -> impl Iterator<Item = Strategy> {
-    let all = STRATEGIES.into_iter().map(Strategy::new);
+    let all = STRATEGIES.iter().copied().map(Strategy::new);
     all.filter(|strategy| strategy.requires() == Requires::Nothing)
 }
 

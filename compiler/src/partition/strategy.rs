@@ -39,7 +39,7 @@ impl Strategy {
             None => (text, None),
         };
         let called = |row: &&StrategyRow| row.name == name || row.older_names.contains(&name);
-        let row = STRATEGIES.into_iter().find(called);
+        let row = STRATEGIES.iter().copied().find(called);
         let row = row.ok_or_else(|| unknown(text))?;
         match (row.number, value) {
             (None, None) => Ok(Self::new(row)),
@@ -51,8 +51,8 @@ impl Strategy {
     /// The strategies whose plans the time model can set beside each other: those that come to a wavefront
     /// without being given a number or a GPU.
     pub fn comparable() -> impl Iterator<Item = Strategy> {
-        let comparable = STRATEGIES.into_iter().filter(|row| row.is_comparable());
-        comparable.map(Strategy::new)
+        let rows = STRATEGIES.iter().copied();
+        rows.filter(|row| row.is_comparable()).map(Strategy::new)
     }
 
     /// Its row of the table.
@@ -197,6 +197,6 @@ fn unknown(text: &str) -> PlanError {
 
 /// How the strategies of such rows are written.
 fn usages(such: impl Fn(&StrategyRow) -> bool) -> Vec<String> {
-    let rows = STRATEGIES.into_iter().filter(|row| such(row));
-    rows.map(StrategyRow::usage).collect()
+    let rows = STRATEGIES.iter().filter(|row| such(row));
+    rows.map(|row| row.usage()).collect()
 }

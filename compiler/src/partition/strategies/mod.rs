@@ -23,7 +23,7 @@ mod threshold;
 pub use paper::PAPER_OPERATIONS;
 
 /// Every strategy, in the order in which people are shown them.
-pub const STRATEGIES: [&StrategyRow; 9] = [
+pub const STRATEGIES: &[&StrategyRow] = &[
     &auto::ROW,
     &own::ROW,
     &mixed::ROW,
