@@ -15,7 +15,7 @@
 //!
 //! let scene = impasto::load("examples/cornell/scene.toml".as_ref())?;
 //! let program = impasto::compile(&scene)?;
-//! let plan = impasto::plan(&program, Strategy::Own);
+//! let plan = impasto::plan(&program, Strategy::OWN)?;
 //! let options = RenderOptions { samples: 16, ..RenderOptions::default() };
 //! let rendering = impasto::render(&scene, &program, &plan, &options)?;
 //! impasto::runtime::film::output::write(&rendering.film, "cornell.png".as_ref(), 0.0)?;
@@ -29,10 +29,12 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use compiler::partition::PlanInputs;
+
 pub use impasto_compiler as compiler;
 pub use impasto_runtime as runtime;
 
-pub use compiler::partition::{Plan, Strategy};
+pub use compiler::partition::{Plan, PlanError, Strategy};
 pub use compiler::{Compilation, MaterialRequest, Program};
 pub use files::FileLoader;
 pub use ir_text::ir_text;
@@ -51,6 +53,7 @@ mod ir_text;
 pub mod measure;
 pub mod plan;
 pub mod starter;
+mod statistics;
 pub mod trace;
 
 /// Why there is no picture.
@@ -65,6 +68,9 @@ pub enum Error {
     /// What materials cost cannot be told in reasonable time.
     #[error("the materials take too long to evaluate, so that nothing is known of what they cost")]
     Costs,
+    /// The strategy has no plan for these materials.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// The GPU, or something that it was asked for.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
@@ -107,9 +113,12 @@ pub fn compile(scene: &Scene) -> Result<Program, Error> {
 }
 
 /// Decides which materials share a kernel.
-pub fn plan(program: &Program, strategy: Strategy) -> Plan {
+///
+/// # Errors
+/// If the strategy must know more than the materials' names; the module [`plan`](mod@plan) gathers that.
+pub fn plan(program: &Program, strategy: Strategy) -> Result<Plan, PlanError> {
     let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
-    strategy.plan(&names)
+    strategy.plan(&PlanInputs::of_names(&names))
 }
 
 /// Renders on the most capable GPU, without showing progress; [`Renderer`] shows it and can be

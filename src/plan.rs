@@ -2,8 +2,8 @@
 //!
 //! ```no_run
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! use impasto::compiler::partition::{DeviceProfile, Wanted};
-//! use impasto::plan::Facts;
+//! use impasto::compiler::partition::{DeviceProfile, Strategy};
+//! use impasto::plan::SceneMaterials;
 //!
 //! let scene = impasto::load("examples/cornell/scene.toml".as_ref())?;
 //! let program = impasto::compile(&scene)?;
@@ -11,8 +11,8 @@
 //! let workload = impasto::plan::workload(&gpu, &scene, &program, None)?;
 //! let info = gpu.info();
 //! let profile = DeviceProfile::shipped(&info.name, info.kind)?.profile;
-//! let facts = Facts::of_scene(&scene, &program, 1024)?;
-//! let plan = Wanted::Auto.plan(&facts.known(&workload, &profile))?;
+//! let materials = SceneMaterials::new(&scene, &program, 1024)?;
+//! let plan = Strategy::AUTO.plan(&materials.inputs(&workload, &profile))?;
 //! # Ok(())
 //! # }
 //! ```
@@ -22,7 +22,7 @@ use std::sync::Arc;
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
 use impasto_compiler::ir::interp::OutOfFuel;
-use impasto_compiler::partition::{DeviceProfile, Known, Wanted, Workload};
+use impasto_compiler::partition::{DeviceProfile, PlanInputs, Strategy, Workload};
 use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
@@ -34,7 +34,7 @@ const ITERATIONS: u32 = 16;
 
 /// What is known of a scene's materials without rendering it.
 #[derive(Clone, Debug)]
-pub struct Facts {
+pub struct SceneMaterials {
     /// Their names, in the order of the program.
     pub names: Vec<String>,
     /// Those that no triangle binds, ascending.
@@ -43,13 +43,13 @@ pub struct Facts {
     pub costs: Vec<Option<Cost>>,
 }
 
-impl Facts {
-    /// The facts of `scene`, whose materials compiled to `program`; each is evaluated at `samples` points
-    /// of the scene's surfaces.
+impl SceneMaterials {
+    /// The materials of `scene`, which compiled to `program`; each is evaluated at `samples` points of the
+    /// scene's surfaces.
     ///
     /// # Errors
     /// If the evaluations of a material take too long together.
-    pub fn of_scene(scene: &Scene, program: &Program, samples: usize) -> Result<Self, OutOfFuel> {
+    pub fn new(scene: &Scene, program: &Program, samples: usize) -> Result<Self, OutOfFuel> {
         let costs = crate::cost::of_scene(scene, program, samples)?;
         Ok(Self {
             names: program.materials().map(|m| m.name.clone()).collect(),
@@ -59,8 +59,12 @@ impl Facts {
     }
 
     /// All that strategies ask for.
-    pub fn known<'a>(&'a self, workload: &'a Workload, profile: &'a DeviceProfile) -> Known<'a> {
-        Known {
+    pub fn inputs<'a>(
+        &'a self,
+        workload: &'a Workload,
+        profile: &'a DeviceProfile,
+    ) -> PlanInputs<'a> {
+        PlanInputs {
             names: &self.names,
             unused: &self.unused,
             costs: Some(&self.costs),
@@ -70,18 +74,20 @@ impl Facts {
     }
 }
 
-/// Plans while a scene is rendered: the automatic plan for what paths turn out to hit, by what materials cost
-/// at `samples` points of the scene's surfaces and by what the GPU takes.
+/// Plans while a scene is rendered: the plan of a strategy for what paths turn out to hit, by what
+/// materials cost at `samples` points of the scene's surfaces and by what the GPU takes.
 pub fn planner(
+    strategy: Strategy,
     scene: Arc<Scene>,
     program: Arc<Program>,
     profile: DeviceProfile,
     samples: usize,
 ) -> Planner {
     Box::new(move |workload| {
-        let facts = Facts::of_scene(&scene, &program, samples);
-        let facts = facts.map_err(|_| "its materials take too long to evaluate".to_owned())?;
-        let plan = Wanted::Auto.plan(&facts.known(workload, &profile));
+        let materials = SceneMaterials::new(&scene, &program, samples);
+        let materials =
+            materials.map_err(|_| "its materials take too long to evaluate".to_owned())?;
+        let plan = strategy.plan(&materials.inputs(workload, &profile));
         plan.map_err(|error| error.to_string())
     })
 }

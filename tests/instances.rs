@@ -15,7 +15,7 @@ fn root() -> PathBuf {
 fn render(mut scene: Scene, [width, height]: [u32; 2], samples: u32) -> Rendering {
     scene.film = FilmSettings { width, height };
     let program = impasto::compile(&scene).unwrap_or_else(|error| panic!("{error}"));
-    let plan = impasto::plan(&program, Strategy::Own);
+    let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
     let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let options = RenderOptions {
         samples,

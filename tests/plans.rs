@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use impasto::compiler::partition::explain::{Subject, explain};
-use impasto::compiler::partition::{Calibrated, DeviceProfile, Wanted, Workload};
-use impasto::plan::Facts;
+use impasto::compiler::partition::{Calibrated, DeviceProfile, Strategy, Workload};
+use impasto::plan::SceneMaterials;
 
 use crate::generated;
 
@@ -51,29 +51,30 @@ fn workload_file(name: &str) -> PathBuf {
     root().join(format!("tests/plans/{name}.workload.json"))
 }
 
-/// What is said of the plan that `wanted` makes for a scene.
-fn explained(name: &str, wanted: Wanted) -> String {
+/// What is said of the plan that `strategy` makes for a scene.
+fn explained(name: &str, strategy: Strategy) -> String {
     let out = tempfile::tempdir().expect("a folder");
     let scene =
         impasto::load(&scene_file(name, out.path())).unwrap_or_else(|e| panic!("{name}: {e}"));
     let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{name}: {e}"));
-    let facts = Facts::of_scene(&scene, &program, SAMPLES).expect("it can be evaluated");
+    let materials = SceneMaterials::new(&scene, &program, SAMPLES).expect("it can be evaluated");
     let text = std::fs::read_to_string(workload_file(name)).unwrap_or_else(|e| {
         panic!(
             "{e}\nmake it on a GPU: impasto plan examples/{name}/scene.toml --save-workload \
              tests/plans/{name}.workload.json"
         )
     });
-    let workload = Workload::parse(&text, &facts.names).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let workload =
+        Workload::parse(&text, &materials.names).unwrap_or_else(|e| panic!("{name}: {e}"));
     let profile = DeviceProfile::named("h200").expect("it is shipped");
-    let plan = wanted
-        .plan(&facts.known(&workload, &profile))
+    let plan = strategy
+        .plan(&materials.inputs(&workload, &profile))
         .unwrap_or_else(|e| panic!("{e}"));
     let subject = Subject {
         plan: &plan,
-        names: &facts.names,
+        names: &materials.names,
         model: Calibrated {
-            costs: &facts.costs,
+            costs: &materials.costs,
             workload: &workload,
             profile: &profile,
         },
@@ -93,7 +94,7 @@ fn every_example_scene() {
     settings.set_prepend_module_to_snapshot(false);
     settings.bind(|| {
         for name in scenes {
-            insta::assert_snapshot!(name.clone(), explained(&name, Wanted::Auto));
+            insta::assert_snapshot!(name.clone(), explained(&name, Strategy::AUTO));
         }
     });
 }

@@ -30,7 +30,7 @@ fn every_material_renders() {
         let rendering = render(
             &gpu,
             &scene,
-            Strategy::Own,
+            Strategy::OWN,
             RenderOptions {
                 samples: 4,
                 ..Default::default()
@@ -66,14 +66,14 @@ fn strategies_agree() {
         };
         seeds.clone().map(picture).collect()
     };
-    let reference = pictures(Strategy::Own, Regeneration::Never);
+    let reference = pictures(Strategy::OWN, Regeneration::Never);
     for (strategy, regeneration) in [
-        (Strategy::Mixed, Regeneration::Never),
-        (Strategy::Binned, Regeneration::Never),
-        (Strategy::Inline, Regeneration::Never),
-        (Strategy::Mega, Regeneration::Never),
-        (Strategy::Mega, Regeneration::Half),
-        (Strategy::Mega, Regeneration::Always),
+        (Strategy::MIXED, Regeneration::Never),
+        (Strategy::BINNED, Regeneration::Never),
+        (Strategy::INLINE, Regeneration::Never),
+        (Strategy::MEGA, Regeneration::Never),
+        (Strategy::MEGA, Regeneration::Half),
+        (Strategy::MEGA, Regeneration::Always),
     ] {
         let other = pictures(strategy, regeneration);
         let outliers = outliers(&reference, &other);
@@ -110,7 +110,7 @@ fn every_assignment_renders_the_same_picture() {
         let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
         rendering.unwrap_or_else(|error| panic!("{error}"))
     };
-    let reference = render(&impasto::plan(&program, Strategy::Own));
+    let reference = render(&impasto::plan(&program, Strategy::OWN).expect("a plan"));
     let mut tried = 0;
     for groups in [
         vec![vec![0], vec![1], vec![2]],
@@ -166,7 +166,7 @@ fn equal_seeds_give_equal_pictures_and_others_do_not() {
             pool,
             ..Default::default()
         };
-        render(&gpu, &scene, Strategy::Own, options).film.pixels
+        render(&gpu, &scene, Strategy::OWN, options).film.pixels
     };
     assert_eq!(picture(5, None), picture(5, None));
     assert_eq!(
@@ -254,7 +254,7 @@ fn scene(path: &str, side: u32) -> Scene {
 
 fn render(gpu: &Gpu, scene: &Scene, strategy: Strategy, options: RenderOptions) -> Rendering {
     let program = impasto::compile(scene).unwrap_or_else(|error| panic!("{error}"));
-    let plan = impasto::plan(&program, strategy);
+    let plan = impasto::plan(&program, strategy).expect("a plan");
     let renderer = Renderer::new(gpu, scene, &program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|error| panic!("{error}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));

@@ -51,7 +51,7 @@ impl Subject {
     /// The picture of every sample alone, as the GPU renders it.
     fn pictures(&self, strategy: Strategy, sampler: Sampler) -> Vec<Vec<[f32; 3]>> {
         let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-        let plan = impasto::plan(&self.program, strategy);
+        let plan = impasto::plan(&self.program, strategy).expect("a plan");
         let options = RenderOptions {
             samples: 1,
             seed: SEED,
@@ -132,8 +132,8 @@ fn compare(gpu: &[Vec<[f32; 3]>], paths: &[Vec<Path>]) -> (usize, f64) {
 type Way = (Strategy, Sampler, MaterialCode);
 
 const WAYS: [Way; 2] = [
-    (Strategy::Mega, Sampler::Owen, MaterialCode::Wgsl),
-    (Strategy::Own, Sampler::Independent, MaterialCode::Ir),
+    (Strategy::MEGA, Sampler::Owen, MaterialCode::Wgsl),
+    (Strategy::OWN, Sampler::Independent, MaterialCode::Ir),
 ];
 
 /// The interpreter in single precision is one more machine that renders: it takes the GPU's ways, by
@@ -181,7 +181,7 @@ fn replays_are_what_the_gpu_renders_under_a_map() {
 #[test]
 fn double_precision_has_the_pictures_mean() {
     let subject = subject("examples/cornell/scene.toml");
-    let gpu = subject.pictures(Strategy::Own, Sampler::Owen);
+    let gpu = subject.pictures(Strategy::OWN, Sampler::Owen);
     let paths = subject.replays::<f64>(MaterialCode::Ir, Sampler::Owen);
     let (different, apart) = compare(&gpu, &paths);
     assert!(different <= 12, "{different} samples differ");

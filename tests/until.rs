@@ -36,7 +36,7 @@ fn the_picture_is_that_of_both_halves() {
     let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
     let scene = scene(8);
     let program = impasto::compile(&scene).expect("materials");
-    let plan = impasto::plan(&program, Strategy::Own);
+    let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
     let options = RenderOptions {
         samples: 22,
         first_sample: 5,
@@ -92,7 +92,7 @@ fn the_estimated_error_is_the_true_one() {
     let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
     let scene = scene(12);
     let program = impasto::compile(&scene).expect("materials");
-    let plan = impasto::plan(&program, Strategy::Mega);
+    let plan = impasto::plan(&program, Strategy::MEGA).expect("a plan");
     for sampler in [Sampler::Independent, Sampler::Sobol, Sampler::Owen] {
         let options = RenderOptions {
             samples: 2048,

@@ -16,14 +16,14 @@ use impasto::compiler::partition::{
     Automatic, Calibrated, DeviceProfile, Form, Groups, Problem, Search, TimeModel, Workload,
 };
 use impasto::compiler::partition::{search, text};
-use impasto::plan::Facts;
+use impasto::plan::SceneMaterials;
 
 const SCENE: &str = "examples/swatches/scene.toml";
 const WORKLOAD: &str = "tests/plans/swatches.workload.json";
 
 /// A kernel takes a start and its operations.
 struct Simple<'a> {
-    facts: &'a Facts,
+    materials: &'a SceneMaterials,
     workload: &'a Workload,
     /// Seconds that a kernel takes to start and to drain.
     start: f64,
@@ -34,7 +34,7 @@ struct Simple<'a> {
 impl TimeModel for Simple<'_> {
     fn seconds(&self, form: Form, members: &[usize]) -> f64 {
         let operations = |m: &usize| {
-            let cost = self.facts.costs[*m].as_ref();
+            let cost = self.materials.costs[*m].as_ref();
             let mean = cost.map_or(0.0, |cost| cost.operations.mean);
             mean * self.workload.materials[*m].share
         };
@@ -99,18 +99,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let workload = args.next().unwrap_or_else(|| WORKLOAD.into());
     let scene = impasto::load(Path::new(&scene))?;
     let program = impasto::compile(&scene)?;
-    let facts = Facts::of_scene(&scene, &program, 256)?;
-    let workload = Workload::parse(&std::fs::read_to_string(workload)?, &facts.names)?;
+    let materials = SceneMaterials::new(&scene, &program, 256)?;
+    let workload = Workload::parse(&std::fs::read_to_string(workload)?, &materials.names)?;
     let profile = DeviceProfile::named("h200").ok_or("there is no profile of that name")?;
 
-    let known = facts.known(&workload, &profile);
+    let inputs = materials.inputs(&workload, &profile);
     let calibrated = Calibrated {
-        costs: &facts.costs,
+        costs: &materials.costs,
         workload: &workload,
         profile: &profile,
     };
     let simple = Simple {
-        facts: &facts,
+        materials: &materials,
         workload: &workload,
         start: 20e-6,
         operation: 1.0 / 33e12,
@@ -127,12 +127,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("simple model, dice", &simple, &dice),
     ];
     for (what, model, search) in plans {
-        let groups = search.search(&known.problem(), model);
-        let plan = known.plan("custom", groups.clone());
-        plan.check_named(&facts.names)?;
+        let groups = search.search(&inputs.problem(), model);
+        let plan = inputs.plan("custom", groups.clone());
+        plan.check_named(&materials.names)?;
         let us = |model: &dyn TimeModel| 1e6 * search::total(model, &groups);
         println!("{what}");
-        println!("  {}", text::print(&plan, &facts.names));
+        println!("  {}", text::print(&plan, &materials.names));
         println!(
             "  {:.1} us by the model used, {:.1} us by the calibrated one",
             us(model),

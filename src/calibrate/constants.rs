@@ -5,9 +5,9 @@
 
 use impasto_compiler::partition::profile::Weights;
 
-/// What is known of a constant beside its name.
+/// What is to be known of a constant of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct About {
+pub struct Constant {
     /// Its name in profiles.
     pub name: &'static str,
     /// The least and the most that it can be.
@@ -18,8 +18,8 @@ pub struct About {
 
 const TIMES: [f64; 2] = [1e-15, 1e-2];
 
-const fn time(name: &'static str, meaning: &'static str) -> About {
-    About {
+const fn time(name: &'static str, meaning: &'static str) -> Constant {
+    Constant {
         name,
         bounds: TIMES,
         meaning,
@@ -27,7 +27,7 @@ const fn time(name: &'static str, meaning: &'static str) -> About {
 }
 
 /// Every constant of the model.
-pub const ABOUT: [About; 15] = [
+pub const CONSTANTS: [Constant; 15] = [
     time("launch", "s, a dispatch that finds nothing to do"),
     time("latency", "s, an operation that waits for the one before"),
     time("alu", "s, float arithmetic of a subgroup"),
@@ -43,32 +43,32 @@ pub const ABOUT: [About; 15] = [
         "scatter",
         "s, the same in addition where neighbours are elsewhere",
     ),
-    About {
+    Constant {
         name: "code",
         bounds: [300.0, 1e6],
         meaning: "operations of code that caches hold",
     },
-    About {
+    Constant {
         name: "miss",
         bounds: [1e-3, 10.0],
         meaning: "slowdown by as much more code side by side, as a share",
     },
-    About {
+    Constant {
         name: "overlap",
         bounds: [1.0, 16.0],
         meaning: "exponent by which operations, memory and waiting overlap",
     },
-    About {
+    Constant {
         name: "inline_loads",
         bounds: [1e-3, 2.0],
         meaning: "share of their loads that inline materials make",
     },
-    About {
+    Constant {
         name: "free_registers",
         bounds: [8.0, 256.0],
         meaning: "live numbers that leave the logic kernel as it is",
     },
-    About {
+    Constant {
         name: "pressure",
         bounds: [1e-3, 20.0],
         meaning: "its slowdown by a hundred more, as a share",
@@ -76,9 +76,9 @@ pub const ABOUT: [About; 15] = [
 ];
 
 /// What is known of the constant called `name`; little of one that is not in the table.
-pub fn about(name: &str) -> About {
-    let found = ABOUT.iter().find(|about| about.name == name);
-    found.copied().unwrap_or(About {
+pub fn constant(name: &str) -> Constant {
+    let found = CONSTANTS.iter().find(|constant| constant.name == name);
+    found.copied().unwrap_or(Constant {
         name: "",
         bounds: [1e-15, 1e9],
         meaning: "",
@@ -98,7 +98,7 @@ pub fn named(weights: &Weights) -> Vec<(String, f64)> {
 pub fn coordinates(weights: &Weights) -> Vec<f64> {
     let all = named(weights).into_iter();
     all.map(|(name, value)| {
-        let [least, most] = about(&name).bounds;
+        let [least, most] = constant(&name).bounds;
         value.clamp(least, most).ln()
     })
     .collect()
@@ -108,7 +108,7 @@ pub fn coordinates(weights: &Weights) -> Vec<f64> {
 pub fn at(coordinates: &[f64], like: &Weights) -> Weights {
     let names = named(like).into_iter().zip(coordinates);
     let fields = names.map(|((name, _), coordinate)| {
-        let [least, most] = about(&name).bounds;
+        let [least, most] = constant(&name).bounds;
         (name, serde_json::json!(coordinate.exp().clamp(least, most)))
     });
     let fields = fields.collect::<serde_json::Map<_, _>>();
@@ -127,14 +127,14 @@ mod tests {
             let weights = profile.weights;
             let back = at(&coordinates(&weights), &weights);
             for ((name, before), (_, after)) in named(&weights).into_iter().zip(named(&back)) {
-                let About {
+                let Constant {
                     bounds, meaning, ..
-                } = about(&name);
+                } = constant(&name);
                 assert!(!meaning.is_empty(), "`{name}` needs a row in the table");
                 let expected = before.clamp(bounds[0], bounds[1]);
                 assert!((after / expected - 1.0).abs() < 1e-12, "{name}");
             }
-            assert_eq!(named(&weights).len(), ABOUT.len(), "a row too many");
+            assert_eq!(named(&weights).len(), CONSTANTS.len(), "a row too many");
         }
     }
 
@@ -143,7 +143,7 @@ mod tests {
         let weights = DeviceProfile::named("h200").expect("it is shipped").weights;
         let far = vec![1e3; coordinates(&weights).len()];
         for (name, value) in named(&at(&far, &weights)) {
-            assert_eq!(value, about(&name).bounds[1], "{name}");
+            assert_eq!(value, constant(&name).bounds[1], "{name}");
         }
     }
 }

@@ -157,9 +157,10 @@ impl<'a> Problem<'a> {
 
     /// Predicted over measured, `floor` seconds added to both.
     fn ratio(&self, point: &Point<'_>, predicted: f64, floor: f64) -> f64 {
-        let logic = match point.kernel.form {
-            Form::Inline => self.sets[point.set].logic_seconds,
-            _ => 0.0,
+        let logic = if point.kernel.form.has_queue() {
+            0.0
+        } else {
+            self.sets[point.set].logic_seconds
         };
         let positive = |seconds: f64| (logic + seconds).max(1e-9) + floor;
         positive(predicted) / positive(point.kernel.measured)

@@ -8,8 +8,8 @@ use impasto_runtime::lab::LabOptions;
 
 use super::room::{self, Coherence};
 use super::sources::{Palette, palettes};
-use crate::measure::{Measurement, Progress, Subject, sample_for_fit};
-use crate::plan::Facts;
+use crate::measure::{MeasuredScene, Measurement, Progress, sample_for_fit};
+use crate::plan::SceneMaterials;
 use crate::{Error, Scene};
 
 /// Points at which each material is evaluated to learn what it costs.
@@ -108,10 +108,10 @@ fn one(
         statistics: true,
         ..LabOptions::default()
     };
-    let facts = Facts::of_scene(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;
-    let subject = Subject::new(scene, &program, facts, &options)?;
+    let materials = SceneMaterials::new(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;
+    let subject = MeasuredScene::new(scene, &program, materials, &options)?;
     let mut lab = subject.lab(gpu, &options)?;
-    let candidates = sample_for_fit(&subject.materials(), effort.pairs);
+    let candidates = sample_for_fit(&subject.on_surface(), effort.pairs);
     let timed = subject.time(&mut lab, &candidates, None::<Instant>, progress)?;
     for (candidate, why) in &timed.failed {
         warn(&format!(

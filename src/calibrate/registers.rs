@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::errors::rank_correlation;
 use crate::measure::Measurement;
+use crate::statistics::rank_correlation;
 
 /// Registers against the estimate, over kernels whose registers the driver told.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::constants::{about, named};
+use super::constants::{constant, named};
 use super::errors::Errors;
 use super::fit::{Fitted, Residual};
 
@@ -94,14 +94,14 @@ fn rows(errors: &[Errors]) -> String {
 fn constants(fitted: &Fitted) -> String {
     let mut out = String::new();
     for (name, value) in named(&fitted.profile.weights) {
-        let about = about(&name);
-        let [least, most] = about.bounds;
+        let constant = constant(&name);
+        let [least, most] = constant.bounds;
         let mark = match value {
             v if v <= least * 1.001 => ", as low as it can be",
             v if v >= most * 0.999 => ", as high as it can be",
             _ => "",
         };
-        let _ = writeln!(out, "{name:<16} {value:>11.4e}  {}{mark}", about.meaning);
+        let _ = writeln!(out, "{name:<16} {value:>11.4e}  {}{mark}", constant.meaning);
     }
     out
 }

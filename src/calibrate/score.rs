@@ -4,10 +4,11 @@
 use std::fmt::Write;
 
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::{Calibrated, DeviceProfile, Form, Known, Wanted, text};
+use impasto_compiler::partition::{Calibrated, DeviceProfile, Form, PlanInputs, Strategy, text};
 use serde::Serialize;
 
 use crate::measure::Measurement;
+use crate::statistics::median;
 
 /// What a profile says of a measurement.
 #[derive(Clone, Debug, Serialize)]
@@ -53,14 +54,14 @@ fn one(set: &Measurement, (name, profile): (&str, &DeviceProfile)) -> Result<Sco
         .filter(|(_, h)| !h.on_surface)
         .map(|(m, _)| m)
         .collect();
-    let known = Known {
+    let inputs = PlanInputs {
         names: &names,
         unused: &unused,
         costs: Some(&costs),
         workload: Some(&set.workload),
         profile: Some(profile),
     };
-    let plan = Wanted::Auto.plan(&known);
+    let plan = Strategy::AUTO.plan(&inputs);
     let plan = plan.map_err(|error| format!("`{}`: {error}", set.scene))?;
     let model = Calibrated {
         costs: &costs,
@@ -90,13 +91,14 @@ pub fn scores_text(scored: &[Scored]) -> String {
     );
     for set in scored {
         let positive = set.kernels.iter().filter(|k| k.measured > 0.0);
-        let mut off: Vec<f64> = positive
+        let off: Vec<f64> = positive
             .map(|k| (k.predicted / k.measured - 1.0).abs())
             .collect();
-        off.sort_by(f64::total_cmp);
-        let median = off
-            .get(off.len() / 2)
-            .map_or_else(|| "-".into(), |e| format!("{:.1} %", 100.0 * e));
+        let median = if off.is_empty() {
+            "-".into()
+        } else {
+            format!("{:.1} %", 100.0 * median(off))
+        };
         let (scene, count) = (&set.scene, set.kernels.len());
         let _ = writeln!(
             out,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use impasto::compiler::partition::{Needs, Wanted};
+use impasto::compiler::partition::{Requires, Strategy};
 use impasto::converge::data::{Convergence, Metric, Reference, SceneConvergence};
 use impasto::converge::pictures::{Pictures, ScenePictures};
 use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
@@ -29,7 +29,7 @@ pub(super) struct ConvergeArgs {
     out: PathBuf,
     /// How materials share kernels: names as of `impasto render --strategy`
     #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = parse_strategy)]
-    strategies: Vec<Wanted>,
+    strategies: Vec<Strategy>,
     /// Samplers: sobol, owen, independent
     #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = parse_sampler)]
     samplers: Vec<Sampler>,
@@ -67,11 +67,11 @@ pub(super) struct ConvergeArgs {
     gpu: GpuArgs,
 }
 
-fn parse_strategy(name: &str) -> Result<Wanted, String> {
-    let wanted = Wanted::parse(name).map_err(|error| error.to_string())?;
-    match wanted.row().needs {
-        Needs::Measurements => Err("only `impasto plan` measures kernels".into()),
-        _ => Ok(wanted),
+fn parse_strategy(name: &str) -> Result<Strategy, String> {
+    let strategy = Strategy::parse(name).map_err(|error| error.to_string())?;
+    match strategy.requires() {
+        Requires::Measurements => Err("only `impasto plan` measures kernels".into()),
+        _ => Ok(strategy),
     }
 }
 

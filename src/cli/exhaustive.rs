@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use clap::Args;
 use impasto::compiler::partition::DeviceProfile;
-use impasto::measure::{Answer, Options, Progress, Subject, exhaustive};
-use impasto::plan::Facts;
+use impasto::measure::{Answer, MeasuredScene, Options, Progress, exhaustive};
+use impasto::plan::SceneMaterials;
 use impasto::runtime::lab::LabOptions;
 use impasto::{Gpu, Program, Scene};
 
@@ -30,7 +30,7 @@ impl ExhaustiveArgs {
         gpu: &Gpu,
         scene: &Scene,
         program: &Program,
-        facts: Facts,
+        materials: SceneMaterials,
         profile: (&str, &DeviceProfile),
         pool: Option<u32>,
         global: &Global,
@@ -49,7 +49,7 @@ impl ExhaustiveArgs {
             bar.set_length(progress.all as u64);
             bar.set_position(progress.done as u64);
         };
-        let subject = Subject::new(scene, program, facts, &options.lab);
+        let subject = MeasuredScene::new(scene, program, materials, &options.lab);
         let answer = subject.and_then(|s| exhaustive(gpu, &s, profile, &options, &mut progress));
         bar.finish_and_clear();
         Ok(answer.map_err(|error| error.to_string())?)

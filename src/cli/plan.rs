@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, Plan, Wanted, Workload, file, text};
-use impasto::plan::Facts;
+use impasto::compiler::partition::{Calibrated, Plan, Strategy, Workload, file, text};
+use impasto::plan::SceneMaterials;
 use impasto::{Gpu, Program, Scene, files};
 use serde::Serialize;
 
@@ -68,37 +68,37 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     if args.needs {
         return super::needs::run(&args.scene, &scene, &program, global);
     }
-    let facts = Facts::of_scene(&scene, &program, args.samples as usize)
+    let materials = SceneMaterials::new(&scene, &program, args.samples as usize)
         .map_err(|_| "the materials take too long to evaluate; try fewer `--samples`".to_owned())?;
     // What is wrong with the plan is said before anything is rendered.
     let source = args
         .wanted
-        .source(&facts.names, &facts.unused, Wanted::Auto)?;
-    if let Source::Strategy(Wanted::Exhaustive) = source {
-        return args.measure(&scene, &program, facts, global);
+        .source(&materials.names, &materials.unused, Strategy::AUTO)?;
+    if matches!(source, Source::Strategy(strategy) if strategy == Strategy::EXHAUSTIVE) {
+        return args.measure(&scene, &program, materials, global);
     }
     let mut gpu = None;
-    let workload = args.workload(&facts, &mut gpu, &scene, &program)?;
+    let workload = args.workload(&materials, &mut gpu, &scene, &program)?;
     let profile = args.profile(&mut gpu)?;
     let plan = match source {
         Source::Given(plan) => plan,
-        Source::Strategy(wanted) => {
-            let known = facts.known(&workload, &profile.profile);
-            wanted.plan(&known).map_err(|e| e.to_string())?
+        Source::Strategy(strategy) => {
+            let inputs = materials.inputs(&workload, &profile.profile);
+            strategy.plan(&inputs).map_err(|e| e.to_string())?
         }
     };
     let subject = Subject {
         plan: &plan,
-        names: &facts.names,
+        names: &materials.names,
         model: Calibrated {
-            costs: &facts.costs,
+            costs: &materials.costs,
             workload: &workload,
             profile: &profile.profile,
         },
         exact: profile.exact,
     };
     let explanation = explain(&subject).map_err(|e| e.to_string())?;
-    args.save(&plan, &facts.names, &workload)?;
+    args.save(&plan, &materials.names, &workload)?;
     match global.json() {
         true => args.print_json(&explanation, &workload),
         false => print(&explanation.to_string()),
@@ -107,7 +107,13 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
 
 impl PlanCommandArgs {
     /// Measures every kernel in the place of predicting it.
-    fn measure(&self, scene: &Scene, program: &Program, facts: Facts, global: &Global) -> Outcome {
+    fn measure(
+        &self,
+        scene: &Scene,
+        program: &Program,
+        materials: SceneMaterials,
+        global: &Global,
+    ) -> Outcome {
         if self.workload.is_some() {
             return Err(Failure::Error(
                 "`--strategy exhaustive` renders the scene to measure its kernels, and takes no `--workload`"
@@ -121,14 +127,14 @@ impl PlanCommandArgs {
             gpu,
             scene,
             program,
-            facts.clone(),
+            materials.clone(),
             (&profile.name, &profile.profile),
             self.pool,
             global,
         )?;
-        let best = text::parse(&answer.best, &facts.names, &facts.unused);
+        let best = text::parse(&answer.best, &materials.names, &materials.unused);
         let best = best.map_err(|e| e.to_string())?;
-        self.save(&best, &facts.names, &answer.measurement.workload)?;
+        self.save(&best, &materials.names, &answer.measurement.workload)?;
         match global.json() {
             true => print(&format!("{:#}\n", serde_json::json!(answer))),
             false => print(&answer.to_string()),
@@ -137,7 +143,7 @@ impl PlanCommandArgs {
 
     fn workload(
         &self,
-        facts: &Facts,
+        materials: &SceneMaterials,
         gpu: &mut Option<Gpu>,
         scene: &Scene,
         program: &Program,
@@ -146,7 +152,7 @@ impl PlanCommandArgs {
             let gpu = self.opened(gpu)?;
             return impasto::plan::workload(gpu, scene, program, self.pool).map_err(super::runtime);
         };
-        let workload = Workload::parse(&read_text(path)?, &facts.names);
+        let workload = Workload::parse(&read_text(path)?, &materials.names);
         let mut workload = workload.map_err(|e| format!("`{}`: {e}", path.display()))?;
         workload.pool = self.pool.unwrap_or(workload.pool);
         Ok(workload)

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use impasto::compiler::partition::{Known, Needs, Wanted};
+use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::options::Progress;
@@ -112,16 +112,17 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
     let gpu = args.gpu.open()?;
-    let options = args.options(planned.renewed, goals.is_some());
+    let options = args.options(planned.renewed_by.is_some(), goals.is_some());
     let mut renderer =
         Renderer::new(&gpu, &scene, &program, &planned.plan, &options).map_err(runtime)?;
-    if planned.renewed {
+    if let Some(strategy) = planned.renewed_by {
         let profile = given.map_or_else(|| Profile::of(&gpu.info()), Ok)?;
         if !profile.exact {
             global.detail("no profile is of this GPU; `impasto calibrate` makes one");
         }
-        let planner = plan::planner(scene.clone(), program.clone(), profile.profile, POINTS);
-        renderer.replan(Replanning::new(program.clone(), planner));
+        let (scene, program) = (scene.clone(), program.clone());
+        let planner = plan::planner(strategy, scene, program.clone(), profile.profile, POINTS);
+        renderer.replan(Replanning::new(program, planner));
     }
     let mut rendering = match &goals {
         Some(goals) => sample_until(&mut renderer, goals, global)?,
@@ -152,49 +153,52 @@ const POINTS: usize = 1024;
 /// The plan that a render begins with.
 struct Planned {
     plan: Plan,
-    /// Whether it is renewed for what paths turn out to hit.
-    renewed: bool,
+    /// The strategy that renews it for what paths turn out to hit.
+    renewed_by: Option<Strategy>,
 }
 
 impl RenderArgs {
-    /// The plan that was asked for. The automatic one begins with a kernel a material.
+    /// The plan that was asked for. A strategy that must know how paths hit materials begins with a kernel
+    /// a material, and plans when that is known.
     fn planned(&self, scene: &Scene, program: &Program) -> Result<Planned, Failure> {
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = plan::unused(scene, program);
         let fixed = |plan| Planned {
             plan,
-            renewed: false,
+            renewed_by: None,
         };
-        let wanted = match self.plan.source(&names, &unused, Wanted::Auto)? {
+        let strategy = match self.plan.source(&names, &unused, Strategy::AUTO)? {
             Source::Given(plan) => return Ok(fixed(plan)),
-            Source::Strategy(wanted) => wanted,
+            Source::Strategy(strategy) => strategy,
         };
-        let mut known = Known {
-            names: &names,
+        let inputs = PlanInputs {
             unused: &unused,
-            costs: None,
-            workload: None,
-            profile: None,
+            ..PlanInputs::of_names(&names)
         };
-        let planned = |known: &Known<'_>| wanted.plan(known).map_err(|e| e.to_string());
-        if wanted == Wanted::Auto {
-            let own = Wanted::Fixed(Strategy::Own).plan(&known);
-            return Ok(Planned {
+        let planned = |inputs: &PlanInputs<'_>| {
+            let plan = strategy.plan(inputs).map_err(|e| e.to_string())?;
+            Ok(fixed(plan))
+        };
+        match strategy.requires() {
+            Requires::Nothing | Requires::Measurements => planned(&inputs),
+            Requires::Costs => {
+                let materials = plan::SceneMaterials::new(scene, program, POINTS);
+                let materials = materials.map_err(|_| {
+                    "the materials take too long to evaluate; choose another strategy".to_owned()
+                })?;
+                planned(&PlanInputs {
+                    costs: Some(&materials.costs),
+                    ..inputs
+                })
+            }
+            Requires::Workload => Ok(Planned {
                 plan: Plan {
-                    strategy: wanted.to_string(),
-                    ..own.map_err(|e| e.to_string())?
+                    strategy: strategy.to_string(),
+                    ..Plan::own(&names, &unused)
                 },
-                renewed: true,
-            });
+                renewed_by: Some(strategy),
+            }),
         }
-        if wanted.row().needs != Needs::Costs {
-            return Ok(fixed(planned(&known)?));
-        }
-        let facts = plan::Facts::of_scene(scene, program, POINTS).map_err(|_| {
-            "the materials take too long to evaluate; choose another strategy".to_owned()
-        })?;
-        known.costs = Some(&facts.costs);
-        Ok(fixed(planned(&known)?))
     }
 
     fn options(&self, count_hits: bool, until: bool) -> RenderOptions {

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use impasto::Plan;
-use impasto::compiler::partition::{PlanError, STRATEGIES, Wanted, file, text};
+use impasto::compiler::partition::{PlanError, STRATEGIES, file, text};
+use impasto::{Plan, Strategy};
 
 use super::Failure;
 
@@ -13,7 +13,7 @@ use super::Failure;
 pub(super) struct PlanArgs {
     /// How materials share kernels
     #[arg(long, value_name = "NAME", value_parser = parse, long_help = help())]
-    strategy: Option<Wanted>,
+    strategy: Option<Strategy>,
     /// Use the plan of this file, which `impasto plan --save` wrote
     #[arg(long, value_name = "P.json", conflicts_with_all = ["strategy", "partition"])]
     plan: Option<PathBuf>,
@@ -26,7 +26,7 @@ pub(super) struct PlanArgs {
 /// Where a plan comes from.
 pub(super) enum Source {
     /// A strategy is still to make it.
-    Strategy(Wanted),
+    Strategy(Strategy),
     /// It was given.
     Given(Plan),
 }
@@ -38,7 +38,7 @@ impl PlanArgs {
         &self,
         names: &[String],
         unused: &[usize],
-        default: Wanted,
+        default: Strategy,
     ) -> Result<Source, Failure> {
         let error = |e: PlanError| Failure::Error(e.to_string());
         if let Some(path) = &self.plan {
@@ -55,15 +55,15 @@ impl PlanArgs {
     }
 }
 
-fn parse(name: &str) -> Result<Wanted, String> {
-    Wanted::parse(name).map_err(|error| error.to_string())
+fn parse(name: &str) -> Result<Strategy, String> {
+    Strategy::parse(name).map_err(|error| error.to_string())
 }
 
 /// The table of strategies.
 fn help() -> String {
     let mut help = "How materials share kernels\n".to_owned();
     for row in STRATEGIES {
-        help += &format!("\n{:<12} {}", row.name, row.help);
+        help += &format!("\n{:<12} {}", row.usage(), row.help);
     }
     help
 }

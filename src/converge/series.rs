@@ -12,6 +12,7 @@ use super::StudyError;
 use super::store::{Record, Store};
 use super::subject::Stage;
 use super::watch::{Clock, Watch};
+use crate::statistics::median;
 
 /// A render that is shorter is timed again, until all together took so long, in seconds.
 const LONG_ENOUGH: f64 = 0.02;
@@ -195,23 +196,5 @@ impl<'a> Bench<'a> {
         };
         watch.render_aside(&mut renderer, &warm_up)?;
         Ok(renderer)
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_middle_of_several_times_counts() {
-        assert_eq!(median(vec![9.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(vec![5.0]), 5.0);
-        assert_eq!(median(vec![3.0, 1.0]), 3.0);
-        assert_eq!(median(Vec::new()), 0.0);
     }
 }

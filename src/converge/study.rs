@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use impasto_compiler::partition::{Plan, Wanted};
+use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::film::Film;
 use impasto_runtime::film::output;
 use impasto_runtime::gpu::Gpu;
@@ -24,7 +24,7 @@ use super::{StudyError, fit, flip, materials, metrics};
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// A series for each of these with each sampler.
-    pub strategies: Vec<Wanted>,
+    pub strategies: Vec<Strategy>,
     /// The samplers.
     pub samplers: Vec<Sampler>,
     /// Samples a pixel, ascending.

@@ -1,7 +1,7 @@
 //! A scene that is studied, with all that renders of it need, and the plan that each strategy comes to.
 
 use impasto_compiler::Program;
-use impasto_compiler::partition::{DeviceProfile, Known, Needs, Plan, Wanted};
+use impasto_compiler::partition::{DeviceProfile, Plan, PlanInputs, Requires, Strategy};
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::identity;
@@ -11,7 +11,7 @@ use impasto_runtime::world::World;
 
 use super::StudyError;
 use super::store::Key;
-use crate::plan::{self, Facts};
+use crate::plan::{self, SceneMaterials};
 
 /// At how many points of surfaces materials are evaluated to see what they cost.
 const POINTS: usize = 1024;
@@ -85,34 +85,32 @@ impl<'a> Stage<'a> {
 
     /// The plan of a strategy. The automatic one is that to which a render comes that lasts: for how
     /// paths hit materials over a few iterations.
-    pub(super) fn plan(&self, wanted: Wanted) -> Result<Plan, StudyError> {
+    pub(super) fn plan(&self, strategy: Strategy) -> Result<Plan, StudyError> {
         let Subject { scene, program, .. } = self.subject;
         let error = |e: impasto_compiler::partition::PlanError| StudyError::Plan(e.to_string());
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = plan::unused(scene, program);
-        let mut known = Known {
-            names: &names,
+        let mut inputs = PlanInputs {
             unused: &unused,
-            costs: None,
-            workload: None,
-            profile: None,
+            ..PlanInputs::of_names(&names)
         };
-        let needs = wanted.row().needs;
-        if needs == Needs::Nothing || needs == Needs::Measurements {
-            return wanted.plan(&known).map_err(error);
+        let requires = strategy.requires();
+        if requires == Requires::Nothing || requires == Requires::Measurements {
+            return strategy.plan(&inputs).map_err(error);
         }
-        let facts = Facts::of_scene(scene, program, POINTS).map_err(|_| crate::Error::Costs)?;
-        known.costs = Some(&facts.costs);
-        if needs == Needs::Costs {
-            return wanted.plan(&known).map_err(error);
+        let materials =
+            SceneMaterials::new(scene, program, POINTS).map_err(|_| crate::Error::Costs)?;
+        inputs.costs = Some(&materials.costs);
+        if requires == Requires::Costs {
+            return strategy.plan(&inputs).map_err(error);
         }
         let workload = plan::workload(self.gpu, scene, program, self.pool)?;
         let info = self.gpu.info();
         let profile = DeviceProfile::shipped(&info.name, info.kind)
             .map_err(|e| StudyError::Plan(e.to_string()))?
             .profile;
-        known.workload = Some(&workload);
-        known.profile = Some(&profile);
-        wanted.plan(&known).map_err(error)
+        inputs.workload = Some(&workload);
+        inputs.profile = Some(&profile);
+        strategy.plan(&inputs).map_err(error)
     }
 }

@@ -24,18 +24,17 @@ pub fn candidates(materials: &[usize]) -> Vec<Candidate> {
     in_all_forms(materials, subsets)
 }
 
-/// Every material by itself, and the subsets in the forms of several.
+/// Every material by itself, and the subsets, in all forms that they may have.
 fn in_all_forms(
     materials: &[usize],
     subsets: impl IntoIterator<Item = Vec<usize>>,
 ) -> Vec<Candidate> {
-    let single = |m: &usize| [Form::Own, Form::Inline].map(|form| candidate(form, vec![*m]));
-    let mut all: Vec<Candidate> = materials.iter().flat_map(single).collect();
-    for members in subsets {
-        let of = |form| candidate(form, members.clone());
-        all.extend([Form::Mixed, Form::Binned, Form::Inline].map(of));
-    }
-    all
+    let each = |members: Vec<usize>| {
+        let forms = Form::of_members(members.len());
+        forms.map(move |form| candidate(form, members.clone()))
+    };
+    let singles = materials.iter().map(|m| vec![*m]);
+    singles.chain(subsets).flat_map(each).collect()
 }
 
 /// A sample for fitting: every material by itself and the first two, three and so on together; with

@@ -180,8 +180,7 @@ impl Measurement {
                     name()
                 ));
             }
-            if !kernel.measured.is_finite() || kernel.form != Form::Inline && kernel.measured < 0.0
-            {
+            if !kernel.measured.is_finite() || kernel.form.has_queue() && kernel.measured < 0.0 {
                 return Err(format!(
                     "the kernel over {} of `{scene}` took no time",
                     name()

@@ -6,15 +6,13 @@ use std::time::{Duration, Instant};
 
 use impasto_compiler::cost::Inputs;
 use impasto_compiler::partition::search::{Automatic, Groups, Search, total};
-use impasto_compiler::partition::{
-    Calibrated, DeviceProfile, Form, Known, Plan, Strategy, Wanted, text,
-};
+use impasto_compiler::partition::{Calibrated, DeviceProfile, Plan, PlanInputs, Strategy, text};
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
 use serde::Serialize;
 
 use super::plans::Times;
-use super::{Measurement, Progress, Subject, candidate, candidates};
+use super::{MeasuredScene, Measurement, Progress, candidate, candidates};
 use crate::Error;
 
 /// How many plans are drawn by chance to be timed as a whole.
@@ -84,27 +82,27 @@ pub struct PlanTime {
 /// If the scene cannot be rendered on the GPU, or that has no timestamps.
 pub fn exhaustive(
     gpu: &Gpu,
-    subject: &Subject<'_>,
+    subject: &MeasuredScene<'_>,
     profile: (&str, &DeviceProfile),
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Answer, Error> {
     let deadline = options.limit.map(|limit| Instant::now() + limit);
     let mut lab = subject.lab(gpu, &options.lab)?;
-    let (facts, materials) = (&subject.facts, subject.materials());
+    let (materials, on_surface) = (&subject.materials, subject.on_surface());
     let workload = lab.workload().clone();
-    let known = facts.known(&workload, profile.1);
+    let inputs = materials.inputs(&workload, profile.1);
     let model = Calibrated {
-        costs: &facts.costs,
+        costs: &materials.costs,
         workload: &workload,
         profile: profile.1,
     };
-    let (mut plans, planning_seconds) = strategies(&known);
-    let wanted = wanted(&plans, &materials);
-    let timed = subject.time(&mut lab, &wanted, deadline, progress)?;
+    let (mut plans, planning_seconds) = strategies(&inputs);
+    let kernels = kernels(&plans, &on_surface);
+    let timed = subject.time(&mut lab, &kernels, deadline, progress)?;
     let mut measurement = subject.measurement(gpu, &lab, &options.lab, timed.kernels);
     let times = tabulate(&mut measurement, &model);
-    plans.extend(found(&known, &times, &materials));
+    plans.extend(found(&inputs, &times, &on_surface));
     let late = deadline.is_some_and(|end| Instant::now() >= end);
     let whole = match late {
         true => vec![None; plans.len()],
@@ -112,7 +110,7 @@ pub fn exhaustive(
     };
     let plans = plans.iter().zip(whole);
     let plans: Vec<PlanTime> = plans
-        .map(|(plan, whole)| PlanTime::new(plan, whole, &times, &model, &facts.names))
+        .map(|(plan, whole)| PlanTime::new(plan, whole, &times, &model, &materials.names))
         .collect();
     let of = |strategy: &str| plans.iter().find(|plan| plan.strategy == strategy);
     let partition = |strategy| of(strategy).map_or_else(String::new, |p| p.partition.clone());
@@ -130,7 +128,7 @@ pub fn exhaustive(
         planning_seconds,
         left_out: timed.left_out,
         failed: failed
-            .map(|(c, why)| failure(c, &facts.names, why))
+            .map(|(c, why)| failure(c, &materials.names, why))
             .collect(),
         plans,
         measurement,
@@ -150,14 +148,14 @@ fn tabulate(measurement: &mut Measurement, model: &Calibrated<'_>) -> Times {
 }
 
 /// The best plan by measured kernels, the worst, and some drawn by chance.
-fn found(known: &Known<'_>, times: &Times, materials: &[usize]) -> Vec<Plan> {
-    let best = Automatic.search(&known.problem(), times);
-    let mut plans = vec![known.plan("best", best)];
+fn found(inputs: &PlanInputs<'_>, times: &Times, materials: &[usize]) -> Vec<Plan> {
+    let best = Automatic.search(&inputs.problem(), times);
+    let mut plans = vec![inputs.plan("best", best)];
     let worst = times.worst(materials);
-    plans.extend(worst.map(|groups| known.plan("worst", groups)));
+    plans.extend(worst.map(|groups| inputs.plan("worst", groups)));
     let mut numbers = Inputs::new(SEED);
     let drawn = (0..DRAWN).filter_map(|_| times.drawn(materials, &mut numbers));
-    plans.extend(drawn.map(|groups| known.plan("sample", groups)));
+    plans.extend(drawn.map(|groups| inputs.plan("sample", groups)));
     plans
 }
 
@@ -195,32 +193,25 @@ fn failure(candidate: &Candidate, names: &[String], why: &str) -> String {
 
 /// The plans of strategies that have iterations, and how long the model's took to find. A strategy that
 /// cannot plan this scene is left out.
-fn strategies(known: &Known<'_>) -> (Vec<Plan>, f64) {
-    let begin = Instant::now();
-    let auto = Wanted::Auto.plan(known);
-    let planning_seconds = begin.elapsed().as_secs_f64();
-    let fixed = [
-        Strategy::Own,
-        Strategy::Mixed,
-        Strategy::Binned,
-        Strategy::Inline,
-    ];
-    let fixed = fixed.map(Wanted::Fixed);
-    let others = fixed.iter().chain(&[Wanted::Paper]);
-    let others = others.map(|wanted| wanted.plan(known));
-    let plans = std::iter::once(auto).chain(others);
-    (plans.filter_map(Result::ok).collect(), planning_seconds)
+fn strategies(inputs: &PlanInputs<'_>) -> (Vec<Plan>, f64) {
+    let mut planning_seconds = 0.0;
+    let plan = |strategy: Strategy| {
+        let begin = Instant::now();
+        let plan = strategy.plan(inputs);
+        if strategy == Strategy::AUTO {
+            planning_seconds = begin.elapsed().as_secs_f64();
+        }
+        plan.ok()
+    };
+    let plans = Strategy::comparable().filter_map(plan).collect();
+    (plans, planning_seconds)
 }
 
 /// The kernels of those plans first, in case that time is short, then all others.
-fn wanted(plans: &[Plan], materials: &[usize]) -> Vec<Candidate> {
-    let of_plans = plans.iter().flat_map(groups).map(|(form, members)| {
-        let form = match (form, members.len()) {
-            (Form::Mixed | Form::Binned, 1) => Form::Own,
-            (form, _) => form,
-        };
-        candidate(form, members)
-    });
+fn kernels(plans: &[Plan], materials: &[usize]) -> Vec<Candidate> {
+    let of_plans = plans.iter().flat_map(groups);
+    let of_plans =
+        of_plans.map(|(form, members)| candidate(form.with_members(members.len()), members));
     let mut all: Vec<Candidate> = Vec::new();
     for candidate in of_plans.chain(candidates(materials)) {
         if !all.contains(&candidate) {

@@ -9,4 +9,4 @@ mod scene;
 pub use candidates::{ALL, candidate, candidates, sample_for_fit};
 pub use data::{Adapter, Data, Kernel, Material, Measurement};
 pub use exhaustive::{Answer, Options, PlanTime, exhaustive};
-pub use scene::{Kernels, Progress, Subject};
+pub use scene::{Kernels, MeasuredScene, Progress};

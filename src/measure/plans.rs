@@ -55,17 +55,13 @@ impl Times {
         let mut more = rest;
         loop {
             let members = chosen(materials, first | more);
-            let forms = match members.len() {
-                1 => &[Form::Own][..],
-                _ => &[Form::Mixed, Form::Binned],
-            };
-            for form in forms {
-                let seconds = self.known(*form, &members);
+            for form in Form::queued_of_members(members.len()) {
+                let seconds = self.known(form, &members);
                 let others = self.worst_queued(materials, rest & !more);
                 if let (Some(seconds), Some((sum, mut groups))) = (seconds, others)
                     && worst.as_ref().is_none_or(|(w, _)| seconds + sum > *w)
                 {
-                    groups.push((*form, members.clone()));
+                    groups.push((form, members.clone()));
                     worst = Some((seconds + sum, groups));
                 }
             }
@@ -96,11 +92,7 @@ impl TimeModel for Times {
 
 /// A queue of one material is the same in every form.
 fn key(form: Form, members: &[usize]) -> (&'static str, Vec<usize>) {
-    let form = match form {
-        Form::Mixed | Form::Binned if members.len() == 1 => Form::Own,
-        form => form,
-    };
-    (form.name(), members.to_vec())
+    (form.with_members(members.len()).name(), members.to_vec())
 }
 
 fn chosen(materials: &[usize], set: u32) -> Vec<usize> {
@@ -119,17 +111,18 @@ fn draw(materials: &[usize], numbers: &mut Inputs) -> Groups {
     }
     groups.retain(|group| !group.is_empty());
     let inline = below(2) == 0;
+    let queued: Vec<Form> = Form::queued_of_members(2).collect();
     let form = |(index, members): (usize, Vec<usize>)| {
-        let several = [Form::Mixed, Form::Binned][below(2)];
-        let form = match members.len() {
-            _ if inline && index == 0 => Form::Inline,
-            1 => Form::Own,
-            _ => several,
+        let form = queued[below(queued.len())].with_members(members.len());
+        let form = if inline && index == 0 {
+            Form::Inline
+        } else {
+            form
         };
         (form, members)
     };
     let mut groups: Groups = groups.into_iter().enumerate().map(form).collect();
-    groups.sort_by_key(|(form, members)| (*form == Form::Inline, members.clone()));
+    groups.sort_by_key(|(form, members)| (!form.has_queue(), members.clone()));
     groups
 }
 

@@ -4,25 +4,24 @@ use std::time::Instant;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::Form;
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
 use impasto_runtime::world::World;
 
 use super::{Adapter, Kernel, Material, Measurement};
-use crate::plan::Facts;
+use crate::plan::SceneMaterials;
 use crate::{Error, RuntimeError, Scene};
 
 /// Kernels that are built and timed together.
 const BATCH: usize = 48;
 
 /// A scene with what is known of it before anything is measured.
-pub struct Subject<'p> {
+pub struct MeasuredScene<'p> {
     name: String,
     program: &'p Program,
     world: World,
     /// What is known of its materials.
-    pub facts: Facts,
+    pub materials: SceneMaterials,
 }
 
 /// How far measuring is.
@@ -45,15 +44,15 @@ pub struct Kernels {
     pub left_out: usize,
 }
 
-impl<'p> Subject<'p> {
-    /// A scene whose materials compiled to `program`, of which `facts` are known.
+impl<'p> MeasuredScene<'p> {
+    /// A scene whose materials compiled to `program`, of which `materials` are known.
     ///
     /// # Errors
     /// If it cannot be rendered.
     pub fn new(
         scene: &Scene,
         program: &'p Program,
-        facts: Facts,
+        materials: SceneMaterials,
         options: &LabOptions,
     ) -> Result<Self, Error> {
         let world = World::of_program(scene, program, &options.technique);
@@ -61,7 +60,7 @@ impl<'p> Subject<'p> {
             name: scene.name.clone(),
             program,
             world: world.map_err(RuntimeError::from)?,
-            facts,
+            materials,
         })
     }
 
@@ -74,9 +73,9 @@ impl<'p> Subject<'p> {
     }
 
     /// The materials that are on some surface.
-    pub fn materials(&self) -> Vec<usize> {
-        let all = 0..self.facts.names.len();
-        all.filter(|m| !self.facts.unused.contains(m)).collect()
+    pub fn on_surface(&self) -> Vec<usize> {
+        let all = 0..self.materials.names.len();
+        all.filter(|m| !self.materials.unused.contains(m)).collect()
     }
 
     /// Times kernels, until `deadline` if there is one.
@@ -113,16 +112,17 @@ impl<'p> Subject<'p> {
     }
 
     fn kernel(&self, candidate: &Candidate, measured: &Measured) -> Kernel {
-        let of = match candidate.form {
-            Form::Inline => measured.logic_seconds,
-            _ => measured.seconds,
+        let of = if candidate.form.has_queue() {
+            measured.seconds
+        } else {
+            measured.logic_seconds
         };
         Kernel {
             form: candidate.form,
             members: candidate
                 .members
                 .iter()
-                .map(|m| self.facts.names[*m].clone())
+                .map(|m| self.materials.names[*m].clone())
                 .collect(),
             measured: measured.seconds,
             spread: measured.spread / of.max(f64::MIN_POSITIVE),
@@ -143,7 +143,7 @@ impl<'p> Subject<'p> {
         kernels: Vec<Kernel>,
     ) -> Measurement {
         let workload = lab.workload().clone();
-        let materials = self.facts.names.iter().zip(&self.facts.costs);
+        let materials = self.materials.names.iter().zip(&self.materials.costs);
         let material = |(name, cost): (&String, &Option<Cost>)| Material {
             name: name.clone(),
             cost: cost.clone(),

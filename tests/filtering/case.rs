@@ -89,7 +89,7 @@ impl Case {
             seed: 0,
             size: [SIZE; 2],
             fov: FOV,
-            strategy: Strategy::Own,
+            strategy: Strategy::OWN,
         }
     }
 
@@ -173,7 +173,7 @@ impl Case {
     /// The picture, row by row.
     pub fn render(&self) -> Vec<[f64; 3]> {
         let (scene, program) = self.load();
-        let plan = impasto::plan(&program, self.strategy);
+        let plan = impasto::plan(&program, self.strategy).expect("a plan");
         let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let options = RenderOptions {
             samples: self.samples,

@@ -114,8 +114,8 @@ fn placed_moved_and_blurred_floors_are_seen_alike() {
 
 #[test]
 fn every_organisation_carries_the_same_cones() {
-    let own = hall(Strategy::Own).render();
-    for strategy in [Strategy::Mixed, Strategy::Inline, Strategy::Mega] {
+    let own = hall(Strategy::OWN).render();
+    for strategy in [Strategy::MIXED, Strategy::INLINE, Strategy::MEGA] {
         for (found, expected) in hall(strategy).render().into_iter().zip(&own) {
             assert_near(found, *expected, 1e-5);
         }
@@ -145,7 +145,7 @@ fn hall(strategy: Strategy) -> Case {
 fn replays_carry_the_same_cones() {
     let case = Case {
         samples: 1,
-        ..hall(Strategy::Own)
+        ..hall(Strategy::OWN)
     };
     let rendered = case.render();
     for materials in [MaterialCode::Ir, MaterialCode::Wgsl] {

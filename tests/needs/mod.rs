@@ -197,7 +197,8 @@ fn picture(gpu: &Gpu, text: &Text, features: Features) -> Vec<f32> {
         },
         ..RenderOptions::default()
     };
-    let plan = impasto::plan(&program, Strategy::Own)
+    let plan = impasto::plan(&program, Strategy::OWN)
+        .expect("a plan")
         .leaving_out(&impasto::plan::unused(&scene, &program));
     let renderer = Renderer::new(gpu, &scene, &program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));

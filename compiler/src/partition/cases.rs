@@ -1,9 +1,15 @@
 //! Materials, scenes and GPUs that might exist, drawn at random: what searches and explanations are
 //! tested with.
 
-use super::{Calibrated, DeviceProfile, Hits, Workload};
+use super::{Calibrated, DeviceProfile, Hits, Requires, STRATEGIES, Strategy, Workload};
 use crate::cost::{Classes, Cost, LANES, Operations};
 use crate::random::SplitMix64;
+
+/// The strategies that must know nothing but names.
+pub(super) fn by_names() -> impl Iterator<Item = Strategy> {
+    let all = STRATEGIES.iter().copied().map(Strategy::new);
+    all.filter(|strategy| strategy.requires() == Requires::Nothing)
+}
 
 pub(super) struct Random(SplitMix64);
 

@@ -22,7 +22,7 @@ impl Plan {
     pub fn check_named(&self, names: &[String]) -> Result<(), PlanError> {
         self.kernels.iter().try_for_each(check_kernel)?;
         self.check_places(names)?;
-        let inline = self.kernels.iter().filter(|k| k.form == Form::Inline);
+        let inline = self.kernels.iter().filter(|k| !k.form.has_queue());
         let inline: Vec<&str> = inline.map(|k| k.name.as_str()).collect();
         if inline.len() > 1 {
             let message = format!("it has several inline kernels: {}", list(inline));
@@ -91,19 +91,22 @@ impl Plan {
 
 fn check_kernel(kernel: &PlanKernel) -> Result<(), PlanError> {
     let (name, members) = (&kernel.name, kernel.materials.len());
-    match (kernel.form, members) {
-        (_, 0) => Err(PlanError::new(format!("kernel `{name}` has no material"))),
-        (Form::Own, 2..) => {
-            let message = format!("kernel `{name}` is own and has {members} materials");
-            Err(PlanError::new(message).hint("`mixed` and `binned` take several"))
-        }
-        _ => Ok(()),
+    if members == 0 {
+        return Err(PlanError::new(format!("kernel `{name}` has no material")));
     }
+    if members > 1 && !kernel.form.takes_several() {
+        let form = kernel.form.name();
+        let message = format!("kernel `{name}` is {form} and has {members} materials");
+        let several = list(Form::queued_of_members(members).map(Form::name));
+        return Err(PlanError::new(message).hint(format!("{several} take several")));
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Strategy;
+    use super::super::PlanInputs;
+    use super::super::cases::by_names;
     use super::*;
 
     fn names() -> Vec<String> {
@@ -124,10 +127,10 @@ mod tests {
 
     #[test]
     fn plans_of_strategies_keep_the_rules() {
-        for (strategy, _) in Strategy::ALL {
+        for strategy in by_names() {
             for count in [0, 1, 3] {
                 let names = &names()[..count];
-                let plan = strategy.plan(names);
+                let plan = strategy.plan(&PlanInputs::of_names(names)).expect("names");
                 assert_eq!(plan.check_named(names), Ok(()), "{strategy:?} {count}");
                 if count == 3 {
                     let fewer = plan.leaving_out(&[1]);

@@ -11,18 +11,24 @@ mod check;
 mod error;
 pub mod explain;
 pub mod file;
+mod form;
+mod inputs;
 pub mod model;
 pub mod profile;
 pub mod search;
+pub mod strategies;
 mod strategy;
 pub mod text;
 pub mod workload;
 
 pub use error::PlanError;
+pub use form::Form;
+pub use inputs::PlanInputs;
 pub use model::{Calibrated, Prediction, TimeModel};
 pub use profile::{DeviceProfile, ProfileError};
 pub use search::{Automatic, Exact, Groups, Heuristic, Problem, Search};
-pub use strategy::{Known, Needs, PAPER_OPERATIONS, STRATEGIES, Strategy, StrategyRow, Wanted};
+pub use strategies::{PAPER_OPERATIONS, Requires, STRATEGIES, StrategyRow};
+pub use strategy::Strategy;
 pub use workload::{Hits, Workload};
 
 /// How the stages of the path tracer are organised.
@@ -33,21 +39,6 @@ pub enum Organisation {
     Wavefront,
     /// One kernel runs whole paths; state stays in registers.
     Mega,
-}
-
-/// How a material kernel treats its members.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Form {
-    /// One material, one queue.
-    Own,
-    /// A switch over one queue.
-    Mixed,
-    /// A queue a material and one dispatch over all of them, in which every workgroup evaluates one
-    /// material.
-    Binned,
-    /// Evaluated where the hit is found, without a queue.
-    Inline,
 }
 
 /// One material kernel.
@@ -74,31 +65,6 @@ pub struct Plan {
     /// Indices of the materials without a kernel, ascending: no surface of the scene binds them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unused: Vec<usize>,
-}
-
-impl Form {
-    /// Every form, with its name in partition strings, plan files and reports.
-    pub const ALL: [(Form, &'static str); 4] = [
-        (Form::Own, "own"),
-        (Form::Mixed, "mixed"),
-        (Form::Binned, "binned"),
-        (Form::Inline, "inline"),
-    ];
-
-    /// The form called `name`.
-    pub fn from_name(name: &str) -> Option<Form> {
-        Self::ALL.iter().find(|(_, n)| *n == name).map(|(f, _)| *f)
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Form::Own => "own",
-            Form::Mixed => "mixed",
-            Form::Binned => "binned",
-            Form::Inline => "inline",
-        }
-    }
 }
 
 impl Plan {
@@ -159,11 +125,9 @@ impl PlanKernel {
             [only] => names.get(only).map(String::as_str),
             _ => None,
         };
-        let name = match form {
-            Form::Own => only.unwrap_or("own"),
-            Form::Mixed => "mixed",
-            Form::Binned => "binned",
-            Form::Inline => "inline",
+        let name = match only {
+            Some(only) if !form.takes_several() => only,
+            _ => form.name(),
         };
         Self {
             name: format!("material_{name}"),

@@ -144,10 +144,11 @@ impl Calibrated<'_> {
 
     fn members(&self, form: Form, members: &[usize]) -> Vec<Member<'_>> {
         let hits = |m: &usize| self.workload.materials.get(*m);
-        let side_by_side = match form {
-            Form::Own | Form::Binned => None,
-            Form::Mixed => Some(members.iter().filter_map(hits).map(|h| h.share).sum()),
-            Form::Inline => Some(1.0),
+        // Inline materials are met by the subgroups of the logic kernel, which has work for all slots.
+        let side_by_side = match (form.diverges(), form.has_queue()) {
+            (false, _) => None,
+            (true, true) => Some(members.iter().filter_map(hits).map(|h| h.share).sum()),
+            (true, false) => Some(1.0),
         };
         let member = |m: &usize| {
             let hits = hits(m)?;
@@ -198,7 +199,7 @@ impl Calibrated<'_> {
 
     /// How many times as long operations take since code does not fit the caches.
     fn crowding(&self, form: Form, members: &[Member<'_>]) -> f64 {
-        if !side_by_side(form) || members.len() < 2 {
+        if !form.diverges() || members.len() < 2 {
             return 1.0;
         }
         let weights = &self.profile.weights;
@@ -218,7 +219,7 @@ impl Calibrated<'_> {
         };
         let all = density(members);
         let one = |m: &Member<'_>| {
-            let density = match side_by_side(form) {
+            let density = match form.diverges() {
                 true => all,
                 false => density(std::slice::from_ref(m)),
             };
@@ -240,15 +241,10 @@ impl Calibrated<'_> {
     }
 }
 
-/// Whether the subgroups of a kernel of this form evaluate several materials.
-fn side_by_side(form: Form) -> bool {
-    matches!(form, Form::Mixed | Form::Inline)
-}
-
 /// Operations of the subgroup that takes longest. Side by side, a workgroup waits for all materials that
 /// some of its subgroups evaluate.
 fn longest(form: Form, members: &[Member<'_>]) -> f64 {
-    if side_by_side(form) {
+    if form.diverges() {
         let met = |m: &Member<'_>| 1.0 - (1.0 - m.present).powf(GROUP);
         return members.iter().map(|m| met(m) * m.issued.sum()).sum();
     }

@@ -138,7 +138,7 @@ impl<'t> Group<'t> {
 }
 
 fn parse_form(number: usize, name: &str) -> Result<Form, PlanError> {
-    let known = || Form::ALL.iter().map(|(_, n)| *n);
+    let known = || Form::all().map(Form::name);
     Form::from_name(name).ok_or_else(|| {
         let error = PlanError::new(format!(
             "group {number} of the partition has the unknown form `{name}`"
@@ -184,7 +184,7 @@ pub(super) fn find(name: &str, names: &[String]) -> Result<usize, String> {
 }
 
 fn one_inline(kernels: &[(Form, Vec<usize>)]) -> Result<(), PlanError> {
-    match kernels.iter().filter(|(f, _)| *f == Form::Inline).count() {
+    match kernels.iter().filter(|(f, _)| !f.has_queue()).count() {
         0 | 1 => Ok(()),
         _ => Err(PlanError::new("the partition has several inline groups")
             .hint("what is inline is part of one kernel, logic: make them one group, as in `inline:a,b`")),
@@ -310,7 +310,7 @@ mod tests {
                     (_, 0) => continue,
                     (0, 2..) => Form::Mixed,
                     (3, _) if kernels.iter().any(|(f, _)| *f == Form::Inline) => Form::Binned,
-                    (other, _) => Form::ALL[other].0,
+                    (other, _) => Form::all().nth(other).expect("four forms"),
                 };
                 kernels.push((form, members));
             }

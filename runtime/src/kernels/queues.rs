@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use impasto_compiler::partition::{Form, Plan};
+use impasto_compiler::partition::Plan;
 
 use crate::kernels::dropped::{self, Row};
 
@@ -31,11 +31,7 @@ impl Queues {
         let mut next = Self::NEW_PATH + 1;
         let queues = plan.kernels.iter().map(|kernel| {
             let begin = next;
-            next += match kernel.form {
-                Form::Inline => 0,
-                Form::Binned => kernel.materials.len(),
-                Form::Own | Form::Mixed => 1,
-            };
+            next += kernel.form.queues(kernel.materials.len());
             begin..next
         });
         queues.collect()
@@ -275,7 +271,7 @@ fn long(words: &[u32], at: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use impasto_compiler::partition::{PlanKernel, Strategy};
+    use impasto_compiler::partition::{Form, PlanKernel};
 
     #[test]
     fn regions_do_not_overlap() {
@@ -331,7 +327,7 @@ mod tests {
                 kernel(Form::Inline, &[2]),
                 kernel(Form::Binned, &[0, 3]),
             ],
-            ..Strategy::Own.plan(&names)
+            ..Plan::own(&names, &[])
         };
         assert_eq!(Queues::of_kernels(&plan), [1..2, 2..2, 2..4]);
     }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use impasto_compiler::Program;
 use impasto_compiler::ir::interp::{TextureLookup, TextureRequest};
-use impasto_compiler::partition::Strategy;
+use impasto_compiler::partition::Plan;
 use naga::valid::ModuleInfo;
 use wgpu::naga;
 
@@ -119,9 +119,7 @@ impl<'p> Replayer<'p> {
         }
         let (materials, instances) = (source.infos(), source.instances());
         let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
-        let plan = Strategy::Mega
-            .plan(&names)
-            .leaving_out(&world.parts.unbound);
+        let plan = Plan::mega(&names, &world.parts.unbound);
         let technique = Technique {
             sampler,
             regeneration: Regeneration::Never,

@@ -22,7 +22,7 @@ pub use split::{GeometryCounts, Split};
 
 use impasto_compiler::Program;
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
-use impasto_compiler::partition::{Plan, Strategy};
+use impasto_compiler::partition::Plan;
 
 use crate::error::SceneError;
 use crate::scene::Scene;
@@ -71,7 +71,7 @@ impl World {
     /// The plan that gives a kernel to each of `materials` that is on some surface.
     pub(crate) fn own_plan(&self, materials: &[MaterialInfo]) -> Plan {
         let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
-        Strategy::Own.plan(&names).leaving_out(&self.parts.unbound)
+        Plan::own(&names, &self.parts.unbound)
     }
 
     /// The world of a scene whose bindings compiled to `instances` of `materials`, reading

@@ -59,11 +59,11 @@ fn what_a_material_gets_wrong_is_counted_for_it_in_every_kind_of_plan() {
     };
     let mut counts = Vec::new();
     for (strategy, kernel) in [
-        (Strategy::Own, "material_m1"),
-        (Strategy::Mixed, "material_mixed"),
-        (Strategy::Binned, "material_binned"),
-        (Strategy::Inline, "logic"),
-        (Strategy::Mega, "mega"),
+        (Strategy::OWN, "material_m1"),
+        (Strategy::MIXED, "material_mixed"),
+        (Strategy::BINNED, "material_binned"),
+        (Strategy::INLINE, "logic"),
+        (Strategy::MEGA, "mega"),
     ] {
         let rendering = rendered(strategy, &options);
         let report = &rendering.report;
@@ -101,10 +101,10 @@ fn what_a_material_gets_wrong_is_counted_for_it_in_every_kind_of_plan() {
 /// The example is of the pixel and sample that it names: rendered alone, that drops it again.
 #[test]
 fn an_example_is_where_it_says() {
-    let all = rendered(Strategy::Own, &samples(4));
+    let all = rendered(Strategy::OWN, &samples(4));
     let example = of(&all, "m3").example.clone().expect("an example");
     let again = rendered(
-        Strategy::Mega,
+        Strategy::MEGA,
         &RenderOptions {
             first_sample: example.sample,
             ..samples(1)
@@ -114,7 +114,7 @@ fn an_example_is_where_it_says() {
     let entry = of(&again, "m3");
     assert!(entry.nonfinite > 0 && entry.nonfinite <= 2 * 16 * 12);
     let other = rendered(
-        Strategy::Own,
+        Strategy::OWN,
         &RenderOptions {
             technique: Technique {
                 sampler: Sampler::Independent,
@@ -137,7 +137,7 @@ fn emission_that_is_no_number_is_the_materials() {
         ..Room::default()
     };
     let surfaces = materials(&[Kind::Diffuse(0.5), Kind::GlowingWrong]);
-    let plan = plan(Strategy::Own, &surfaces);
+    let plan = plan(Strategy::OWN, &surfaces);
     let rendering = render_plan(&room.world(), &surfaces, &plan, &samples(4));
     let entry = of(&rendering, "m1");
     assert!(entry.nonfinite > 0 && entry.negative == 0);
@@ -162,7 +162,7 @@ fn an_example_replays() {
             technique,
             ..samples(2)
         };
-        let rendering = rendered(Strategy::Own, &options);
+        let rendering = rendered(Strategy::OWN, &options);
         let examples: Vec<_> = rendering
             .report
             .dropped
@@ -191,7 +191,7 @@ fn an_example_replays() {
 #[test]
 fn radiance_that_is_no_light_is_counted_where_it_would_be_added() {
     for (radiance, negative) in [(f32::MAX, false), (-1.0, true)] {
-        for (strategy, kernel) in [(Strategy::Own, "logic"), (Strategy::Mega, "mega")] {
+        for (strategy, kernel) in [(Strategy::OWN, "logic"), (Strategy::MEGA, "mega")] {
             let surfaces = materials(&[Kind::Diffuse(0.5)]);
             let mut world = Room {
                 walls: false,

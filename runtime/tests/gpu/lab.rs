@@ -62,7 +62,7 @@ fn a_kernel_works_on_the_hits_of_its_members_and_no_others() {
         assert!(measured.seconds > 0.0 && measured.logic_seconds > 0.0);
     }
     // The same hits again, whatever ran in between.
-    let plans = [Strategy::Own, Strategy::Mixed, Strategy::Binned].map(|s| plan(s, &surfaces));
+    let plans = [Strategy::OWN, Strategy::MIXED, Strategy::BINNED].map(|s| plan(s, &surfaces));
     for iteration in lab.iterations(&plans).unwrap_or_else(|e| panic!("{e}")) {
         assert!(iteration.unwrap_or_else(|e| panic!("{e}")).seconds > 0.0);
     }
@@ -95,7 +95,7 @@ fn neighbours_share_blocks_only_where_they_hit_the_same() {
 fn an_iteration_takes_about_what_its_kernels_take() {
     let (world, surfaces) = (room().world(), surfaces());
     let mut lab = lab(&world, &surfaces);
-    let own = plan(Strategy::Own, &surfaces);
+    let own = plan(Strategy::OWN, &surfaces);
     let singles: Vec<Candidate> = (0..4).map(|m| candidate(Form::Own, &[m])).collect();
     let kernels: f64 = measure(&mut lab, &singles).iter().map(|m| m.seconds).sum();
     let added = kernels + lab.workload().logic_seconds + lab.workload().other_seconds;
@@ -138,8 +138,8 @@ fn what_cannot_be_measured_keeps_nothing_else_from_it() {
         assert!(why.contains("no kernel"), "{why}");
     }
     assert!(good.as_ref().is_ok_and(|m| m.seconds > 0.0));
-    let mega = plan(Strategy::Mega, &surfaces);
-    let own = plan(Strategy::Own, &surfaces);
+    let mega = plan(Strategy::MEGA, &surfaces);
+    let own = plan(Strategy::OWN, &surfaces);
     let iterations = lab.iterations(&[mega, own]);
     let iterations = iterations.unwrap_or_else(|e| panic!("{e}"));
     let why = iterations[0].as_ref().expect_err("no iterations");

@@ -19,7 +19,7 @@ fn a_lost_gpu_is_an_error_and_what_was_kept_can_be_gone_on_from() {
         ..Room::default()
     };
     let surfaces = materials(&[Kind::Diffuse(0.5)]);
-    let plan = plan(Strategy::Own, &surfaces);
+    let plan = plan(Strategy::OWN, &surfaces);
     let open = || Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
 
     let gpu = open();

@@ -96,7 +96,7 @@ fn a_slab_absorbs_by_its_thickness() {
     let absorption = [0.2, 1.0, 4.0];
     let tinted = Solids(vec![Solid::smooth(absorption, 1.5, 0)]);
     for thickness in [0.5, 2.0] {
-        let rendering = seen(slab(0, 0.0, thickness).into(), &tinted, Strategy::Own);
+        let rendering = seen(slab(0, 0.0, thickness).into(), &tinted, Strategy::OWN);
         assert_layers(&rendering, &[(f64::from(thickness), absorption, 1.5)]);
     }
 }
@@ -117,9 +117,9 @@ fn of_media_that_overlap_the_one_of_higher_priority_is_there() {
     const WATER: [f32; 3] = [0.1, 0.3, 0.6];
     let layers = |wall, fill| [(wall, GLASS, 1.5), (fill, WATER, 1.33), (wall, GLASS, 1.5)];
     let (planes, solids) = filled_glass(7, 3);
-    let reference = seen(planes.clone(), &solids, Strategy::Own);
+    let reference = seen(planes.clone(), &solids, Strategy::OWN);
     assert_layers(&reference, &layers(1.0, 1.5));
-    for strategy in [Strategy::Mixed, Strategy::Mega] {
+    for strategy in [Strategy::MIXED, Strategy::MEGA] {
         let other = seen(planes.clone(), &solids, strategy);
         if gpu().info().kind == "software" {
             assert!(other.film == reference.film, "{strategy:?} differs");
@@ -127,7 +127,7 @@ fn of_media_that_overlap_the_one_of_higher_priority_is_there() {
         assert_layers(&other, &layers(1.0, 1.5));
     }
     let (planes, solids) = filled_glass(3, 7);
-    let swapped = seen(planes, &solids, Strategy::Own);
+    let swapped = seen(planes, &solids, Strategy::OWN);
     assert_layers(&swapped, &layers(0.5, 2.5));
 }
 
@@ -140,7 +140,7 @@ fn a_boundary_has_the_index_of_what_it_lies_in() {
         Solid::smooth([0.0, 0.0, 1.0], 1.6, 2),
     ]);
     let planes = [slab(0, 0.0, 5.0), slab(1, 1.0, 4.0), slab(2, 2.0, 3.0)].concat();
-    let rendering = seen(planes, &solids, Strategy::Own);
+    let rendering = seen(planes, &solids, Strategy::OWN);
     let layers = [
         (1.0, CLEAR, 1.33),
         (1.0, CLEAR, 2.4),
@@ -167,7 +167,7 @@ fn what_is_thin_walled_or_opaque_changes_no_medium() {
             solid: 1,
         });
     }
-    let rendering = seen(planes, &solids, Strategy::Own);
+    let rendering = seen(planes, &solids, Strategy::OWN);
     assert_layers(&rendering, &[(1.0, absorption, 1.5)]);
 }
 
@@ -190,11 +190,11 @@ fn a_camera_in_a_medium_sees_through_it() {
         around,
         ..Planes::default()
     };
-    let inside = render(&planes(vec![0], &[]), &solids, Strategy::Own, 1);
+    let inside = render(&planes(vec![0], &[]), &solids, Strategy::OWN, 1);
     for (channel, a) in absorption.iter().enumerate() {
         assert_channel(&inside, channel, 2.0 * f64::from(-1.5 * a).exp());
     }
-    let outside = render(&planes(vec![], &[]), &solids, Strategy::Own, 1);
+    let outside = render(&planes(vec![], &[]), &solids, Strategy::OWN, 1);
     assert_channel(&outside, 1, 2.0);
     // In the inner of two, which ends at 0.25.
     let end = Plane {
@@ -202,7 +202,7 @@ fn a_camera_in_a_medium_sees_through_it() {
         outward: true,
         solid: 2,
     };
-    let nested = render(&planes(vec![0, 2], &[end]), &solids, Strategy::Own, 256);
+    let nested = render(&planes(vec![0, 2], &[end]), &solids, Strategy::OWN, 256);
     let r = f64::powi((1.5 - 1.1) / (1.5 + 1.1), 2);
     for (channel, a) in absorption.iter().enumerate() {
         let way = 0.25 * 9.0 + 1.25 * f64::from(*a);
@@ -230,7 +230,7 @@ fn light_is_absorbed_on_its_way_from_light_to_surface() {
         around: vec![1],
         max_depth: 2,
     };
-    let rendering = render(&lit, &Solids(vec![ground, medium]), Strategy::Own, 1);
+    let rendering = render(&lit, &Solids(vec![ground, medium]), Strategy::OWN, 1);
     let irradiance = 5.0 / (0.75 * 0.75);
     for (channel, a) in absorption.iter().enumerate() {
         let way = f64::from(*a) * (0.5 + 0.75);
@@ -247,7 +247,7 @@ fn light_is_absorbed_on_its_way_from_light_to_surface() {
         around: Vec::new(),
         ..lit
     };
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let rendering = render(&behind, &Solids(vec![skin]), strategy, 1);
         for (channel, a) in absorption.iter().enumerate() {
             let way = f64::from(*a) * 0.5;
@@ -291,7 +291,7 @@ fn light_behind_what_blocks_its_samples_counts_once() {
             around,
             max_depth: 8,
         };
-        let rendering = render(&planes, &solids, Strategy::Own, 64);
+        let rendering = render(&planes, &solids, Strategy::OWN, 64);
         let values = rendering.film.pixels.iter().map(|p| f64::from(p[0]));
         let (mean, error) = mean(values);
         let difference = (mean - 0.7).abs();
@@ -325,7 +325,7 @@ fn hidden_boundaries_cost_no_depth_but_end_somewhere() {
         max_depth: 1,
         ..Planes::default()
     };
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let few = render(&shells(32), &solids, strategy, 1);
         assert_eq!(few.report.lost_paths, 0);
         assert_channel(&few, 0, 2.0 * (-0.4f64).exp());
@@ -346,7 +346,7 @@ fn a_fifth_medium_is_counted_and_left_out() {
         planes,
         ..Planes::default()
     };
-    let rendering = render(&planes, &solids, Strategy::Own, 1);
+    let rendering = render(&planes, &solids, Strategy::OWN, 1);
     assert_eq!(rendering.report.media_overflow, rendering.report.paths);
     assert_channel(&rendering, 0, (-1.0f64).exp());
 }
@@ -377,7 +377,7 @@ fn kernels_follow_media_as_far_as_a_scene_needs() {
     let reads = "fn exterior_index(";
     let absorbs = "transmittance(";
     let overlaps = ["is_false_boundary(", "trace_to_boundary("];
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let assert = |solids: Vec<Solid>, present: &[&str], absent: &[&str]| {
             let text = texts(&Solids(solids), strategy);
             for name in present {

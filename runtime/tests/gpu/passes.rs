@@ -72,7 +72,7 @@ fn in_passes(
 
 #[test]
 fn passes_give_the_bits_of_the_whole() {
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let options = RenderOptions {
             first_sample: 3,
             ..samples(6)
@@ -111,7 +111,7 @@ fn passes_give_the_bits_of_the_whole() {
 
 #[test]
 fn a_render_goes_on_from_what_was_kept() {
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let options = samples(5);
         let reference = whole(strategy, &options);
         let (kept, _) = in_passes(strategy, &options, None).expect("it renders");
@@ -135,9 +135,9 @@ fn a_render_goes_on_from_what_was_kept() {
 
 #[test]
 fn a_render_does_not_go_on_from_another() {
-    let film = whole(Strategy::Own, &samples(4)).sums;
+    let film = whole(Strategy::OWN, &samples(4)).sums;
     let refused = |options: &RenderOptions, part: &str| {
-        let result = in_passes(Strategy::Own, options, Some(film.clone()));
+        let result = in_passes(Strategy::OWN, options, Some(film.clone()));
         let error = result.expect_err("refused").to_string();
         assert!(error.contains(part), "{error}");
     };
@@ -156,7 +156,7 @@ fn a_render_does_not_go_on_from_another() {
 
 #[test]
 fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
-    let reference = whole(Strategy::Own, &samples(9));
+    let reference = whole(Strategy::OWN, &samples(9));
     // In other pools, and one of them in the other organisation of the same kernels.
     let part = |first_sample, count, pool| {
         let options = RenderOptions {
@@ -164,7 +164,7 @@ fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
             pool: Some(pool),
             ..samples(count)
         };
-        whole(Strategy::Own, &options).sums
+        whole(Strategy::OWN, &options).sums
     };
     let parts = [part(0, 4, 77), part(4, 1, 1), part(5, 4, 1000)];
     for order in [[0, 1, 2], [2, 0, 1]] {
@@ -184,12 +184,12 @@ fn only_what_changes_the_picture_changes_its_identity() {
     let identity = |room: Room, strategy, options: RenderOptions| {
         *renderer(strategy, &room, &options).identity()
     };
-    let base = identity(room(), Strategy::Own, samples(1));
+    let base = identity(room(), Strategy::OWN, samples(1));
     let pool = RenderOptions {
         pool: Some(99),
         ..samples(7)
     };
-    assert_eq!(identity(room(), Strategy::Mega, pool), base);
+    assert_eq!(identity(room(), Strategy::MEGA, pool), base);
     let deeper = Room {
         max_depth: 6,
         ..room()
@@ -203,14 +203,14 @@ fn only_what_changes_the_picture_changes_its_identity() {
         ..room()
     };
     for other in [deeper, brighter, painted] {
-        assert_ne!(identity(other, Strategy::Own, samples(1)).scene, base.scene);
+        assert_ne!(identity(other, Strategy::OWN, samples(1)).scene, base.scene);
     }
 }
 
 /// A stopped render is the render of fewer samples, not a mean of the shorter paths.
 #[test]
 fn a_stopped_render_is_one_of_fewer_samples() {
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let mut options = samples(1 << 20);
         options.pool = Some(333);
         let mut after = 40;

@@ -65,7 +65,7 @@ fn check(some: &Rendering, chosen: &[u32], whole: &Rendering, samples: u32) {
 #[test]
 fn some_pixels_have_the_bits_of_the_whole_and_others_no_samples() {
     let odd: Vec<u32> = (0..SIZE.0 * SIZE.1).filter(|p| p % 3 == 1).collect();
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let whole = rendering(&mut renderer(strategy, &samples(6)));
         // Pools that hold all paths, part of a sample's, and one path.
         for (pool, chosen) in [
@@ -92,9 +92,9 @@ fn other_pixels_are_chosen_without_building_kernels_anew() {
         pixels: Some(all.clone().into()),
         ..samples(5)
     };
-    let mut whole = renderer(Strategy::Own, &samples(5));
+    let mut whole = renderer(Strategy::OWN, &samples(5));
     let whole = rendering(&mut whole);
-    let mut some = renderer(Strategy::Own, &options);
+    let mut some = renderer(Strategy::OWN, &options);
     check(&rendering(&mut some), &all, &whole, 5);
     let last: Vec<u32> = (100..128).collect();
     some.select_pixels(last.clone().into()).expect("they exist");
@@ -128,7 +128,7 @@ fn pixels_that_are_none_are_refused() {
             ..samples(1)
         };
         let (world, surfaces) = (world(), surfaces());
-        let plan = plan(Strategy::Own, &surfaces);
+        let plan = plan(Strategy::OWN, &surfaces);
         let built = Renderer::from_world(gpu(), &world, &surfaces, &plan, &options);
         built.map(|_| ()).expect_err("refused").to_string()
     };
@@ -144,13 +144,13 @@ fn pixels_that_are_none_are_refused() {
             "{error}"
         );
     }
-    let mut whole = renderer(Strategy::Own, &samples(1));
+    let mut whole = renderer(Strategy::OWN, &samples(1));
     let error = whole.select_pixels([3].into()).expect_err("refused");
     assert!(
         error.to_string().contains("RenderOptions::pixels"),
         "{error}"
     );
-    let all = renderer(Strategy::Own, &samples(1));
+    let all = renderer(Strategy::OWN, &samples(1));
     // Code and buffer exist only where some pixels are chosen.
     let text = |renderer: &Renderer<'_>| renderer.kernels().map(|(_, w)| w).collect::<String>();
     assert!(!text(&all).contains("pixel_list") && !text(&all).contains("run.pixels"));
@@ -158,5 +158,5 @@ fn pixels_that_are_none_are_refused() {
         pixels: Some([3].into()),
         ..samples(1)
     };
-    assert!(text(&renderer(Strategy::Own, &options)).contains("pixel_list"));
+    assert!(text(&renderer(Strategy::OWN, &options)).contains("pixel_list"));
 }

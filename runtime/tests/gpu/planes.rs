@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Medium, Table};
-use impasto_compiler::partition::{Plan, Strategy};
+use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::Camera;
@@ -382,7 +382,8 @@ fn sample_light(position: vec3<f32>, bits: vec4<u32>) -> LightSample {
 
 pub fn planned(solids: &Solids, strategy: Strategy) -> Plan {
     let names: Vec<String> = solids.infos().into_iter().map(|m| m.name).collect();
-    strategy.plan(&names)
+    let plan = strategy.plan(&PlanInputs::of_names(&names));
+    plan.unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub fn render(planes: &Planes, solids: &Solids, strategy: Strategy, samples: u32) -> Rendering {

@@ -74,17 +74,17 @@ fn assert_equal_but_for_rounding(a: &Film, b: &Film) {
 #[test]
 fn every_plan_renders_the_same_paths() {
     let surfaces = surfaces();
-    let (reference, _) = run(&plan(Strategy::Own, &surfaces));
+    let (reference, _) = run(&plan(Strategy::OWN, &surfaces));
     for other in [
-        plan(Strategy::Mixed, &surfaces),
-        plan(Strategy::Mega, &surfaces),
+        plan(Strategy::MIXED, &surfaces),
+        plan(Strategy::MEGA, &surfaces),
         custom(&[
             (Form::Mixed, &[0, 2]),
             (Form::Inline, &[1]),
             (Form::Own, &[3]),
         ]),
         custom(&[(Form::Inline, &[0, 1, 2, 3])]),
-        plan(Strategy::Binned, &surfaces),
+        plan(Strategy::BINNED, &surfaces),
     ] {
         let (film, report) = run(&other);
         assert_equal_but_for_rounding(&film, &reference);
@@ -153,7 +153,7 @@ fn every_assignment_renders_the_same_paths() {
     let own = render_plan(
         &world,
         &surfaces,
-        &plan(Strategy::Own, &surfaces),
+        &plan(Strategy::OWN, &surfaces),
         &samples(4),
     );
     let mut tried = 0;
@@ -229,8 +229,8 @@ fn binned_kernels_go_on_in_a_second_row() {
         let plan = plan(strategy, &surfaces);
         render_plan(&world, &surfaces, &plan, &options).film
     };
-    let reference = render(Strategy::Own, 64);
-    assert_equal_but_for_rounding(&render(Strategy::Binned, 1), &reference);
+    let reference = render(Strategy::OWN, 64);
+    assert_equal_but_for_rounding(&render(Strategy::BINNED, 1), &reference);
 }
 
 /// Kernels of every form append and ask for rays in every way.
@@ -245,7 +245,7 @@ fn every_form_renders_by_every_technique() {
     let reference = render_plan(
         &world,
         &surfaces,
-        &plan(Strategy::Own, &surfaces),
+        &plan(Strategy::OWN, &surfaces),
         &samples(4),
     );
     let forms = custom(&[
@@ -253,7 +253,7 @@ fn every_form_renders_by_every_technique() {
         (Form::Inline, &[1]),
         (Form::Own, &[2]),
     ]);
-    let binned = plan(Strategy::Binned, &surfaces);
+    let binned = plan(Strategy::BINNED, &surfaces);
     for (append, _, _) in Append::ALL {
         for (ray_data, ray_order) in [
             (RayData::Slots, RayOrder::Queue),
@@ -307,8 +307,8 @@ fn kernels_of_the_same_name_are_numbered() {
 
 #[test]
 fn kernels_count_their_items() {
-    let (_, own) = run(&plan(Strategy::Own, &surfaces()));
-    let (_, shared) = run(&plan(Strategy::Mixed, &surfaces()));
+    let (_, own) = run(&plan(Strategy::OWN, &surfaces()));
+    let (_, shared) = run(&plan(Strategy::MIXED, &surfaces()));
     let items = |report: &Report, name: &str| {
         let named = report.kernels.iter().filter(|k| k.name.starts_with(name));
         named.map(|k| k.items).sum::<u64>()
@@ -327,7 +327,7 @@ fn kernels_count_their_items() {
 
 #[test]
 fn reports_say_what_ran() {
-    let (_, report) = run(&plan(Strategy::Mega, &surfaces()));
+    let (_, report) = run(&plan(Strategy::MEGA, &surfaces()));
     assert_eq!(report.path_state_bytes, 0);
     let mega = report.kernels.last().expect("a kernel");
     assert_eq!((mega.name.as_str(), mega.items), ("mega", report.paths));
@@ -350,7 +350,7 @@ fn texts(room: &Room, surfaces: &Materials, strategy: Strategy) -> String {
 #[test]
 fn what_a_scene_does_not_need_is_absent_from_its_kernels() {
     let surfaces = materials(&[Kind::Diffuse(0.5)]);
-    for strategy in [Strategy::Own, Strategy::Mega] {
+    for strategy in [Strategy::OWN, Strategy::MEGA] {
         let needless = texts(&Room::default().scattering(), &surfaces, strategy);
         let shadowed = texts(&Room::default(), &surfaces, strategy);
         for name in [
@@ -376,7 +376,7 @@ fn what_a_scene_does_not_need_is_absent_from_its_kernels() {
 #[test]
 fn checks_and_timing_do_not_change_the_picture() {
     let surfaces = surfaces();
-    let plan = plan(Strategy::Own, &surfaces);
+    let plan = plan(Strategy::OWN, &surfaces);
     let (reference, _) = run(&plan);
     for (timing, checked) in [(Timing::AroundPass, false), (Timing::None, true)] {
         let options = GpuOptions {
@@ -453,7 +453,7 @@ fn unbound_materials_need_no_kernel() {
     let all = render_plan(
         &world,
         &surfaces,
-        &plan(Strategy::Own, &surfaces),
+        &plan(Strategy::OWN, &surfaces),
         &samples(2),
     );
     for kernels in groups {
@@ -483,7 +483,7 @@ fn unbound_materials_need_no_kernel() {
         );
     }
     // A megakernel leaves them out as well.
-    let mega = plan(Strategy::Mega, &surfaces).leaving_out(&[1, 2]);
+    let mega = plan(Strategy::MEGA, &surfaces).leaving_out(&[1, 2]);
     let mega = render_plan(&world, &surfaces, &mega, &samples(2));
     assert_equal_but_for_rounding(&mega.film, &all.film);
     assert_eq!(mega.report.kernels[1].materials, ["m0", "m3"]);
@@ -493,7 +493,7 @@ fn unbound_materials_need_no_kernel() {
 fn settings_that_cannot_be_rendered_are_named() {
     let refused = |room: Room, options| {
         let (world, surfaces) = (room.world(), surfaces());
-        let plan = plan(Strategy::Own, &surfaces);
+        let plan = plan(Strategy::OWN, &surfaces);
         match Renderer::from_world(gpu(), &world, &surfaces, &plan, &options) {
             Err(error) => error.to_string(),
             Ok(_) => panic!("not refused"),
@@ -523,7 +523,7 @@ fn invalid_material_code_is_an_error_with_its_place() {
     let broken = format!("{begin} let broken: u32 = 1.5;");
     world.parts.surface.wgsl = world.parts.surface.wgsl.replace(begin, &broken);
     let surfaces = surfaces();
-    let plan = plan(Strategy::Own, &surfaces);
+    let plan = plan(Strategy::OWN, &surfaces);
     match Renderer::from_world(gpu(), &world, &surfaces, &plan, &samples(1)) {
         Err(RuntimeError::Shader { kernel, message }) => {
             assert_eq!(kernel, "logic");

@@ -46,7 +46,7 @@ fn options(samples_a_pixel: u32) -> RenderOptions {
 /// A renderer with a kernel a material.
 fn renderer(options: &RenderOptions) -> Renderer<'static> {
     let surfaces = surfaces();
-    let own = plan(Strategy::Own, &surfaces);
+    let own = plan(Strategy::OWN, &surfaces);
     Renderer::from_world(gpu(), &room().world(), &surfaces, &own, options)
         .unwrap_or_else(|e| panic!("{e}"))
 }
@@ -160,7 +160,7 @@ fn whatever_takes_over_renders_the_same_picture() {
 #[test]
 fn the_same_plan_goes_on_without_counting() {
     let whole = render(&mut renderer(&options(16)));
-    let own = plan(Strategy::Own, &surfaces());
+    let own = plan(Strategy::OWN, &surfaces());
     let mut renderer = renderer(&options(16));
     let counts = |renderer: &Renderer<'_>| {
         let text: String = renderer.kernels().map(|(_, wgsl)| wgsl).collect();
@@ -190,7 +190,7 @@ fn what_cannot_take_over_leaves_the_plan_as_it_was() {
     let planners: [(Planner, &str); 4] = [
         (Box::new(|_| Err("no profile".into())), "no profile"),
         (always(custom(&[(Form::Own, &[0])])), "`m1`"),
-        (always(plan(Strategy::Mega, &surfaces)), "megakernel"),
+        (always(plan(Strategy::MEGA, &surfaces)), "megakernel"),
         (
             Box::new(|_| panic!("a defect in a planner")),
             "planning broke off",

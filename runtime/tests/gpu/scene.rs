@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use impasto_compiler::abi::InstanceInfo;
-use impasto_compiler::partition::{Form, Strategy};
+use impasto_compiler::partition::{Form, PlanInputs, Strategy};
 use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
@@ -132,8 +132,9 @@ pub fn render(
 ) -> Rendering {
     let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
     let inline = strategy == "inline";
-    let strategy = Strategy::from_name(if inline { "shared" } else { strategy });
-    let mut plan = strategy.expect("a strategy").plan(&names);
+    let strategy = Strategy::parse(if inline { "shared" } else { strategy });
+    let plan = strategy.and_then(|strategy| strategy.plan(&PlanInputs::of_names(&names)));
+    let mut plan = plan.unwrap_or_else(|e| panic!("{e}"));
     for kernel in &mut plan.kernels {
         if inline {
             kernel.form = Form::Inline;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
-use impasto_compiler::partition::{Plan, Strategy};
+use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
@@ -437,7 +437,8 @@ fn text(wgsl: String) -> ShaderPart {
 /// A plan by a strategy for stub materials.
 pub fn plan(strategy: Strategy, materials: &Materials) -> Plan {
     let names: Vec<String> = materials.infos.iter().map(|m| m.name.clone()).collect();
-    strategy.plan(&names)
+    let plan = strategy.plan(&PlanInputs::of_names(&names));
+    plan.unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub fn samples(samples: u32) -> RenderOptions {
@@ -467,7 +468,7 @@ pub fn render_plan(
 
 /// Renders with one kernel a material.
 pub fn render(world: &World, materials: &Materials, options: &RenderOptions) -> Rendering {
-    render_plan(world, materials, &plan(Strategy::Own, materials), options)
+    render_plan(world, materials, &plan(Strategy::OWN, materials), options)
 }
 
 /// Mean of the first channel over all pixels, and its standard error from their spread.

@@ -25,7 +25,7 @@ fn seen(planes: Vec<Plane>, solids: &Solids, front: f32, samples: u32) -> Render
         max_depth: 2000,
         ..Planes::default()
     };
-    let rendering = render(&planes, solids, Strategy::Own, samples);
+    let rendering = render(&planes, solids, Strategy::OWN, samples);
     assert_eq!(rendering.report.lost_paths, 0);
     rendering
 }
@@ -179,9 +179,9 @@ fn light_is_counted_once_however_it_is_found() {
         };
         render(&planes, &solids, strategy, samples)
     };
-    let chance = by(Light::None, Strategy::Own, 2048);
-    let sampled = by(Light::Sky, Strategy::Own, 256);
-    let mega = by(Light::Sky, Strategy::Mega, 256);
+    let chance = by(Light::None, Strategy::OWN, 2048);
+    let sampled = by(Light::Sky, Strategy::OWN, 256);
+    let mega = by(Light::Sky, Strategy::MEGA, 256);
     if gpu().info().kind == "software" {
         assert!(mega.film == sampled.film);
     }

@@ -47,7 +47,7 @@ fn render(plan: &Plan, options: &RenderOptions) -> Rendering {
 
 #[test]
 fn hits_are_what_queues_hold() {
-    let own = plan(Strategy::Own, &surfaces());
+    let own = plan(Strategy::OWN, &surfaces());
     let uncounted = render(&own, &samples(4));
     assert!(uncounted.report.workload.is_none());
     for append in [Append::Workgroup, Append::Subgroup, Append::Thread] {
@@ -61,11 +61,11 @@ fn hits_are_what_queues_hold() {
 
 #[test]
 fn hits_are_the_same_in_every_form() {
-    let own = render(&plan(Strategy::Own, &surfaces()), &counting(4));
+    let own = render(&plan(Strategy::OWN, &surfaces()), &counting(4));
     for other in [
-        plan(Strategy::Mixed, &surfaces()),
-        plan(Strategy::Binned, &surfaces()),
-        plan(Strategy::Inline, &surfaces()),
+        plan(Strategy::MIXED, &surfaces()),
+        plan(Strategy::BINNED, &surfaces()),
+        plan(Strategy::INLINE, &surfaces()),
         custom(&[
             (Form::Binned, &[0, 3]),
             (Form::Inline, &[1]),
@@ -80,11 +80,11 @@ fn hits_are_the_same_in_every_form() {
 
 #[test]
 fn megakernels_and_odd_workgroups_count_nothing() {
-    let mega = render(&plan(Strategy::Mega, &surfaces()), &counting(1));
+    let mega = render(&plan(Strategy::MEGA, &surfaces()), &counting(1));
     assert!(mega.report.workload.is_none());
     let mut options = counting(1);
     options.technique.workgroup = Some(48);
-    let odd = render(&plan(Strategy::Own, &surfaces()), &options);
+    let odd = render(&plan(Strategy::OWN, &surfaces()), &options);
     assert!(odd.report.workload.is_none());
 }
 
@@ -105,7 +105,7 @@ fn seen(width: u32, height: u32, samples_a_pixel: u32) -> (Rendering, f64) {
         ..counting(samples_a_pixel)
     };
     options.technique.sampler = Sampler::Independent;
-    let own = plan(Strategy::Own, &surfaces);
+    let own = plan(Strategy::OWN, &surfaces);
     let rendering = render_plan(&room.world(), &surfaces, &own, &options);
     // Paths keep step: there is one iteration in which all hit something.
     let iterations = rendering.report.iterations as f64;

@@ -84,7 +84,7 @@ fn changes(subject: &Subject, groups: &Groups, k: usize) -> Vec<Change> {
         let old = old.to_vec();
         changes.push(Change { what, old, new });
     };
-    for other in queued(members.len()).filter(|other| other != form) {
+    for other in Form::queued_of_members(members.len()).filter(|other| other != form) {
         offer(
             format!("as {}", other.name()),
             &[k],
@@ -109,7 +109,7 @@ fn changes(subject: &Subject, groups: &Groups, k: usize) -> Vec<Change> {
             offer(what, &[k, j], vec![(Form::Inline, all)]);
             continue;
         }
-        for form in queued(all.len()) {
+        for form in Form::queued_of_members(all.len()) {
             let what = format!("merged with `{name}` as {}", form.name());
             offer(what, &[k, j], vec![(form, all.clone())]);
         }
@@ -137,7 +137,7 @@ fn without(
         .copied()
         .filter(|other| *other != m)
         .collect();
-    let rest = (kept(*form, rest.len()), rest);
+    let rest = (form.with_members(rest.len()), rest);
     let alone = format!("`{name}` in a kernel of its own");
     offer(alone, &[k], vec![rest.clone(), (Form::Own, vec![m])]);
     if groups.iter().all(|(form, _)| *form != Form::Inline) {
@@ -153,9 +153,9 @@ fn without(
             Form::Inline => format!("`{name}` inline"),
             _ => format!("`{name}` in `{}`", subject.plan.kernels[j].name),
         };
-        let forms = match with {
-            Form::Own => vec![Form::Mixed, Form::Binned],
-            other => vec![*other],
+        let forms: Vec<Form> = match with.takes_several() {
+            true => vec![*with],
+            false => Form::queued_of_members(all.len()).collect(),
         };
         for form in forms {
             offer(
@@ -164,24 +164,6 @@ fn without(
                 vec![rest.clone(), (form, all.clone())],
             );
         }
-    }
-}
-
-/// The forms with a queue that a kernel of `count` members may have.
-fn queued(count: usize) -> impl Iterator<Item = Form> {
-    let forms = match count {
-        1 => [Some(Form::Own), None],
-        _ => [Some(Form::Mixed), Some(Form::Binned)],
-    };
-    forms.into_iter().flatten()
-}
-
-/// The form of a kernel that has fewer members than before.
-fn kept(form: Form, count: usize) -> Form {
-    match (form, count) {
-        (Form::Inline, _) => Form::Inline,
-        (_, 1) => Form::Own,
-        (form, _) => form,
     }
 }
 

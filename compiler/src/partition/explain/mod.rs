@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::search::total;
 use super::{
-    Calibrated, Form, Groups, Known, Organisation, Plan, PlanError, Prediction, Strategy,
-    TimeModel, Wanted,
+    Calibrated, Form, Groups, Organisation, Plan, PlanError, PlanInputs, Prediction, Strategy,
+    TimeModel,
 };
 
 mod alternatives;
@@ -51,7 +51,7 @@ pub struct Explanation {
     /// The kernels, in the plan's order.
     pub kernels: Vec<Kernel>,
     /// What the plans of other strategies take.
-    pub strategies: Vec<Rival>,
+    pub strategies: Vec<OtherPlan>,
     /// Materials that no surface binds.
     pub unused: Vec<String>,
     /// Materials on a surface that no path has hit.
@@ -96,7 +96,7 @@ pub struct Member {
 
 /// A plan by another rule.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Rival {
+pub struct OtherPlan {
     /// The strategy.
     pub strategy: String,
     /// Its plan.
@@ -135,7 +135,7 @@ pub fn explain(subject: &Subject) -> Result<Explanation, PlanError> {
     let placed = groups
         .iter()
         .flat_map(|(_, members)| members.iter().copied());
-    let nobody = placed.filter(|m| subject.share(*m) == 0.0);
+    let never_hit = placed.filter(|m| subject.share(*m) == 0.0);
     Ok(Explanation {
         strategy: plan.strategy.clone(),
         partition: super::text::print(plan, names),
@@ -147,9 +147,9 @@ pub fn explain(subject: &Subject) -> Result<Explanation, PlanError> {
         kernels: (0..groups.len())
             .map(|k| subject.kernel(k, &groups, seconds))
             .collect(),
-        strategies: subject.rivals(seconds),
+        strategies: subject.other_plans(seconds),
         unused: plan.unused.iter().map(|m| name(*m)).collect(),
-        never_hit: nobody.map(name).collect(),
+        never_hit: never_hit.map(name).collect(),
         unknown: unknown::sentences(subject),
     })
 }
@@ -195,7 +195,7 @@ impl Subject<'_> {
 
     /// How many members a subgroup evaluates, on average over those that evaluate any.
     fn diverges(&self, form: Form, members: &[usize]) -> f64 {
-        if matches!(form, Form::Own | Form::Binned) {
+        if !form.diverges() {
             return 1.0;
         }
         let of = |m: &usize| self.model.subgroups(form, *m, members).0;
@@ -230,38 +230,28 @@ impl Subject<'_> {
     }
 
     /// What other strategies come to, by the same model.
-    fn rivals(&self, seconds: f64) -> Vec<Rival> {
-        let known = Known {
+    fn other_plans(&self, seconds: f64) -> Vec<OtherPlan> {
+        let inputs = PlanInputs {
             names: self.names,
             unused: &self.plan.unused,
             costs: Some(self.model.costs),
             workload: Some(self.model.workload),
             profile: Some(self.model.profile),
         };
-        let fixed = [
-            Strategy::Own,
-            Strategy::Mixed,
-            Strategy::Binned,
-            Strategy::Inline,
-        ];
-        let all = [Wanted::Auto]
-            .into_iter()
-            .chain(fixed.map(Wanted::Fixed))
-            .chain([Wanted::Paper]);
-        let rival = |wanted: Wanted| {
-            let plan = wanted.plan(&known).ok()?;
+        let other = |strategy: Strategy| {
+            let plan = strategy.plan(&inputs).ok()?;
             let kernels = plan.kernels.iter();
             let takes: f64 = kernels
                 .map(|k| self.model.seconds(k.form, &k.materials))
                 .sum();
-            Some(Rival {
-                strategy: wanted.to_string(),
+            Some(OtherPlan {
+                strategy: strategy.to_string(),
                 partition: super::text::print(&plan, self.names),
                 seconds: takes,
                 times: (seconds > 0.0).then(|| takes / seconds),
             })
         };
-        all.filter_map(rival).collect()
+        Strategy::comparable().filter_map(other).collect()
     }
 }
 

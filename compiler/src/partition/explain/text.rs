@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use super::{Alternative, Explanation, Kernel, Member, Rival};
+use super::{Alternative, Explanation, Kernel, Member, OtherPlan};
 use crate::partition::Form;
 
 /// Kernels, materials and names that are listed before the rest is only counted.
@@ -20,10 +20,10 @@ impl fmt::Display for Explanation {
         if self.kernels.len() > LISTED {
             writeln!(f, "\n{} more kernels", self.kernels.len() - LISTED)?;
         }
-        self.nobody(f)?;
+        self.not_hit(f)?;
         writeln!(f, "\nother plans, by the same model:")?;
-        for rival in &self.strategies {
-            self.rival(f, rival)?;
+        for other in &self.strategies {
+            self.other(f, other)?;
         }
         writeln!(f, "\nthis estimate does not know")?;
         self.unknown
@@ -67,7 +67,7 @@ impl Explanation {
     }
 
     /// Materials without hits or surfaces.
-    fn nobody(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn not_hit(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.unused.is_empty() {
             writeln!(f, "\nno surface uses {}: no kernel", names(&self.unused))?;
         }
@@ -78,14 +78,14 @@ impl Explanation {
         Ok(())
     }
 
-    fn rival(&self, f: &mut fmt::Formatter<'_>, rival: &Rival) -> fmt::Result {
-        let Rival {
+    fn other(&self, f: &mut fmt::Formatter<'_>, other: &OtherPlan) -> fmt::Result {
+        let OtherPlan {
             strategy,
             seconds,
             times,
             ..
-        } = rival;
-        let same = match rival.partition == self.partition {
+        } = other;
+        let same = match other.partition == self.partition {
             true => ", the same",
             false => "",
         };

@@ -42,7 +42,7 @@ impl Problem {
     pub fn new(materials: impl IntoIterator<Item = usize>) -> Self {
         Self {
             materials: materials.into_iter().collect(),
-            forms: Form::ALL.map(|(form, _)| form).to_vec(),
+            forms: Form::all().collect(),
         }
     }
 
@@ -52,14 +52,9 @@ impl Problem {
 
     /// The forms with a queue that a kernel of `count` materials may have.
     fn queued(&self, count: usize) -> impl Iterator<Item = Form> + '_ {
-        let several = [Form::Binned, Form::Mixed];
-        let single = match self.allows(Form::Own) {
-            true => [Form::Own; 2],
-            false => several,
-        };
-        let forms = if count == 1 { single } else { several };
-        let repeated = forms[0] == forms[1];
-        let forms = forms.into_iter().take(if repeated { 1 } else { 2 });
+        let alone = count == 1 && Form::queued_of_members(1).any(|form| self.allows(form));
+        // Of forms that take the same, searches keep the last: of binned and mixed, mixed.
+        let forms = Form::queued_of_members(if alone { 1 } else { 2 }).rev();
         forms.filter(|form| self.allows(*form))
     }
 }
@@ -99,7 +94,7 @@ fn better(a: f64, b: f64) -> bool {
 
 /// Kernels by their first members, inline last: the order in which plans have them.
 pub(super) fn ordered(mut groups: Groups) -> Groups {
-    groups.sort_by_key(|(form, members)| (*form == Form::Inline, members.first().copied()));
+    groups.sort_by_key(|(form, members)| (!form.has_queue(), members.first().copied()));
     groups
 }
 

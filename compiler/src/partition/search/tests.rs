@@ -55,7 +55,7 @@ fn every(rest: &[usize], blocks: &mut Groups, visit: &mut dyn FnMut(&Groups)) {
             blocks[i].1.pop();
         }
     }
-    for (form, _) in Form::ALL {
+    for form in Form::all() {
         if form != Form::Inline || blocks.iter().all(|(f, _)| *f != Form::Inline) {
             blocks.push((form, vec![*first]));
             every(rest, blocks, visit);
