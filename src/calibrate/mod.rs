@@ -12,7 +12,7 @@ mod room;
 mod score;
 mod sources;
 
-pub use errors::{Errors, rank_correlation};
+pub use errors::Errors;
 pub use fit::{Fitted, Residual, fit};
 pub use measure::{Effort, Step, measure};
 pub use registers::{Registers, registers};

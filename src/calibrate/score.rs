@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::{Calibrated, DeviceProfile, Form, Known, Wanted, text};
+use impasto_runtime::lab::statistics::median;
 use serde::Serialize;
 
 use crate::measure::Measurement;
@@ -90,12 +91,7 @@ pub fn scores_text(scored: &[Scored]) -> String {
     );
     for set in scored {
         let positive = set.kernels.iter().filter(|k| k.measured > 0.0);
-        let mut off: Vec<f64> = positive
-            .map(|k| (k.predicted / k.measured - 1.0).abs())
-            .collect();
-        off.sort_by(f64::total_cmp);
-        let median = off
-            .get(off.len() / 2)
+        let median = median(positive.map(|k| (k.predicted / k.measured - 1.0).abs()))
             .map_or_else(|| "-".into(), |e| format!("{:.1} %", 100.0 * e));
         let (scene, count) = (&set.scene, set.kernels.len());
         let _ = writeln!(

@@ -5,6 +5,7 @@
 
 use impasto_compiler::partition::Plan;
 use impasto_runtime::film::Film;
+use impasto_runtime::lab::statistics::median;
 use impasto_runtime::render::{Renderer, Rendering, Samples};
 use impasto_runtime::technique::{Choice, Sampler};
 
@@ -143,7 +144,7 @@ impl<'a> Bench<'a> {
         self.seconds_a_sample = begin.elapsed().as_secs_f64() / f64::from(wanted.samples);
         let record = Record {
             timed: seconds.len(),
-            gpu_seconds: median(seconds),
+            gpu_seconds: median(seconds).unwrap_or_default(),
             ..self.described(wanted, &rendering)
         };
         Ok((record, rendering.film))
@@ -195,23 +196,5 @@ impl<'a> Bench<'a> {
         };
         watch.render_aside(&mut renderer, &warm_up)?;
         Ok(renderer)
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_middle_of_several_times_counts() {
-        assert_eq!(median(vec![9.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(vec![5.0]), 5.0);
-        assert_eq!(median(vec![3.0, 1.0]), 3.0);
-        assert_eq!(median(Vec::new()), 0.0);
     }
 }

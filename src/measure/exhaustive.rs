@@ -11,7 +11,7 @@ use impasto_compiler::partition::{
 };
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::plans::Times;
 use super::{Measurement, Progress, Subject, candidate, candidates};
@@ -32,7 +32,7 @@ pub struct Options {
 }
 
 /// What was measured, and what follows from it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The kernels, and what the scene asks of them.
     #[serde(flatten)]
@@ -59,7 +59,7 @@ pub struct Answer {
 }
 
 /// A plan with its times.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanTime {
     /// The strategy that made it; `best` and `worst` by measured kernels, `sample` by chance.
     pub strategy: String,
