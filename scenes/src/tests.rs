@@ -104,16 +104,16 @@ fn files_are_the_same_bytes_everywhere() {
     });
     // Changes on purpose are entered here.
     let expected = [
-        ("cornell", 0xd86f_b89e_4359_fdea),
-        ("carpaint", 0x23de_92b5_453e_c6ff),
-        ("city", 0x1892_751e_7868_db51),
-        ("conference", 0xd5c0_9aa4_7ee3_579d),
-        ("forest", 0xb6c5_568a_301d_dbbf),
-        ("glasses", 0xe15b_2cd8_f4c2_4a97),
-        ("materials_preview", 0x71ca_6aa9_bf62_72ff),
-        ("swatches", 0x796a_4e01_0c1d_c438),
-        ("crossover", 0x3344_8263_48ef_db90),
-        ("mixes", 0xff75_86c5_6533_0e12),
+        ("cornell", 0x11da_1ac4_796a_d0dc),
+        ("carpaint", 0x8535_ed71_b640_384d),
+        ("city", 0x2a31_d0ee_3cc0_83a1),
+        ("conference", 0xa943_3770_13bf_c583),
+        ("forest", 0xb261_1370_33f7_fb59),
+        ("glasses", 0xd945_0bdb_e980_7eed),
+        ("materials_preview", 0x3739_15af_d0b9_95a5),
+        ("swatches", 0xe59a_e850_5f72_177b),
+        ("crossover", 0xec98_823f_79b1_c902),
+        ("mixes", 0xe9d7_d835_2350_c989),
         ("textures", 0x0cdf_4d4d_b6dd_e235),
     ];
     assert_eq!(digests, expected, "{digests:#x?}");

@@ -129,32 +129,33 @@ fn core_list(entries: &[&Entry]) -> String {
     text
 }
 
-const INDEX: &str = "Everything that `use std::...` imports and every file in `materials/`, each rendered by Impasto \
-under the same light. A picture leads to its signature, parameters, source and an example. The language itself is in \
-[language.md](../language.md).\n";
+const INDEX: &str = "This page shows everything that `use std::...` imports, and every file in `materials/`. Impasto renders each of them \
+under the same light. A picture leads to its signature, parameters, source and an example. [language.md](../language.md) \
+describes the language itself.\n";
 
 const HOW: &str = "
 ## How the pictures are made
 
-`cargo experiments gallery` renders what has changed since the last time and writes these pages from the doc comments; \
-`--check` renders nothing and fails if a page or picture is missing or stale. BSDFs, surface models and materials are \
-on a shader ball of 10 cm with a groove, a neutral core in a cup, and a foot; patterns are on a flat tile of 10 cm \
-that shows a value as light; EDFs are lamps before a wall. `--size` and `--spp` set the quality, `--only 'bsdf/*'` \
+`cargo experiments gallery` renders what has changed since the last time, and writes these pages from the doc \
+comments. `--check` renders nothing, and fails if a page or picture is missing or stale. BSDFs, surface models and \
+materials are on a shader ball of 10 cm with a groove, a neutral core in a cup, and a foot. Patterns are on a flat tile \
+of 10 cm that shows a value as light. EDFs are lamps before a wall. `--size` and `--spp` set the quality, `--only 'bsdf/*'` \
 chooses, `--again` renders what is current, too, and `--impasto FILE` takes a command that is already built.
 
-A new file in `stdlib/` or `materials/` is in the gallery without further ado. A doc line of its definition says how \
-it wants to be shown, if the defaults do not do:
+A new file in `stdlib/` or `materials/` appears in the gallery by itself. A doc line of its definition changes how it is \
+shown:
 
 | doc line | meaning |
 |---|---|
-| `Gallery: scale = 2 m` | the shader ball is so large, for bricks and asphalt |
+| `Gallery: scale = 2 m` | the size of the shader ball, for bricks and asphalt |
 | `Gallery: value = 0.5 + 0.5 * perlin(position / 1 cm)` | what a tile shows: a float or color of `position`, `uv` and other inputs |
 | `Gallery: surface = diffuse(0.5, normal: ...)` | what the shader ball is made of, for what bends normals |
 | `Gallery: item = fn height(p: point) -> length = ...;` | a function that the others call |
 
-Names of the library are imported by themselves. An example of textures may name `\"stone.png\"`. `images/manifest.json` keeps for each picture a hash of the source \
-that it shows (without comments and spaces) and how it was made. Costs on the pages are operations of one evaluation, \
-on average over random points and directions, as `impasto cost` counts them.
+Names of the library are imported automatically. An example of textures may name `\"stone.png\"`. \
+`images/manifest.json` keeps two things for each picture: a hash of the source that it shows (without comments and \
+spaces), and how it was made. Costs on the pages are operations of one evaluation, as `impasto cost` counts them: means \
+over random points and directions.
 ";
 
 /// Where the picture of an entry is, seen from the pages.

@@ -13,10 +13,9 @@ pub(super) fn page(paper: &Paper) -> String {
     let mut out = String::from(
         "# The paper's tables, measured\n\n\
          Laine, Karras and Aila, \"Megakernels Considered Harmful: Wavefront Path Tracing on GPUs\" (2013)\n\
-         report what follows on a Tesla K20, for scenes that were never published. Here are the same tables for\n\
-         the scenes that stand in for them ([scenes.md](scenes.md)), rendered by Impasto. `cargo experiments paper` \
-         measures them\nand writes this page; the numbers, with the command of each, are in\n\
-         [paper.json](paper.json).\n\n",
+         measure a Tesla K20 and scenes that were never published. This page has the same tables for the scenes that stand \
+         in for\nthem ([scenes.md](scenes.md)), rendered by Impasto. `cargo experiments paper` measures them and writes this \
+         page. All\nnumbers, with the command of each, are in [paper.json](paper.json).\n\n",
     );
     let adapter = &paper.adapter;
     let _ = writeln!(
@@ -24,8 +23,8 @@ pub(super) fn page(paper: &Paper) -> String {
         "Machine: {} ({}, {}), Impasto {}.\n",
         adapter.name, adapter.backend, adapter.driver, paper.version
     );
-    out += "Rates are of the steady state: from a quarter to nine tenths of the paths. Times are of the \
-            GPU's timestamps.\nRatios are to be trusted more than absolute numbers.\n";
+    out += "Rates are of the steady state: from a quarter to nine tenths of the paths. Times are those of the \
+            GPU's timestamps.\nRatios are more reliable than absolute numbers.\n";
     for section in SECTIONS {
         let body = match section {
             "speed" => tables::speed(paper),
@@ -47,8 +46,8 @@ pub(super) fn page(paper: &Paper) -> String {
 fn faults(paper: &Paper) -> String {
     let count = |of: fn(&Report) -> u64| paper.records.iter().map(|r| of(&r.report)).sum::<u64>();
     format!(
-        "\n## What was lost\n\nIn all of these renders: {} samples that were not finite, {} cut to what the film \
-         holds, {} requests that found\na queue full. Scenes: {}.\n",
+        "\n## What was lost\n\nAll of these renders together lost {} samples that were not finite. They cut {} samples to \
+         what the film holds, and {}\nrequests found a queue full. Scenes: {}.\n",
         count(|r| r.nonfinite_samples),
         count(|r| r.clamped_samples),
         count(|r| r.queue_overflow),

@@ -147,8 +147,8 @@ pub(super) fn table(paper: &Paper) -> String {
     }
     format!(
         "## Ray casts alone\n\n\
-         Millions of rays a second (`impasto rays SCENE`, medians of nine): those of the camera, diffusely scattered \
-         where these\nhit, once more, and shadow rays between hits. Techniques other than the default are named by what \
-         they change.\n{out}"
+         Millions of rays a second (`impasto rays SCENE`, medians of nine). The sets are rays of the camera, rays diffusely \
+         scattered\nwhere these hit, rays scattered once more, and shadow rays between hits. The name of a technique says \
+         what it changes of the\ndefault.\n{out}"
     )
 }

@@ -41,9 +41,9 @@ pub(super) fn speed(paper: &Paper) -> String {
     }
     format!(
         "## Table 1: megakernel against wavefront\n\n\
-         Mpaths/s, medians of three renders. The megakernel regenerates paths never, when over half of a subgroup \
-         idles\n(the paper's), or at once; the speedup is against the best of the three. `shared` is the wavefront \
-         with one kernel for all\nmaterials, `own` with one for each.\n\n\
+         Mpaths/s, medians of three renders. The megakernel regenerates paths never, when over half of a subgroup idles \
+         (as in\nthe paper), or at once. The speedup is relative to the fastest of the three. `shared` is the wavefront with \
+         one kernel for\nall materials, `own` the one with a kernel for each material.\n\n\
          | scene | triangles | mega, never | mega, half | mega, always | shared | own | speedup | paper's speedup |\n\
          |---|---|---|---|---|---|---|---|---|\n{rows}"
     )
@@ -93,9 +93,9 @@ pub(super) fn stages(paper: &Paper) -> String {
     }
     format!(
         "## Table 2: time of the stages\n\n\
-         Milliseconds an iteration over the paper's pool of 2^20 paths, strategy `own`; in brackets the share here \
-         and the paper's.\nThe column of queues is what prepares indirect arguments; appending is part of the stages \
-         that append (see the\nablations). The paper's path state takes 212 bytes.\n\n\
+         Milliseconds an iteration with the paper's pool of 2^20 paths, strategy `own`. The brackets hold the share here and \
+         the\npaper's share. The column `queues` is the kernel that prepares indirect arguments. Appending to queues is part \
+         of the stages\nthat append (see the ablations). The paper's path state takes 212 bytes.\n\n\
          | scene | logic | new path | materials | ray casts | queues | bytes a path |\n\
          |---|---|---|---|---|---|---|\n{rows}"
     )
@@ -172,9 +172,9 @@ pub(super) fn ablations(paper: &Paper) -> String {
         .collect();
     format!(
         "## Ablations\n\n\
-         One technique is changed at a time ([techniques.md](techniques.md)), strategy `own`: Mpaths/s, and in \
-         brackets\nthe ratio to the defaults. The paper reports 1.40 for coalesced appends over single ones and 1.80 \
-         for the structure of\narrays in CARPAINT, and 1.05 for a pool of 8 M over 1 M.\n\n\
+         Each row changes one technique ([techniques.md](techniques.md)), strategy `own`: Mpaths/s, and in brackets the ratio \
+         to the\ndefaults. The paper reports a ratio of 1.40 for coalesced appends over single ones, 1.80 for the structure of \
+         arrays in\nCARPAINT, and 1.05 for a pool of 8 M paths over 1 M.\n\n\
          | technique | option | {} |\n|---|---|---|---|---|\n| defaults | | {} |\n{rows}",
         SCENES.map(|s| s.title).join(" | "),
         base.join(" | ")
@@ -207,9 +207,9 @@ pub(super) fn utilisation(paper: &Paper) -> String {
     }
     format!(
         "## Thread utilisation\n\n\
-         Lanes of a subgroup at work, on average over the statements it executes (`--profile`); several kernels of a \
-         stage are\nweighted by their times. The paper reports, in CONFERENCE, 23 % for the megakernel and for the \
-         wavefront 60 % in logic, 99 %\nin new paths, 71 % in materials, 35 % in ray casts.\n\n\
+         The mean share of a subgroup's lanes that are at work, over the statements that the subgroup executes (`--profile`). \
+         Several\nkernels of a stage are weighted by their times. In CONFERENCE the paper reports 23 % for the megakernel. For \
+         the wavefront it\nreports 60 % in logic, 99 % in new paths, 71 % in materials and 35 % in ray casts.\n\n\
          | scene | mega | logic | new path | materials | ray casts |\n|---|---|---|---|---|---|\n{rows}"
     )
 }
@@ -271,7 +271,7 @@ pub(super) fn crossover(paper: &Paper) -> String {
     }
     format!(
         "## Where separate kernels begin to pay\n\n\
-         Mpaths/s in a room of small things (`cargo scenes crossover`): one material with more and more \
-         evaluations of noise,\nand more and more different materials of middling cost.\n{out}"
+         Mpaths/s in a room of small things (`cargo scenes crossover`). The family `noise` has one material with 0 to 16 \
+         evaluations of\nnoise. The family `materials` has 1 to 64 different materials of middling cost.\n{out}"
     )
 }

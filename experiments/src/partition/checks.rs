@@ -44,12 +44,12 @@ pub(super) fn predictions(scenes: &[Measured]) -> String {
     format!(
         "## Predictions\n\n\
          ![Predicted against measured times of kernels](images/partition-kernels.svg)\n\n\
-         Errors are medians of |predicted / measured - 1|. In the median, predictions are *bias* times what was measured. \
-         Inline\nmaterials have no kernel of their own: there the times are those of the logic kernel with them in it.\n\n\
+         An error is the median of |predicted / measured - 1|, and *bias* is the median of predicted / measured. Inline \
+         materials\nhave no kernel of their own. Their times are those of the logic kernel that contains them.\n\n\
          | form | kernels | error | bias | rank correlation |\n|---|---|---|---|---|\n{forms}\n\
          ![Predicted against measured times of plans](images/partition-plans.svg)\n\n\
-         Of a plan, the material kernels are predicted; the rest of an iteration is what the profiling pass of the scene \
-         measured.\n\n\
+         The model predicts the material kernels of a plan. The rest of an iteration is measured by the scene's \
+         profiling pass.\n\n\
          | scene | pool | rank correlation | kernel | plan's kernels | iteration |\n|---|---|---|---|---|---|\n{rows}"
     )
 }
@@ -60,8 +60,8 @@ pub(super) fn held_out(results: &Results) -> String {
     if let Some(fit) = results.fit.filter(|fit| fit.points > 0) {
         let _ = write!(
             out,
-            "The constants of the profile `{}` were fitted to {} kernels, with a median error of {} and a rank correlation \
-             of {:.3};\nfitted to half of the materials, the median error on the other half is {}.\n",
+            "The constants of the profile `{}` were fitted to {} kernels. The median error is {}, and the rank correlation is \
+             {:.3}.\nA fit to half of the materials has a median error of {} on the other half.\n",
             results.profile,
             fit.points,
             percent(fit.median_error),
@@ -72,10 +72,9 @@ pub(super) fn held_out(results: &Results) -> String {
     if let Some(held) = &results.held_out {
         let _ = write!(
             out,
-            "{}Of the materials on this page, every second by name was taken, and the constants fitted to the kernels over \
-             these alone\n(`cargo experiments partition --held-out`). On the {} kernels over the others the median error is {}, one in \
-             ten is off by more\nthan {}, predictions are {:.2} times what was measured in the median, and the rank \
-             correlation is {:.3}.\n",
+            "{}`cargo experiments partition --held-out` fits the constants to the kernels over every second material of this \
+             page, by name.\nOn the {} kernels over the others the median error is {}, and one prediction in ten is off \
+             by more than {}.\nThe median of predicted / measured is {:.2}, and the rank correlation is {:.3}.\n",
             if out.is_empty() { "" } else { "\n" },
             held.kernels,
             percent(held.median),
@@ -169,7 +168,7 @@ pub(super) fn additivity(scenes: &[Measured]) -> String {
     let list = match outside.len() {
         0 => String::new(),
         n => format!(
-            "\nOf the {n} that are further off, the furthest:\n\n\
+            "\nPlans further off: {n}. The furthest are:\n\n\
              | scene | pool | strategy | partition | iteration over sum |\n|---|---|---|---|---|\n{rows}"
         ),
     };
@@ -181,9 +180,9 @@ pub(super) fn additivity(scenes: &[Measured]) -> String {
     .unwrap_or(0.0);
     format!(
         "## Do kernels add up?\n\n\
-         Whole iterations were timed as well: {} plans drawn by lot and {} of the strategies' are within 2 % of the sum of \
-         their\nparts. The median difference is {}, 95 % are within {}, and iterations take {bias:.3} times the sum in the \
-         median. The\nrepetitions of a kernel spread by {} in the median.\n{list}",
+         Whole iterations were timed as well: {} random plans and {} plans of the strategies are within 2 % of the sum of \
+         their\nkernels. The median difference is {}, and 95 % of the plans are within {}. The median of the time of an \
+         iteration over the\nsum is {bias:.3}. The median spread of the repetitions of a kernel is {}.\n{list}",
         by_lot(true),
         by_lot(false),
         percent(middle),

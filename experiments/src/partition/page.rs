@@ -40,28 +40,33 @@ pub(super) fn page(results: &Results, scenes: &[Measured]) -> String {
 }
 
 const INTRODUCTION: &str = "# Is the automatic partition the best?\n\n\
-    Laine, Karras and Aila (2013) chose by hand which materials share a kernel, and leave open how to do it \
-    automatically.\nImpasto predicts the time of every candidate from what materials cost and how a scene hits them, \
-    and takes the plan with\nthe least sum. Here that plan is held against the fastest one that was measured: \
-    *regret* is the time of an iteration\nby a plan over that by the best plan, 1 where nothing is lost. \
-    `cargo experiments partition` measures it and writes this page;\nall numbers are in [partition.json](partition.json).\n\n";
+    Laine, Karras and Aila (2013) chose by hand which materials share a kernel. They leave open how to choose \
+    automatically.\nImpasto predicts the time of every candidate kernel from what its materials cost and how the scene \
+    hits them. It takes the\nplan with the least sum. This page compares that plan with the fastest one that was \
+    measured.\n\n\
+    The *regret* of a plan is the time of an iteration by that plan over the time by the best plan. It is 1 if nothing is \
+    lost.\n`cargo experiments partition` measures it and writes this page. All numbers are in \
+    [partition.json](partition.json).\n\n";
 
 const LIMITS: &str = "\n## How it is measured, and what that does not say\n\n\
-    `impasto plan SCENE --strategy exhaustive --pool N` renders until paths of all lengths are mixed, keeps a copy of \
-    what they\nare between two iterations, and times every kernel on this copy, again and again, by the GPU's \
-    timestamps. The time of an\ninline set is what it adds to the logic kernel. Up to six materials, all sets are \
-    timed in all forms, and every plan is\nadded up; the best is the least of them. Beyond, single materials, \
-    pairs, the\nsets of the strategies' plans, and larger sets drawn by lot are timed, as far as the time of a scene \
-    goes, and the best is that of\nthe plans made of these: regret is then a lower bound. The least of many sums is\nalso the luckiest, which makes regret look larger by up \
-    to the spread of the measurements. Iterations at the start and at\nthe end of a picture, when few paths are alive, \
-    are in none of this but in the whole renders.\n\n\
+    `impasto plan SCENE --strategy exhaustive --pool N` renders until paths of all lengths are mixed. It keeps a copy of \
+    the\npaths between two iterations, and times every kernel on this copy several times, by the GPU's timestamps. \
+    The time of an inline\nset is what it adds to the logic kernel.\n\n\
+    - Up to six materials, every set is timed in every form. The time of every plan is the sum of its kernels' times, and \
+    the\n  best plan is the one with the least sum.\n\
+    - With more materials, single materials, pairs, the sets of the strategies' plans and randomly chosen larger sets \
+    are timed,\n  until the time for the scene is over. The best plan is the best one of these kernels, so regret is \
+    a lower bound.\n\
+    - The least of many sums is also the luckiest. This makes regret look larger, by up to the spread of the \
+    measurements.\n\
+    - Few paths are alive at the start and at the end of a picture. Only the whole renders include those \
+    iterations.\n\n\
     ```text\n\
-    cargo scenes\n\
     cargo experiments partition                     # all of it; again, to go on where it stopped\n\
     cargo experiments partition --only stones_3     # one scene\n\
-    cargo experiments partition --repredict h200    # what was measured, predicted anew by a profile; no GPU\n\
-    cargo experiments partition --page --held-out   # the model fitted to half of the materials; no GPU\n\
-    cargo experiments partition --page              # the page from the JSON alone\n\
+    cargo experiments partition --repredict h200    # predicts anew what was measured, by a profile; no GPU\n\
+    cargo experiments partition --page --held-out   # fits the model to half of the materials; no GPU\n\
+    cargo experiments partition --page              # writes the page from the JSON alone\n\
     ```\n";
 
 #[cfg(test)]
@@ -86,8 +91,8 @@ mod tests {
             "| regret of every scene at most 1.05 | 1.103 (tiny, 1 M paths) | **missed** |",
             "| tiny | 1 M paths | `own:a\\|own:b\\|own:c` | `mixed:a,b\\|inline:c` | 10.3 % |",
             "| own | 3 | 22.2 % | 0.78 | 0.500 |",
-            "0 of 1 plans drawn by lot and 3 of 3 of the strategies' are within 2 %",
-            "Of the 1 that are further off, the furthest:",
+            "0 of 1 random plans and 3 of 3 plans of the strategies are within 2 %",
+            "Plans further off: 1. The furthest are:",
             "| tiny | 1 M paths | sample | `own:b\\|binned:a,c` | 1.043 |",
             "| tiny | 1 M paths | 110.0 | - | - | 55.0 | - |",
             "| tiny | 1 M paths | 1.103 | 1.333 | 1.103 | 1.310 | 1.069 | 1.345 | 1.048 | 1.138 | 2.207 |",

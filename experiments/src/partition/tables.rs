@@ -153,10 +153,11 @@ pub(super) fn scenes(scenes: &[Measured]) -> String {
     }
     format!(
         "## Scenes\n\n\
-         The paper's three, as the repository has them, and mixes (`cargo scenes mixes`): in those with random hits \
-         every\nsmall triangle of a closed room is of a material drawn by lot, in those with coherent hits paths stay in \
-         booths of one\nmaterial each. Behind a material stand its hits in an iteration over 100 slots of the pool, and \
-         in how many of 100 blocks of\n32 neighbouring slots there is one.\n\n\
+         The first three are the paper's, as the repository has them. The others are mixes (`cargo scenes mixes`). In mixes \
+         with\nrandom hits, every small triangle of a closed room has a randomly chosen material. In mixes with coherent \
+         hits, paths stay in\nbooths of one material each. Two numbers stand behind a material: its hits in an iteration \
+         as percent of the slots of the\npool, and in brackets the percentage of blocks of 32 neighbouring slots that have \
+         such a hit.\n\n\
          | scene | | hits | shares | kernels | plans | materials |\n|---|---|---|---|---|---|---|\n{rows}"
     )
 }
@@ -192,8 +193,8 @@ pub(super) fn regret(scenes: &[Measured]) -> String {
     format!(
         "## Regret\n\n\
          Time of an iteration by each strategy's plan over that by the best plan. *Kernels* is the chosen plan's regret in \
-         material\nkernels alone, which rays and logic do not dilute. `mega` has no iterations; its column is that of \
-         whole renders, relative to\nthe chosen plan's.\n\n\
+         material\nkernels alone; rays and logic do not dilute it. `mega` has no iterations: its column compares whole \
+         renders, relative to the\nchosen plan.\n\n\
          ![Regret of every strategy in every scene](images/partition-regret.svg)\n\n\
          | scene | pool | auto | kernels | {} | mega |\n|---|---|---|---|{}---|\n{rows}",
         BASELINES.join(" | "),
@@ -229,7 +230,7 @@ pub(super) fn differences(scenes: &[Measured]) -> String {
     let count = scenes.iter().filter(|s| s.auto == s.best).count();
     format!(
         "## Where another plan was faster\n\n\
-         In {count} of {} cases the chosen plan is the best. In the others it loses so much of an iteration:\n\n\
+         The chosen plan is the best in {count} of {} cases. In the others the loss is this share of an iteration:\n\n\
          | scene | pool | chosen | best | loss |\n|---|---|---|---|---|\n{rows}",
         scenes.len()
     )
@@ -267,9 +268,9 @@ pub(super) fn renders(scenes: &[Measured]) -> String {
     }
     format!(
         "## Whole renders\n\n\
-         Mpaths/s of the steady state, the best of some renders by turns. *Auto's plan* is fixed from the start; `auto` \
-         begins with a\nkernel a material, counts hits, and changes to its plan while it renders. No *best* stands where it is \
-         the chosen plan.\n\n\
+         Mpaths/s of the steady state, the best of several renders, which take turns. *Auto's plan* is fixed from the start. \
+         `auto` begins\nwith a kernel for each material, counts hits, and changes to its plan while it renders. *Best* is \
+         left out if it is the chosen\nplan.\n\n\
          | scene | pool | {} |\n|---|---|{}\n{rows}",
         WAYS.join(" | "),
         "---|".repeat(WAYS.len())

@@ -90,14 +90,19 @@ fn head(ended: &[Ended], command: &str, on: Option<&str>) -> String {
 }
 
 const INTRODUCTION: &str = "\
-Every number here was measured by a test that fails beyond its bound. Tests walk the BSDFs of
-`stdlib/bsdf` and the materials of `materials/` from their folders. The oracle is the interpreter
-of the compiler's IR in double precision. Relative errors are over the value, or over a thousandth
-of the light where less is reflected. Bounds come from the doc comment of each BSDF: `Region:` lines
-say where single precision is off by more than 1e-4 and by how much, `Furnace:` lines what a white
-surface keeps, `Albedo:` how near its albedo is to the integral, `Weights:` the greatest value over
-density (4 where nothing is said). What a search found wanting once is a line of
-`compiler/tests/stdlib/regressions/`.
+A test measured every number here, and fails if the number is beyond its bound. The tests walk the
+BSDFs of `stdlib/bsdf` and the materials of `materials/` from their folders. The reference is the
+interpreter of the compiler's IR in double precision. Errors are relative to the value, or to a
+thousandth of the light where less is reflected.
+
+Bounds come from the doc comment of each BSDF:
+
+- `Region:` where single precision is off by more than 1e-4, and by how much;
+- `Furnace:` what a white surface keeps;
+- `Albedo:` how near the albedo is to the integral;
+- `Weights:` the greatest value over density (4 where nothing is said).
+
+Cases that a search once found to fail are lines of `compiler/tests/stdlib/regressions/`.
 ";
 
 /// Processor and system, without names of anybody's machine.
