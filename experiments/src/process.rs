@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use impasto::runtime::report::Report;
+use impasto::runtime::render::report::Report;
 use xtask::shell::{self, Result, cargo};
 
 /// The command to measure: `given`, or the one that is built from this checkout.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use impasto::runtime::report::Report;
+use impasto::runtime::render::report::Report;
 
 use super::experiments::{SCENES, SECTIONS};
 use super::record::Paper;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use impasto::files::write_whole;
-use impasto::runtime::rays::{RayRate, RayReport};
+use impasto::runtime::lab::rays::{RayRate, RayReport};
 use impasto::runtime::technique::Choice as _;
 use serde::{Deserialize, Serialize};
 use xtask::shell::{self, Result};

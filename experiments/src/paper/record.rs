@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use impasto::files::write_whole;
-use impasto::runtime::report::{AdapterReport, KernelReport, Report};
+use impasto::runtime::render::report::{AdapterReport, KernelReport, Report};
 use serde::{Deserialize, Serialize};
 use xtask::shell::Result;
 
@@ -148,7 +148,7 @@ const SCHEMA: u32 = 2;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use impasto::runtime::report::TimeSource;
+    use impasto::runtime::render::report::TimeSource;
     use impasto::runtime::technique::Traversal;
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use impasto::runtime::report::{KernelReport, Report};
+use impasto::runtime::render::report::{KernelReport, Report};
 
 use super::experiments::{ABLATIONS, SCENES, Scene};
 use super::record::{Paper, Record, sum};

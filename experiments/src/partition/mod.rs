@@ -27,7 +27,7 @@ use impasto::calibrate::{self, Errors};
 use impasto::compiler::partition::DeviceProfile;
 use impasto::files::write_whole;
 use impasto::measure::{Data, Measurement};
-use impasto::runtime::report::AdapterReport;
+use impasto::runtime::render::report::AdapterReport;
 use xtask::shell::Result;
 
 use crate::process;

@@ -9,7 +9,7 @@ use impasto::calibrate::Errors;
 use impasto::compiler::partition::Form;
 use impasto::compiler::partition::profile::Fit;
 use impasto::measure::Answer;
-use impasto::runtime::report::AdapterReport;
+use impasto::runtime::render::report::AdapterReport;
 use serde::{Deserialize, Serialize};
 use xtask::shell::Result;
 

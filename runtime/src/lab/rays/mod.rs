@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::report::AdapterReport;
+use crate::render::report::AdapterReport;
 use crate::scene::Scene;
 use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
 use crate::world::bvh::Bvh;
