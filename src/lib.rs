@@ -48,12 +48,13 @@ pub use runtime::scene::Scene;
 pub mod calibrate;
 pub mod converge;
 pub mod cost;
+pub mod docs;
 pub mod files;
 mod ir_text;
 pub mod measure;
 pub mod plan;
+pub mod plot;
 pub mod starter;
-mod statistics;
 pub mod trace;
 
 /// Why there is no picture.
@@ -96,6 +97,20 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
             },
         })
         .collect()
+}
+
+/// The materials of a file with their defaults, as the compiler is asked for them. A file without any is
+/// asked for one all the same: the compiler knows what to say.
+pub fn file_requests(file: &str, loader: &mut FileLoader) -> Vec<MaterialRequest> {
+    let names = compiler::check(file, loader).materials;
+    if names.is_empty() {
+        return vec![MaterialRequest::new(file, file)];
+    }
+    let request = |name: String| MaterialRequest {
+        material: Some(name.clone()),
+        ..MaterialRequest::new(name, file)
+    };
+    names.into_iter().map(request).collect()
 }
 
 /// Compiles every material of a scene. Warnings are dropped; [`compiler::compile`] gives them.

@@ -177,7 +177,8 @@ choices! {
 }
 
 /// A value of every choice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Technique {
     /// Whether kernels count the lanes at work, which makes them much slower.
     pub profile: bool,

@@ -12,7 +12,6 @@ mod room;
 mod score;
 mod sources;
 
-pub use crate::statistics::rank_correlation;
 pub use errors::Errors;
 pub use fit::{Fitted, Residual, fit};
 pub use measure::{Effort, Step, measure};

@@ -5,10 +5,10 @@ use std::fmt::Write;
 
 use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::{Calibrated, DeviceProfile, Form, PlanInputs, Strategy, text};
+use impasto_runtime::lab::statistics::median;
 use serde::Serialize;
 
 use crate::measure::Measurement;
-use crate::statistics::median;
 
 /// What a profile says of a measurement.
 #[derive(Clone, Debug, Serialize)]
@@ -91,14 +91,8 @@ pub fn scores_text(scored: &[Scored]) -> String {
     );
     for set in scored {
         let positive = set.kernels.iter().filter(|k| k.measured > 0.0);
-        let off: Vec<f64> = positive
-            .map(|k| (k.predicted / k.measured - 1.0).abs())
-            .collect();
-        let median = if off.is_empty() {
-            "-".into()
-        } else {
-            format!("{:.1} %", 100.0 * median(off))
-        };
+        let median = median(positive.map(|k| (k.predicted / k.measured - 1.0).abs()))
+            .map_or_else(|| "-".into(), |e| format!("{:.1} %", 100.0 * e));
         let (scene, count) = (&set.scene, set.kernels.len());
         let _ = writeln!(
             out,

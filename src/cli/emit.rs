@@ -10,11 +10,10 @@ use impasto::compiler::ir;
 use impasto::compiler::passes::PIPELINE;
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest, Parameters, diag, lexer, parser};
-use impasto::files;
 use impasto::{FileLoader, Program};
+use impasto::{docs, files};
 use serde::Serialize;
 
-use super::docs::docs;
 use super::{Failure, Global, Outcome, print};
 
 #[derive(Args)]
@@ -134,7 +133,7 @@ fn syntax(args: &EmitArgs, bytes: &[u8], global: &Global) -> Result<String, Fail
         what => {
             let (module, diagnostics) = parser::parse(file, &text);
             let shown = match what {
-                What::Docs => docs(&module, &text),
+                What::Docs => format!("{:#}\n", serde_json::json!(docs::docs(&module, &text))),
                 _ => parser::print(&module),
             };
             (shown, diagnostics)

@@ -18,7 +18,6 @@ mod checkpoint;
 mod completions;
 mod converge;
 mod cost;
-mod docs;
 mod dropped;
 mod emit;
 mod eval;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use impasto::runtime::lab::rays::{RayOptions, RayRate, measure, techniques};
+use impasto::runtime::lab::rays::{RayOptions, RayRate, RayReport, measure, techniques};
 use impasto::runtime::technique::{Choice, Technique};
 
 use super::info::GpuArgs;
@@ -50,13 +50,13 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     let mut progress = |technique: &Technique| global.detail(&names(technique).join(" "));
     let rates = measure(&gpu, &scene, &options, &mut progress).map_err(runtime)?;
     if global.json() {
-        let report = serde_json::json!({
-            "adapter": gpu.info(),
-            "scene": scene.name,
-            "triangles": scene.mesh.len(),
-            "rates": rates,
-        });
-        return print(&format!("{report:#}\n"));
+        let report = RayReport {
+            adapter: gpu.info(),
+            scene: scene.name.clone(),
+            triangles: scene.mesh.len(),
+            rates,
+        };
+        return print(&format!("{:#}\n", serde_json::json!(report)));
     }
     print(&table(&options.techniques, &rates))
 }
@@ -77,7 +77,7 @@ fn table(techniques: &[Technique], rates: &[RayRate]) -> String {
     let head = ["traversal", "stack", "leaves", "fetch"];
     let mut out: String = head.map(|name| format!("{name:<11}")).concat();
     for rate in rates.iter().take(sets) {
-        out += &format!("{:>11}", rate.rays);
+        out += &format!("{:>11}", rate.rays.name());
     }
     out += "   (millions of rays a second)\n";
     for (technique, rates) in techniques.iter().zip(rates.chunks(sets.max(1))) {

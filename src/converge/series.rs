@@ -5,6 +5,7 @@
 
 use impasto_compiler::partition::Plan;
 use impasto_runtime::film::Film;
+use impasto_runtime::lab::statistics::median;
 use impasto_runtime::render::{Renderer, Rendering, Samples};
 use impasto_runtime::technique::{Choice, Sampler};
 
@@ -12,7 +13,6 @@ use super::StudyError;
 use super::store::{Record, Store};
 use super::subject::Stage;
 use super::watch::{Clock, Watch};
-use crate::statistics::median;
 
 /// A render that is shorter is timed again, until all together took so long, in seconds.
 const LONG_ENOUGH: f64 = 0.02;
@@ -144,7 +144,7 @@ impl<'a> Bench<'a> {
         self.seconds_a_sample = begin.elapsed().as_secs_f64() / f64::from(wanted.samples);
         let record = Record {
             timed: seconds.len(),
-            gpu_seconds: median(seconds),
+            gpu_seconds: median(seconds).unwrap_or_default(),
             ..self.described(wanted, &rendering)
         };
         Ok((record, rendering.film))

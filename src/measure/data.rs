@@ -79,7 +79,7 @@ pub struct Kernel {
     #[serde(default)]
     pub logic_seconds: f64,
     /// What the time model said of it, by the profile at hand.
-    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted: Option<Prediction>,
     /// Registers that the driver gives a thread of it, where it tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -117,7 +117,8 @@ impl Data {
         }
     }
 
-    /// The measurements in the text of a file.
+    /// The measurements in the text of a file, without what was predicted of them: that was another
+    /// version's, or another profile's.
     ///
     /// # Errors
     /// What is wrong with it, and what to do.
@@ -126,7 +127,7 @@ impl Data {
                      `impasto plan SCENE --strategy exhaustive --format json`";
         let broken = |e: serde_json::Error| format!("it cannot be read: {e}{again}");
         let kind: Kind = serde_json::from_str(text).map_err(broken)?;
-        let data = match (kind.answer, kind.sets, kind.kernels) {
+        let mut data = match (kind.answer, kind.sets, kind.kernels) {
             (Some(answer), ..) => Self::new(vec![serde_json::from_value(answer).map_err(broken)?]),
             (_, Some(_), _) => {
                 let version = kind.version.unwrap_or_default();
@@ -140,8 +141,9 @@ impl Data {
             (_, _, Some(_)) => Self::new(vec![serde_json::from_str(text).map_err(broken)?]),
             _ => return Err(format!("it holds no measurements{again}")),
         };
-        for set in &data.sets {
+        for set in &mut data.sets {
             set.check().map_err(|why| format!("{why}{again}"))?;
+            set.kernels.iter_mut().for_each(|k| k.predicted = None);
         }
         Ok(data)
     }

@@ -9,7 +9,7 @@ use impasto_compiler::partition::search::{Automatic, Groups, Search, total};
 use impasto_compiler::partition::{Calibrated, DeviceProfile, Plan, PlanInputs, Strategy, text};
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::plans::Times;
 use super::{MeasuredScene, Measurement, Progress, candidate, candidates};
@@ -30,7 +30,7 @@ pub struct Options {
 }
 
 /// What was measured, and what follows from it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The kernels, and what the scene asks of them.
     #[serde(flatten)]
@@ -57,7 +57,7 @@ pub struct Answer {
 }
 
 /// A plan with its times.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanTime {
     /// The strategy that made it; `best` and `worst` by measured kernels, `sample` by chance.
     pub strategy: String,

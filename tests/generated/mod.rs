@@ -1,7 +1,6 @@
 //! Example scenes whose geometry is generated: made anew in a folder of the test's own.
 
 use std::path::Path;
-use std::process::Command;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -9,26 +8,7 @@ fn root() -> &'static Path {
 
 /// Generates what belongs to a scene in `out`.
 pub(crate) fn generate(name: &str, out: &Path) {
-    let run = Command::new(env!("CARGO"))
-        .args([
-            "run",
-            "--quiet",
-            "--package",
-            "xtask",
-            "--",
-            "scenes",
-            name,
-            "--out",
-        ])
-        .arg(out)
-        .current_dir(root())
-        .output()
-        .expect("cargo runs");
-    assert!(
-        run.status.success(),
-        "{}",
-        String::from_utf8_lossy(&run.stderr)
-    );
+    impasto_scenes::write(name, out).unwrap_or_else(|why| panic!("{name}: {why}"));
 }
 
 /// A scene generated anew in `out`, beside copies of the scene file and of the materials: the path of

@@ -16,7 +16,7 @@ const PACKAGES: [&str; 2] = ["mesa-vulkan-drivers", "libvulkan1"];
 const MANIFESTS: &str = "vulkan/icd.d";
 
 /// Installs a driver if none is registered. To be called before building.
-pub(crate) fn prepare() -> Result {
+pub fn prepare() -> Result {
     if !cfg!(target_os = "linux") || !registered_drivers().is_empty() {
         return Ok(());
     }
@@ -26,7 +26,7 @@ pub(crate) fn prepare() -> Result {
 
 /// Checks by running `impasto info` that there is a usable adapter; where there is none,
 /// installs a driver and checks again. Prints which adapter it is.
-pub(crate) fn require(impasto: &Path) -> Result {
+pub fn require(impasto: &Path) -> Result {
     shell::section("Looking for an adapter");
     let info = || shell::capture(Command::new(impasto).arg("info"));
     let adapter = match info() {

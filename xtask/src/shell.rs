@@ -1,14 +1,25 @@
 //! Running other programs, always showing what is run.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 
 /// What went wrong, in a sentence for people.
-pub(crate) type Result<T = ()> = std::result::Result<T, String>;
+pub type Result<T = ()> = std::result::Result<T, String>;
+
+/// How a command ends: what went wrong is told on standard error.
+pub fn exit_code(result: Result) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
 
 /// The root of the repository: where this was built, or the current folder if that is not there, since a
-/// built xtask can be carried to another machine.
-pub(crate) fn root() -> &'static Path {
+/// built command can be carried to another machine.
+pub fn root() -> &'static Path {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     match manifest.parent() {
         Some(built) if built.is_dir() => built,
@@ -17,19 +28,19 @@ pub(crate) fn root() -> &'static Path {
 }
 
 /// The cargo that runs this.
-pub(crate) fn cargo() -> Command {
+pub fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     command
 }
 
 /// A headline, so that long output can be followed.
-pub(crate) fn section(title: &str) {
+pub fn section(title: &str) {
     eprintln!("\n=== {title}");
 }
 
 /// Runs `command` with its output shown; an error unless it exits with 0.
-pub(crate) fn run(command: &mut Command) -> Result {
+pub fn run(command: &mut Command) -> Result {
     let line = shown(command);
     eprintln!("$ {line}");
     match command.status() {
@@ -40,7 +51,7 @@ pub(crate) fn run(command: &mut Command) -> Result {
 }
 
 /// Runs `command` quietly: its output if it exits with 0, else what it wrote to standard error.
-pub(crate) fn capture(command: &mut Command) -> Result<String> {
+pub fn capture(command: &mut Command) -> Result<String> {
     let output = command
         .stdin(Stdio::null())
         .output()
@@ -54,15 +65,15 @@ pub(crate) fn capture(command: &mut Command) -> Result<String> {
 }
 
 /// Is a program of that name on the search path?
-pub(crate) fn exists(program: &str) -> bool {
+pub fn exists(program: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
 }
 
 /// The built `impasto` command of a cargo profile's folder (`debug` or `release`).
 ///
-/// xtask itself lies in one of those folders, whatever target directory is in use.
-pub(crate) fn impasto(profile_folder: &str) -> Result<PathBuf> {
+/// The command that runs lies in one of those folders, whatever target directory is in use.
+pub fn impasto(profile_folder: &str) -> Result<PathBuf> {
     let own = std::env::current_exe().map_err(|e| format!("cannot find the build folder: {e}"))?;
     let target = own
         .ancestors()

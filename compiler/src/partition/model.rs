@@ -39,6 +39,7 @@ pub trait TimeModel {
 
 /// The seconds of a kernel, in parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Prediction {
     /// The dispatch and its drain.
     pub launch: f64,

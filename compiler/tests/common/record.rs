@@ -1,4 +1,4 @@
-//! What tests of numerical stability measured, kept for `cargo xtask stress`, and how hard they
+//! What tests of numerical stability measured, kept for `cargo experiments stress`, and how hard they
 //! are to try.
 //!
 //! `IMPASTO_EFFORT=full` has the same tests look at more directions, samples and restarts; there is

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::snapshot::Snapshot;
+use super::statistics::median;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::gpu::resources::Resources;
@@ -163,50 +164,5 @@ fn round(
 pub(super) fn medians(samples: &[Sample]) -> Vec<f64> {
     let steps = samples.first().map_or(0, |sample| sample.steps.len());
     let of = |step| median(samples.iter().map(|sample| sample.steps[step]));
-    (0..steps).map(of).collect()
-}
-
-/// The number in the middle, 0 of none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    quantile(&sorted(values), 0.5)
-}
-
-/// Half of the distance between the quartiles.
-pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
-    let sorted = sorted(values);
-    0.5 * (quantile(&sorted, 0.75) - quantile(&sorted, 0.25))
-}
-
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// Between the two nearest, in proportion.
-fn quantile(sorted: &[f64], at: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let place = at * last as f64;
-    let below = place as usize;
-    let above = (below + 1).min(last);
-    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_middle_and_the_spread_of_few_numbers() {
-        let of = |values: &[f64]| {
-            let values = || values.iter().copied();
-            (median(values()), spread(values()))
-        };
-        assert_eq!(of(&[]), (0.0, 0.0));
-        assert_eq!(of(&[3.0]), (3.0, 0.0));
-        assert_eq!(of(&[9.0, 1.0, 2.0, 3.0, 4.0]), (3.0, 1.0));
-        assert_eq!(of(&[4.0, 1.0]), (2.5, 0.75));
-    }
+    (0..steps).filter_map(of).collect()
 }

@@ -28,10 +28,12 @@ mod candidates;
 mod hits;
 pub mod rays;
 mod snapshot;
+pub mod statistics;
 
 use bench::{Run, Sample};
 use candidates::Cache;
 use snapshot::Snapshot;
+use statistics::{median, spread};
 
 /// How to measure.
 #[derive(Clone, Debug)]
@@ -208,7 +210,7 @@ impl<'a> Lab<'a> {
         runs.push(Ok(self.bare_logic()?));
         let mut samples = self.time_those(&runs)?;
         let bare = samples.pop().and_then(Result::ok).unwrap_or_default();
-        let bare = bench::median(bare.iter().map(|sample| sample.steps[0]));
+        let bare = median(bare.iter().map(|sample| sample.steps[0])).unwrap_or_default();
         let told = self.tell(candidates);
         let results = candidates.iter().zip(told).zip(runs.iter().zip(samples));
         let measured = results.map(|((candidate, statistics), (run, samples))| {
@@ -260,8 +262,8 @@ impl<'a> Lab<'a> {
             let names = run.schedule.steps.iter().map(|step| step.name.clone());
             let total = || samples.iter().map(|sample| sample.total);
             Ok(Iteration {
-                seconds: bench::median(total()),
-                spread: bench::spread(total()),
+                seconds: median(total()).unwrap_or_default(),
+                spread: spread(total()).unwrap_or_default(),
                 kernels: names.zip(bench::medians(&samples)).collect(),
             })
         });
@@ -314,13 +316,13 @@ fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> 
     let step = |index: usize| move |sample: &Sample| sample.steps.get(index).copied();
     let at = run.subject;
     let times = || samples.iter().filter_map(step(at));
-    let logic_seconds = bench::median(samples.iter().filter_map(step(0)));
+    let logic_seconds = median(samples.iter().filter_map(step(0))).unwrap_or_default();
     Measured {
         seconds: match candidate.form {
             Form::Inline => logic_seconds - bare,
-            _ => bench::median(times()),
+            _ => median(times()).unwrap_or_default(),
         },
-        spread: bench::spread(times()),
+        spread: spread(times()).unwrap_or_default(),
         items: samples
             .last()
             .map_or(0, |sample| run.items(&sample.counters)),

@@ -1,9 +1,10 @@
 //! The report of a render: what ran, on what, how long, and what was dropped. Scripts read it
-//! as JSON; the names of fields are a promise.
+//! as JSON; the names of fields are a promise. Reports of older versions are read as well: what they
+//! lack has its default.
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::film::Film;
 use crate::gpu::GpuInfo;
@@ -19,7 +20,8 @@ use crate::technique::Technique;
 use crate::world::GeometryCounts;
 
 /// What a render did. Times are in seconds, sizes in bytes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Report {
     /// The GPU.
     pub adapter: AdapterReport,
@@ -64,9 +66,8 @@ pub struct Report {
     pub paths: u64,
     /// Time the GPU was busy, without building pipelines.
     pub gpu_seconds: f64,
-    /// Where GPU times come from: `timestamps`, or `wall` on GPUs without them, where
-    /// `gpu_seconds` is the time waited and kernels have none.
-    pub timing: &'static str,
+    /// Where GPU times come from.
+    pub timing: TimeSource,
     /// Time from the first submission to the finished film.
     pub wall_seconds: f64,
     /// Time to compose and build the pipelines; callers add what they spent on materials.
@@ -111,8 +112,27 @@ pub struct Report {
     pub lost_paths: u64,
 }
 
+impl Report {
+    /// Paths a second that count: of the steady state if it was reached, else of the whole render.
+    pub fn rate(&self) -> f64 {
+        self.steady_paths_per_second
+            .unwrap_or(self.paths_per_second)
+    }
+}
+
+/// Where the GPU times of a report come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TimeSource {
+    /// The GPU's timestamps.
+    #[default]
+    Timestamps,
+    /// The time waited, on GPUs without timestamps: kernels have no times.
+    Wall,
+}
+
 /// A material of a report.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MaterialReport {
     /// Its name.
     pub name: String,
@@ -140,7 +160,7 @@ impl MaterialReport {
 }
 
 /// The GPU of a report.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AdapterReport {
     /// Its name.
     pub name: String,
@@ -161,7 +181,8 @@ impl From<GpuInfo> for AdapterReport {
 }
 
 /// What one kernel did.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct KernelReport {
     /// Its name.
     pub name: String,
@@ -183,7 +204,7 @@ pub struct KernelReport {
 }
 
 /// How a plan was renewed while rendering.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReplanReport {
     /// Iterations that the first plan ran.
     pub at_iteration: u64,
@@ -282,7 +303,11 @@ impl Inputs<'_> {
             resumed_samples: self.resumed.samples,
             paths: all_paths,
             gpu_seconds,
-            timing: if self.timed { "timestamps" } else { "wall" },
+            timing: if self.timed {
+                TimeSource::Timestamps
+            } else {
+                TimeSource::Wall
+            },
             wall_seconds: self.wall_seconds,
             compile_seconds: self.compile_seconds,
             paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),

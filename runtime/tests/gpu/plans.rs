@@ -8,7 +8,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan, PlanKernel, Strategy
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Film;
 use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
-use impasto_runtime::render::report::Report;
+use impasto_runtime::render::report::{Report, TimeSource};
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::technique::{Append, Choice, RayData, RayOrder};
 
@@ -399,8 +399,11 @@ fn checks_and_timing_do_not_change_the_picture() {
                 .filter(|k| k.gpu_seconds > 0.0)
                 .count();
             match timing {
-                Timing::None => assert_eq!((report.timing, timed), ("wall", 0)),
-                _ => assert_eq!((report.timing, timed), ("timestamps", report.kernels.len())),
+                Timing::None => assert_eq!((report.timing, timed), (TimeSource::Wall, 0)),
+                _ => assert_eq!(
+                    (report.timing, timed),
+                    (TimeSource::Timestamps, report.kernels.len())
+                ),
             }
             assert!(report.gpu_seconds > 0.0 && report.gpu_seconds <= report.wall_seconds);
         }

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use clap::Args;
 use impasto::FileLoader;
+use impasto::compiler::Loader;
 use impasto::compiler::cost::{self, Cost, Inputs, Operations};
-use impasto::compiler::{self, Loader, MaterialRequest};
 use impasto::cost::{MaterialCost, anywhere, of_scene};
 use serde::Serialize;
 use serde_json::json;
@@ -103,15 +103,7 @@ fn file_materials(
         loader
             .load(file)
             .map_err(|message| format!("cannot read `{file}`: {message}"))?;
-        let checked = compiler::check(file, &mut loader);
-        if checked.materials.is_empty() {
-            // The compiler knows what to say of a file without materials.
-            requests.push(MaterialRequest::new(file, file));
-        }
-        requests.extend(checked.materials.into_iter().map(|name| MaterialRequest {
-            material: Some(name.clone()),
-            ..MaterialRequest::new(name, file)
-        }));
+        requests.extend(impasto::file_requests(file, &mut loader));
     }
     let program = compile(&requests, &mut loader, global)?;
     anywhere(&program, samples).map_err(too_long)

@@ -6,8 +6,8 @@ use plotters::style::text_anchor::HPos;
 
 use super::content::material_name;
 use super::numbers::{percent, shortened};
-use super::plot::{Area, COLORS, FAINT, GRID, INK, failed, picture, text, write};
 use crate::converge::data::{MaterialShare, SceneConvergence};
+use crate::plot::{Area, COLORS, FAINT, GRID, INK, failed, picture, text, write};
 
 /// The most materials that are drawn; the others are one.
 const MOST: usize = 16;

@@ -1,6 +1,7 @@
 //! A document of headings, texts, tables and figures, and its two forms: Markdown and HTML.
 
-use super::numbers::{address, printable};
+use super::numbers::address;
+use crate::plot::printable;
 
 /// A part of a document. All texts are plain: whatever is in them is shown as it is.
 #[derive(Clone, Debug, PartialEq)]

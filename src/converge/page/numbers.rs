@@ -54,16 +54,6 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
     format!("{}…", start.trim_end())
 }
 
-/// A text without the characters that neither XML nor a terminal bears.
-pub(super) fn printable(text: &str) -> String {
-    let shown = |c: char| match c {
-        c if c.is_control() => ' ',
-        '\u{fffe}' | '\u{ffff}' => ' ',
-        c => c,
-    };
-    text.chars().map(shown).collect()
-}
-
 /// A name as a part of names of files: letters, digits and hyphens.
 pub(super) fn file_name(name: &str) -> String {
     let kept = |c: char| match c.is_ascii_alphanumeric() {
@@ -90,6 +80,7 @@ pub(super) fn address(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plot::printable;
 
     #[test]
     fn numbers_have_three_digits() {

@@ -1,17 +1,16 @@
 //! Plots of errors against time and samples, both axes logarithmic.
 //!
-//! Pictures bring their own white ground, so that they read the same on light and dark pages. Legends
-//! stand beside the plot, never over data. Only what has a logarithm is drawn; ranges are never empty,
-//! which the plotting library could not bear.
+//! Legends stand beside the plot, never over data. Only what has a logarithm is drawn; ranges are never
+//! empty, which the plotting library could not bear.
 
-use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 
-use super::numbers::{label, number, printable, shortened, time};
+use super::numbers::{label, number, shortened, time};
 use crate::converge::data::{Metric, SceneConvergence, Series};
 use crate::converge::fit::means;
+use crate::plot::{Area, COLORS, FAINT, GRID, INK, failed, picture, text, ticks, write};
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,23 +23,6 @@ pub(super) enum Of {
     Materials,
 }
 
-/// Text, axes and grid.
-pub(super) const INK: RGBColor = RGBColor(0x1f, 0x23, 0x28);
-pub(super) const FAINT: RGBColor = RGBColor(0x6b, 0x72, 0x80);
-pub(super) const GRID: RGBColor = RGBColor(0xe5, 0xe7, 0xeb);
-
-/// Colors that people with any color vision tell apart. Source: Okabe and Ito 2008, "Color Universal
-/// Design".
-pub(super) const COLORS: [RGBColor; 7] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x9e, 0x73),
-    RGBColor(0xcc, 0x79, 0xa7),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
-    RGBColor(0x11, 0x11, 0x11),
-];
-
 /// Height of a picture, and the width of its plot without the legend, in pixels.
 const HEIGHT: u32 = 440;
 const PLOT: u32 = 560;
@@ -48,48 +30,6 @@ const PLOT: u32 = 560;
 const TITLE: u32 = 34;
 /// The most characters of a label in a legend.
 const LABEL: usize = 40;
-
-/// A drawing area in a text.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// A style of text of a size in pixels.
-pub(super) fn text(size: f64, color: RGBColor, anchor: HPos) -> TextStyle<'static> {
-    // The library draws letters smaller by this factor than it is asked for.
-    let style = ("sans-serif", size * 1.24).into_font().color(&color);
-    style.pos(Pos::new(anchor, VPos::Center))
-}
-
-/// An SVG of some size, by what `draw` draws on white.
-pub(super) fn picture(
-    (width, height): (u32, u32),
-    title: &str,
-    draw: impl FnOnce(&Area<'_>) -> Result<(), String>,
-) -> Result<String, String> {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (width, height)).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        write(&root, title, (14, 18), &text(15.0, INK, HPos::Left))?;
-        draw(&root)?;
-        root.present().map_err(failed)?;
-    }
-    Ok(svg)
-}
-
-/// Writes a text at some pixel.
-pub(super) fn write(
-    area: &Area<'_>,
-    what: &str,
-    at: (i32, i32),
-    style: &TextStyle<'_>,
-) -> Result<(), String> {
-    area.draw_text(&printable(what), style, at).map_err(failed)
-}
-
-/// Why there is no picture.
-pub(super) fn failed(error: impl std::fmt::Display) -> String {
-    format!("cannot draw a plot: {error}")
-}
 
 /// What is drawn of a series.
 struct Curve {
@@ -346,21 +286,6 @@ fn range(values: &[f64]) -> [f64; 2] {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(0.0, f64::max);
     [low / 1.3, high * 1.3]
-}
-
-/// Round values in a range, about as many as there is room for.
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
-    let decades = (high / low).log10();
-    let steps: &[f64] = match decades {
-        wide if wide > 2.6 => &[1.0],
-        wide if wide > 1.0 => &[1.0, 2.0, 5.0],
-        _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
-    };
-    let every = (decades / 10.0).ceil().max(1.0) as i32;
-    let range = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
-    let range = range.filter(|decade| decade.rem_euclid(every) == 0);
-    let all = range.flat_map(|d| steps.iter().map(move |s| s * 10f64.powi(d)));
-    all.filter(|v| (low..=high).contains(v)).collect()
 }
 
 /// A round value without needless zeros.

@@ -8,16 +8,18 @@
 mod caster;
 mod sets;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
+use crate::render::report::AdapterReport;
 use crate::scene::Scene;
 use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
 use crate::world::bvh::Bvh;
 
 use caster::Caster;
-use sets::{RaySet, SetKind};
+use sets::RaySet;
+pub use sets::SetKind;
 
 /// What to cast.
 #[derive(Clone, Debug)]
@@ -33,18 +35,20 @@ pub struct RayOptions {
 }
 
 /// One technique on one set of rays.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RayRate {
-    /// The set: `primary`, `diffuse`, `diffuse2` or `shadow`.
-    pub rays: &'static str,
+    /// The set.
+    pub rays: SetKind,
     /// Rays cast.
     pub count: usize,
     /// How many of them hit something.
+    #[serde(default)]
     pub hits: usize,
     /// How many hit at another distance than by the default technique (by over 1e-4 of it), or
     /// something where that hit nothing.
     pub astray: usize,
     /// Median GPU seconds of a cast of all; seconds waited where the GPU has no timestamps.
+    #[serde(default)]
     pub seconds: f64,
     /// Millions of rays cast in a second.
     pub mrays_per_second: f64,
@@ -56,6 +60,20 @@ pub struct RayRate {
     pub leaves: Leaves,
     /// How threads got rays.
     pub ray_fetch: RayFetch,
+}
+
+/// What was measured in a scene: the answer of `impasto rays --format json`, which says more of the
+/// GPU than most readers need.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RayReport<A = AdapterReport> {
+    /// The GPU.
+    pub adapter: A,
+    /// The scene's name.
+    pub scene: String,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Every technique on every set of rays.
+    pub rates: Vec<RayRate>,
 }
 
 /// Every technique of casting rays that a GPU can run. Threads that do not fetch rays test
@@ -157,7 +175,7 @@ fn rate(
     let pairs = set.hits.iter().zip(&cast.hits);
     let count = set.rays.len();
     Ok(RayRate {
-        rays: set.kind.name(),
+        rays: set.kind,
         count,
         hits: cast.hits.iter().filter(|h| h.is_some()).count(),
         astray: pairs.filter(|(a, b)| sets::differ(a, b, set.kind)).count(),

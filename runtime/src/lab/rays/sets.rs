@@ -1,6 +1,7 @@
 //! The rays of the benchmark.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::RayOptions;
 use crate::scene::{Mesh, Scene};
@@ -27,8 +28,9 @@ pub(super) struct SurfaceHit {
 }
 
 /// The kinds of rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SetKind {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SetKind {
     /// From the camera.
     Primary,
     /// Scattered where those hit.
@@ -55,7 +57,8 @@ impl SetKind {
         SetKind::Shadow,
     ];
 
-    pub(super) fn name(self) -> &'static str {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
         match self {
             SetKind::Primary => "primary",
             SetKind::Diffuse => "diffuse",

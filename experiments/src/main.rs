@@ -1,0 +1,46 @@
+//! The project's experiments, run as `cargo experiments <name>`: each measures something, or shows it, and
+//! writes pages of docs/.
+//!
+//! What a whole process takes is measured on the `impasto` command that an experiment starts; whatever
+//! needs no GPU is asked of the library.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod gallery;
+mod paper;
+mod partition;
+mod process;
+mod stress;
+
+#[derive(Parser)]
+#[command(
+    bin_name = "cargo experiments",
+    about = "What the project measures and shows of itself"
+)]
+struct Cli {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Subcommand)]
+enum Experiment {
+    /// Measure the tables of the paper on this machine's GPU, and write docs/paper.md
+    Paper(paper::PaperArgs),
+    /// Measure partitions of materials into kernels, and hold the automatic one against the best
+    Partition(partition::PartitionArgs),
+    /// Run the tests of numerical stability at full effort, and write docs/stability.md
+    Stress(stress::StressArgs),
+    /// Render everything in the library, and write docs/library
+    Gallery(gallery::GalleryArgs),
+}
+
+fn main() -> ExitCode {
+    xtask::shell::exit_code(match Cli::parse().experiment {
+        Experiment::Paper(args) => paper::run(&args),
+        Experiment::Partition(args) => partition::run(&args),
+        Experiment::Stress(args) => stress::run(&args),
+        Experiment::Gallery(args) => gallery::run(&args),
+    })
+}

@@ -1,0 +1,451 @@
+//! A scene as measured: times of plans, regret, and how far predictions are off.
+
+use impasto::compiler::partition::Form;
+use impasto::measure::Answer;
+use impasto::runtime::lab::statistics::{median, rank_correlation};
+use xtask::shell::Result;
+
+use super::plans::{Plan, Set, Times, every, kernel, members};
+use super::results::Scene;
+
+/// Plans of up to so many materials are all added up.
+pub(super) const EXHAUSTIVE: u32 = 6;
+
+/// Strategies that the chosen plan is held against, besides mega, which has no material kernels.
+pub(super) const BASELINES: [&str; 6] = [
+    "own",
+    "mixed",
+    "binned",
+    "inline",
+    "paper",
+    "threshold=1000",
+];
+
+/// What follows from a scene's numbers.
+pub(super) struct Measured<'a> {
+    pub scene: &'a Scene,
+    /// Materials on surfaces.
+    used: Set,
+    measured: Times,
+    predicted: Times,
+    pub auto: Plan,
+    pub best: Plan,
+    /// Seconds of the material kernels of either.
+    auto_seconds: f64,
+    best_seconds: f64,
+}
+
+/// A kernel or plan: what was predicted and what was measured, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pair {
+    pub predicted: f64,
+    pub measured: f64,
+}
+
+impl Pair {
+    /// How far the prediction is off, as a share.
+    pub(super) fn error(self) -> f64 {
+        (self.predicted / self.measured - 1.0).abs()
+    }
+}
+
+impl<'a> Measured<'a> {
+    /// # Errors
+    /// A plan that names what the scene has not, or kernels that the chosen plan needs and that were not
+    /// measured.
+    pub(super) fn new(scene: &'a Scene) -> Result<Self> {
+        let times = |of: fn(&super::results::Kernel) -> f64| {
+            let entries = scene.kernels.iter().map(|k| {
+                let set = k.1.iter().fold(0, |set, i| set | 1 << i);
+                (kernel(k.0, set), of(k))
+            });
+            Times::new(entries)
+        };
+        let (predicted, measured) = (times(|k| k.2), times(|k| k.3));
+        let used = scene.materials.iter().enumerate().filter(|(_, m)| m.used);
+        let used: Set = used.fold(0, |set, (i, _)| set | 1 << i);
+        let what = format!("{} with {} paths", scene.name, scene.pool);
+        let auto = parse(scene, &scene.auto).map_err(|e| format!("{what}: {e}"))?;
+        let missing = || {
+            format!(
+                "{what}: a kernel of the chosen plan {} was not measured",
+                scene.auto
+            )
+        };
+        let auto_seconds = measured.sum(&auto).ok_or_else(missing)?;
+        let mut new = Self {
+            scene,
+            used,
+            measured,
+            predicted,
+            best: auto.clone(),
+            best_seconds: auto_seconds,
+            auto_seconds,
+            auto,
+        };
+        let candidates = new
+            .listed()
+            .into_iter()
+            .filter_map(|p| Some((new.measured.sum(&p)?, p)));
+        let searched = new
+            .measured
+            .best(used)
+            .map(|(plan, seconds)| (seconds, plan));
+        let best = candidates
+            .chain(searched)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((seconds, plan)) = best.filter(|(seconds, _)| *seconds < auto_seconds) {
+            (new.best, new.best_seconds) = (plan, seconds);
+        }
+        Ok(new)
+    }
+
+    /// Materials that plans are about.
+    pub(super) fn count(&self) -> u32 {
+        self.used.count_ones()
+    }
+
+    /// As a partition string.
+    pub(super) fn text(&self, plan: &Plan) -> String {
+        plan.text(&names(self.scene))
+    }
+
+    /// Seconds of an iteration but for material kernels.
+    fn rest(&self) -> f64 {
+        self.scene.logic + self.scene.other
+    }
+
+    /// The different plans that the answer lists and that can be read.
+    fn listed(&self) -> Vec<Plan> {
+        let plans = self.scene.plans.iter();
+        let mut out: Vec<Plan> = plans
+            .filter_map(|p| parse(self.scene, &p.partition).ok())
+            .collect();
+        out.sort();
+        out.dedup();
+        out
+    }
+
+    /// The plan of a strategy.
+    fn plan_of(&self, strategy: &str) -> Option<Plan> {
+        let own = || members(self.used).map(|i| (Form::Own, 1 << i)).collect();
+        match strategy {
+            "own" => Some(Plan::new(own())),
+            "mixed" => Some(Plan::new(vec![kernel(Form::Mixed, self.used)])),
+            "binned" => Some(Plan::new(vec![kernel(Form::Binned, self.used)])),
+            "inline" => Some(Plan::new(vec![kernel(Form::Inline, self.used)])),
+            _ => {
+                let listed = self.scene.plans.iter().find(|p| p.strategy == strategy);
+                let Some(listed) = listed else {
+                    return self.threshold(strategy.strip_prefix("threshold=")?.parse().ok()?);
+                };
+                parse(self.scene, &listed.partition).ok()
+            }
+        }
+    }
+
+    /// A kernel for each material of so many operations and more, and a mixed one for the others; none if
+    /// the operations of one are not known.
+    fn threshold(&self, operations: f64) -> Option<Plan> {
+        let mut kernels = Vec::new();
+        let mut others: Set = 0;
+        for i in members(self.used) {
+            if self.scene.materials[i].operations? >= operations {
+                kernels.push((Form::Own, 1 << i));
+            } else {
+                others |= 1 << i;
+            }
+        }
+        if others != 0 {
+            kernels.push(kernel(Form::Mixed, others));
+        }
+        Some(Plan::new(kernels))
+    }
+
+    /// Time of an iteration by the chosen plan over that by the best.
+    pub(super) fn regret(&self) -> f64 {
+        (self.rest() + self.auto_seconds) / (self.rest() + self.best_seconds)
+    }
+
+    /// The same of material kernels alone.
+    pub(super) fn material_regret(&self) -> f64 {
+        self.auto_seconds / self.best_seconds
+    }
+
+    /// In what the answer's own sum over all plans differs from this one's, if it does: both add up the same
+    /// kernels, each in its way.
+    pub(super) fn disagreement(&self, answer: &Answer) -> Option<String> {
+        let said = answer.regret.filter(|_| self.count() <= EXHAUSTIVE)?;
+        let found = self.material_regret();
+        ((said / found - 1.0).abs() > 1e-3).then(|| {
+            format!(
+                "`impasto plan` has the regret {said:.4} against {}, this {found:.4} against {}",
+                answer.best,
+                self.text(&self.best)
+            )
+        })
+    }
+
+    /// The regret of another strategy's plan; none if it was not measured.
+    pub(super) fn regret_of(&self, strategy: &str) -> Option<f64> {
+        let seconds = self.measured.sum(&self.plan_of(strategy)?)?;
+        Some((self.rest() + seconds) / (self.rest() + self.best_seconds))
+    }
+
+    /// Paths a second of whole renders.
+    pub(super) fn rate(&self, label: &str) -> Option<f64> {
+        self.scene.renders.iter().find(|r| r.label == label)?.rate()
+    }
+
+    /// Time of whole renders in another way over time by the chosen plan.
+    pub(super) fn render_ratio(&self, label: &str) -> Option<f64> {
+        Some(self.rate("auto's plan")? / self.rate(label)?)
+    }
+
+    /// Every kernel of a form, or of all. Inline materials have no kernel of their own: there it is the logic
+    /// kernel with them in it.
+    pub(super) fn kernels(&self, form: Option<Form>) -> Vec<Pair> {
+        let wanted = |k: &&super::results::Kernel| form.is_none_or(|f| f == k.0);
+        let pair = |k: &super::results::Kernel| {
+            let logic = if k.0 == Form::Inline {
+                self.scene.logic
+            } else {
+                0.0
+            };
+            Pair {
+                predicted: logic + k.2,
+                measured: logic + k.3,
+            }
+        };
+        self.scene.kernels.iter().filter(wanted).map(pair).collect()
+    }
+
+    /// Every plan up to [`EXHAUSTIVE`] materials and the listed ones beyond: the material kernels' times.
+    pub(super) fn material_plans(&self) -> Vec<Pair> {
+        let plans = if self.count() <= EXHAUSTIVE {
+            every(self.used)
+        } else {
+            self.listed()
+        };
+        let pair = |plan: &Plan| {
+            Some(Pair {
+                predicted: self.predicted.sum(plan)?,
+                measured: self.measured.sum(plan)?,
+            })
+        };
+        plans.iter().filter_map(pair).collect()
+    }
+
+    /// The same with all else that an iteration does.
+    pub(super) fn plans(&self) -> Vec<Pair> {
+        let with_rest = |pair: Pair| Pair {
+            predicted: pair.predicted + self.rest(),
+            measured: pair.measured + self.rest(),
+        };
+        self.material_plans().into_iter().map(with_rest).collect()
+    }
+
+    /// Of each plan that was timed as a whole: its strategy, its partition, and time over the sum of its parts.
+    pub(super) fn additivity(&self) -> Vec<(&str, &str, f64)> {
+        let one = |p: &'a super::results::Plan| {
+            let plan = parse(self.scene, &p.partition).ok()?;
+            let sum = self.rest() + self.measured.sum(&plan)?;
+            Some((p.strategy.as_str(), p.partition.as_str(), p.measured? / sum))
+        };
+        self.scene.plans.iter().filter_map(one).collect()
+    }
+
+    /// Rank correlation of predicted and measured kernels.
+    pub(super) fn rank_correlation(&self) -> Option<f64> {
+        correlation(&self.kernels(None))
+    }
+
+    /// Median error of kernels, of plans' material kernels and of whole iterations.
+    pub(super) fn median_errors(&self) -> [Option<f64>; 3] {
+        [self.kernels(None), self.material_plans(), self.plans()].map(median_error)
+    }
+}
+
+/// Median of |predicted / measured - 1|.
+pub(super) fn median_error(pairs: Vec<Pair>) -> Option<f64> {
+    median(pairs.into_iter().map(Pair::error))
+}
+
+/// Spearman's.
+pub(super) fn correlation(pairs: &[Pair]) -> Option<f64> {
+    let pairs: Vec<(f64, f64)> = pairs.iter().map(|p| (p.predicted, p.measured)).collect();
+    rank_correlation(&pairs)
+}
+
+fn names(scene: &Scene) -> Vec<String> {
+    scene.materials.iter().map(|m| m.name.clone()).collect()
+}
+
+/// A plan of the scene, from its partition string.
+fn parse(scene: &Scene, partition: &str) -> Result<Plan> {
+    let materials = scene.materials.iter().enumerate();
+    let unused: Vec<usize> = materials.filter(|(_, m)| !m.used).map(|(i, _)| i).collect();
+    Plan::parse(partition, &names(scene), &unused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::super::results::{self, Material};
+    use super::*;
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-9 * b.abs()
+    }
+
+    #[test]
+    fn the_best_plan_and_the_regret_are_those_known() {
+        let scene = fixture::scene();
+        let measured = Measured::new(&scene).expect("fits");
+        assert_eq!(measured.count(), 3, "the ghost is in no plan");
+        assert_eq!(measured.text(&measured.best), "mixed:a,b|inline:c");
+        assert_eq!(measured.text(&measured.auto), scene.auto);
+        assert!(close(measured.material_regret(), 60.0 / 45.0));
+        assert!(close(measured.regret(), 160.0 / 145.0));
+        let mut answer = fixture::answer();
+        assert_eq!(measured.disagreement(&answer), None);
+        answer.regret = Some(1.2);
+        assert!(
+            measured
+                .disagreement(&answer)
+                .is_some_and(|why| why.contains("1.2000"))
+        );
+        for (strategy, seconds) in [
+            ("own", 160.0),
+            ("mixed", 190.0),
+            ("inline", 195.0),
+            ("paper", 152.0),
+            ("threshold=1000", 165.0),
+        ] {
+            let regret = measured.regret_of(strategy).expect("known");
+            assert!(close(regret, seconds / 145.0), "{strategy}: {regret}");
+        }
+        assert_eq!(measured.regret_of("threshold=7"), None);
+        // Half as many paths a second, so twice the time.
+        assert!(close(measured.render_ratio("mega").expect("rendered"), 2.0));
+    }
+
+    #[test]
+    fn all_plans_of_few_materials_are_added_up() {
+        let scene = fixture::scene();
+        let measured = Measured::new(&scene).expect("fits");
+        let plans = measured.material_plans();
+        assert_eq!(plans.len(), 22);
+        let least = plans
+            .iter()
+            .map(|p| p.measured)
+            .fold(f64::INFINITY, f64::min);
+        assert!(close(least, 45e-6));
+        let [kernels, materials, whole] = measured.median_errors().map(|e| e.expect("pairs"));
+        assert!(
+            kernels > whole && materials > whole,
+            "what is known of both dilutes errors"
+        );
+    }
+
+    #[test]
+    fn strategies_that_are_not_listed_follow_from_operations() {
+        let mut scene = fixture::scene();
+        scene.plans.retain(|p| p.strategy != "threshold=1000");
+        let operations = [Some(1200.0), Some(300.0), Some(999.0)];
+        for (material, operations) in scene.materials.iter_mut().zip(operations) {
+            material.operations = operations;
+        }
+        let measured = Measured::new(&scene).expect("fits");
+        let regret = measured.regret_of("threshold=1000").expect("known");
+        assert!(
+            close(regret, 165.0 / 145.0),
+            "own:a|mixed:b,c and not {regret}"
+        );
+        scene.materials[1].operations = None;
+        let measured = Measured::new(&scene).expect("fits");
+        assert_eq!(measured.regret_of("threshold=1000"), None);
+    }
+
+    #[test]
+    fn beyond_six_materials_the_best_is_that_of_the_measured_kernels() {
+        let mut scene = fixture::scene();
+        let names = ["a", "b", "c", "d", "e", "f", "g"];
+        scene.materials = names
+            .iter()
+            .map(|name| Material {
+                name: (*name).into(),
+                ..scene.materials[0].clone()
+            })
+            .collect();
+        let own = |i| results::Kernel(Form::Own, vec![i], 9e-6, 10e-6, 0.0);
+        scene.kernels = (0..names.len()).map(own).collect();
+        scene
+            .kernels
+            .push(results::Kernel(Form::Binned, vec![1, 4], 30e-6, 12e-6, 0.0));
+        let all: Vec<String> = names.iter().map(|name| format!("own:{name}")).collect();
+        scene.auto = all.join("|");
+        scene.plans = vec![results::Plan {
+            strategy: "own".into(),
+            partition: scene.auto.clone(),
+            measured: None,
+        }];
+        let measured = Measured::new(&scene).expect("fits");
+        assert_eq!(
+            measured.text(&measured.best),
+            "own:a|own:c|own:d|own:f|own:g|binned:b,e"
+        );
+        assert!(close(measured.regret(), 170.0 / 162.0));
+        assert_eq!(
+            measured.material_plans().len(),
+            1,
+            "a sample, and no sums over all"
+        );
+        assert_eq!(measured.regret_of("mixed"), None);
+    }
+
+    #[test]
+    fn of_inline_materials_the_logic_kernel_counts() {
+        let scene = fixture::scene();
+        let measured = Measured::new(&scene).expect("fits");
+        let inline = measured.kernels(Some(Form::Inline))[0];
+        assert!(
+            close(inline.predicted, 65e-6) && close(inline.measured, 67e-6),
+            "{inline:?}"
+        );
+        assert!(close(measured.kernels(Some(Form::Own))[0].measured, 20e-6));
+        assert_eq!(measured.kernels(None).len(), 18);
+    }
+
+    #[test]
+    fn whole_iterations_are_held_against_sums() {
+        let scene = fixture::scene();
+        let measured = Measured::new(&scene).expect("fits");
+        let ratios: Vec<f64> = measured
+            .additivity()
+            .iter()
+            .map(|(_, _, ratio)| *ratio)
+            .collect();
+        let expected = [161.0 / 160.0, 161.0 / 160.0, 150.0 / 152.0, 168.0 / 161.0];
+        assert_eq!(ratios.len(), expected.len());
+        assert!(
+            ratios.iter().zip(expected).all(|(a, b)| close(*a, b)),
+            "{ratios:?}"
+        );
+    }
+
+    #[test]
+    fn a_plan_that_was_not_measured_is_an_error() {
+        let mut scene = fixture::scene();
+        scene.kernels.retain(|k| k.0 != Form::Own);
+        let why = Measured::new(&scene)
+            .err()
+            .expect("own kernels are missing");
+        assert!(
+            why.contains("was not measured") && why.contains("tiny"),
+            "{why}"
+        );
+        scene.auto = "own:a|own:z".into();
+        assert!(Measured::new(&scene).is_err_and(|why| why.contains("`z`")));
+    }
+}
