@@ -13,7 +13,7 @@ use impasto_runtime::world::SceneParts;
 use impasto_runtime::world::camera::CameraFrame;
 use impasto_runtime::world::lights::Lights;
 use impasto_runtime::world::media::Media;
-use impasto_runtime::world::surface::Surface;
+use impasto_runtime::world::surface;
 use impasto_runtime::world::{MaterialSource, World};
 use std::ops::ControlFlow;
 
@@ -291,7 +291,7 @@ impl Planes {
                     buffers: vec![BufferData::new("planes", "array<vec4<u32>>", &rows)],
                 },
                 bvh: text(count + TRAVERSAL),
-                surface: Surface::ByHand(text(SURFACE.to_string())),
+                surface: surface::Surface::ByHand(text(SURFACE.to_string())),
                 lights: Lights::ByHand {
                     part: text(constants + LIGHTS),
                     sampled: self.light != Light::None,
