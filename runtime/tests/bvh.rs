@@ -5,7 +5,7 @@ use glam::{DVec3, EulerRot, Quat, Vec3};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
 use impasto_runtime::world::bvh::Bvh;
-use impasto_runtime::world::surface::{geometry_part, surface_part};
+use impasto_runtime::world::surface::{geometry_part, positions_part};
 
 #[derive(Clone, Copy, Debug)]
 struct Hit {
@@ -452,7 +452,7 @@ fn leaving_rays(built: &Built, random: &mut Random, count: usize) -> Vec<(Ray, b
         .collect();
     let no_lights = vec![u32::MAX; built.mesh.len()];
     let geometry = geometry_part(&built.mesh, built.bvh.order(), &no_lights, &[]);
-    let surface = surface_part(&built.mesh, built.bvh.order(), false);
+    let surface = positions_part(built.mesh.bounds());
     let body = "
         let at = input[i];
         let normal = hit_geometric_normal(at.x);

@@ -2,17 +2,14 @@
 //! there. Rays are cast on the GPU; copies are searched by brute force in f64 on the CPU.
 
 use crate::support::light_scenes::dark_scene;
+use crate::support::worlds::kernel_parts;
 use crate::support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 use glam::{DVec3, Vec2, Vec3};
 use impasto_compiler::abi::{Emission, InstanceInfo, Medium};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL, Object, Placement, Scene, Transform};
 use impasto_runtime::technique::{Copies, Stack, Technique, Traversal};
 use impasto_runtime::wgsl::ShaderPart;
-use impasto_runtime::world::Placed;
 use impasto_runtime::world::Split;
-use impasto_runtime::world::bvh::Bvh;
-use impasto_runtime::world::lights::NO_LIGHT;
-use impasto_runtime::world::surface::{geometry_part, surface_part};
 
 /// A ball around the origin with normals, texture coordinates and two materials.
 fn ball(n: usize) -> Mesh {
@@ -121,20 +118,21 @@ fn instances() -> Vec<InstanceInfo> {
     (0..5).map(info).collect()
 }
 
-/// Words of media, one an instance.
-const MEDIA: [u32; 5] = [11, 12, 13, 14, 15];
+/// Geometry, casts and surface of a scene, as kernels read them.
+fn parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
+    let parts = kernel_parts(scene, &instances(), technique).expect("it builds");
+    [parts.geometry, parts.bvh, parts.surface]
+}
 
-/// Geometry, casts and surface of a scene with its objects placed.
+/// The same of a scene with its objects placed.
 fn placed_parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
     let split = Split::new(scene, &instances(), Copies::Shared).expect("it fits");
     assert_eq!(split.placements.len(), scene.placements.len());
-    let placed = Placed::build(&split, 5, technique.traversal).expect("it builds");
-    let lights = vec![NO_LIGHT; split.world.len()];
-    [
-        placed.geometry_part(&lights, &MEDIA),
-        placed.levels().part(technique),
-        placed.surface_part(true),
-    ]
+    let technique = Technique {
+        copies: Copies::Shared,
+        ..*technique
+    };
+    parts(scene, &technique)
 }
 
 /// The logarithm of how many primitives a placement has at least.
@@ -151,15 +149,11 @@ fn block_shift(geometry: &ShaderPart) -> u32 {
 fn flat_parts(scene: &Scene) -> ([ShaderPart; 3], Mesh) {
     let split = Split::new(scene, &instances(), Copies::Flat).expect("it fits");
     assert!(split.placements.is_empty());
-    let mesh = split.world.into_owned();
-    let bvh = Bvh::build(&mesh, Traversal::default());
-    let lights = vec![NO_LIGHT; mesh.len()];
-    let parts = [
-        geometry_part(&mesh, bvh.order(), &lights, &MEDIA),
-        bvh.part(&Technique::default()),
-        surface_part(&mesh, bvh.order(), true),
-    ];
-    (parts, mesh)
+    let technique = Technique {
+        copies: Copies::Flat,
+        ..Technique::default()
+    };
+    (parts(scene, &technique), split.world.into_owned())
 }
 
 /// What a kernel learns of the nearest hit.

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
+use crate::support::worlds::kernel_parts;
 use glam::{Vec2, Vec3};
-use impasto_compiler::abi::{InputSet, MaterialInfo};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::scene::{Scene, load};
 use impasto_runtime::technique::{Copies, Stack, Technique};
-use impasto_runtime::world::SceneParts;
+use impasto_runtime::world::KernelParts;
 use impasto_runtime::world::Split;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n\
@@ -189,21 +189,8 @@ fn a_sample_of_copies_has_something_of_everything() {
     assert_eq!(none.len(), 2 + 2 * 10);
 }
 
-fn parts(scene: &Scene, technique: &Technique) -> Result<SceneParts, SceneError> {
-    let info = MaterialInfo {
-        name: "m".into(),
-        delta_only: false,
-        crosses: false,
-        transmissive: false,
-        varying_emission: false,
-        inputs: InputSet {
-            uv: true,
-            ..InputSet::default()
-        },
-        textures: Vec::new(),
-        lobes: 1,
-    };
-    SceneParts::build(scene, &[info], &[], &[], technique)
+fn parts(scene: &Scene, technique: &Technique) -> Result<KernelParts, SceneError> {
+    kernel_parts(scene, &[], technique)
 }
 
 #[test]

@@ -2,33 +2,65 @@
 
 use std::path::Path;
 
+use crate::support::light_scenes::dark_scene;
+use crate::support::worlds::{kernel_parts, world};
 use crate::support::{Random, Row, floats, row, run};
 use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
-use impasto_compiler::abi::{TextureRef, TextureSpace};
+use impasto_compiler::abi::{Emission, InstanceInfo, TextureRef, TextureSpace};
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile};
+use impasto_runtime::audit;
 use impasto_runtime::error::SceneError;
-use impasto_runtime::scene::{Mesh, NO_MATERIAL};
+use impasto_runtime::scene::{Mesh, Scene};
+use impasto_runtime::technique::Technique;
 use impasto_runtime::wgsl::ShaderPart;
-use impasto_runtime::world::surface::{geometry_part, surface_part};
 use impasto_runtime::world::texture;
 
 /// A mesh with one entry a triangle: corners, vertex normals, texture coordinates.
 type Triangle = ([Vec3; 3], Option<[Vec3; 3]>, [Vec2; 3]);
 
+/// Geometry and surface of triangles, each of an instance of its own, as kernels read them.
 fn parts(triangles: &[Triangle]) -> [ShaderPart; 2] {
-    let mesh = Mesh {
+    let (scene, instances) = scene(Mesh {
         positions: triangles.iter().map(|t| t.0).collect(),
         normals: triangles.iter().map(|t| t.1).collect(),
         uvs: triangles.iter().map(|t| t.2).collect(),
-        materials: vec![NO_MATERIAL; triangles.len()],
-        lights: vec![None; triangles.len()],
+        ..Mesh::default()
+    });
+    let technique = Technique::default();
+    let parts = kernel_parts(&scene, &instances, &technique).expect("the parts build");
+    [parts.geometry, parts.surface]
+}
+
+/// A scene of some corners, each triangle an instance of the one material.
+fn scene(mesh: Mesh) -> (Scene, Vec<InstanceInfo>) {
+    let triangles = mesh.positions.len();
+    let instance = |index: usize| InstanceInfo {
+        name: format!("i{index}"),
+        material: 0,
+        emission: Emission::None,
+        medium: None,
     };
-    let order: Vec<u32> = (0..mesh.len() as u32).collect();
-    [
-        geometry_part(&mesh, &order, &order, &[]),
-        surface_part(&mesh, &order, true),
-    ]
+    let mesh = Mesh {
+        materials: (0..triangles as u32).collect(),
+        lights: vec![None; triangles],
+        ..mesh
+    };
+    let scene = Scene {
+        mesh,
+        ..dark_scene()
+    };
+    (scene, (0..triangles).map(instance).collect())
+}
+
+/// The primitives that triangles are, which the corners' buffer tells by their instances.
+fn primitives(geometry: &ShaderPart) -> Vec<u32> {
+    let rows: &[[Row; 3]] = bytemuck::cast_slice(&geometry.buffers[0].bytes);
+    let mut primitives = vec![0; rows.len()];
+    for (primitive, [[.., instance], ..]) in (0..).zip(rows) {
+        primitives[*instance as usize] = primitive;
+    }
+    primitives
 }
 
 /// What a kernel gets at barycentric coordinates of each triangle.
@@ -43,9 +75,10 @@ struct Seen {
 
 fn look(triangles: &[Triangle], at: &[(u32, Vec2)]) -> Vec<Seen> {
     let [geometry, surface] = parts(triangles);
+    let primitives = primitives(&geometry);
     let input: Vec<Row> = at
         .iter()
-        .map(|(p, b)| [*p, b.x.to_bits(), b.y.to_bits(), 0])
+        .map(|(t, b)| [primitives[*t as usize], b.x.to_bits(), b.y.to_bits(), 0])
         .collect();
     let body = "
         let p = input[i].x;
@@ -168,21 +201,64 @@ fn unusable_attributes_fall_back() {
     );
 }
 
+/// Of corners that have neither normals nor coordinates, materials that read both are given the
+/// geometric normal and zeros, and kernels have neither buffers nor functions for more.
 #[test]
 fn a_scene_without_attributes_has_no_buffers_for_them() {
-    let triangle = ([Vec3::ZERO, Vec3::X, Vec3::Y], None, [Vec2::ZERO; 3]);
-    let [geometry, _] = parts(&[triangle]);
-    let mesh = Mesh {
-        positions: vec![triangle.0],
-        materials: vec![NO_MATERIAL],
-        lights: vec![None],
+    let mut files = MemoryLoader::default();
+    files.add(
+        "a.impasto",
+        "use std::bsdf::diffuse;\n\
+         material bent { surface = diffuse(color(uv.x, uv.y, tangent.x), normalize(normal + 0.1 * tangent)); }",
+    );
+    let compilation = compile(&[MaterialRequest::new("bent", "a.impasto")], &mut files);
+    let program = compilation
+        .program
+        .unwrap_or_else(|| panic!("{:?}", compilation.diagnostics));
+    let materials = program.infos();
+    let read = materials[0].inputs;
+    assert!(read.normal && read.uv && read.tangent, "{read:?}");
+
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let (scene, instances) = scene(Mesh {
+        positions: vec![corners],
         ..Mesh::default()
+    });
+    let technique = Technique::default();
+    let world = world(&scene, &materials, &instances, &technique).expect("the parts build");
+    let parts = world.kernel_parts(&materials, &technique);
+    assert!(parts.surface.buffers.is_empty());
+
+    let kernels = audit::kernels(&world, &program, technique).expect("they are composed");
+    for name in ["hit_normal", "hit_uv", "hit_tangent", "vertex_"] {
+        let having = kernels.iter().find(|kernel| kernel.wgsl.contains(name));
+        assert!(having.is_none(), "`{name}` in {having:?}");
+    }
+    let kernel = kernels.iter().find(|kernel| kernel.name == "bent");
+    let kernel = &kernel.expect("a kernel of the material").wgsl;
+    let items = ["struct PathHit", "struct SurfacePoint", "fn surface_point"];
+    let point = ShaderPart {
+        wgsl: items.map(|start| item(kernel, start)).concat(),
+        buffers: Vec::new(),
     };
-    let surface = surface_part(&mesh, &[0], true);
-    assert!(surface.buffers.is_empty());
-    let body = "result[i] = bitcast<vec4<u32>>(vec4<f32>(hit_normal(0u, vec2<f32>(0.2)), hit_uv(0u, vec2<f32>(0.2)).x));";
-    let rows = run(&[&geometry, &surface], body, &[], 1, 1);
+    let body = "
+        let seen = surface_point(PathHit(1.0, 0.2, 0.2, 0u), 1.0);
+        result[0] = bitcast<vec4<u32>>(vec4<f32>(seen.normal, seen.uv.x));
+        result[1] = bitcast<vec4<u32>>(vec4<f32>(seen.tangent, seen.uv.y));";
+    let rows = run(&[&parts.geometry, &parts.surface, &point], body, &[], 1, 2);
     assert_eq!(floats(rows[0]), [0.0, 0.0, 1.0, 0.0]);
+    assert_eq!(floats(rows[1]), [0.0; 4]);
+}
+
+/// The item of a kernel that begins so.
+fn item(kernel: &str, start: &str) -> String {
+    let begin = kernel.find(start).unwrap_or_else(|| panic!("no `{start}`"));
+    let text = &kernel[begin..];
+    let end = match text.lines().next() {
+        Some(line) if line.ends_with('}') => line.len(),
+        _ => text.find("\n}").expect("an end") + 2,
+    };
+    text[..end].to_owned() + "\n"
 }
 
 /// The texture part of files in a folder of their own.

@@ -96,12 +96,12 @@ mod tests {
             well_formed(svg).unwrap_or_else(|why| panic!("{name}: {why}"));
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
         }
-        for ((_, name), color) in Form::all().zip(COLORS) {
+        for (form, color) in Form::all().zip(COLORS) {
             let color = format!("#{:02X}{:02X}{:02X}", color.0, color.1, color.2);
             let dots = pictures[0].1.split("<circle");
             // One of them is the legend's.
             let drawn = dots.filter(|dot| dot.contains(&color)).count();
-            assert!(drawn > 1, "{name} is not drawn");
+            assert!(drawn > 1, "{} is not drawn", form.name());
         }
         for word in ["auto", "mega", "threshold=1000", "tiny"] {
             let texts = pictures[2].1.lines().map(str::trim);

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use impasto_compiler::abi::MaterialInfo;
 use serde::Serialize;
 use wgpu::naga::{Expression, Function, Module};
 
@@ -14,7 +15,7 @@ use crate::kernels::stages::STAGES;
 use crate::kernels::state;
 use crate::render::Makings;
 use crate::technique::Technique;
-use crate::world::needs::{Facts, Forcing, Need, Needs, ROWS, Row};
+use crate::world::needs::{Decision, Forcing, Need, NeedInputs, Needs, ROWS, Row};
 use crate::world::{MaterialSource, World};
 
 /// Sizes of a pool that kernels are written for; they are constants in the text.
@@ -90,8 +91,15 @@ pub fn report(
     source: &dyn MaterialSource,
     technique: Technique,
 ) -> Result<NeedsReport, RuntimeError> {
-    let mut scale = Scale::new(world, source, technique);
-    let natural = scale.natural();
+    let materials = source.infos();
+    let mut scale = Scale {
+        world,
+        source,
+        technique,
+        materials: &materials,
+        operations: BTreeMap::new(),
+    };
+    let natural = Decision::of(&scale.inputs(), |_| Needs::default()).needs;
     let extent = scale.weigh(Needs::default())?;
     let everything = scale.weigh(Needs::everything(natural))?;
     let rows = ROWS.iter().map(|row| scale.row(row, natural, extent));
@@ -122,17 +130,8 @@ pub fn kernels(
     source: &dyn MaterialSource,
     technique: Technique,
 ) -> Result<Vec<KernelText>, RuntimeError> {
-    let world = world.texts();
-    let materials = source.infos();
-    let facts = Facts {
-        world: &world,
-        materials: &materials,
-        technique: &technique,
-        wavefront: true,
-    };
-    let natural = Needs::of(&facts, Needs::default());
-    let forced = Needs::forced(technique.features, natural);
-    let (_, kernels) = compose(&world, source, technique, forced)?;
+    let decision = world.decide(&source.infos(), &technique);
+    let (_, kernels) = compose(world, source, technique, decision)?;
     let text = |kernel: Kernel| KernelText {
         name: kernel.recipe.name,
         wgsl: kernel.wgsl,
@@ -148,35 +147,18 @@ pub fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Writes kernels with rows forced, and weighs them.
 struct Scale<'a> {
-    world: World,
+    world: &'a World,
     source: &'a dyn MaterialSource,
     technique: Technique,
+    materials: &'a [MaterialInfo],
     /// Operations of kernels seen before, by their text.
     operations: BTreeMap<String, i64>,
 }
 
 impl<'a> Scale<'a> {
-    fn new(world: &World, source: &'a dyn MaterialSource, technique: Technique) -> Self {
-        Self {
-            world: world.texts(),
-            source,
-            technique,
-            operations: BTreeMap::new(),
-        }
-    }
-
-    fn natural(&self) -> Needs {
-        let materials = self.source.infos();
-        Needs::of(&self.facts(&materials), Needs::default())
-    }
-
-    fn facts<'b>(&'b self, materials: &'b [impasto_compiler::abi::MaterialInfo]) -> Facts<'b> {
-        Facts {
-            world: &self.world,
-            materials,
-            technique: &self.technique,
-            wavefront: true,
-        }
+    /// What decides which rows are on.
+    fn inputs(&self) -> NeedInputs<'a> {
+        self.world.need_inputs(self.materials, &self.technique)
     }
 
     fn row(
@@ -185,8 +167,7 @@ impl<'a> Scale<'a> {
         natural: Needs,
         extent: Extent,
     ) -> Result<NeedReport, RuntimeError> {
-        let materials = self.source.infos();
-        let because = (row.reason)(&self.facts(&materials), natural);
+        let because = (row.reason)(&self.inputs(), natural);
         let saved = match because.is_none() && row.is_forceable_with(natural) {
             true => Some(self.weigh(Needs::of_rows(&[row.need]))?.beyond(extent)),
             false => None,
@@ -214,7 +195,8 @@ impl<'a> Scale<'a> {
 
     /// What kernels and state take with some rows forced.
     fn weigh(&mut self, forced: Needs) -> Result<Extent, RuntimeError> {
-        let (layout, kernels) = compose(&self.world, self.source, self.technique, forced)?;
+        let decision = Decision::of(&self.inputs(), |_| forced);
+        let (layout, kernels) = compose(self.world, self.source, self.technique, decision)?;
         let lines = kernels.iter().flat_map(|k| k.wgsl.lines());
         let mut operations = 0;
         for kernel in &kernels {
@@ -252,18 +234,16 @@ impl Extent {
     }
 }
 
-/// The kernels of a wavefront with a kernel a material, and its layout, with some rows forced.
-pub(crate) fn compose(
+/// The kernels of a wavefront with a kernel a material, and its layout, as it was decided.
+fn compose(
     world: &World,
     source: &dyn MaterialSource,
     technique: Technique,
-    forced: Needs,
+    decision: Decision,
 ) -> Result<(Layout, Vec<Kernel>), RuntimeError> {
-    let materials = source.infos();
-    let plan = world.own_plan(&materials);
-    let layout = Layout::with_forced(world, &materials, &plan, &technique, |_| forced)?;
-    let specialised = world.clone().specialised(layout.needs);
-    let makings = Makings::new(SUBGROUP_SIZE, &specialised, source, technique);
+    let makings = Makings::decided(SUBGROUP_SIZE, world, source, technique, decision)?;
+    let plan = world.own_plan(&makings.materials);
+    let layout = makings.layout(&plan)?;
     let kernels = makings.composer(&plan, layout, SIZES).kernels();
     Ok((layout, kernels))
 }

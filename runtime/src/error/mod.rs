@@ -87,6 +87,14 @@ pub enum RuntimeError {
         /// What is possible.
         expected: String,
     },
+    /// A world made by hand lacks what its kernels read.
+    #[error("the world has no {part}, which the stage `{stage}` asks for")]
+    MissingPart {
+        /// What it lacks.
+        part: &'static str,
+        /// The stage whose kernels include it.
+        stage: &'static str,
+    },
     /// The plan does not fit the materials.
     #[error("the plan `{strategy}` does not fit the materials: {reason}")]
     Plan {

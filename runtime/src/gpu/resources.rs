@@ -52,7 +52,7 @@ impl Resources {
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             });
-            let mut bytes = data.bytes.clone();
+            let mut bytes = data.bytes.to_vec();
             bytes.resize(size as usize, 0);
             gpu.queue.write_buffer(&buffer, 0, &bytes);
             buffers.push(buffer);

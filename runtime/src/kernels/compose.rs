@@ -10,11 +10,13 @@ use crate::film;
 use crate::fingerprint::Fingerprint;
 use crate::kernels::cones;
 use crate::kernels::modules::{Composer, Kernel, Recipe};
+use crate::kernels::order;
 use crate::kernels::profile;
 use crate::kernels::stages::{Part, StageId};
 use crate::kernels::state::{self, Storage};
 use crate::wgsl;
-use crate::wgsl::text::{Flag, mentions, predicate, preprocess, reachable, without_comments};
+use crate::wgsl::template::Flag;
+use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::needs::{Need, Needs};
 
@@ -84,7 +86,7 @@ impl Composer<'_> {
             text += &self.fates();
         }
         for id in stages {
-            text += &preprocess(id.stage().body, &self.flags(*id, members));
+            text += &id.stage().body.wgsl(&self.flags(*id, members));
         }
         text += &recipe.shell;
         if mentions(&without_comments(&text), MATERIAL_OF) {
@@ -146,8 +148,7 @@ impl Composer<'_> {
     }
 
     fn part(&self, part: Part, members: &[usize]) -> String {
-        let world = self.world;
-        let parts = &world.parts;
+        let (world, parts) = (self.world, self.parts);
         match part {
             Part::Random => self.random.wgsl.clone(),
             Part::Camera => {
@@ -160,11 +161,8 @@ impl Composer<'_> {
             Part::Surface => parts.surface.wgsl.clone(),
             Part::Mis => crate::world::lights::mis().wgsl,
             Part::Lights => parts.lights.wgsl.clone(),
-            Part::Media => {
-                let part = parts.media.part.as_ref();
-                part.map_or_else(String::new, |part| part.wgsl.clone())
-            }
-            Part::Order => crate::kernels::order::bins(self.technique.ray_order, parts.bounds),
+            Part::Media => text(parts.media.as_ref()),
+            Part::Order => order::bins(self.technique.ray_order, world.parts.bounds),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
         }
@@ -174,8 +172,7 @@ impl Composer<'_> {
     fn materials(&self, members: &[usize]) -> String {
         let infos = self.infos(members);
         let textured = infos.iter().any(|m| !m.textures.is_empty());
-        let textures = self.world.parts.texture.as_ref().filter(|_| textured);
-        let mut out = textures.map_or_else(String::new, |part| part.wgsl.clone());
+        let mut out = text(self.parts.texture.as_ref().filter(|_| textured));
         out += &self.source.wgsl(members);
         let needs = self.needs_of(members);
         if needs.has(Need::VaryingEmission) && infos.iter().all(|m| !m.varying_emission) {
@@ -232,7 +229,7 @@ impl Composer<'_> {
 
     /// The buffers of all parts of the scene, and the tables of its materials.
     pub(crate) fn scene_buffers(&self) -> impl Iterator<Item = &BufferData> {
-        self.parts()
+        self.read_parts()
             .flat_map(|part| &part.buffers)
             .chain(self.tables)
     }
@@ -254,7 +251,7 @@ impl Composer<'_> {
         );
         fingerprint.add(self.source.wgsl(&all).as_bytes());
         fingerprint.add(self.source.lookup_wgsl().as_bytes());
-        for part in self.parts() {
+        for part in self.read_parts() {
             fingerprint.add(part.wgsl.as_bytes());
         }
         for buffer in self.scene_buffers() {
@@ -265,19 +262,14 @@ impl Composer<'_> {
     }
 
     /// Random numbers and the parts of the scene.
-    fn parts(&self) -> impl Iterator<Item = &ShaderPart> {
-        let parts = &self.world.parts;
-        let parts: [Option<&ShaderPart>; 7] = [
-            Some(&self.random),
-            Some(&parts.geometry),
-            Some(&parts.bvh),
-            Some(&parts.surface),
-            Some(&parts.lights),
-            parts.media.part.as_ref(),
-            parts.texture.as_ref(),
-        ];
-        parts.into_iter().flatten()
+    fn read_parts(&self) -> impl Iterator<Item = &ShaderPart> {
+        std::iter::once(self.random).chain(self.parts.all())
     }
+}
+
+/// The text of a part that is there if it is needed.
+fn text(part: Option<&ShaderPart>) -> String {
+    part.map_or_else(String::new, |part| part.wgsl.clone())
 }
 
 /// The function that gives the row that samples of an instance are counted in if they are dropped.

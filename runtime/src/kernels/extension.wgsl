@@ -42,12 +42,12 @@ fn extension(request: u32) {
     let direction = bitcast<vec3<f32>>(ray[1].xyz);
 #if overlap
     keep_hit(request, trace_to_boundary(request, start, direction, ray[0].w));
-#else
-#if scattering
-    keep_hit(request, trace_to_surface(request, start, direction, ray[0].w));
-#else
-    keep_hit(request, trace_closest(start, direction, 3.0e38, ray[0].w));
 #endif
+#if scattering && !overlap
+    keep_hit(request, trace_to_surface(request, start, direction, ray[0].w));
+#endif
+#if !scattering && !overlap
+    keep_hit(request, trace_closest(start, direction, 3.0e38, ray[0].w));
 #endif
 }
 #endif

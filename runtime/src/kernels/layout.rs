@@ -8,8 +8,7 @@ use crate::error::RuntimeError;
 use crate::kernels::queues::{Counters, Queues};
 use crate::kernels::state;
 use crate::technique::{RayData, Technique};
-use crate::world::World;
-use crate::world::needs::{Facts, Need, Needs};
+use crate::world::needs::{Decision, Need, Needs};
 
 /// The buffers of rays and of their results in the order of requests: the name, bytes a path, and
 /// whether it is of shadow rays.
@@ -25,8 +24,6 @@ pub(crate) const RAY_BUFFERS: [(&str, u64, bool); 4] = [
 pub(crate) struct Layout {
     /// What must exist.
     pub needs: Needs,
-    /// What of it the scene could be without.
-    pub forced: Needs,
     /// The queues of a wavefront.
     pub queues: Queues,
     /// The buffer of counters.
@@ -36,35 +33,16 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// Of a plan for `materials`, of which it may leave out those that are `unbound`.
     pub(crate) fn new(
-        world: &World,
+        decision: &Decision,
         materials: &[MaterialInfo],
+        unbound: &[usize],
         plan: &Plan,
-        technique: &Technique,
     ) -> Result<Self, RuntimeError> {
-        let forced = |natural| Needs::forced(technique.features, natural);
-        Self::with_forced(world, materials, plan, technique, forced)
-    }
-
-    /// The same with rows of the table of needs `forced`, whatever the technique says; they may follow from
-    /// those that the scene needs by itself.
-    pub(crate) fn with_forced(
-        world: &World,
-        materials: &[MaterialInfo],
-        plan: &Plan,
-        technique: &Technique,
-        forced: impl FnOnce(Needs) -> Needs,
-    ) -> Result<Self, RuntimeError> {
-        check_plan(plan, materials, &world.parts.unbound)?;
+        check_plan(plan, materials, unbound)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
-        let facts = Facts {
-            world,
-            materials,
-            technique,
-            wavefront,
-        };
-        let natural = Needs::of(&facts, Needs::default());
-        let needs = Needs::of(&facts, forced(natural));
+        let needs = decision.of_plan(wavefront);
         let of_kernels = Queues::of_kernels(plan);
         let queues = Queues {
             materials: of_kernels.iter().map(|queues| queues.len()).sum(),
@@ -80,7 +58,6 @@ impl Layout {
         };
         Ok(Self {
             needs,
-            forced: needs.minus(natural),
             queues,
             counters,
             wavefront,

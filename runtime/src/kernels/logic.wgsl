@@ -40,8 +40,7 @@ fn logic(slot: u32) {
 #else
         carried.throughput *= transmittance(load_media(slot).stack, hit.t);
 #endif
-#if shadow_rays
-#else
+#if !shadow_rays
         store_throughput(slot, carried);
 #endif
 #endif
@@ -60,13 +59,11 @@ fn logic(slot: u32) {
     }
 #if varying_emission
     if instance != NOTHING && vertex >= MAX_DEPTH && !needs_last_evaluation(instance) {
-        instance = NOTHING;
-    }
 #else
     if vertex >= MAX_DEPTH {
+#endif
         instance = NOTHING;
     }
-#endif
 #if shadow_rays
     var bits = vec4<u32>(0u);
     if instance != NOTHING {
@@ -75,14 +72,14 @@ fn logic(slot: u32) {
 #endif
 #if roulette
     if instance != NOTHING && vertex >= ROULETTE_START {
+        let survival = survival_probability(carried.throughput);
 #if shadow_rays
-        let survival = survival_probability(carried.throughput);
         if unit_numbers(bits).w < survival {
-            carried.throughput /= survival;
 #else
-        let survival = survival_probability(carried.throughput);
         if random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC)).w < survival {
+#endif
             carried.throughput /= survival;
+#if !shadow_rays
             store_throughput(slot, carried);
 #endif
         } else {

@@ -15,11 +15,11 @@ use crate::kernels::shells::SUBGROUP;
 use crate::kernels::stages::{STAGES, StageId};
 use crate::technique::{Regeneration, Technique};
 use crate::wgsl;
-use crate::wgsl::text::preprocess;
+use crate::wgsl::template::template;
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::bvh;
-use crate::world::needs::{self, Facts, Need, Needs};
-use crate::world::{MaterialSource, World};
+use crate::world::needs::{Decision, Need, Needs};
+use crate::world::{KernelParts, MaterialSource, World};
 
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
@@ -108,6 +108,9 @@ pub(crate) struct Sizes {
 /// Composes the kernels of one plan.
 pub(crate) struct Composer<'a> {
     pub world: &'a World,
+    pub decision: &'a Decision,
+    /// The world's parts, as the decision asks for them.
+    pub parts: &'a KernelParts,
     pub source: &'a dyn MaterialSource,
     pub materials: &'a [MaterialInfo],
     pub instances: &'a [InstanceInfo],
@@ -122,7 +125,7 @@ pub(crate) struct Composer<'a> {
     /// Lanes of the GPU's largest subgroups.
     pub subgroup_size: u32,
     /// Random numbers of the sampler.
-    pub random: ShaderPart,
+    pub random: &'a ShaderPart,
 }
 
 impl Composer<'_> {
@@ -164,26 +167,7 @@ impl Composer<'_> {
 
     /// The needs of a kernel that evaluates `members` only.
     pub(crate) fn needs_of(&self, members: &[usize]) -> Needs {
-        let materials: Vec<MaterialInfo> = self.infos(members).into_iter().cloned().collect();
-        let facts = Facts {
-            world: self.world,
-            materials: &materials,
-            technique: &self.technique,
-            wavefront: self.layout.wavefront,
-        };
-        let all = self.layout.needs;
-        let own = Needs::of(&facts, Needs::default()).or(self.layout.forced);
-        let needs = all.minus(needs::OF_MATERIALS.minus(own));
-        let lit = needs.has(Need::ShadowRays);
-        let needs = if lit {
-            needs
-        } else {
-            needs.without(Need::Absorption)
-        };
-        match needs.any(&[Need::Absorption, Need::MediumChanges, Need::ExteriorIor]) {
-            true => needs,
-            false => needs.without(Need::Media),
-        }
+        self.decision.of_members(self.layout.needs, members)
     }
 
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
@@ -209,7 +193,7 @@ impl Composer<'_> {
                 ("END_CONSUMED", consumed.end as u32),
             ])
             + &first_of_kernel(&binned)
-            + &preprocess(include_str!("prepare.wgsl"), &flags);
+            + &template!("prepare.wgsl").wgsl(&flags);
         Recipe::plain(name, Vec::new(), Feed::Once, text)
     }
 
@@ -218,9 +202,9 @@ impl Composer<'_> {
         let flags = [
             ("shadow_rays", self.layout.needs.has(Need::ShadowRays)),
             ("regenerates", self.regenerates()),
-            ("walk_lane", bvh::asks_for_lane(&self.world.parts.bvh)),
+            ("walk_lane", bvh::asks_for_lane(&self.parts.bvh)),
         ];
-        let mut shell = preprocess(include_str!("mega.wgsl"), &flags);
+        let mut shell = template!("mega.wgsl").wgsl(&flags);
         if self.regenerates() {
             // Idle lanes times this must exceed the subgroup's lanes.
             let share = match self.technique.regeneration {

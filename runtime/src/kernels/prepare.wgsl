@@ -3,14 +3,13 @@
 
 @compute @workgroup_size(PREPARE_SIZE)
 fn main(@builtin(local_invocation_index) lane: u32) {
-#if queues
-#if binned
+#if queues && binned
     place_groups(lane);
-#else
+#endif
+#if queues && !binned
     for (var queue = FIRST_CONSUMED + lane; queue < END_CONSUMED; queue += PREPARE_SIZE) {
         dispatch(queue, consume(queue));
     }
-#endif
 #endif
 #if work
     if lane == 0u {

@@ -23,22 +23,22 @@ fn main(
     let item = index * WORKGROUP_SIZE + lane;
 #endif
     var slot = item;
-#if queued
-#if binned
+#if queued && binned
     let in_range = item < bin.items;
     let region = bin.queue;
-#else
+#endif
+#if queued && !binned
     let in_range = item < atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
-#if slots
+#endif
+#if queued && !binned && slots
     let region = CONSUMED_REGION;
 #endif
-#endif
-#if slots
+#if queued && slots
     if in_range {
         slot = queues[region * POOL_SIZE + item];
     }
 #endif
-#else
+#if !queued
     let in_range = item < POOL_SIZE;
 #endif
     if in_range {

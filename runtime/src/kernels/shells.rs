@@ -10,7 +10,8 @@ use crate::kernels::modules::Composer;
 use crate::kernels::queues::Queues;
 use crate::technique::{Append, Leaves};
 use crate::wgsl;
-use crate::wgsl::text::{case_labels, preprocess};
+use crate::wgsl::template::template;
+use crate::wgsl::text::case_labels;
 use crate::world::bvh;
 use crate::world::needs::Need;
 
@@ -112,7 +113,7 @@ impl EntryPoint {
             ("subgroups", self.subgroups),
             ("walk_lane", self.walk_lane),
         ];
-        preprocess(include_str!("shell.wgsl"), &flags)
+        template!("shell.wgsl").wgsl(&flags)
     }
 }
 
@@ -147,7 +148,7 @@ impl FetchShell<'_> {
             ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
         ]) + &format!("const COUNTER_RAYS_FETCHED: u32 = {};\n", self.counter)
             + SUBGROUP
-            + &preprocess(include_str!("fetch.wgsl"), &flags)
+            + &template!("fetch.wgsl").wgsl(&flags)
     }
 }
 
@@ -164,7 +165,7 @@ impl Composer<'_> {
             keeps: shell.casts && requests,
             counts_hits: shell.counts_hits,
             subgroups: pushes && self.technique.append == Append::Subgroup,
-            walk_lane: shell.traverses && bvh::asks_for_lane(&self.world.parts.bvh),
+            walk_lane: shell.traverses && bvh::asks_for_lane(&self.parts.bvh),
         };
         let mut out = self.layout.queues.constants();
         if let Some(consumed) = shell.consumes {
@@ -213,16 +214,16 @@ impl Composer<'_> {
             ("keeps_shadows", keeps && shell.casts_shadows),
             ("subgroups", self.technique.append == Append::Subgroup),
         ];
-        let one_by_one = preprocess(include_str!("append/one_by_one.wgsl"), &flags);
+        let one_by_one = || template!("append/one_by_one.wgsl").wgsl(&flags);
         let append = match self.technique.append {
-            Append::Workgroup => preprocess(include_str!("append/workgroup.wgsl"), &flags),
-            Append::Subgroup => one_by_one + include_str!("append/subgroup.wgsl") + SUBGROUP,
-            Append::Thread => one_by_one + include_str!("append/thread.wgsl"),
+            Append::Workgroup => template!("append/workgroup.wgsl").wgsl(&flags),
+            Append::Subgroup => one_by_one() + include_str!("append/subgroup.wgsl") + SUBGROUP,
+            Append::Thread => one_by_one() + include_str!("append/thread.wgsl"),
         };
         wgsl::constants_u32(&[
             ("FIRST_PUSHED", first as u32),
             ("PUSHED_QUEUES", (end - first) as u32),
-        ]) + &preprocess(include_str!("queue.wgsl"), &flags)
+        ]) + &template!("queue.wgsl").wgsl(&flags)
             + &append
     }
 
@@ -234,7 +235,7 @@ impl Composer<'_> {
             limit: self.sizes.fetch_limit,
             slots: !self.layout.needs.has(Need::Requests),
             together: self.technique.leaves == Leaves::Together,
-            walk_lane: bvh::asks_for_lane(&self.world.parts.bvh),
+            walk_lane: bvh::asks_for_lane(&self.parts.bvh),
         };
         wgsl::constant_u32("CONSUMED_REGION", consumed.region as u32) + &fetch.wgsl()
     }

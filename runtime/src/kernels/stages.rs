@@ -6,6 +6,7 @@
 //! from the table (which text a kernel is composed of, which queues there are) is derived in
 //! `modules`, `wavefront` and `queues`. A new stage is one file in `kernels/` and one row here.
 
+use crate::wgsl::template::{Template, template};
 use crate::world::needs::{ALWAYS, Need, When, when};
 
 const ABSORPTION: When = when(&[Need::Absorption]);
@@ -62,6 +63,26 @@ pub(crate) enum Part {
     Materials,
 }
 
+impl Part {
+    /// What messages call it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Part::Random => "random numbers",
+            Part::Camera => "camera",
+            Part::Film => "film",
+            Part::Numbers => "tests of numbers",
+            Part::Geometry => "geometry",
+            Part::Surface => "surface",
+            Part::Mis => "weights of light samples",
+            Part::Lights => "lights",
+            Part::Media => "media",
+            Part::Traversal => "ray casts",
+            Part::Order => "order of rays",
+            Part::Materials => "texture lookups",
+        }
+    }
+}
+
 /// One stage.
 #[derive(Debug)]
 pub(crate) struct Stage {
@@ -69,8 +90,8 @@ pub(crate) struct Stage {
     pub id: StageId,
     /// Its name in reports and GPU captures, and of its WGSL function.
     pub name: &'static str,
-    /// The WGSL function.
-    pub body: &'static str,
+    /// The file of the WGSL function.
+    pub body: Template,
     /// The texts it needs, each with what must exist for it.
     pub parts: &'static [(Part, When)],
     /// When it exists.
@@ -83,7 +104,7 @@ pub(crate) const STAGES: [Stage; 7] = [
     Stage {
         id: StageId::Logic,
         name: "logic",
-        body: include_str!("logic.wgsl"),
+        body: template!("logic.wgsl"),
         parts: &[
             (Part::Random, ALWAYS),
             (Part::Numbers, ALWAYS),
@@ -99,14 +120,14 @@ pub(crate) const STAGES: [Stage; 7] = [
     Stage {
         id: StageId::NewPath,
         name: "new_path",
-        body: include_str!("new_path.wgsl"),
+        body: template!("new_path.wgsl"),
         parts: &[(Part::Random, ALWAYS), (Part::Camera, ALWAYS)],
         need: ALWAYS,
     },
     Stage {
         id: StageId::Material,
         name: "material",
-        body: include_str!("material.wgsl"),
+        body: template!("material.wgsl"),
         parts: &[
             (Part::Random, ALWAYS),
             (Part::Numbers, ALWAYS),
@@ -121,28 +142,28 @@ pub(crate) const STAGES: [Stage; 7] = [
     Stage {
         id: StageId::BinShadow,
         name: "bin_shadow",
-        body: include_str!("bin_shadow.wgsl"),
+        body: template!("bin_shadow.wgsl"),
         parts: &[(Part::Order, ALWAYS)],
         need: when(&[Need::Order, Need::ShadowRays]),
     },
     Stage {
         id: StageId::Shadow,
         name: "shadow",
-        body: include_str!("shadow.wgsl"),
+        body: template!("shadow.wgsl"),
         parts: &[(Part::Geometry, ALWAYS), (Part::Traversal, ALWAYS)],
         need: when(&[Need::ShadowRays]),
     },
     Stage {
         id: StageId::BinExtension,
         name: "bin_extension",
-        body: include_str!("bin_extension.wgsl"),
+        body: template!("bin_extension.wgsl"),
         parts: &[(Part::Order, ALWAYS)],
         need: when(&[Need::Order]),
     },
     Stage {
         id: StageId::Extension,
         name: "extension",
-        body: include_str!("extension.wgsl"),
+        body: template!("extension.wgsl"),
         parts: &[
             (Part::Geometry, ALWAYS),
             (Part::Traversal, ALWAYS),
@@ -173,7 +194,7 @@ mod tests {
         for stage in &STAGES {
             assert_eq!(stage.id.stage().name, stage.name);
             assert_eq!(STAGES.iter().filter(|s| s.id == stage.id).count(), 1);
-            assert!(stage.body.contains(&format!("\nfn {}(", stage.name)));
+            assert!(stage.body.text.contains(&format!("\nfn {}(", stage.name)));
         }
         assert_eq!(StageId::Extension as usize, STAGES.len() - 1);
     }

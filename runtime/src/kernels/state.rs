@@ -599,7 +599,7 @@ mod tests {
                     let listed = of_name
                         .map(stages)
                         .any(|s: &[StageId]| s.contains(&stage.id));
-                    let calls = stage.body.contains(&call);
+                    let calls = stage.body.text.contains(&call);
                     assert_eq!(calls, listed, "{}: {call}", stage.name);
                 }
             }

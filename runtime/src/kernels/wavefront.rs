@@ -151,7 +151,7 @@ impl Composer<'_> {
         possible
             && self.layout.wavefront
             && self.technique.ray_fetch == RayFetch::Persistent
-            && bvh::provides_steps(&self.world.parts.bvh)
+            && bvh::provides_steps(&self.parts.bvh)
     }
 
     /// The kernels that put a queue of rays in order, if that is wanted: `count` is the stage that

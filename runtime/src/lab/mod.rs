@@ -138,7 +138,7 @@ impl<'a> Lab<'a> {
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;
-        let mut makings = Makings::new(gpu.subgroup_size(), world, source, render.technique);
+        let mut makings = Makings::new(gpu.subgroup_size(), world, source, render.technique)?;
         let own = world.own_plan(&makings.materials);
         // No plan has more queues or counters: buffers of this layout do for all.
         let mut layout = makings.layout(&own)?;
@@ -159,7 +159,13 @@ impl<'a> Lab<'a> {
             snapshot: Snapshot::new(gpu, &resources)?,
             resources,
             cache: Cache::default(),
-            workload: workload::before_rendering(world, &makings.materials, &layout, sizes.pool),
+            workload: workload::before_rendering(
+                world,
+                &makings.parts.surface,
+                &makings.materials,
+                &layout,
+                sizes.pool,
+            ),
             makings,
         };
         lab.begin(&own, options.warm_iterations)?;

@@ -87,7 +87,7 @@ impl Job {
             &self.world,
             &*self.source,
             self.technique,
-        );
+        )?;
         makings.some_pixels = present.layout.needs.has(Need::SomePixels);
         let layout = makings.layout(plan)?;
         let queues = 4 * u64::from(sizes.pool) * layout.queue_words();

@@ -7,7 +7,7 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::Plan;
 use impasto_compiler::partition::workload::BLOCK;
 
-use super::{Facts, RenderOptions, Renderer};
+use super::{RenderOptions, Renderer, ReportInputs};
 use crate::error::RuntimeError;
 use crate::film::file::Identity;
 use crate::gpu::Gpu;
@@ -15,6 +15,7 @@ use crate::gpu::resources::Resources;
 use crate::gpu::schedule::{Schedule, Size, Step};
 use crate::kernels::layout::Layout;
 use crate::kernels::modules::{Composer, Feed, Kernel, Sizes};
+use crate::kernels::parts;
 use crate::kernels::random::{self, Demand};
 use crate::render::pool;
 use crate::render::report::MaterialReport;
@@ -23,8 +24,8 @@ use crate::render::workload;
 use crate::scene::Scene;
 use crate::technique::Technique;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::needs::{Facts as NeedFacts, Need, Needs};
-use crate::world::{MaterialSource, World};
+use crate::world::needs::{Decision, Need};
+use crate::world::{KernelParts, MaterialSource, World};
 
 /// A plan that can run: its kernels, and the buffers they work in.
 #[derive(Clone, Debug)]
@@ -47,6 +48,9 @@ pub(crate) struct Makings<'a> {
     pub technique: Technique,
     /// Whether only some pixels are rendered.
     pub some_pixels: bool,
+    decision: Decision,
+    /// The world's parts, as the decision asks for them.
+    pub parts: KernelParts,
     subgroup_size: u32,
     random: ShaderPart,
 }
@@ -76,7 +80,7 @@ impl<'g> Renderer<'g> {
         let mut options = options.clone();
         options.technique = options.technique.within(gpu.has_subgroups());
         settings::check(world, &options)?;
-        let mut makings = Makings::new(gpu.subgroup_size(), world, source, options.technique);
+        let mut makings = Makings::new(gpu.subgroup_size(), world, source, options.technique)?;
         makings.some_pixels = options.pixels.is_some();
         let layout = makings.layout(plan)?;
         options.technique = layout.technique(options.technique);
@@ -86,7 +90,7 @@ impl<'g> Renderer<'g> {
         if options.count_hits {
             composer.layout.counters.hits = counted_materials(gpu, &composer);
         }
-        let facts = Facts::of(&composer, &options);
+        let facts = ReportInputs::of(&composer, &options);
         let resources = Resources::new(gpu, &composer, &options)?;
         let build = |kernel: &Kernel| build_step(gpu, kernel, &resources, sizes);
         let (kernels, steps) = build_all(&composer, build)?;
@@ -99,7 +103,7 @@ impl<'g> Renderer<'g> {
         warm_up(gpu, &resources, &schedule, &options)?;
         Ok(Self {
             gpu,
-            texts: options.count_hits.then(|| world.texts()),
+            texts: options.count_hits.then(|| world.without_contents()),
             options,
             ready: Ready {
                 plan: plan.clone(),
@@ -109,7 +113,7 @@ impl<'g> Renderer<'g> {
                 resources,
                 schedule,
             },
-            facts: Facts {
+            facts: ReportInputs {
                 compile_seconds: begin.elapsed().as_secs_f64(),
                 ..facts
             },
@@ -136,44 +140,59 @@ pub fn identity(
         world,
         source,
         options.technique.within(gpu.has_subgroups()),
-    );
+    )?;
     let plan = world.own_plan(&makings.materials);
     let layout = makings.layout(&plan)?;
     let sizes = pool::sizes(gpu, world, &layout, options)?;
     let composer = makings.composer(&plan, layout, sizes);
-    Ok(Facts::of(&composer, options).identity)
+    Ok(ReportInputs::of(&composer, options).identity)
 }
 
 impl<'a> Makings<'a> {
+    /// Decides what `world` needs, and writes its parts accordingly.
+    ///
+    /// # Errors
+    /// If the world lacks a part that its kernels ask for.
     pub(crate) fn new(
         subgroup_size: u32,
         world: &'a World,
         source: &'a dyn MaterialSource,
         technique: Technique,
-    ) -> Self {
-        let materials = source.infos();
-        let facts = NeedFacts {
-            world,
-            materials: &materials,
-            technique: &technique,
-            wavefront: true,
-        };
-        let demand = Demand::of(world, Needs::of(&facts, Needs::default()));
-        Self {
+    ) -> Result<Self, RuntimeError> {
+        let decision = world.decide(&source.infos(), &technique);
+        Self::decided(subgroup_size, world, source, technique, decision)
+    }
+
+    /// The same where it is decided already.
+    pub(crate) fn decided(
+        subgroup_size: u32,
+        world: &'a World,
+        source: &'a dyn MaterialSource,
+        technique: Technique,
+        decision: Decision,
+    ) -> Result<Self, RuntimeError> {
+        let parts = world.parts.written(decision.needs);
+        parts::check(&parts, decision.needs)?;
+        // What is forced gets no dimension, which would change the others'.
+        let demand = Demand::of(world, decision.natural);
+        Ok(Self {
             world,
             source,
-            materials,
+            materials: source.infos(),
             random: random::part(technique.sampler, demand),
             instances: source.instances(),
             tables: source.tables().iter().map(BufferData::from).collect(),
             technique,
             some_pixels: false,
+            decision,
+            parts,
             subgroup_size,
-        }
+        })
     }
 
     pub(crate) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
-        let mut layout = Layout::new(self.world, &self.materials, plan, &self.technique)?;
+        let unbound = &self.world.parts.unbound;
+        let mut layout = Layout::new(&self.decision, &self.materials, unbound, plan)?;
         if self.some_pixels {
             layout.needs = layout.needs.with(Need::SomePixels);
         }
@@ -189,6 +208,8 @@ impl<'a> Makings<'a> {
     ) -> Composer<'b> {
         let mut composer = Composer {
             world: self.world,
+            decision: &self.decision,
+            parts: &self.parts,
             source: self.source,
             materials: &self.materials,
             instances: &self.instances,
@@ -199,7 +220,7 @@ impl<'a> Makings<'a> {
             technique: self.technique,
             queue_table: false,
             subgroup_size: self.subgroup_size,
-            random: self.random.clone(),
+            random: &self.random,
         };
         if self.technique.profile {
             composer.layout.counters.profiled = composer.recipes().len();
@@ -208,7 +229,7 @@ impl<'a> Makings<'a> {
     }
 }
 
-impl Facts {
+impl ReportInputs {
     /// What is known before kernels are built, which takes yet unknown time.
     fn of(composer: &Composer<'_>, options: &RenderOptions) -> Self {
         let world = composer.world;
@@ -231,6 +252,7 @@ impl Facts {
             materials: MaterialReport::of(composer.materials, composer.instances),
             workload: workload::before_rendering(
                 world,
+                &composer.parts.surface,
                 composer.materials,
                 &composer.layout,
                 composer.sizes.pool,

@@ -60,7 +60,7 @@ pub struct Renderer<'g> {
     gpu: &'g Gpu,
     options: RenderOptions,
     ready: Ready,
-    facts: Facts,
+    facts: ReportInputs,
     /// What kernels of another plan would be composed from, if hits are counted.
     texts: Option<World>,
     replan: Option<Replan>,
@@ -69,7 +69,7 @@ pub struct Renderer<'g> {
 
 /// What the report says of the world and the plan.
 #[derive(Debug)]
-struct Facts {
+struct ReportInputs {
     strategy: String,
     width: u32,
     height: u32,

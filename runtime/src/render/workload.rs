@@ -10,6 +10,7 @@ use crate::kernels::modules::Kernel;
 use crate::kernels::stages::StageId;
 use crate::kernels::state;
 use crate::render::status::Status;
+use crate::wgsl::ShaderPart;
 use crate::world::World;
 use crate::world::needs::{Need, Needs};
 
@@ -18,15 +19,16 @@ const TRIANGLE_BYTES: u64 = 48;
 /// The bytes that a hit reads of the buffers of vertices, if materials ask for them.
 const VERTEX_BYTES: [(&str, u64); 2] = [("vertex_normals", 16), ("vertex_uvs", 24)];
 
-/// The part of a workload that is known before anything is rendered.
+/// The part of a workload that is known before anything is rendered of a world whose kernels read `surface`.
 pub(crate) fn before_rendering(
     world: &World,
+    surface: &ShaderPart,
     materials: &[MaterialInfo],
     layout: &Layout,
     pool: u32,
 ) -> Workload {
     let unbound = &world.parts.unbound;
-    let geometry = geometry_bytes(world, materials);
+    let geometry = geometry_bytes(surface, materials);
     let hits = |(index, material): (usize, &MaterialInfo)| Hits {
         material: material.name.clone(),
         on_surface: !unbound.contains(&index),
@@ -54,8 +56,8 @@ fn traffic(needs: Needs, material: &MaterialInfo) -> [u64; 2] {
 }
 
 /// Bytes of the triangle that was hit, as far as some material asks for it.
-fn geometry_bytes(world: &World, materials: &[MaterialInfo]) -> u64 {
-    let has = |name: &str| world.parts.surface.buffers.iter().any(|b| b.name == name);
+fn geometry_bytes(surface: &ShaderPart, materials: &[MaterialInfo]) -> u64 {
+    let has = |name: &str| surface.buffers.iter().any(|b| b.name == name);
     let asked = |name: &str| match name {
         "vertex_normals" => materials.iter().any(|m| m.inputs.normal),
         _ => materials.iter().any(|m| m.inputs.uv || m.inputs.tangent),

@@ -20,12 +20,10 @@ use super::textures::Textures;
 use super::{LIMIT, lower};
 use crate::film::{self, Sums};
 use crate::gpu::resources::run_words;
-use crate::kernels::layout::Layout;
-use crate::kernels::modules::{Composer, Sizes};
+use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
-use crate::kernels::random::{self, Demand};
 use crate::options::RenderOptions;
-use crate::render::settings;
+use crate::render::{Makings, settings};
 use crate::technique::{Regeneration, Sampler, Technique};
 use crate::wgsl::BufferData;
 use crate::world::{MaterialSource, World};
@@ -117,39 +115,25 @@ impl<'p> Replayer<'p> {
                 most: MAX_PIXELS,
             });
         }
-        let (materials, instances) = (source.infos(), source.instances());
-        let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
-        let plan = Plan::mega(&names, &world.parts.unbound);
         let technique = Technique {
             sampler,
             regeneration: Regeneration::Never,
             ..Technique::default()
         };
-        let layout = Layout::new(world, &materials, &plan, &technique)?;
-        // Nothing is forced: what is needed is what numbers are drawn for.
-        let demand = Demand::of(world, layout.needs);
-        let tables: Vec<BufferData> = source.tables().iter().map(BufferData::from).collect();
-        let composer = Composer {
-            world,
-            source,
-            materials: &materials,
-            instances: &instances,
-            tables: &tables,
-            plan: &plan,
-            layout,
-            // One slot, one thread.
-            sizes: Sizes {
-                pool: 1,
-                workgroup: 1,
-                threads: 1,
-                fetch_limit: 1,
-                row_groups: 1,
-            },
-            technique,
-            queue_table: false,
-            subgroup_size: 1,
-            random: random::part(sampler, demand),
+        let makings = Makings::new(1, world, source, technique)?;
+        let materials = makings.materials.iter();
+        let names: Vec<String> = materials.map(|m| m.name.clone()).collect();
+        let plan = Plan::mega(&names, &world.parts.unbound);
+        let layout = makings.layout(&plan)?;
+        // One slot, one thread.
+        let sizes = Sizes {
+            pool: 1,
+            workgroup: 1,
+            threads: 1,
+            fetch_limit: 1,
+            row_groups: 1,
         };
+        let composer = makings.composer(&plan, layout, sizes);
         let kernels = composer.recipes().into_iter().enumerate();
         let mega = kernels.rev().find(|(_, recipe)| recipe.form.is_some());
         let (index, recipe) = mega.ok_or_else(|| lower::unsupported("megakernel", "main"))?;
@@ -162,7 +146,8 @@ impl<'p> Replayer<'p> {
             )
         };
         let of = |material: usize| names.get(material).cloned().unwrap_or_default();
-        let instances = instances.iter().map(|i| (i.name.clone(), of(i.material)));
+        let instances = composer.instances.iter();
+        let instances = instances.map(|i| (i.name.clone(), of(i.material)));
         Ok(Self {
             module,
             info,

@@ -1,7 +1,8 @@
-//! WGSL text that the host writes: literals here, conditional lines in `text`, and pieces with the
-//! buffers that they read in `part`.
+//! WGSL text that the host writes: literals here, files with conditional lines in `template`, and pieces
+//! with the buffers that they read in `part`.
 
 mod part;
+pub(crate) mod template;
 pub(crate) mod text;
 
 pub use part::{BufferData, ShaderPart};

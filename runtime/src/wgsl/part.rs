@@ -5,6 +5,8 @@
 //! the buffers of the parts that the kernel includes. What a scene lacks is absent from both
 //! text and buffers, so a kernel pays for what it uses.
 
+use std::sync::Arc;
+
 use impasto_compiler::abi::Table;
 
 /// Contents of one read-only storage buffer.
@@ -17,8 +19,8 @@ pub struct BufferData {
     pub name: &'static str,
     /// Its WGSL type, such as `array<vec4<u32>>`.
     pub wgsl_type: &'static str,
-    /// The contents; never empty, and a multiple of the element's size.
-    pub bytes: Vec<u8>,
+    /// The contents, which clones share; never empty, and a multiple of the element's size.
+    pub bytes: Arc<[u8]>,
 }
 
 impl BufferData {
@@ -31,34 +33,21 @@ impl BufferData {
         Self {
             name,
             wgsl_type,
-            bytes: bytemuck::cast_slice(values).to_vec(),
+            bytes: bytemuck::cast_slice(values).into(),
         }
     }
 }
 
 impl BufferData {
-    /// The same without its contents.
-    pub(crate) fn text(&self) -> Self {
-        Self {
-            bytes: Vec::new(),
-            ..*self
-        }
+    /// Forgets the contents.
+    pub(crate) fn drop_contents(&mut self) {
+        self.bytes = Arc::default();
     }
 }
 
 impl From<&Table> for BufferData {
     fn from(table: &Table) -> Self {
         Self::new(table.name, table.wgsl_type, &table.words)
-    }
-}
-
-impl ShaderPart {
-    /// The same without the contents of buffers, for composing kernels that read what is uploaded.
-    pub(crate) fn text(&self) -> Self {
-        Self {
-            wgsl: self.wgsl.clone(),
-            buffers: self.buffers.iter().map(BufferData::text).collect(),
-        }
     }
 }
 

@@ -1,34 +1,6 @@
-//! Small tools on WGSL text: conditional lines, predicates, and who mentions whom.
-//!
-//! A line `#if NAME`, `#else` or `#endif` in a kernel file keeps or drops the lines between,
-//! so that what a scene does not need is absent from its kernels.
+//! Small tools on WGSL text: predicates, what an entry point comes to, and who mentions whom.
 
 use std::collections::BTreeMap;
-
-/// A name of `#if` lines, and whether it is set.
-pub(crate) type Flag = (&'static str, bool);
-
-/// `text` with conditional lines resolved by `flags`. A name that is no flag counts as unset;
-/// the lines that then miss make validation fail.
-pub(crate) fn preprocess(text: &str, flags: &[(&str, bool)]) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut open: Vec<bool> = Vec::new();
-    for line in text.lines() {
-        if let Some(name) = line.strip_prefix("#if ") {
-            open.push(flags.iter().any(|(flag, set)| *flag == name && *set));
-        } else if line == "#else" {
-            if let Some(last) = open.last_mut() {
-                *last = !*last;
-            }
-        } else if line == "#endif" {
-            open.pop();
-        } else if open.iter().all(|kept| *kept) {
-            out.push_str(line);
-            out.push('\n');
-        }
-    }
-    out
-}
 
 /// `text` without what its entry point does not come to: functions, structures, constants and variables,
 /// each with the comment above it, and headings of what is left out whole. Items begin at the
@@ -166,15 +138,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn conditional_lines_nest() {
-        let text = "a\n#if x\nb\n#if y\nc\n#else\nd\n#endif\n#endif\ne\n";
-        let with = |x, y| preprocess(text, &[("x", x), ("y", y)]);
-        assert_eq!(with(true, true), "a\nb\nc\ne\n");
-        assert_eq!(with(true, false), "a\nb\nd\ne\n");
-        assert_eq!(with(false, true), "a\ne\n");
-    }
-
-    #[test]
     fn predicates_look_up_what_differs() {
         let none = predicate("p", &[0, 1, 2], |_| false);
         assert_eq!(none, "fn p(instance: u32) -> bool { return false; }\n");
@@ -205,17 +168,5 @@ mod tests {
     fn mentions_are_whole_identifiers() {
         assert!(mentions("state[0]", "state"));
         assert!(!mentions("my_state[0] + states", "state"));
-    }
-
-    #[test]
-    fn a_kernel_file_balances_its_conditions() {
-        for entry in std::fs::read_dir("src/kernels").expect("the folder of kernels") {
-            let path = entry.expect("an entry").path();
-            let Ok(text) = std::fs::read_to_string(&path) else {
-                continue;
-            };
-            let count = |start: &str| text.lines().filter(|l| l.starts_with(start)).count();
-            assert_eq!(count("#if "), count("#endif"), "{}", path.display());
-        }
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::scene::Camera;
-use crate::wgsl::text::preprocess;
+use crate::wgsl::template::template;
 use crate::wgsl::{constant_f32, constant_u32, constant_vec3};
 
 /// A pinhole or thin-lens camera. A ray through the picture at (x, y) in [-1, 1]^2, y up, goes
@@ -52,6 +52,6 @@ impl CameraFrame {
             out += &constant_f32("LENS_RADIUS", self.lens_radius);
             out += &constant_f32("FOCUS_DISTANCE", focus);
         }
-        out + &preprocess(include_str!("camera.wgsl"), &[("lens", lens)])
+        out + &template!("camera.wgsl").wgsl(&[("lens", lens)])
     }
 }

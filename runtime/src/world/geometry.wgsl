@@ -14,8 +14,7 @@ struct Triangle {
     c: vec3<f32>
 }
 
-#if placed
-#else
+#if !placed
 fn triangle_vertices(primitive: u32) -> Triangle {
     return Triangle(
         bitcast<vec3<f32>>(triangles[3u * primitive].xyz),

@@ -14,6 +14,7 @@ use crate::error::SceneError;
 use crate::scene::MAX_NESTED;
 use crate::wgsl::constant_u32;
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::needs::MediaTraits;
 
 /// How many distinct media, and how many priorities, a scene can have: a word's halves hold them.
 const MAX_MEDIA: usize = 0xffff;
@@ -83,6 +84,18 @@ impl Media {
             scatter,
             overlap,
         })
+    }
+}
+
+impl Media {
+    /// What the table of needs has to know.
+    pub(super) fn traits(&self) -> MediaTraits {
+        MediaTraits {
+            followed: self.part.is_some(),
+            absorb: self.absorb,
+            scatter: self.scatter,
+            overlap: self.overlap,
+        }
     }
 }
 

@@ -9,14 +9,14 @@ pub mod camera;
 pub mod first_hit;
 pub mod lights;
 pub mod media;
-pub mod needs;
+pub(crate) mod needs;
 mod parts;
 mod placed;
 mod split;
 pub mod surface;
 pub mod texture;
 
-pub use parts::{SceneParts, Sources};
+pub use parts::{KernelParts, SceneParts};
 pub use placed::Placed;
 pub use split::{GeometryCounts, Split};
 
@@ -27,10 +27,8 @@ use impasto_compiler::partition::Plan;
 use crate::error::SceneError;
 use crate::scene::Scene;
 use crate::technique::Technique;
-use crate::wgsl::ShaderPart;
 use crate::world::camera::CameraFrame;
-use crate::world::media::Media;
-use crate::world::needs::{Facts, Needs};
+use crate::world::needs::{Decision, NeedInputs, Needs};
 
 /// A scene as the kernels see it.
 #[derive(Clone, Debug)]
@@ -85,58 +83,54 @@ impl World {
     ) -> Result<Self, SceneError> {
         lights::check(scene, instances)?;
         let (width, height) = (scene.film.width, scene.film.height);
-        let world = Self {
+        Ok(Self {
             width,
             height,
             camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
             parts: SceneParts::build(scene, materials, instances, textures, technique)?,
-        };
-        let needs = world.needs(materials, technique);
-        Ok(world.specialised(needs))
+        })
     }
 }
 
 impl World {
-    /// What it needs in a wavefront, and what the technique adds to that.
-    fn needs(&self, materials: &[MaterialInfo], technique: &Technique) -> Needs {
-        let facts = Facts {
-            world: self,
+    /// What decides which kernels it needs with these materials.
+    pub(crate) fn need_inputs<'m>(
+        &self,
+        materials: &'m [MaterialInfo],
+        technique: &Technique,
+    ) -> NeedInputs<'m> {
+        NeedInputs {
+            lights: self.parts.lights.traits(),
+            media: self.parts.media.traits(),
+            surface: self.parts.surface.traits(),
+            lens: self.camera.lens_radius > 0.0,
+            max_depth: self.max_depth,
+            roulette_start: self.roulette_start,
             materials,
-            technique,
-            wavefront: true,
-        };
-        let natural = Needs::of(&facts, Needs::default());
-        Needs::of(&facts, Needs::forced(technique.features, natural))
+            ray_order: technique.ray_order,
+            ray_data: technique.ray_data,
+        }
     }
 
-    /// The world with the texts that some needs ask for.
-    pub(crate) fn specialised(mut self, needs: Needs) -> Self {
-        self.parts.specialise(needs);
-        self
+    /// What it needs with these materials, and what the technique adds to that.
+    pub(crate) fn decide(&self, materials: &[MaterialInfo], technique: &Technique) -> Decision {
+        let inputs = self.need_inputs(materials, technique);
+        Decision::of(&inputs, |natural| {
+            Needs::forced(technique.features, natural)
+        })
     }
 
-    /// All that kernels are composed of, without the contents of buffers.
-    pub(crate) fn texts(&self) -> World {
-        let parts = &self.parts;
+    /// The parts that its kernels are composed of with these materials.
+    pub fn kernel_parts(&self, materials: &[MaterialInfo], technique: &Technique) -> KernelParts {
+        self.parts.written(self.decide(materials, technique).needs)
+    }
+
+    /// The same without the contents of buffers, for composing kernels that read what is uploaded already.
+    pub(crate) fn without_contents(&self) -> World {
         World {
-            parts: SceneParts {
-                geometry: parts.geometry.text(),
-                bvh: parts.bvh.text(),
-                surface: parts.surface.text(),
-                lights: parts.lights.text(),
-                media: Media {
-                    part: parts.media.part.as_ref().map(ShaderPart::text),
-                    of_instance: Vec::new(),
-                    ..parts.media
-                },
-                texture: parts.texture.as_ref().map(ShaderPart::text),
-                unbound: parts.unbound.clone(),
-                facts: parts.facts.clone(),
-                sources: parts.sources.as_ref().map(Sources::text),
-                ..*parts
-            },
+            parts: self.parts.without_contents(),
             ..*self
         }
     }

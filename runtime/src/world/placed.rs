@@ -4,15 +4,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::split::Split;
-use super::surface::{offset_constants, pack_normals};
+use super::surface::{Corners, GEOMETRY, normals_buffer, uvs_buffer};
 use crate::error::SceneError;
 use crate::scene::{Mesh, NO_MATERIAL, Placement, Transform};
 use crate::technique::Traversal;
 use crate::wgsl;
-use crate::wgsl::text::preprocess;
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::bvh::{Levels, ObjectTree};
 use crate::world::lights::NO_LIGHT;
@@ -93,14 +92,11 @@ impl<'s> Placed<'s> {
     /// table of each triangle of the world, `media` the word of each instance's medium, or
     /// nothing where paths follow none.
     pub fn geometry_part(&self, lights: &[u32], media: &[u32]) -> ShaderPart {
-        let flags = [("placed", true)];
-        let text = include_str!("geometry.wgsl");
-        let placed = include_str!("geometry_placed.wgsl");
         let table = MaterialTable::new(&self.placements);
         ShaderPart {
             wgsl: wgsl::constant_u32("BLOCK_SHIFT", self.blocks.shift)
-                + &preprocess(text, &flags)
-                + &preprocess(placed, &flags),
+                + &GEOMETRY.wgsl(&[("placed", true)])
+                + include_str!("geometry_placed.wgsl"),
             buffers: vec![
                 self.triangles(lights),
                 self.rows(&table),
@@ -110,46 +106,38 @@ impl<'s> Placed<'s> {
         }
     }
 
-    /// `hit_position` and the other functions of a hit. Texture coordinates are left out unless
-    /// `reads_uv`. Needs the geometry part.
-    pub fn surface_part(&self, reads_uv: bool) -> ShaderPart {
-        let flags = [("placed", true)];
-        let mut part = ShaderPart {
-            wgsl: offset_constants(self.bounds) + include_str!("surface.wgsl"),
-            buffers: Vec::new(),
+    /// What corners have beside positions; texture coordinates are left out unless materials read them.
+    pub(super) fn corners(&self, reads_uv: bool) -> Corners {
+        let any = |has: fn(&Mesh) -> bool| self.meshes.iter().any(|mesh| has(mesh));
+        let normals = || {
+            let of_triangle = self.gather(|mesh, t| mesh.normals.get(t).copied().flatten());
+            normals_buffer(of_triangle)
         };
-        if self.meshes.iter().all(|m| m.normals.is_empty()) {
-            part.wgsl += include_str!("surface_flat.wgsl");
-        } else {
-            let text = include_str!("surface_smooth.wgsl");
-            part.wgsl += &preprocess(text, &flags);
-            let rows = self.gather(|mesh, t| pack_normals(mesh.normals.get(t).copied().flatten()));
-            part.buffers
-                .push(BufferData::new("vertex_normals", "array<vec4<u32>>", &rows));
+        let uvs = || {
+            let of_triangle = self.gather(|mesh, t| mesh.uvs.get(t).copied().unwrap_or_default());
+            uvs_buffer(of_triangle)
+        };
+        Corners {
+            bounds: self.bounds,
+            origin: DVec3::ZERO,
+            placed: true,
+            triangles: self.gather(|_, _| ()).count(),
+            normals: any(|m| !m.normals.is_empty()).then(normals),
+            uvs: (reads_uv && any(|m| !m.uvs.is_empty())).then(uvs),
         }
-        if !reads_uv || self.meshes.iter().all(|m| m.uvs.is_empty()) {
-            part.wgsl += include_str!("surface_no_uv.wgsl");
-        } else {
-            part.wgsl += &preprocess(include_str!("surface_uv.wgsl"), &flags);
-            let rows: Vec<[Vec2; 3]> =
-                self.gather(|mesh, t| mesh.uvs.get(t).copied().unwrap_or_default());
-            part.buffers
-                .push(BufferData::new("vertex_uvs", "array<vec2<f32>>", &rows));
-        }
-        part
     }
 
     /// Something of every triangle, in the order of all.
-    fn gather<T>(&self, of: impl Fn(&Mesh, usize) -> T) -> Vec<T> {
+    fn gather<T>(&self, of: impl Fn(&Mesh, usize) -> T) -> impl Iterator<Item = T> {
         let objects = self.meshes.iter().zip(self.levels.objects());
         let each = objects.flat_map(|(mesh, tree)| tree.order.iter().map(|&t| (*mesh, t as usize)));
-        each.map(|(mesh, triangle)| of(mesh, triangle)).collect()
+        each.map(move |(mesh, triangle)| of(mesh, triangle))
     }
 
     fn triangles(&self, lights: &[u32]) -> BufferData {
         let nothing = self.placements.first().map_or(0, |p| p.materials.len()) as u32;
         let world = self.meshes.first().filter(|_| self.has_world);
-        let rows: Vec<[[u32; 4]; 3]> = self.gather(|mesh, t| {
+        let rows = self.gather(|mesh, t| {
             let at_home = world.is_some_and(|world| std::ptr::eq(*world, mesh));
             let light = if at_home { lights[t] } else { NO_LIGHT };
             let material = match mesh.materials[t] {
@@ -163,6 +151,7 @@ impl<'s> Placed<'s> {
                 [x, y, z, extra[k]]
             })
         });
+        let rows: Vec<[[u32; 4]; 3]> = rows.collect();
         BufferData::new("triangles", "array<vec4<u32>>", &rows)
     }
 

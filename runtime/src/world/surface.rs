@@ -1,12 +1,16 @@
 //! The shader parts that read triangles: `geometry` (what every other part needs) and `surface`
 //! (what materials see of a hit).
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::scene::Mesh;
 use crate::wgsl;
-use crate::wgsl::text::preprocess;
+use crate::wgsl::template::{Template, template};
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::needs::{Need, Needs, SurfaceTraits};
+
+/// Triangles, where they are or placed.
+pub(super) const GEOMETRY: Template = template!("geometry.wgsl");
 
 /// How far rays start off the surface they leave, relative to the largest coordinate of the
 /// point: 16 to 32 units in its last place. Four is too little for rays that graze a flat mesh.
@@ -35,56 +39,192 @@ pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) 
         .collect();
     let triangles = BufferData::new("triangles", "array<vec4<u32>>", &rows);
     ShaderPart {
-        wgsl: preprocess(include_str!("geometry.wgsl"), &[]),
+        wgsl: GEOMETRY.wgsl(&[("placed", false)]),
         buffers: vec![triangles],
     }
 }
 
-/// `hit_position` and the other functions of a hit, for the triangles of `mesh` in `order`.
-/// Texture coordinates are left out unless `reads_uv`. Needs the geometry part.
-pub fn surface_part(mesh: &Mesh, order: &[u32], reads_uv: bool) -> ShaderPart {
-    let mut part = ShaderPart {
-        wgsl: offset_constants(mesh.bounds()) + include_str!("surface.wgsl"),
+/// What kernels ask of hits, of which each scene needs a part.
+#[derive(Clone, Debug)]
+pub enum Surface {
+    /// A scene's corners, of which text is written once it is known what of them materials read.
+    OfScene(Corners),
+    /// A text by hand, which is taken as it is.
+    ByHand(ShaderPart),
+}
+
+/// What the corners of a scene's triangles have.
+#[derive(Clone, Debug)]
+pub struct Corners {
+    /// The corners of a box around everything.
+    pub(super) bounds: [Vec3; 2],
+    /// What coordinates are counted from.
+    pub(super) origin: DVec3,
+    /// Are there objects that are placed?
+    pub(super) placed: bool,
+    pub(super) triangles: usize,
+    /// Absent if no corner has any.
+    pub(super) normals: Option<BufferData>,
+    /// The same; absent as well if no material reads any.
+    pub(super) uvs: Option<BufferData>,
+}
+
+/// What corners may have beside positions.
+struct Attribute {
+    buffer: &'static str,
+    wgsl_type: &'static str,
+    /// Bytes a triangle.
+    bytes: usize,
+    functions: Template,
+}
+
+const NORMALS: Attribute = Attribute {
+    buffer: "vertex_normals",
+    wgsl_type: "array<vec4<u32>>",
+    bytes: 16,
+    functions: template!("surface_smooth.wgsl"),
+};
+
+const UVS: Attribute = Attribute {
+    buffer: "vertex_uvs",
+    wgsl_type: "array<vec2<f32>>",
+    bytes: 24,
+    functions: template!("surface_uv.wgsl"),
+};
+
+impl Attribute {
+    /// The buffer of three values for each of some triangles.
+    fn buffer<T: bytemuck::NoUninit>(&self, triangles: &[T]) -> BufferData {
+        BufferData::new(self.buffer, self.wgsl_type, triangles)
+    }
+
+    /// The same where no corner has any.
+    fn nothing(&self, triangles: usize) -> BufferData {
+        self.buffer(&vec![0u8; self.bytes * triangles])
+    }
+}
+
+/// Vertex normals, three a triangle.
+pub(super) fn normals_buffer(triangles: impl Iterator<Item = Option<[Vec3; 3]>>) -> BufferData {
+    let rows: Vec<[u32; 4]> = triangles.map(pack_normals).collect();
+    NORMALS.buffer(&rows)
+}
+
+/// Texture coordinates, three a triangle.
+pub(super) fn uvs_buffer(triangles: impl Iterator<Item = [Vec2; 3]>) -> BufferData {
+    let rows: Vec<[Vec2; 3]> = triangles.collect();
+    UVS.buffer(&rows)
+}
+
+impl Corners {
+    /// Of the triangles of `mesh` in `order`; texture coordinates are left out unless materials read them.
+    pub(super) fn of_mesh(mesh: &Mesh, order: &[u32], reads_uv: bool) -> Self {
+        let in_order = || order.iter().map(|index| *index as usize);
+        let normals = || normals_buffer(in_order().map(|i| mesh.normals[i]));
+        let uvs = || uvs_buffer(in_order().map(|i| mesh.uvs[i]));
+        Self {
+            bounds: mesh.bounds(),
+            origin: DVec3::ZERO,
+            placed: false,
+            triangles: order.len(),
+            normals: (!mesh.normals.is_empty()).then(normals),
+            uvs: (reads_uv && !mesh.uvs.is_empty()).then(uvs),
+        }
+    }
+
+    /// The functions of a hit that `needs` asks for. Corners without what they are asked for have zeros.
+    fn written(&self, needs: Needs) -> ShaderPart {
+        let ShaderPart { mut wgsl, .. } = positions_part(self.bounds);
+        if needs.has(Need::Moved) {
+            wgsl += &in_world(self.origin);
+        }
+        let any_uvs = [Need::Uvs, Need::Tangents, Need::UvWidths];
+        let mut read = Vec::new();
+        for (is_read, attribute, values) in [
+            (needs.has(Need::Normals), NORMALS, &self.normals),
+            (needs.any(&any_uvs), UVS, &self.uvs),
+        ] {
+            if is_read {
+                wgsl += &attribute.functions.wgsl(&[("placed", self.placed)]);
+                read.push((attribute, values));
+            }
+        }
+        // What there is comes first.
+        read.sort_by_key(|(_, values)| values.is_none());
+        let buffer = |(attribute, values): (Attribute, &Option<BufferData>)| {
+            let nothing = || attribute.nothing(self.triangles);
+            values.clone().unwrap_or_else(nothing)
+        };
+        ShaderPart {
+            wgsl,
+            buffers: read.into_iter().map(buffer).collect(),
+        }
+    }
+}
+
+impl Surface {
+    /// The part with the functions that `needs` asks for. Needs the geometry part.
+    pub(super) fn written(&self, needs: Needs) -> ShaderPart {
+        match self {
+            Surface::OfScene(corners) => corners.written(needs),
+            Surface::ByHand(part) => part.clone(),
+        }
+    }
+
+    /// What the table of needs has to know; of what is written by hand the worst is assumed.
+    pub(super) fn traits(&self) -> SurfaceTraits {
+        match self {
+            Surface::OfScene(corners) => SurfaceTraits {
+                normals: corners.normals.is_some(),
+                uvs: corners.uvs.is_some(),
+                moved: corners.origin != DVec3::ZERO,
+                placed: corners.placed,
+            },
+            Surface::ByHand(_) => SurfaceTraits {
+                normals: true,
+                uvs: true,
+                moved: false,
+                placed: false,
+            },
+        }
+    }
+
+    /// The buffers that it may read.
+    pub(super) fn buffers_mut(&mut self) -> Vec<&mut BufferData> {
+        match self {
+            Surface::OfScene(Corners { normals, uvs, .. }) => {
+                normals.iter_mut().chain(uvs).collect()
+            }
+            Surface::ByHand(part) => part.buffers.iter_mut().collect(),
+        }
+    }
+}
+
+/// `hit_position`, `hit_geometric_normal` and `offset_origin`, which every scene needs, in a scene between two
+/// corners. Needs the geometry part.
+pub fn positions_part(bounds: [Vec3; 2]) -> ShaderPart {
+    ShaderPart {
+        wgsl: offset_constants(bounds) + include_str!("surface.wgsl"),
         buffers: Vec::new(),
-    };
-    if mesh.normals.is_empty() {
-        part.wgsl += include_str!("surface_flat.wgsl");
-    } else {
-        part.wgsl += &preprocess(include_str!("surface_smooth.wgsl"), &[]);
-        part.buffers.push(normals_buffer(mesh, order));
     }
-    if mesh.uvs.is_empty() || !reads_uv {
-        part.wgsl += include_str!("surface_no_uv.wgsl");
-    } else {
-        part.wgsl += &preprocess(include_str!("surface_uv.wgsl"), &[]);
-        part.buffers.push(uvs_buffer(mesh, order));
-    }
-    part
+}
+
+/// The place in the world of a place in the scene's own coordinates.
+fn in_world(origin: DVec3) -> String {
+    wgsl::constant_vec3("WORLD_ORIGIN", origin.as_vec3())
+        + "\nfn in_world(position: vec3<f32>) -> vec3<f32> {\n    return position + WORLD_ORIGIN;\n}\n"
 }
 
 /// What `offset_origin` moves rays by, in a scene between two corners.
-pub(super) fn offset_constants([low, high]: [Vec3; 2]) -> String {
+fn offset_constants([low, high]: [Vec3; 2]) -> String {
     let largest = low.abs().max(high.abs()).max_element();
     // The floor is positive even for a scene that is all zeros, so that it is an offset.
     let floor = (largest * OFFSET_FLOOR).max(f32::MIN_POSITIVE);
     wgsl::constant_f32("ORIGIN_OFFSET", OFFSET) + &wgsl::constant_f32("ORIGIN_OFFSET_FLOOR", floor)
 }
 
-fn normals_buffer(mesh: &Mesh, order: &[u32]) -> BufferData {
-    let rows = order
-        .iter()
-        .map(|&i| pack_normals(mesh.normals[i as usize]));
-    let rows: Vec<[u32; 4]> = rows.collect();
-    BufferData::new("vertex_normals", "array<vec4<u32>>", &rows)
-}
-
-fn uvs_buffer(mesh: &Mesh, order: &[u32]) -> BufferData {
-    let rows: Vec<[Vec2; 3]> = order.iter().map(|&i| mesh.uvs[i as usize]).collect();
-    BufferData::new("vertex_uvs", "array<vec2<f32>>", &rows)
-}
-
 /// Three vertex normals, and whether there are any.
-pub(super) fn pack_normals(normals: Option<[Vec3; 3]>) -> [u32; 4] {
+fn pack_normals(normals: Option<[Vec3; 3]>) -> [u32; 4] {
     match normals {
         Some([a, b, c]) => [pack_normal(a), pack_normal(b), pack_normal(c), 1],
         None => [0; 4],

@@ -8,6 +8,7 @@ use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Sampler, Technique};
 use impasto_runtime::trace::{End, MaterialCode, Replayer};
+use impasto_runtime::world::lights::Lights;
 
 /// One wall of each kind of wrong material, and what is wrong with it: the value, and whether that is
 /// below zero.
@@ -201,7 +202,9 @@ fn radiance_that_is_no_light_is_counted_where_it_would_be_added() {
             }
             .scattering()
             .world();
-            let lights = &mut world.parts.lights;
+            let Lights::ByHand { part: lights, .. } = &mut world.parts.lights else {
+                panic!("they are written by hand");
+            };
             let wrong = format!("(3.0 + direction.x) * {radiance:e}");
             lights.wgsl = lights.wgsl.replace("weight * SKY", &wrong);
             let plan = plan(strategy, &surfaces);

@@ -3,6 +3,7 @@
 use crate::gpu::stub::{Kind, Room, materials, red, render, samples};
 use impasto_runtime::render::Rendering;
 use impasto_runtime::wgsl::BufferData;
+use impasto_runtime::world::lights::Lights;
 
 /// Every path sees the sky at once, so that every sample is `value` exactly.
 fn sky(value: f32, count: u32) -> Rendering {
@@ -14,7 +15,9 @@ fn sky(value: f32, count: u32) -> Rendering {
     }
     .scattering()
     .world();
-    let lights = &mut world.parts.lights;
+    let Lights::ByHand { part: lights, .. } = &mut world.parts.lights else {
+        panic!("they are written by hand");
+    };
     lights.wgsl = lights.wgsl.replace("weight * SKY", "sky_value[0]");
     lights
         .buffers

@@ -11,8 +11,9 @@ use impasto_runtime::wgsl::{BufferData, ShaderPart};
 use impasto_runtime::world::GeometryCounts;
 use impasto_runtime::world::SceneParts;
 use impasto_runtime::world::camera::CameraFrame;
+use impasto_runtime::world::lights::Lights;
 use impasto_runtime::world::media::Media;
-use impasto_runtime::world::needs::facts::SceneFacts;
+use impasto_runtime::world::surface;
 use impasto_runtime::world::{MaterialSource, World};
 use std::ops::ControlFlow;
 
@@ -290,14 +291,14 @@ impl Planes {
                     buffers: vec![BufferData::new("planes", "array<vec4<u32>>", &rows)],
                 },
                 bvh: text(count + TRAVERSAL),
-                moved: false,
-                surface: text(SURFACE.to_string()),
-                lights: text(constants + LIGHTS),
+                surface: surface::Surface::ByHand(text(SURFACE.to_string())),
+                lights: Lights::ByHand {
+                    part: text(constants + LIGHTS),
+                    sampled: self.light != Light::None,
+                    weighted: true,
+                },
                 media,
                 texture: None,
-                has_sampled_lights: self.light != Light::None,
-                facts: SceneFacts::by_hand(true),
-                sources: None,
                 counts: GeometryCounts::default(),
                 unbound: Vec::new(),
             },

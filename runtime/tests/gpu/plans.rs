@@ -11,6 +11,7 @@ use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
 use impasto_runtime::render::report::{Report, TimeSource};
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::technique::{Append, Choice, RayData, RayOrder};
+use impasto_runtime::world::surface::Surface;
 
 pub fn room() -> Room {
     Room {
@@ -524,7 +525,10 @@ fn invalid_material_code_is_an_error_with_its_place() {
     let mut world = room().world();
     let begin = "fn hit_position(primitive: u32, uv: vec2<f32>) -> vec3<f32> {";
     let broken = format!("{begin} let broken: u32 = 1.5;");
-    world.parts.surface.wgsl = world.parts.surface.wgsl.replace(begin, &broken);
+    let Surface::ByHand(surface) = &mut world.parts.surface else {
+        panic!("it is written by hand");
+    };
+    surface.wgsl = surface.wgsl.replace(begin, &broken);
     let surfaces = surfaces();
     let plan = plan(Strategy::OWN, &surfaces);
     match Renderer::from_world(gpu(), &world, &surfaces, &plan, &samples(1)) {

@@ -15,8 +15,9 @@ use impasto_runtime::wgsl::{BufferData, ShaderPart};
 use impasto_runtime::world::GeometryCounts;
 use impasto_runtime::world::SceneParts;
 use impasto_runtime::world::camera::CameraFrame;
+use impasto_runtime::world::lights::Lights;
 use impasto_runtime::world::media::Media;
-use impasto_runtime::world::needs::facts::SceneFacts;
+use impasto_runtime::world::surface::Surface;
 use impasto_runtime::world::{MaterialSource, World};
 
 pub fn gpu() -> &'static Gpu {
@@ -412,14 +413,14 @@ impl Room {
                 },
                 bvh: text(geometry + TRAVERSAL),
                 bounds: [Vec3::NEG_ONE, Vec3::ONE],
-                moved: false,
-                surface: text(SURFACE.to_string()),
-                lights: text(constants + LIGHTS),
+                surface: Surface::ByHand(text(SURFACE.to_string())),
+                lights: Lights::ByHand {
+                    part: text(constants + LIGHTS),
+                    sampled: self.strategies != Strategies::Scattering,
+                    weighted: self.strategies == Strategies::Both,
+                },
                 media: Media::default(),
                 texture: None,
-                has_sampled_lights: self.strategies != Strategies::Scattering,
-                facts: SceneFacts::by_hand(self.strategies == Strategies::Both),
-                sources: None,
                 counts: GeometryCounts::default(),
                 unbound: self.unbound.clone(),
             },

@@ -8,8 +8,9 @@ use impasto_runtime::scene::{
     Light, Mesh, NO_MATERIAL, QuadLight, Scene,
 };
 use impasto_runtime::technique::Technique;
-use impasto_runtime::world::SceneParts;
+use impasto_runtime::world::KernelParts;
 
+use super::worlds::kernel_parts;
 use super::{Random, Row, floats, row, run};
 
 /// A scene without light, of one triangle far below everything.
@@ -249,12 +250,12 @@ pub(crate) fn turned(mut scene: Scene, degrees: f32) -> Scene {
     scene
 }
 
-pub(crate) fn parts(scene: &Scene, instances: &[InstanceInfo]) -> SceneParts {
-    SceneParts::build(scene, &[], instances, &[], &Technique::default()).expect("the parts build")
+pub(crate) fn parts(scene: &Scene, instances: &[InstanceInfo]) -> KernelParts {
+    kernel_parts(scene, instances, &Technique::default()).expect("the parts build")
 }
 
 pub(crate) fn evaluate(
-    parts: &SceneParts,
+    parts: &KernelParts,
     body: &str,
     input: &[Row],
     count: usize,
@@ -283,14 +284,14 @@ pub(crate) struct Sample {
     pub(crate) weighted: Vec3,
 }
 
-pub(crate) fn sample(parts: &SceneParts, position: Vec3, count: usize, seed: u64) -> Vec<Sample> {
+pub(crate) fn sample(parts: &KernelParts, position: Vec3, count: usize, seed: u64) -> Vec<Sample> {
     let mut random = Random::new(seed);
     let numbers: Vec<Row> = (0..count).map(|_| [(); 4].map(|_| random.bits())).collect();
     sample_with(parts, position, &numbers)
 }
 
 /// One sample for each row of random bits.
-pub(crate) fn sample_with(parts: &SceneParts, position: Vec3, numbers: &[Row]) -> Vec<Sample> {
+pub(crate) fn sample_with(parts: &KernelParts, position: Vec3, numbers: &[Row]) -> Vec<Sample> {
     let count = numbers.len();
     let mut input = vec![row(position.extend(0.0).to_array())];
     input.extend(numbers);
@@ -335,7 +336,7 @@ const EMISSION: &str = "
 
 /// Moves the functions before `//body` out of the body.
 pub(crate) fn split_body(
-    parts: &SceneParts,
+    parts: &KernelParts,
     body: &str,
     input: &[Row],
     count: usize,
@@ -349,7 +350,7 @@ pub(crate) fn split_body(
 
 /// What rays from `position` along `directions` meet, weighted against `bsdf_pdf`.
 pub(crate) fn met(
-    parts: &SceneParts,
+    parts: &KernelParts,
     position: Vec3,
     directions: &[Vec3],
     bsdf_pdf: f32,

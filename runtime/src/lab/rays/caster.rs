@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::technique::{Leaves, RayFetch, Technique};
 use crate::wgsl;
 use crate::wgsl::ShaderPart;
-use crate::wgsl::text::preprocess;
+use crate::wgsl::template::template;
 use crate::world::bvh::{self, Bvh};
 use crate::world::surface::geometry_part;
 
@@ -156,7 +156,7 @@ impl<'g> Caster<'g> {
         ]);
         text.extend(self.parts.iter().map(|part| part.wgsl.as_str()));
         let flags = [("any_hit", any_hit), ("fetched", persistent)];
-        text += &preprocess(include_str!("../../kernels/rays.wgsl"), &flags);
+        text += &template!("../../kernels/rays.wgsl").wgsl(&flags);
         text += &self.shell(sizes.fetch_limit);
         crate::gpu::shader::validate("rays", &text)?;
         let layout = self.layout();

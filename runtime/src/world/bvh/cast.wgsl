@@ -92,8 +92,7 @@ fn begin_walk(
     start_nodes(&walk, root);
     return walk;
 }
-#if placed
-#else
+#if !placed
 
 // Tests the next of walk.leaves, of which there must be one.
 fn visit_triangle(walk: ptr<function, Walk>) {

@@ -12,13 +12,13 @@ var<private> own_stack: array<Group, BVH_STACK_SIZE - STACK_SHARED>;
 #endif
 
 fn store_stack(at: u32, group: Group) {
-#if shared
-#if own
+#if shared && own
     if at >= STACK_SHARED {
         own_stack[at - STACK_SHARED] = group;
         return;
     }
 #endif
+#if shared
     shared_stack[at * WORKGROUP_SIZE + walk_lane] = group;
 #else
     own_stack[at] = group;
@@ -26,12 +26,12 @@ fn store_stack(at: u32, group: Group) {
 }
 
 fn load_stack(at: u32) -> Group {
-#if shared
-#if own
+#if shared && own
     if at >= STACK_SHARED {
         return own_stack[at - STACK_SHARED];
     }
 #endif
+#if shared
     return shared_stack[at * WORKGROUP_SIZE + walk_lane];
 #else
     return own_stack[at];

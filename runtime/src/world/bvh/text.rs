@@ -5,7 +5,8 @@ use std::fmt::Write;
 use crate::technique::{Stack, Technique, Traversal};
 use crate::wgsl;
 use crate::wgsl::ShaderPart;
-use crate::wgsl::text::{mentions, preprocess};
+use crate::wgsl::template::template;
+use crate::wgsl::text::mentions;
 
 /// How much slabs are widened, relative to the terms of a plane's distance: 16 units in the last
 /// place. The builder rounds exponents by up to 11 of them (through `log2`), the kernel by 2.
@@ -32,17 +33,17 @@ pub(super) fn casts(
         ("placed", placed),
     ];
     let nodes = if binary {
-        include_str!("binary.wgsl")
+        template!("binary.wgsl")
     } else {
-        include_str!("wide.wgsl")
+        template!("wide.wgsl")
     };
     let mut out = wgsl::constant_u32("BVH_ROOT", root) + &wgsl::constant_f32("BVH_SLACK", SLACK);
-    out += &preprocess(include_str!("cast.wgsl"), &flags);
+    out += &template!("cast.wgsl").wgsl(&flags);
     out += include_str!("triangle.wgsl");
     if placed {
-        out += &preprocess(include_str!("placed.wgsl"), &flags);
+        out += &template!("placed.wgsl").wgsl(&flags);
     }
-    out += &preprocess(nodes, &flags);
+    out += &nodes.wgsl(&flags);
     out += &match stack {
         Stack::Trail => trail(if binary { 1 } else { 8 }, depth),
         Stack::Private => array(depth, 0),
@@ -72,7 +73,7 @@ fn array(size: usize, shared: usize) -> String {
     let flags = [("shared", shared > 0), ("own", shared < size)];
     wgsl::constant_u32("BVH_STACK_SIZE", size as u32)
         + &wgsl::constant_u32("STACK_SHARED", shared as u32)
-        + &preprocess(include_str!("stack.wgsl"), &flags)
+        + &template!("stack.wgsl").wgsl(&flags)
 }
 
 /// What is left of a stack if `bits` bits a level say what remains to be visited there, and the

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use super::{Context, Kind, Sampled, luminance};
+use super::{Context, Kind, Piece, Sampled, luminance};
 use crate::scene::{DistantLight, Light};
 use crate::wgsl;
+use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
 pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
@@ -63,11 +64,13 @@ pub(super) fn empty(is_disc: bool) -> Kind {
     }
 }
 
-fn text(lights: &[&DistantLight], first: u32) -> String {
-    let mut text = wgsl::constant_u32("FIRST_DISTANT_LIGHT", first)
-        + &wgsl::constant_u32("DISTANT_LIGHTS", lights.len() as u32)
-        + include_str!("distant.wgsl")
-        + "\nfn distant_light(index: u32) -> DistantLight {\n    switch index {\n";
+fn text(lights: &[&DistantLight], first: u32) -> Vec<Piece> {
+    let constants = wgsl::constants_u32(&[
+        ("FIRST_DISTANT_LIGHT", first),
+        ("DISTANT_LIGHTS", lights.len() as u32),
+    ]);
+    let mut text =
+        "\nfn distant_light(index: u32) -> DistantLight {\n    switch index {\n".to_owned();
     for (index, light) in lights.iter().enumerate() {
         let case = match index + 1 == lights.len() {
             true => "default".to_owned(),
@@ -75,7 +78,12 @@ fn text(lights: &[&DistantLight], first: u32) -> String {
         };
         text += &format!("        {case}: {{ return {}; }}\n", literal(light));
     }
-    text + "    }\n}\n"
+    text += "    }\n}\n";
+    vec![
+        Piece::Written(constants),
+        Piece::File(template!("distant.wgsl")),
+        Piece::Written(text),
+    ]
 }
 
 fn literal(light: &DistantLight) -> String {

@@ -9,12 +9,12 @@ struct DistantLight {
 
 fn sample_distant_light(pick: LightPick, position: vec3<f32>) -> LightSample {
     let light = distant_light(pick.light - FIRST_DISTANT_LIGHT);
-#if disc_lights
-#if directional_lights
+#if disc_lights && directional_lights
     if !(light.sine2 > 0.0) {
         return LightSample(light.axis, FAR_AWAY, light.value / pick.probability, 0.0);
     }
 #endif
+#if disc_lights
     // h = (1 - cos theta) / 2 is uniform, and exact where the cosine is all but 1.
     let h = light.sine2 * pick.u.x;
     let sine = 2.0 * sqrt(h * (1.0 - h));

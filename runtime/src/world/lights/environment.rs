@@ -7,10 +7,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::alias::PackedAlias;
-use super::{Context, Kind, Sampled, luminance};
+use super::{Context, Kind, Piece, Sampled, luminance};
 use crate::scene::{Environment, EnvironmentMap, EnvironmentSource};
 use crate::wgsl;
 use crate::wgsl::BufferData;
+use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
 pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
@@ -22,7 +23,7 @@ pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
 }
 
 /// A kind without lights.
-fn without_lights(serves: &'static [Need], wgsl: String) -> Kind {
+fn without_lights(serves: &'static [Need], wgsl: Vec<Piece>) -> Kind {
     Kind {
         serves,
         idle: false,
@@ -42,7 +43,7 @@ fn environment_kind(
     context: &Context,
     (need, what): (&'static [Need; 1], &str),
     irradiance: Option<f64>,
-    wgsl: String,
+    wgsl: Vec<Piece>,
 ) -> Kind {
     let sampled = irradiance.map(|irradiance| Sampled {
         power: irradiance * context.cross_section(),
@@ -74,9 +75,7 @@ pub(super) fn empty_map() -> Kind {
         texels: vec![Vec3::ZERO],
     };
     let table = Importance::new(&map);
-    let text = map_text(&map, 0.0)
-        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", 0)
-        + include_str!("environment_map_sampled.wgsl");
+    let text = sampled_map_text(&map, 0.0, 0);
     Kind {
         buffers: map_buffers(&map, &table),
         ..without_lights(MAP.0, text)
@@ -93,8 +92,10 @@ fn uniform(
         return None;
     }
     if !environment.sample {
-        let text = wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
-            + include_str!("environment_uniform.wgsl");
+        let text = vec![
+            Piece::Written(wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)),
+            Piece::File(template!("environment_uniform.wgsl")),
+        ];
         return Some(environment_kind(context, UNIFORM, None, text));
     }
     let text = uniform_text(radiance, first);
@@ -102,10 +103,13 @@ fn uniform(
     Some(environment_kind(context, UNIFORM, Some(irradiance), text))
 }
 
-fn uniform_text(radiance: Vec3, light: u32) -> String {
-    wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
-        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", light)
-        + include_str!("environment_uniform_sampled.wgsl")
+fn uniform_text(radiance: Vec3, light: u32) -> Vec<Piece> {
+    let constants = wgsl::constant_vec3("ENVIRONMENT_RADIANCE", radiance)
+        + &wgsl::constant_u32("ENVIRONMENT_LIGHT", light);
+    vec![
+        Piece::Written(constants),
+        Piece::File(template!("environment_uniform_sampled.wgsl")),
+    ]
 }
 
 fn mapped(
@@ -118,15 +122,14 @@ fn mapped(
     if table.irradiance <= 0.0 {
         return None;
     }
-    let mut text = map_text(map, environment.rotate);
     if !environment.sample {
-        text += include_str!("environment_map_unsampled.wgsl");
+        let mut text = map_text(map, environment.rotate);
+        text.push(Piece::File(template!("environment_map_unsampled.wgsl")));
         let mut kind = environment_kind(context, MAP, None, text);
         kind.buffers = vec![texel_buffer(map, &[])];
         return Some(kind);
     }
-    text += &wgsl::constant_u32("ENVIRONMENT_LIGHT", first);
-    text += include_str!("environment_map_sampled.wgsl");
+    let text = sampled_map_text(map, environment.rotate, first);
     Some(Kind {
         buffers: map_buffers(map, &table),
         chooses: true,
@@ -135,13 +138,25 @@ fn mapped(
 }
 
 /// What samples of a map and rays that escape have in common; it is turned by `rotate` degrees.
-fn map_text(map: &EnvironmentMap, rotate: f32) -> String {
+fn map_text(map: &EnvironmentMap, rotate: f32) -> Vec<Piece> {
     let (sine, cosine) = f64::from(rotate).to_radians().sin_cos();
-    wgsl::constant_u32("ENVIRONMENT_WIDTH", map.width)
+    let constants = wgsl::constant_u32("ENVIRONMENT_WIDTH", map.width)
         + &wgsl::constant_u32("ENVIRONMENT_HEIGHT", map.height)
         + &wgsl::constant_f32("ENVIRONMENT_SINE", sine as f32)
-        + &wgsl::constant_f32("ENVIRONMENT_COSINE", cosine as f32)
-        + include_str!("environment_map.wgsl")
+        + &wgsl::constant_f32("ENVIRONMENT_COSINE", cosine as f32);
+    vec![
+        Piece::Written(constants),
+        Piece::File(template!("environment_map.wgsl")),
+    ]
+}
+
+/// The same with samples of the map, which is the light of an index.
+fn sampled_map_text(map: &EnvironmentMap, rotate: f32, light: u32) -> Vec<Piece> {
+    let mut text = map_text(map, rotate);
+    let constant = wgsl::constant_u32("ENVIRONMENT_LIGHT", light);
+    text.push(Piece::Written(constant));
+    text.push(Piece::File(template!("environment_map_sampled.wgsl")));
+    text
 }
 
 fn map_buffers(map: &EnvironmentMap, table: &Importance) -> Vec<BufferData> {

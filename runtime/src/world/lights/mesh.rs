@@ -3,7 +3,8 @@
 use glam::Vec3;
 use impasto_compiler::abi::Emission;
 
-use super::{Context, Kind, Sampled, area, luminance};
+use super::{Context, Kind, Piece, Sampled, area, luminance};
+use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
 pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
@@ -48,7 +49,7 @@ pub(super) fn empty() -> Kind {
         idle: false,
         rows: Vec::new(),
         lights: Vec::new(),
-        wgsl: include_str!("mesh.wgsl").to_owned(),
+        wgsl: vec![Piece::File(template!("mesh.wgsl"))],
         buffers: Vec::new(),
         sample: "sample_mesh_light",
         hit: Some("mesh_light_hit"),

@@ -10,11 +10,10 @@ use impasto_compiler::abi::{Emission, InstanceInfo};
 use crate::error::SceneError;
 use crate::scene::{Mesh, Scene};
 use crate::wgsl;
-use crate::wgsl::text::{Flag, preprocess};
+use crate::wgsl::template::{Flag, Template, template};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::media::Media;
-use crate::world::needs::facts::SceneFacts;
-use crate::world::needs::{Need, Needs};
+use crate::world::needs::{LightTraits, Need, Needs};
 
 mod alias;
 mod distant;
@@ -31,47 +30,54 @@ pub const NO_LIGHT: u32 = u32::MAX;
 const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
     [mesh::kind, quad::kind, distant::kind, environment::kind];
 
-/// The lights of a scene.
+/// What lights a scene, of which text is written once it is known what of it is needed.
 #[derive(Clone, Debug)]
-pub struct Lights {
-    /// `sample_light`, `light_hit` and `light_escape`; needs the surface part and [`mis`].
-    pub part: ShaderPart,
-    /// For each triangle of the world its index in the light table, or [`NO_LIGHT`].
-    pub of_triangle: Vec<u32>,
-    /// Can any light be sampled?
-    pub has_sampled: bool,
-    /// What the part is made of.
-    pub(crate) kinds: Kinds,
+pub enum Lights {
+    /// The lights of a scene.
+    OfScene(Kinds),
+    /// A text by hand, which is taken as it is.
+    ByHand {
+        /// `sample_light`, `light_hit` and `light_escape`.
+        part: ShaderPart,
+        /// Can any light be sampled?
+        sampled: bool,
+        /// Can scattered rays find a light that is sampled as well?
+        weighted: bool,
+    },
 }
 
 impl Lights {
-    /// The lights of `scene`, whose triangles in the world are those of `mesh`, the first
-    /// primitives in `order`, and which reaches from corner to corner of `bounds`. Its bindings
-    /// compiled to `instances` with `media`.
-    pub fn build(
-        scene: &Scene,
-        mesh: &Mesh,
-        bounds: [Vec3; 2],
-        order: &[u32],
-        instances: &[InstanceInfo],
-        media: &Media,
-    ) -> Lights {
-        let context = Context::new(scene, mesh, bounds, order, instances, media);
-        let mut kinds = Kinds::default();
-        for kind in KINDS {
-            kinds.0.extend(kind(&context, kinds.count()));
+    /// The part with the functions that `needs` asks for; needs the surface part and [`mis`].
+    pub(super) fn written(&self, needs: Needs) -> ShaderPart {
+        match self {
+            Lights::OfScene(kinds) => kinds.written(needs),
+            Lights::ByHand { part, .. } => part.clone(),
         }
-        let mut of_triangle = vec![NO_LIGHT; mesh.len()];
-        for (index, light) in kinds.0.iter().flat_map(|k| &k.lights).enumerate() {
-            for &triangle in &light.triangles {
-                of_triangle[triangle as usize] = index as u32;
-            }
+    }
+
+    /// What the table of needs has to know; of what is written by hand the worst is assumed.
+    pub(super) fn traits(&self) -> LightTraits {
+        match self {
+            Lights::OfScene(kinds) => kinds.traits(),
+            Lights::ByHand {
+                sampled, weighted, ..
+            } => LightTraits {
+                rows: Vec::new(),
+                sampled: *sampled,
+                weighted: *weighted,
+                far: true,
+                choice: true,
+                hit: true,
+                escape: true,
+            },
         }
-        Lights {
-            part: kinds.part(kinds.possible_needs()),
-            of_triangle,
-            has_sampled: kinds.is_any_sampled(),
-            kinds,
+    }
+
+    /// The buffers that it may read.
+    pub(super) fn buffers_mut(&mut self) -> Vec<&mut BufferData> {
+        match self {
+            Lights::OfScene(kinds) => kinds.0.iter_mut().flat_map(|k| &mut k.buffers).collect(),
+            Lights::ByHand { part, .. } => part.buffers.iter_mut().collect(),
         }
     }
 }
@@ -149,8 +155,8 @@ struct Kind {
     rows: Vec<(Need, String)>,
     /// Those of the light table.
     lights: Vec<Sampled>,
-    /// The kind's functions and constants, with `#if` lines.
-    wgsl: String,
+    /// The kind's functions and constants.
+    wgsl: Vec<Piece>,
     buffers: Vec<BufferData>,
     /// `fn NAME(pick: LightPick, position: vec3<f32>) -> LightSample`
     sample: &'static str,
@@ -161,6 +167,24 @@ struct Kind {
     escape: Option<&'static str>,
     /// Is there more to choose in one of its lights?
     chooses: bool,
+}
+
+/// A piece of a kind's text.
+#[derive(Clone, Debug)]
+enum Piece {
+    /// What the host writes.
+    Written(String),
+    /// A file.
+    File(Template),
+}
+
+impl Piece {
+    fn wgsl(&self, flags: &[Flag]) -> String {
+        match self {
+            Piece::Written(text) => text.clone(),
+            Piece::File(template) => template.wgsl(flags),
+        }
+    }
 }
 
 /// A row of the light table.
@@ -187,6 +211,37 @@ struct Sampled {
 pub struct Kinds(Vec<Kind>);
 
 impl Kinds {
+    /// The lights of `scene`, whose triangles in the world are those of `mesh`, the first
+    /// primitives in `order`, and which reaches from corner to corner of `bounds`. Its bindings
+    /// compiled to `instances` with `media`.
+    pub(super) fn build(
+        scene: &Scene,
+        mesh: &Mesh,
+        bounds: [Vec3; 2],
+        order: &[u32],
+        instances: &[InstanceInfo],
+        media: &Media,
+    ) -> Kinds {
+        let context = Context::new(scene, mesh, bounds, order, instances, media);
+        let mut kinds = Kinds::default();
+        for kind in KINDS {
+            kinds.0.extend(kind(&context, kinds.count()));
+        }
+        kinds
+    }
+
+    /// For each triangle of the world, of which there are `triangles`, its index in the light table, or
+    /// [`NO_LIGHT`].
+    pub(super) fn of_triangle(&self, triangles: usize) -> Vec<u32> {
+        let mut of_triangle = vec![NO_LIGHT; triangles];
+        for (index, light) in self.0.iter().flat_map(|k| &k.lights).enumerate() {
+            for &triangle in &light.triangles {
+                of_triangle[triangle as usize] = index as u32;
+            }
+        }
+        of_triangle
+    }
+
     /// How many lights there are.
     fn count(&self) -> u32 {
         self.0.iter().map(|k| k.lights.len() as u32).sum()
@@ -200,54 +255,28 @@ impl Kinds {
         all.filter(|(_, light)| !light.by_chance)
     }
 
-    fn is_any_sampled(&self) -> bool {
-        self.sampled().next().is_some()
-    }
-
-    /// What the table of needs has to know.
-    pub(crate) fn facts(&self) -> SceneFacts {
+    fn traits(&self) -> LightTraits {
         let chooses = self.sampled().any(|(kind, _)| kind.chooses);
-        SceneFacts {
-            lights: self.0.iter().flat_map(|k| k.rows.clone()).collect(),
+        LightTraits {
+            rows: self.0.iter().flat_map(|k| k.rows.clone()).collect(),
+            sampled: self.sampled().next().is_some(),
             weighted: self.sampled().any(|(_, light)| !light.is_discrete),
             far: self.sampled().any(|(kind, _)| kind.hit.is_none()),
             choice: self.count() > 1 || chooses,
             hit: self.0.iter().any(|k| k.hit.is_some()),
             escape: self.0.iter().any(|k| k.escape.is_some()),
-            ..SceneFacts::default()
         }
-    }
-
-    /// The rows that these lights may need, whatever the materials.
-    fn possible_needs(&self) -> Needs {
-        let rows = self.0.iter().flat_map(|k| &k.rows);
-        let of_kinds = rows.fold(Needs::default(), |needs, (row, _)| needs.with(*row));
-        of_kinds.or(Needs::of_rows(&[
-            Need::Mis,
-            Need::LightChoice,
-            Need::HitLights,
-            Need::EscapeLights,
-        ]))
     }
 
     /// The part with the functions that `needs` asks for. Kinds that it asks for in vain have their code and
     /// no light.
-    pub(crate) fn part(&self, needs: Needs) -> ShaderPart {
+    fn written(&self, needs: Needs) -> ShaderPart {
         let has = |kind: &Kind| self.0.iter().any(|k| k.sample == kind.sample);
         let idle = empty_kinds(needs).into_iter();
         let idle = idle.filter(|k| needs.any(k.serves) && !has(k));
         let idle = idle.map(|kind| Kind { idle: true, ..kind });
         let kinds: Vec<Kind> = self.0.iter().cloned().chain(idle).collect();
         part(&kinds, self.count(), needs)
-    }
-
-    /// The same without the contents of buffers.
-    pub(crate) fn text(&self) -> Self {
-        let text = |kind: &Kind| Kind {
-            buffers: kind.buffers.iter().map(BufferData::text).collect(),
-            ..kind.clone()
-        };
-        Self(self.0.iter().map(text).collect())
     }
 }
 
@@ -265,23 +294,23 @@ fn empty_kinds(needs: Needs) -> [Kind; 5] {
 /// The part of some kinds, which have `count` lights.
 fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
     let flags: Vec<Flag> = needs.flags().collect();
-    let text = |text: &str| preprocess(text, &flags);
     let mut part = ShaderPart {
-        wgsl: text(include_str!("common.wgsl")),
+        wgsl: template!("common.wgsl").wgsl(&flags),
         buffers: Vec::new(),
     };
     let sampled = kinds.iter().flat_map(|k| &k.lights).any(|l| !l.by_chance);
     part.wgsl += &format!("const HAS_SAMPLED_LIGHTS: bool = {sampled};\n");
     if count > 0 || kinds.iter().any(|k| k.idle) {
         part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count.max(1));
-        part.wgsl += &text(include_str!("select.wgsl"));
+        part.wgsl += &template!("select.wgsl").wgsl(&flags);
         part.buffers.push(light_table(kinds));
     }
     if kinds.iter().any(|k| k.hit.is_some()) {
-        part.wgsl += &text(include_str!("area.wgsl"));
+        part.wgsl += &template!("area.wgsl").wgsl(&flags);
     }
     for kind in kinds {
-        part.wgsl += &text(&kind.wgsl);
+        part.wgsl
+            .extend(kind.wgsl.iter().map(|piece| piece.wgsl(&flags)));
         part.buffers.extend(kind.buffers.iter().cloned());
     }
     part.wgsl += &sample_function(kinds);

@@ -1,7 +1,8 @@
 //! Parallelograms that emit and reflect nothing.
 
-use super::{Context, Kind, Sampled, luminance};
+use super::{Context, Kind, Piece, Sampled, luminance};
 use crate::scene::{Light, QuadLight};
+use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
 pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
@@ -35,7 +36,7 @@ pub(super) fn empty() -> Kind {
         idle: false,
         rows: Vec::new(),
         lights: Vec::new(),
-        wgsl: include_str!("quad.wgsl").to_owned(),
+        wgsl: vec![Piece::File(template!("quad.wgsl"))],
         buffers: Vec::new(),
         sample: "sample_quad_light",
         hit: Some("quad_light_hit"),

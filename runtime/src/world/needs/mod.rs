@@ -1,19 +1,21 @@
 //! What must exist for a scene: one table of needs, of which everything else takes its conditions.
 //!
-//! A row of the table is a feature: when a scene has it, and why. State fields, stages, parts
+//! A row of the table is a feature: when a scene has it, and why. The rows are decided once for a world, its
+//! materials and a technique ([`Decision`]), before any text is written. State fields, stages, parts
 //! of WGSL, their `#if` flags and random draws name rows (`When`) and decide nothing themselves; so a scene
 //! pays for what it uses. Rows can be forced, to measure what a scene saves by not having them
 //! ([`crate::audit`]), and to test that they change no picture.
 
 use crate::technique::Features;
-use crate::wgsl::text::Flag;
+use crate::wgsl::template::Flag;
 
-pub mod facts;
+mod decision;
+mod inputs;
+mod table;
 
-pub(crate) mod table;
-
-pub(crate) use facts::Facts;
-pub(crate) use table::{Forcing, Need, OF_MATERIALS, ROWS, Row};
+pub(crate) use decision::Decision;
+pub(crate) use inputs::{LightTraits, MediaTraits, NeedInputs, SurfaceTraits};
+pub(crate) use table::{Forcing, Need, OF_MATERIALS, OF_WAVEFRONTS, ROWS, Row};
 
 /// The rows that are on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,12 +50,12 @@ impl Needs {
         Self(bits)
     }
 
-    /// What a scene needs, and what is `forced` with all that it is built on.
-    pub(crate) fn of(facts: &Facts<'_>, forced: Needs) -> Self {
+    /// What the table says of `inputs`, and what is `forced` with all that it is built on.
+    fn judged(inputs: &NeedInputs<'_>, forced: Needs) -> Self {
         let forced = forced.with_foundations();
         let mut needs = Needs::default();
         for row in &ROWS {
-            if forced.has(row.need) || (row.reason)(facts, needs).is_some() {
+            if forced.has(row.need) || (row.reason)(inputs, needs).is_some() {
                 needs = needs.with(row.need);
             }
         }
@@ -99,6 +101,11 @@ impl Needs {
     /// The rows of either.
     pub(crate) fn or(self, other: Needs) -> Self {
         Self(self.0 | other.0)
+    }
+
+    /// The rows of both.
+    pub(crate) fn and(self, other: Needs) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// The rows of this that another lacks.

@@ -1,6 +1,6 @@
 //! The table of needs: a row for everything that a scene may do without.
 
-use super::{Facts, Needs};
+use super::{NeedInputs, Needs};
 use crate::technique::{RayData, RayOrder};
 
 /// One row.
@@ -15,7 +15,7 @@ pub(crate) struct Row {
     /// When a scene has it, in words.
     pub when: &'static str,
     /// Why this scene has it; `None` if it has not. Rows before it are decided.
-    pub reason: fn(&Facts<'_>, Needs) -> Option<String>,
+    pub reason: fn(&NeedInputs<'_>, Needs) -> Option<String>,
     /// The rows that it cannot be without.
     pub foundations: &'static [Need],
     /// The random numbers that it draws.
@@ -109,36 +109,36 @@ rows! {
     HitLights, "lights that paths run into", "hit_lights",
         "a light has a surface",
         on &[], draws "", Whole, |f, _| {
-            f.world.parts.facts.hit.then(|| "a light has a surface".into())
+            f.lights.hit.then(|| "a light has a surface".into())
         };
     EscapeLights, "light from infinity", "escape_lights",
         "the environment or a disc in the sky is seen by paths that leave the scene",
         on &[], draws "", Whole, |f, _| {
-            f.world.parts.facts.escape.then(|| "there is light beyond the scene".into())
+            f.lights.escape.then(|| "there is light beyond the scene".into())
         };
     // ---- Sampling lights ----
     ShadowRays, "shadow rays", "shadow_rays",
         "a light can be sampled, and paths scatter it by a material that is not discrete only",
         on &[], draws "the point on a light", Whole, |f, _| {
-            let sampled = f.world.parts.has_sampled_lights && f.world.max_depth > 1;
+            let sampled = f.lights.sampled && f.max_depth > 1;
             sampled.then(|| f.material("scatters light that is sampled", |m| !m.delta_only))?
         };
     LightChoice, "choice of a light", "light_choice",
         "lights are sampled, and there is more than one to choose from or a map to choose in",
         on &[ShadowRays], draws "the choice of a light", Whole, |f, n| {
-            let choice = n.has(ShadowRays) && f.world.parts.facts.choice;
+            let choice = n.has(ShadowRays) && f.lights.choice;
             choice.then(|| "there is more than one light to choose from, or a map".into())
         };
     Mis, "multiple importance sampling", "mis",
         "light that is sampled can be found by scattered rays as well",
         on &[ShadowRays], draws "", Whole, |f, n| {
-            let weighted = n.has(ShadowRays) && f.world.parts.facts.weighted;
+            let weighted = n.has(ShadowRays) && f.lights.weighted;
             weighted.then(|| "scattered rays may hit a light that is sampled".into())
         };
     FarLights, "sampled light from infinity", "far_lights",
         "a light at infinity is sampled",
         on &[ShadowRays], draws "", Whole, |f, n| {
-            let far = n.has(ShadowRays) && f.world.parts.facts.far;
+            let far = n.has(ShadowRays) && f.lights.far;
             far.then(|| "a light at infinity is sampled".into())
         };
     UnlitMaterials, "hits without a light sample", "unlit_materials",
@@ -157,23 +157,23 @@ rows! {
     Media, "media", "media",
         "some result depends on the medium that a path is in",
         on &[], draws "", Whole, |f, _| {
-            f.world.parts.media.part.is_some().then(|| "some result depends on what fills an object".into())
+            f.media.followed.then(|| "some result depends on what fills an object".into())
         };
     Absorption, "absorption", "absorption",
         "a medium absorbs or scatters light",
         on &[Media], draws "", Whole, |f, _| {
-            f.world.parts.media.absorb.then(|| "a medium absorbs or scatters light".into())
+            f.media.absorb.then(|| "a medium absorbs or scatters light".into())
         };
     Scattering, "media that scatter", "scattering",
         "a medium scatters light",
         on &[Media, Absorption], draws "",
         Never("it would need a table of media that scatter"), |f, _| {
-            f.world.parts.media.scatter.then(|| "a medium scatters light".into())
+            f.media.scatter.then(|| "a medium scatters light".into())
         };
     Overlap, "overlapping media", "overlap",
         "media differ in priority",
         on &[Media], draws "", Whole, |f, _| {
-            f.world.parts.media.overlap.then(|| "media differ in priority".into())
+            f.media.overlap.then(|| "media differ in priority".into())
         };
     MediumChanges, "paths that change their medium", "changes_medium",
         "paths follow media, and a material with an interior lets them cross",
@@ -199,37 +199,37 @@ rows! {
     Moved, "an origin of the scene's own", "moved",
         "coordinates are counted from nearby, and a material reads `position`",
         on &[Position], draws "", Never("the scene lies where it lies"), |f, n| {
-            let moved = f.world.parts.moved && n.has(Position);
+            let moved = f.surface.moved && n.has(Position);
             moved.then(|| "coordinates are counted from nearby".into())
         };
     Normals, "vertex normals", "normals",
         "corners have normals, and a material reads `normal`",
         on &[], draws "", Whole, |f, _| {
-            let any = f.world.parts.facts.normals;
+            let any = f.surface.normals;
             any.then(|| f.reads("`normal`, and corners have some", |i| i.normal))?
         };
     Uvs, "texture coordinates", "uvs",
         "corners have texture coordinates, and a material reads `uv`",
         on &[], draws "", Whole, |f, _| {
-            let any = f.world.parts.facts.uvs;
+            let any = f.surface.uvs;
             any.then(|| f.reads("`uv`, and corners have some", |i| i.uv))?
         };
     Tangents, "tangents", "tangents",
         "corners have texture coordinates, and a material reads `tangent`",
         on &[], draws "", Whole, |f, _| {
-            let any = f.world.parts.facts.uvs;
+            let any = f.surface.uvs;
             any.then(|| f.reads("`tangent`, and corners have coordinates", |i| i.tangent))?
         };
     RayCones, "ray cones", "ray_cones",
         "a material asks for the `filter_width` of what varies",
         on &[], draws "", Whole, |f, _| {
-            let any = f.world.parts.facts.uvs;
+            let any = f.surface.uvs;
             f.reads("how wide it is seen", |i| i.footprint || any && i.footprint_uv)
         };
     UvWidths, "widths of texture coordinates", "uv_widths",
         "corners have texture coordinates, and a material asks for the `filter_width` of `uv`",
         on &[RayCones], draws "", Whole, |f, _| {
-            let any = f.world.parts.facts.uvs;
+            let any = f.surface.uvs;
             any.then(|| f.reads("how wide it sees `uv`, and corners have some", |i| i.footprint_uv))?
         };
     Textures, "textures", "textures",
@@ -246,19 +246,19 @@ rows! {
     Roulette, "Russian roulette", "roulette",
         "paths are long enough to be ended at random",
         on &[], draws "whether a path goes on", Whole, |f, n| {
-            let last = f.world.max_depth + u32::from(n.has(VaryingEmission));
-            let start = f.world.roulette_start;
+            let last = f.max_depth + u32::from(n.has(VaryingEmission));
+            let start = f.roulette_start;
             (start < last).then(|| format!("paths may end from segment {start} on"))
         };
     Lens, "lens", "lens",
         "the camera has an aperture",
         on &[], draws "the point on the lens", Whole, |f, _| {
-            (f.world.camera.lens_radius > 0.0).then(|| "the camera has an aperture".into())
+            f.lens.then(|| "the camera has an aperture".into())
         };
     Placements, "placed objects", "placements",
         "objects are repeated often enough to be stored once",
         on &[], draws "", Never("the scene's objects are repeated or not"), |f, _| {
-            f.world.parts.facts.placed.then(|| "objects are placed more than once".into())
+            f.surface.placed.then(|| "objects are placed more than once".into())
         };
     // ---- Techniques ----
     SomePixels, "some pixels only", "some_pixels",
@@ -267,14 +267,14 @@ rows! {
     Order, "rays in an order of their own", "order",
         "`--ray-order` asks for it",
         on &[], draws "", ASKED, |f, _| {
-            let asked = f.wavefront && f.technique.ray_order != RayOrder::Queue;
+            let asked = f.ray_order != RayOrder::Queue;
             asked.then(|| "`--ray-order` asks for it".into())
         };
     // Rays that are ordered, cross hidden boundaries or scatter on their way belong to a slot.
     Requests, "rays in buffers of their own", "requests",
         "`--ray-data requests` asks for it, and rays neither have an order nor cross hidden boundaries nor scatter on their way",
         on &[], draws "", ASKED, |f, n| {
-            let asked = f.wavefront && f.technique.ray_data == RayData::Requests;
+            let asked = f.ray_data == RayData::Requests;
             let possible = !n.any(&[Order, Overlap, Scattering]);
             (asked && possible).then(|| "`--ray-data requests` asks for it".into())
         };
@@ -294,3 +294,6 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
     Textures,
     LobeChoice,
 ]);
+
+/// The rows of a wavefront, that a megakernel has never.
+pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests]);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec3};
 use impasto_runtime::scene::{EnvironmentMap, EnvironmentSource, Scene};
-use impasto_runtime::world::SceneParts;
+use impasto_runtime::world::KernelParts;
 
 use crate::record::{Bound, Row, effort};
 use crate::support::light_scenes::{
@@ -58,7 +58,7 @@ fn vectors(inputs: &[Vec3]) -> Vec<Words> {
         .collect()
 }
 
-fn ask(parts: &SceneParts, body: &str, input: &[Words], rows: usize) -> Vec<[f64; 4]> {
+fn ask(parts: &KernelParts, body: &str, input: &[Words], rows: usize) -> Vec<[f64; 4]> {
     let answers = evaluate(parts, body, input, input.len(), rows * input.len());
     answers
         .into_iter()
