@@ -1,4 +1,4 @@
-//! Where an OBJ file is placed: the transform of a `[[geometry]]` entry, and its `placements`,
+//! Where a geometry file is placed: the transform of a `[[geometry]]` entry, and its `placements`,
 //! listed in the scene or in a file of their own. `docs/scenes.md` describes both.
 
 use std::path::Path;
@@ -19,7 +19,7 @@ const SINGULAR: &str = "flattens what it places";
 const SINGULAR_HINT: &str =
     "no direction may be scaled to nothing, or a million times less than another";
 
-/// Where an OBJ file is placed, relative to its entry.
+/// Where a geometry file is placed, relative to its entry.
 #[derive(Default)]
 pub(super) struct Places {
     pub(super) list: Vec<Place>,
