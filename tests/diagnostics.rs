@@ -167,7 +167,7 @@ fn request(name: &str, source: &str) -> Option<MaterialRequest> {
     let params = directives.iter().filter_map(|d| d.strip_prefix("param "));
     let params = params.map(|param| {
         let (name, value) = param.split_once('=').expect("//@ param NAME = VALUE");
-        (name.trim().to_owned(), value.trim().to_owned())
+        (name.trim().to_owned(), value.trim().into())
     });
     let material = directives.iter().find_map(|d| d.strip_prefix("material "));
     (!directives.is_empty()).then(|| MaterialRequest {

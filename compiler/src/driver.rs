@@ -6,6 +6,7 @@ use crate::build::{ProgramBuilder, Setting};
 use crate::diag::{self, Code, Diagnostic};
 use crate::ir::{self, Module};
 use crate::loader::Loader;
+use crate::parameter_value::ParameterValue;
 use crate::passes::MaterialState;
 use crate::program::Program;
 use crate::sema::Checker;
@@ -14,7 +15,7 @@ use crate::stages::{Progress, Stage};
 use crate::{ast, codegen};
 
 /// A material to compile: which, under what name, with which parameters.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRequest {
     /// What the scene calls it.
     pub name: String,
@@ -22,8 +23,8 @@ pub struct MaterialRequest {
     pub file: String,
     /// Which material of the file; its only one when absent.
     pub material: Option<String>,
-    /// Parameters that differ from their defaults: name, and value as source text.
-    pub params: Vec<(String, String)>,
+    /// Parameters that differ from their defaults.
+    pub params: Vec<(String, ParameterValue)>,
     /// Where the values of parameters go.
     pub parameters: Parameters,
 }

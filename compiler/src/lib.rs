@@ -34,6 +34,7 @@ pub mod ir;
 pub mod lexer;
 mod loader;
 pub mod oracle;
+mod parameter_value;
 pub mod parameters;
 pub mod parser;
 pub mod partition;
@@ -49,4 +50,5 @@ pub use driver::{
     compile_with_progress,
 };
 pub use loader::{Loader, MemoryLoader, library_text};
+pub use parameter_value::ParameterValue;
 pub use program::Program;

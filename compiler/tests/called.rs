@@ -52,7 +52,7 @@ fn user(text: &str) -> Asked {
 
 /// The model as a scene names it, with parameters set to constants.
 fn model(params: &[(&str, &str)]) -> Asked {
-    let params = params.iter().map(|(n, v)| (n.to_string(), v.to_string()));
+    let params = params.iter().map(|(n, v)| (n.to_string(), (*v).into()));
     let request = MaterialRequest {
         params: params.collect(),
         parameters: Parameters::Baked,

@@ -10,7 +10,7 @@ fn compiled(text: &str, params: &[(&str, &str)]) -> Program {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", text);
     let mut request = MaterialRequest::new("m", "m.impasto");
-    let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
+    let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).into());
     request.params = params.iter().map(owned).collect();
     let compilation = compile(&[request], &mut files);
     let problems = diag::render::text(&compilation.sources, &compilation.diagnostics, false);

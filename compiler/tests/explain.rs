@@ -16,7 +16,11 @@ fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
     files.add(FILE, example.bytes());
     let checked = check(FILE, &mut files);
     let request = MaterialRequest {
-        params: example.params.clone(),
+        params: example
+            .params
+            .iter()
+            .map(|(n, v)| (n.clone(), v.as_str().into()))
+            .collect(),
         ..MaterialRequest::new("example", FILE)
     };
     if code != Code::NoMaterial && example.params.is_empty() {

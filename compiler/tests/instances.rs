@@ -29,7 +29,7 @@ material lamp {
 /// A request with parameters written as `name = value; name = value`.
 fn request(name: &str, file: &str, params: &str) -> MaterialRequest {
     let pairs = params.split(';').filter_map(|p| p.split_once('='));
-    let pairs = pairs.map(|(n, v)| (n.trim().to_owned(), v.trim().to_owned()));
+    let pairs = pairs.map(|(n, v)| (n.trim().to_owned(), v.trim().into()));
     MaterialRequest {
         params: pairs.collect(),
         ..MaterialRequest::new(name, file)

@@ -116,7 +116,7 @@ fn what_instances_differ_in_is_decided_when_it_runs() {
     let request = |name: &str, way: &str, picture: &str| MaterialRequest {
         params: vec![
             ("way".into(), way.into()),
-            ("picture".into(), format!("{picture:?}")),
+            ("picture".into(), format!("{picture:?}").into()),
         ],
         ..MaterialRequest::new(name, "m.impasto")
     };

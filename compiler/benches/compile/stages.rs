@@ -111,7 +111,7 @@ impl Case {
             false => format!("{}/{}", env!("CARGO_MANIFEST_DIR"), self.file),
         };
         let mut request = MaterialRequest::new("m", file);
-        let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
+        let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).into());
         request.params = self.params.iter().map(owned).collect();
         if self.table {
             request.parameters = Parameters::Table;

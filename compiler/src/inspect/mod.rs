@@ -419,7 +419,9 @@ fn material(
         file: query.file.clone(),
         material: Some(name.to_owned()),
         params: if own {
-            query.params.clone()
+            let given = query.params.iter();
+            let text = |(name, text): &(String, String)| (name.clone(), text.as_str().into());
+            given.map(text).collect()
         } else {
             Vec::new()
         },

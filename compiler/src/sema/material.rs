@@ -1,15 +1,13 @@
 //! Checking materials: parameters, patterns and outputs.
 
-use crate::ast::{self, Expr, ItemKind};
+use crate::ast::{self, ItemKind};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::build::{Builder, const_type};
-use crate::ir::{self, Const, ExprKind, Material, MaterialParam, Type};
-use crate::parser;
+use crate::ir::build::Builder;
+use crate::ir::{self, ExprKind, Material, Type};
 
 use super::body::{Binding, Body, Operand, Place};
 use super::called::{self, Declared, MaterialSignature, Origin};
 use super::modules::{ItemRef, ModuleId, list};
-use super::types::{NAMED, Ty};
 use super::{Checker, expr};
 
 impl Checker<'_> {
@@ -115,99 +113,6 @@ impl Checker<'_> {
         })
     }
 
-    /// The values of a material's parameters: defaults, and what a scene sets as source text.
-    /// `origin` names the scene's setting in diagnostics.
-    pub fn parameter_values(
-        &mut self,
-        module: ModuleId,
-        material: &Material,
-        given: &[(String, String)],
-        origin: &str,
-    ) -> Option<Vec<Const>> {
-        let mut values: Vec<Const> = material.params.iter().map(|p| p.default.clone()).collect();
-        let mut ok = true;
-        for (name, text) in given {
-            let Some(index) = material.params.iter().position(|p| p.name == *name) else {
-                if self.only_callers_give(module, material, name, origin) {
-                    ok = false;
-                    continue;
-                }
-                let names: Vec<&str> = material.params.iter().map(|p| p.name.as_str()).collect();
-                let message = format!(
-                    "{origin}: material `{}` has no parameter `{name}`",
-                    material.name
-                );
-                let unknown = Diagnostic::without_span(Code::UnknownParameter, message)
-                    .expected(if names.is_empty() {
-                        "no parameters".into()
-                    } else {
-                        format!("one of {}", list(names.iter().copied()))
-                    })
-                    .did_you_mean(name, names);
-                self.report(unknown);
-                ok = false;
-                continue;
-            };
-            match self.parameter_value(module, &material.params[index], text, origin) {
-                Some(value) => values[index] = value,
-                None => ok = false,
-            }
-        }
-        ok.then_some(values)
-    }
-
-    /// Reports a setting of a parameter that is an input, if `name` is one.
-    fn only_callers_give(
-        &mut self,
-        module: ModuleId,
-        material: &Material,
-        name: &str,
-        origin: &str,
-    ) -> bool {
-        let ast = self.ast(module);
-        let item = ast.items.iter().find(|i| i.span == material.span);
-        let Some(ItemKind::Material(declared)) = item.map(|i| &i.kind) else {
-            return false;
-        };
-        let Some(p) = declared.params.iter().find(|p| p.name.node == name) else {
-            return false;
-        };
-        let message = format!(
-            "{origin}: `{name}` of `{}` is an input of the surface, which a scene cannot set",
-            material.name
-        );
-        let wrong = Diagnostic::new(Code::UnknownParameter, p.span, message)
-            .expected("parameters whose default is a constant")
-            .hint("call the material from another one, with an argument for it");
-        self.report(wrong);
-        true
-    }
-
-    fn parameter_value(
-        &mut self,
-        module: ModuleId,
-        param: &MaterialParam,
-        text: &str,
-        origin: &str,
-    ) -> Option<Const> {
-        let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
-        let file = self
-            .sources
-            .add(format!("{origin}, parameter {}", param.name), text);
-        let (expr, diagnostics) = parser::parse_expression(file, text);
-        diagnostics.into_iter().for_each(|d| self.report(d));
-        let expr = expr?;
-        if let (ast::ExprKind::Str(path), Ty::Texture) = (&expr.kind, ty) {
-            // A scene names files relative to itself; the runtime resolves them.
-            return Some(Const::Int(self.texture("", path)));
-        }
-        let expr = retyped(expr, param.surface_type);
-        let value = self.constant(module, &expr, *ty, &format!("`{}`", param.name))?;
-        debug_assert_eq!(const_type(&value), param.ty);
-        self.in_range(param, &value, expr.span, "the value")
-            .then_some(value)
-    }
-
     /// The index of the image file `path`, relative to `folder`.
     pub(super) fn texture(&mut self, folder: &str, path: &str) -> i32 {
         let path = if path.starts_with('/') {
@@ -222,17 +127,6 @@ impl Checker<'_> {
         });
         index as i32
     }
-}
-
-/// A scene writes any three numbers as `color(...)`: call it what the parameter is.
-fn retyped(mut expr: Expr, ty: &str) -> Expr {
-    if let ast::ExprKind::Call { callee, .. } = &mut expr.kind
-        && callee.node == "color"
-        && matches!(ty, "vec3" | "point" | "vector" | "normal")
-    {
-        callee.node = ty.to_owned();
-    }
-    expr
 }
 
 impl Body<'_, '_> {

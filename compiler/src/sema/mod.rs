@@ -22,6 +22,7 @@ mod constant;
 mod convert;
 mod expr;
 mod filter;
+mod given;
 mod gradient;
 mod imports;
 mod inline;

@@ -12,7 +12,7 @@ pub fn compilation(text: &str, params: &[(&str, &str)]) -> Compilation {
     files.add("m.impasto", text);
     let params = params
         .iter()
-        .map(|(n, v)| ((*n).to_owned(), (*v).to_owned()))
+        .map(|(n, v)| ((*n).to_owned(), (*v).into()))
         .collect();
     let request = MaterialRequest {
         params,

@@ -142,7 +142,7 @@ fn instances(text: &str, name: &str, values: &[&str]) -> Program {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", text);
     let request = |value: &&str| MaterialRequest {
-        params: vec![(name.to_owned(), (*value).to_owned())],
+        params: vec![(name.to_owned(), (*value).into())],
         ..MaterialRequest::new(*value, "m.impasto")
     };
     let requests: Vec<MaterialRequest> = values.iter().map(request).collect();

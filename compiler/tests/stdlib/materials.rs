@@ -34,7 +34,7 @@ fn program(file: &str, loader: &mut dyn Loader) -> Program {
 /// The program of a file's material with values for its parameters.
 fn program_with(file: &str, params: Vec<(String, String)>, loader: &mut dyn Loader) -> Program {
     let request = MaterialRequest {
-        params,
+        params: params.into_iter().map(|(n, v)| (n, v.into())).collect(),
         ..MaterialRequest::new("m", file)
     };
     let compiled = compile(&[request], loader);

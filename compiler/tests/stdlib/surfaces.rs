@@ -78,7 +78,10 @@ pub fn set(name: &str, params: &[Setting]) -> Program {
     let mut files = MemoryLoader::default();
     files.add("model.impasto", text);
     let request = MaterialRequest {
-        params: params.to_vec(),
+        params: params
+            .iter()
+            .map(|(n, v)| (n.clone(), v.as_str().into()))
+            .collect(),
         parameters: Parameters::Baked,
         ..MaterialRequest::new("m", "model.impasto")
     };

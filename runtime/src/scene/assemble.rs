@@ -1,4 +1,4 @@
-//! From entries and OBJ files to what a scene consists of: triangles in the world, and objects
+//! From entries and geometry files to what a scene consists of: triangles in the world, and objects
 //! with their placements. Both give the same picture; this file decides which is which.
 
 use std::collections::BTreeMap;
@@ -10,14 +10,15 @@ use glam::DVec3;
 use super::MAX_TRIANGLES;
 use super::bindings::Bindings;
 use super::description::{Description, GeometrySpec};
+use super::formats::{self, Format};
 use super::load::Source;
-use super::mesh::{MAX_COORDINATE, Oddities};
+use super::mesh::{MAX_COORDINATE, Repairs};
 use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
 use super::{Light, MaterialBinding, Mesh, Object, Placement, Transform};
 use crate::error::SceneError;
 
-/// Copies of an OBJ file are shared if that saves so many triangles. Below, one level of
+/// Copies of a geometry file are shared if that saves so many triangles. Below, one level of
 /// hierarchy is faster than two (docs/measurements.md), and memory no concern.
 const SHARE_FROM: usize = 1 << 20;
 
@@ -34,14 +35,15 @@ pub(super) struct Assembled {
 }
 
 /// Puts together what `description` of the scene at `path` says of `sources`, by the names that
-/// its entries use.
+/// its entries use. `formats` are those that geometry can have.
 pub(super) fn assemble(
     path: &Path,
-    base: &Path,
+    formats: &[Format],
     description: &Description,
     sources: &BTreeMap<String, Source>,
     warnings: &mut Vec<String>,
 ) -> Result<Assembled, SceneError> {
+    let base = path.parent().unwrap_or(Path::new(""));
     let files = place_files(base, &description.geometry)?;
     let entries: Vec<Entry> = description
         .geometry
@@ -49,7 +51,7 @@ pub(super) fn assemble(
         .zip(&files)
         .map(|(spec, file)| Entry {
             spec,
-            source: &sources[&spec.obj],
+            source: &sources[&spec.file],
             places: match (&spec.places, file) {
                 (PlacesSpec::Listed(places), _) | (_, Some(places)) => places,
                 (PlacesSpec::File(_), None) => &NOWHERE,
@@ -58,6 +60,7 @@ pub(super) fn assemble(
         .collect();
     let mut assembly = Assembly {
         path,
+        formats,
         bindings: Bindings::new(&description.materials),
         copies: copies(&entries),
         origin: origin(&entries, description),
@@ -91,8 +94,8 @@ fn origin(entries: &[Entry], description: &Description) -> DVec3 {
     } in entries
     {
         let of_file = extents
-            .entry(&spec.obj)
-            .or_insert_with(|| Extent::of(&source.obj));
+            .entry(&spec.file)
+            .or_insert_with(|| Extent::of(&source.geometry));
         for place in &places.list {
             all.add_placed(of_file, &spec.transform.then(&place.transform));
         }
@@ -118,16 +121,16 @@ static NOWHERE: Places = Places {
 
 /// An entry with the files that it names.
 struct Entry<'d> {
-    spec: &'d GeometrySpec,
-    source: &'d Source,
+    spec: &'d GeometrySpec<'d>,
+    source: &'d Source<'d>,
     places: &'d Places,
 }
 
-/// How often each OBJ file is placed by entries that leave the choice to us.
+/// How often each geometry file is placed by entries that leave the choice to us.
 fn copies<'d>(entries: &[Entry<'d>]) -> BTreeMap<&'d str, usize> {
     let mut copies = BTreeMap::new();
     for entry in entries.iter().filter(|e| e.spec.share.is_none()) {
-        *copies.entry(entry.spec.obj.as_str()).or_default() += entry.places.list.len();
+        *copies.entry(entry.spec.file.as_str()).or_default() += entry.places.list.len();
     }
     copies
 }
@@ -135,10 +138,11 @@ fn copies<'d>(entries: &[Entry<'d>]) -> BTreeMap<&'d str, usize> {
 /// A scene that grows by entries.
 struct Assembly<'d, 'w> {
     path: &'d Path,
+    formats: &'d [Format],
     bindings: Bindings<'d>,
     copies: BTreeMap<&'d str, usize>,
     origin: DVec3,
-    /// Where the coordinates of each object count from, in its OBJ file.
+    /// Where the coordinates of each object count from, in its geometry file.
     object_origins: Vec<DVec3>,
     mesh: Mesh,
     objects: Vec<Object>,
@@ -149,21 +153,22 @@ struct Assembly<'d, 'w> {
 impl<'d> Assembly<'d, '_> {
     fn push(&mut self, entry: &Entry<'d>) -> Result<(), SceneError> {
         let materials = self.materials(entry)?;
-        let oddities = match self.is_shared(entry) {
-            true => self.place(entry, &materials)?,
-            false => self.copy(entry, &materials)?,
+        let repairs = if self.is_shared(entry) {
+            self.place(entry, &materials)?
+        } else {
+            self.copy(entry, &materials)?
         };
-        self.warn(entry, oddities);
+        self.warn(entry, repairs);
         if self.stored() > MAX_TRIANGLES {
-            return Err(too_many_triangles(self.path));
+            return Err(self.too_many_triangles());
         }
         Ok(())
     }
 
     fn is_shared(&self, entry: &Entry) -> bool {
-        let copies = self.copies.get(entry.spec.obj.as_str()).copied();
+        let copies = self.copies.get(entry.spec.file.as_str()).copied();
         let saved = copies.unwrap_or(0).saturating_sub(1) as u64;
-        let triangles = entry.source.obj.triangles.len() as u64;
+        let triangles = entry.source.geometry.triangles.len() as u64;
         let is_worth_it = saved * triangles >= SHARE_FROM as u64;
         entry.spec.share.unwrap_or(is_worth_it)
     }
@@ -189,11 +194,7 @@ impl<'d> Assembly<'d, '_> {
             }
             let own = place.material.map(|index| &places.materials[index]);
             let name = own.or(spec.material.as_ref());
-            let (path, obj) = (&source.path, &source.obj);
-            let list = self
-                .bindings
-                .resolve(path, name, &obj.materials, &source.library)?;
-            let list: Arc<[u32]> = list.into();
+            let list: Arc<[u32]> = self.bindings.resolve(source, name)?.into();
             known.insert(place.material, Arc::clone(&list));
             each.push(list);
         }
@@ -201,34 +202,32 @@ impl<'d> Assembly<'d, '_> {
     }
 
     /// Adds the triangles of every place to those in the world.
-    fn copy(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Oddities, SceneError> {
-        let Source { path, obj, .. } = entry.source;
+    fn copy(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Repairs, SceneError> {
+        let Source { path, geometry, .. } = entry.source;
         let copies = entry.places.list.len();
-        let total = (copies as u64).saturating_mul(obj.triangles.len() as u64);
+        let total = (copies as u64).saturating_mul(geometry.triangles.len() as u64);
         if total > MAX_TRIANGLES as u64 {
-            return Err(too_many_triangles(self.path));
+            return Err(self.too_many_triangles());
         }
-        let mut oddities = Oddities::default();
+        let mut repairs = Repairs::default();
         for (place, materials) in entry.places.list.iter().zip(materials) {
             let transform = self.transform(entry, &place.transform)?;
-            let found = self
-                .mesh
-                .push_obj(path, obj, &transform, self.origin, materials)?;
-            oddities.without_area += found.without_area;
-            oddities.turned += found.turned;
+            repairs +=
+                self.mesh
+                    .push_geometry(path, geometry, &transform, self.origin, materials)?;
         }
-        Ok(oddities)
+        Ok(repairs)
     }
 
     /// Places the entry's object.
-    fn place(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Oddities, SceneError> {
-        let (object, oddities) = self.object(entry)?;
+    fn place(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Repairs, SceneError> {
+        let (object, repairs) = self.object(entry)?;
         if self.placements.len() + materials.len() > placements::MAX_PLACEMENTS {
             return Err(placements::too_many(self.path));
         }
         let mesh = &self.objects[object as usize].mesh;
         if mesh.is_empty() {
-            return Ok(oddities);
+            return Ok(repairs);
         }
         let corners = mesh.positions.iter().flatten();
         let largest = corners.fold(0.0f32, |m, p| m.max(p.abs().max_element()));
@@ -249,55 +248,55 @@ impl<'d> Assembly<'d, '_> {
                 materials: Arc::clone(materials),
             });
         }
-        Ok(oddities)
+        Ok(repairs)
     }
 
-    /// The object of the entry's OBJ file, and what is strange about it if it is new.
-    fn object(&mut self, entry: &Entry) -> Result<(u32, Oddities), SceneError> {
-        let name = &entry.spec.obj;
+    /// The object of the entry's geometry file, and what was done to it if it is new.
+    fn object(&mut self, entry: &Entry) -> Result<(u32, Repairs), SceneError> {
+        let name = &entry.spec.file;
         if let Some(known) = self.objects.iter().position(|o| o.name == *name) {
-            return Ok((known as u32, Oddities::default()));
+            return Ok((known as u32, Repairs::default()));
         }
-        let Source { path, obj, .. } = entry.source;
-        let slots: Vec<u32> = (0..obj.materials.len() as u32).collect();
+        let Source { path, geometry, .. } = entry.source;
+        let slots: Vec<u32> = (0..geometry.materials.len() as u32).collect();
         let mut mesh = Mesh::default();
-        let at = origin::of(&Extent::of(obj));
-        let oddities = mesh.push_obj(path, obj, &Transform::default(), at, &slots)?;
+        let at = origin::of(&Extent::of(geometry));
+        let repairs = mesh.push_geometry(path, geometry, &Transform::default(), at, &slots)?;
         mesh.simplify();
         let name = name.clone();
         self.objects.push(Object { name, mesh });
         self.object_origins.push(at);
-        Ok((self.objects.len() as u32 - 1, oddities))
+        Ok((self.objects.len() as u32 - 1, repairs))
     }
 
-    /// From the OBJ file to the world.
+    /// From the geometry file to the world.
     fn transform(&self, entry: &Entry, place: &Transform) -> Result<Transform, SceneError> {
         let transform = entry.spec.transform.then(place);
         if transform.is_invertible() {
             return Ok(transform);
         }
-        let obj = &entry.spec.obj;
-        let message = format!("the transforms of `{obj}` and of its placement flatten it together");
+        let file = &entry.spec.file;
+        let message =
+            format!("the transforms of `{file}` and of its placement flatten it together");
         Err(SceneError::in_file(self.path, message).hint("scale less unevenly"))
     }
 
-    fn warn(&mut self, entry: &Entry, oddities: Oddities) {
-        let Entry { spec, source, .. } = entry;
+    fn warn(&mut self, entry: &Entry, repairs: Repairs) {
+        let file = &entry.spec.file;
+        let geometry = &entry.source.geometry;
         let mut counted = |what: &str, count: usize| {
             if count > 0 {
-                self.warnings.push(format!("{}: {what}: {count}", spec.obj));
+                self.warnings.push(format!("{file}: {what}: {count}"));
             }
         };
-        counted("triangles without area, left out", oddities.without_area);
+        counted("triangles without area, left out", repairs.degenerate);
         counted(
             "triangles wound against their normals, turned over",
-            oddities.turned,
+            repairs.flipped,
         );
-        counted(
-            "faces of fewer than three corners, left out",
-            source.obj.thin_faces,
-        );
-        if let Some(missing) = &source.library.missing {
+        let of_file = geometry.warnings.iter().map(|w| w.text(file));
+        self.warnings.extend(of_file);
+        if let Some(missing) = &geometry.missing {
             let warning = format!("{}; no material needs it", missing.clone());
             self.warnings.push(warning);
         }
@@ -309,7 +308,7 @@ impl<'d> Assembly<'d, '_> {
         lights: Vec<Light>,
     ) -> Result<Assembled, SceneError> {
         if self.mesh.is_empty() && self.placements.is_empty() {
-            return Err(no_triangle(self.path, description.geometry.is_empty()));
+            return Err(self.no_triangle(description.geometry.is_empty()));
         }
         self.mesh.simplify();
         let camera_media = self.bindings.of_camera(&description.camera_media)?;
@@ -323,21 +322,24 @@ impl<'d> Assembly<'d, '_> {
             lights,
         })
     }
-}
-
-fn too_many_triangles(path: &Path) -> SceneError {
-    let message = format!("the scene stores more than {MAX_TRIANGLES} triangles");
-    SceneError::in_file(path, message)
-        .hint("copies of one OBJ file are stored once unless `share = false` says otherwise")
-}
-
-/// A scene of nothing, because it names no geometry or because that has no extent.
-fn no_triangle(path: &Path, names_none: bool) -> SceneError {
-    if names_none {
-        let error = SceneError::in_file(path, "the scene has no geometry");
-        return error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`");
+    fn too_many_triangles(&self) -> SceneError {
+        let message = format!("the scene stores more than {MAX_TRIANGLES} triangles");
+        let formats = formats::names(self.formats);
+        SceneError::in_file(self.path, message).hint(format!(
+            "copies of one {formats} file are stored once unless `share = false` says otherwise"
+        ))
     }
-    let message = "the scene has no geometry: no face of its OBJ files has an area";
-    let hint = "all corners of a face lie on a line, or too near for single precision";
-    SceneError::in_file(path, message).hint(hint)
+
+    /// A scene of nothing, because it names no geometry or because that has no extent.
+    fn no_triangle(&self, names_none: bool) -> SceneError {
+        if names_none {
+            let error = SceneError::in_file(self.path, "the scene has no geometry");
+            return error.hint("add a [[geometry]] entry with `obj = \"file.obj\"`");
+        }
+        let formats = formats::names(self.formats);
+        let message =
+            format!("the scene has no geometry: no face of its {formats} files has an area");
+        let hint = "all corners of a face lie on a line, or too near for single precision";
+        SceneError::in_file(self.path, message).hint(hint)
+    }
 }

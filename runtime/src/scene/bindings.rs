@@ -1,26 +1,20 @@
-//! Which material each name of an OBJ file gets.
+//! Which material of the scene each material name of a geometry file gets.
 
-use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+use std::collections::HashMap;
+use std::path::Path;
 
+use impasto_compiler::ParameterValue;
 use impasto_compiler::diag::nearest;
 
 use super::MaterialBinding;
 use super::description::{MaterialName, MaterialSpec, ParamSpec};
 use super::document::list;
+use super::formats::FileMaterial;
+use super::load::Source;
 use crate::error::SceneError;
 
 /// The name whose binding serves every name without one of its own.
 const WILDCARD: &str = "*";
-
-/// The MTL values that an OBJ file's materials have.
-#[derive(Default)]
-pub(super) struct Library {
-    /// By material name: the folder of its MTL file relative to the scene, and the values.
-    pub(super) materials: BTreeMap<String, (PathBuf, tobj::Material)>,
-    /// The first MTL file that could not be read.
-    pub(super) missing: Option<SceneError>,
-}
 
 /// Resolves names to materials, merging those that turn out to be the same.
 pub(super) struct Bindings<'d> {
@@ -30,7 +24,7 @@ pub(super) struct Bindings<'d> {
     by_content: HashMap<Content, u32>,
 }
 
-/// What makes two bindings the same material: file, item, parameters and how they are compiled.
+/// What makes two bindings the same material: file, item, parameters as text and how they are compiled.
 type Content = (String, Option<String>, Vec<(String, String)>, bool);
 
 impl<'d> Bindings<'d> {
@@ -43,37 +37,36 @@ impl<'d> Bindings<'d> {
         }
     }
 
-    /// Indices of the materials of an OBJ file's faces, for each name it uses; those of
+    /// Indices of the materials of a geometry file's triangles, for each material it uses; those of
     /// `override_by` for all, if it is given.
     pub(super) fn resolve(
         &mut self,
-        path: &Path,
+        source: &Source,
         override_by: Option<&MaterialName>,
-        names: &[String],
-        library: &Library,
     ) -> Result<Vec<u32>, SceneError> {
+        let materials = &source.geometry.materials;
         let specs = match override_by {
-            Some(material) => vec![self.overriding(material)?; names.len()],
-            None => self.of_names(path, names)?,
+            Some(material) => vec![self.overriding(material)?; materials.len()],
+            None => self.of_names(source)?,
         };
-        if let Some(missing) = &library.missing {
-            let needs_it = |&&spec: &&usize| self.specs[spec].reads_mtl();
+        if let Some(missing) = &source.geometry.missing {
+            let needs_it = |&&spec: &&usize| self.specs[spec].reads_files();
             if let Some(&spec) = specs.iter().find(needs_it) {
                 let reader = &self.specs[spec].name;
                 let hint = format!("the material `{reader}` of the scene reads its values");
                 return Err(missing.clone().hint(hint));
             }
         }
-        let each = specs.iter().zip(names);
+        let each = specs.iter().zip(materials);
         Ok(each
-            .map(|(&spec, name)| self.instantiate(spec, name, library))
+            .map(|(&spec, material)| self.instantiate(spec, &material.name, Some(material)))
             .collect())
     }
 
     /// Indices of the materials that the camera is in. Nothing else need use them.
     pub(super) fn of_camera(&mut self, media: &[MaterialName]) -> Result<Vec<u32>, SceneError> {
         let index = |medium: &MaterialName| match self.find(&medium.name) {
-            Some(spec) => Ok(self.instantiate(spec, &medium.name, &Library::default())),
+            Some(spec) => Ok(self.instantiate(spec, &medium.name, None)),
             None => {
                 let hint = self.suggestion(&medium.name);
                 Err(medium.missing.clone().hint(hint))
@@ -106,15 +99,17 @@ impl<'d> Bindings<'d> {
         self.find(&material.name).ok_or_else(error)
     }
 
-    fn of_names(&self, path: &Path, names: &[String]) -> Result<Vec<usize>, SceneError> {
+    fn of_names(&self, source: &Source) -> Result<Vec<usize>, SceneError> {
+        let path = &source.path;
+        let names = || source.geometry.materials.iter().map(|m| m.name.as_str());
         let wildcard = self.find(WILDCARD);
-        let found: Vec<Option<usize>> = names.iter().map(|n| self.find(n).or(wildcard)).collect();
-        let missing = names.iter().zip(&found).filter(|(_, spec)| spec.is_none());
-        let missing: Vec<&str> = missing.map(|(name, _)| name.as_str()).collect();
+        let found: Vec<Option<usize>> = names().map(|n| self.find(n).or(wildcard)).collect();
+        let missing = names().zip(&found).filter(|(_, spec)| spec.is_none());
+        let missing: Vec<&str> = missing.map(|(name, _)| name).collect();
         match missing[..] {
             [] => Ok(found.into_iter().flatten().collect()),
             [""] => {
-                let message = "faces without `usemtl` have no material";
+                let message = format!("{} have no material", source.format.without_material);
                 Err(SceneError::in_file(path, message).hint(
                     "add `material = \"...\"` to its [[geometry]], or bind everything with [materials.\"*\"]",
                 ))
@@ -143,28 +138,25 @@ impl<'d> Bindings<'d> {
     }
 
     /// The index of the material that `spec` is for faces of `name`.
-    fn instantiate(&mut self, spec: usize, name: &str, library: &Library) -> u32 {
+    /// `material` is what the geometry file says of it.
+    fn instantiate(&mut self, spec: usize, name: &str, material: Option<&FileMaterial>) -> u32 {
         self.used[spec] = true;
         let spec = &self.specs[spec];
-        let mtl = library.materials.get(name);
-        let params: Vec<(String, String)> = spec
-            .params
-            .iter()
-            .filter_map(|(key, value)| Some((key.clone(), value.source(mtl)?)))
-            .collect();
-        let content = (spec.file.clone(), spec.material.clone(), params, spec.bake);
+        let params = spec.values(material);
+        let texts = params.iter().map(|(key, v)| (key.clone(), v.to_string()));
+        let (file, item) = (spec.file.clone(), spec.material.clone());
+        let content = (file.clone(), item.clone(), texts.collect(), spec.bake);
         if let Some(&known) = self.by_content.get(&content) {
             return known;
         }
         let index = self.resolved.len() as u32;
-        self.by_content.insert(content.clone(), index);
-        let (file, material, params, bake) = content;
+        self.by_content.insert(content, index);
         self.resolved.push(MaterialBinding {
             name: self.unique_name(spec, name),
             file,
-            material,
+            material: item,
             params,
-            bake,
+            bake: spec.bake,
         });
         index
     }
@@ -173,7 +165,7 @@ impl<'d> Bindings<'d> {
     fn unique_name(&self, spec: &MaterialSpec, name: &str) -> String {
         let stem = Path::new(&spec.file).file_stem().and_then(|s| s.to_str());
         let name = match spec.name.as_str() {
-            WILDCARD if spec.reads_mtl() && !name.is_empty() => name,
+            WILDCARD if spec.reads_files() && !name.is_empty() => name,
             WILDCARD => stem.unwrap_or("material"),
             own => own,
         };
@@ -185,22 +177,21 @@ impl<'d> Bindings<'d> {
 }
 
 impl MaterialSpec {
-    /// Does some parameter come from the MTL file?
-    fn reads_mtl(&self) -> bool {
-        self.params
-            .iter()
-            .any(|(_, p)| matches!(p, ParamSpec::Mtl(_)))
+    /// Does some parameter get a value that geometry files give?
+    fn reads_files(&self) -> bool {
+        let mut params = self.params.iter();
+        params.any(|(_, value)| matches!(value, ParamSpec::OfFile(_)))
     }
-}
 
-impl ParamSpec {
-    fn source(&self, mtl: Option<&(PathBuf, tobj::Material)>) -> Option<String> {
-        match self {
-            ParamSpec::Source(text) => Some(text.clone()),
-            ParamSpec::Mtl(value) => {
-                let folder = mtl.map_or(Path::new(""), |(folder, _)| folder);
-                value.source(mtl.map(|(_, material)| material), folder)
-            }
-        }
+    /// The values of its parameters where it is bound to `material` of a geometry file.
+    fn values(&self, material: Option<&FileMaterial>) -> Vec<(String, ParameterValue)> {
+        let value = |spec: &ParamSpec| match spec {
+            ParamSpec::Given(value) => Some(value.clone()),
+            ParamSpec::OfFile(value) => value.of(material),
+        };
+        let params = self.params.iter();
+        params
+            .filter_map(|(name, spec)| Some((name.clone(), value(spec)?)))
+            .collect()
     }
 }

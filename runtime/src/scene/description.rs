@@ -2,10 +2,11 @@
 //! format.
 
 use glam::{DVec3, Vec3};
+use impasto_compiler::ParameterValue;
 use toml::de::DeValue;
 
-use super::document::{Document, Table, Value, numbers};
-use super::mtl::MtlValue;
+use super::document::{Document, Table, Value, number, numbers};
+use super::formats::{self, FileValue, Format};
 use super::placements::{self, PlacesSpec};
 use super::{
     Camera, DistantLight, FilmSettings, Integrator, Light, MAX_NESTED, QuadLight, Transform,
@@ -17,14 +18,14 @@ const MAX_FILM: u32 = 16_384;
 /// Longest path that can be asked for.
 const MAX_DEPTH: u32 = 65_535;
 
-pub(super) struct Description {
+pub(super) struct Description<'f> {
     pub(super) name: Option<String>,
     pub(super) camera: CameraSpec,
     /// Materials whose interiors the camera is in, outermost first.
     pub(super) camera_media: Vec<MaterialName>,
     pub(super) film: FilmSettings,
     pub(super) integrator: Integrator,
-    pub(super) geometry: Vec<GeometrySpec>,
+    pub(super) geometry: Vec<GeometrySpec<'f>>,
     pub(super) materials: Vec<MaterialSpec>,
     pub(super) lights: Vec<LightSpec>,
     pub(super) environment: Option<EnvironmentSpec>,
@@ -87,9 +88,10 @@ pub(super) struct MaterialName {
 }
 
 /// A `[[geometry]]` entry.
-pub(super) struct GeometrySpec {
-    pub(super) obj: String,
-    /// From the OBJ file to where its places count from.
+pub(super) struct GeometrySpec<'f> {
+    pub(super) file: String,
+    pub(super) format: &'f Format,
+    /// From the geometry file to where its places count from.
     pub(super) transform: Transform,
     /// Material of all its faces, whatever the file says.
     pub(super) material: Option<MaterialName>,
@@ -109,10 +111,10 @@ pub(super) struct MaterialSpec {
 
 /// Where a parameter's value comes from.
 pub(super) enum ParamSpec {
-    /// An Impasto constant expression.
-    Source(String),
-    /// The MTL material that the binding is used for.
-    Mtl(MtlValue),
+    /// The scene itself.
+    Given(ParameterValue),
+    /// What the geometry file says of the material that the binding is used for.
+    OfFile(&'static FileValue),
 }
 
 /// The `[environment]` table.
@@ -128,8 +130,12 @@ pub(super) enum EnvironmentSpecSource {
     Color(Vec3),
 }
 
-impl Description {
-    pub(super) fn read(document: &Document) -> Result<Description, SceneError> {
+impl<'f> Description<'f> {
+    /// Reads a scene whose geometry is of some of the given formats.
+    pub(super) fn read(
+        document: &Document,
+        formats: &'f [Format],
+    ) -> Result<Description<'f>, SceneError> {
         let parsed = document.parse()?;
         let mut root = Table::new(document, "the scene", &parsed);
         let name = root.get("name").map(|v| v.string().map(str::to_owned));
@@ -140,8 +146,8 @@ impl Description {
             camera_media,
             film: film(&mut root)?,
             integrator: integrator(&mut root)?,
-            geometry: geometry(&mut root)?,
-            materials: materials(&mut root)?,
+            geometry: geometry(&mut root, formats)?,
+            materials: materials(&mut root, formats)?,
             lights: lights(&mut root)?,
             environment: environment(&mut root)?,
         };
@@ -244,7 +250,10 @@ fn integrator(root: &mut Table) -> Result<Integrator, SceneError> {
     Ok(integrator)
 }
 
-fn geometry(root: &mut Table) -> Result<Vec<GeometrySpec>, SceneError> {
+fn geometry<'f>(
+    root: &mut Table,
+    formats: &'f [Format],
+) -> Result<Vec<GeometrySpec<'f>>, SceneError> {
     let Some(value) = root.get("geometry") else {
         return Ok(Vec::new());
     };
@@ -254,8 +263,10 @@ fn geometry(root: &mut Table) -> Result<Vec<GeometrySpec>, SceneError> {
         Ok(Some(MaterialName { name, missing }))
     };
     let entry = |mut table: Table| {
+        let (file, format) = geometry_file(&mut table, formats)?;
         let spec = GeometrySpec {
-            obj: table.require("obj")?.string()?.to_owned(),
+            file,
+            format,
             transform: placements::transform(&mut table)?,
             material: optional(&mut table, "material", named, None)?,
             places: placements::places(&mut table)?,
@@ -267,18 +278,44 @@ fn geometry(root: &mut Table) -> Result<Vec<GeometrySpec>, SceneError> {
     value.tables("geometry")?.into_iter().map(entry).collect()
 }
 
-fn materials(root: &mut Table) -> Result<Vec<MaterialSpec>, SceneError> {
+/// The file that an entry names, and its format. `obj` says that an extension which tells no other
+/// format is that of an OBJ file.
+fn geometry_file<'f>(
+    table: &mut Table,
+    formats: &'f [Format],
+) -> Result<(String, &'f Format), SceneError> {
+    let file = table.get("file");
+    let (value, otherwise) = match file {
+        None => (table.require("obj")?, formats::of_extension(formats, "obj")),
+        Some(_) if table.get("obj").is_some() => {
+            return Err(table.error("[[geometry]] needs either `file` or `obj`"));
+        }
+        Some(file) => (file, None),
+    };
+    let name = value.string()?;
+    match formats::of_file(formats, name).or(otherwise) {
+        Some(format) => Ok((name.to_owned(), format)),
+        None => Err(value
+            .error(format!("`{name}` is in no format that is read here"))
+            .hint(format!(
+                "geometry is read from {}, told by the extension",
+                formats::readable(formats)
+            ))),
+    }
+}
+
+fn materials(root: &mut Table, formats: &[Format]) -> Result<Vec<MaterialSpec>, SceneError> {
     let Some(value) = root.get("materials") else {
         return Ok(Vec::new());
     };
     let table = value.table("[materials]")?;
     let entries = table.named().into_iter();
     entries
-        .map(|(name, value)| material(name, &value))
+        .map(|(name, value)| material(name, &value, formats))
         .collect()
 }
 
-fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
+fn material(name: &str, value: &Value, formats: &[Format]) -> Result<MaterialSpec, SceneError> {
     let title = format!("[materials.{name:?}]");
     let mut table = value.table(&title)?;
     let file = table.require("file")?.string()?.to_owned();
@@ -288,7 +325,7 @@ fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
     if let Some(value) = table.get("params") {
         let entries = value.table(format!("{title} params"))?.named();
         for (key, value) in entries {
-            params.push((key.to_owned(), param(&value)?));
+            params.push((key.to_owned(), param(&value, formats)?));
         }
     }
     table.finish()?;
@@ -301,52 +338,53 @@ fn material(name: &str, value: &Value) -> Result<MaterialSpec, SceneError> {
     })
 }
 
-/// A parameter's value as an Impasto constant expression, or the MTL value that gives it.
-fn param(value: &Value) -> Result<ParamSpec, SceneError> {
-    let source = match value.item() {
-        DeValue::Boolean(b) => b.to_string(),
-        DeValue::Integer(i) if i.radix() == 10 => i.as_str().to_owned(),
-        DeValue::Float(_) => float_source(value.float()?),
-        DeValue::Array(_) => {
-            let numbers = numbers(value.item()).filter(|n| (2..=4).contains(&n.len()));
-            let numbers = numbers.ok_or_else(|| value.mismatch("2 to 4 finite numbers"))?;
-            array_source(&numbers)
+/// A parameter's value, or where it comes from.
+fn param(value: &Value, formats: &[Format]) -> Result<ParamSpec, SceneError> {
+    let given = match value.item() {
+        DeValue::Boolean(b) => ParameterValue::Bool(*b),
+        DeValue::Integer(i) if i.radix() == 10 => integer(i.as_str()),
+        item @ DeValue::Float(_) => {
+            ParameterValue::Float(number(item).ok_or_else(|| value.mismatch("a finite number"))?)
+        }
+        item @ DeValue::Array(_) => {
+            let components = numbers(item).filter(|n| (2..=4).contains(&n.len()));
+            let components = components.ok_or_else(|| value.mismatch("2 to 4 finite numbers"))?;
+            ParameterValue::Floats(components)
         }
         DeValue::String(text) => match text.strip_prefix('$') {
-            Some(key) => {
-                let known = || MtlValue::ALL.iter().map(|v| v.name());
-                let found = MtlValue::ALL.into_iter().find(|v| v.name() == key);
-                return found.map(ParamSpec::Mtl).ok_or_else(|| {
-                    let known: Vec<String> = known().map(|n| format!("${n}")).collect();
-                    value
-                        .error(format!("`${key}` is no value of an MTL file"))
-                        .hint(format!("there are {}", known.join(", ")))
-                });
+            Some(key) => return file_value(key, value, formats).map(ParamSpec::OfFile),
+            None if text.trim().is_empty() => {
+                return Err(value.mismatch("an Impasto expression, such as \"0.6 mm\""));
             }
-            None => text.trim().to_owned(),
+            None => text.trim().into(),
         },
         _ => return Err(value.mismatch("a number, true, false, an array of numbers or a string")),
     };
-    match source.is_empty() {
-        true => Err(value.mismatch("an Impasto expression, such as \"0.6 mm\"")),
-        false => Ok(ParamSpec::Source(source)),
-    }
+    Ok(ParamSpec::Given(given))
 }
 
-/// The shortest literal that reads back as `value`, with a point or an exponent.
-pub(super) fn float_source(value: f32) -> String {
-    format!("{value:?}")
+/// A decimal integer. What the language does not write as one, such as `+3`, stays text, which it
+/// will refuse.
+fn integer(text: &str) -> ParameterValue {
+    let value = text.parse().ok();
+    let value = value.filter(|v: &i64| v.to_string() == text);
+    value.map_or_else(|| text.into(), ParameterValue::Int)
 }
 
-/// `vec2(a, b)`, `color(r, g, b)` or `vec4(a, b, c, d)`; colors stand for other triples, too.
-pub(super) fn array_source(numbers: &[f64]) -> String {
-    let name = match numbers.len() {
-        2 => "vec2",
-        3 => "color",
-        _ => "vec4",
-    };
-    let values: Vec<String> = numbers.iter().map(|&v| float_source(v as f32)).collect();
-    format!("{name}({})", values.join(", "))
+/// The value of that name which geometry files give materials.
+fn file_value(
+    key: &str,
+    value: &Value,
+    formats: &[Format],
+) -> Result<&'static FileValue, SceneError> {
+    let all = || formats.iter().flat_map(|f| f.values);
+    all().find(|v| v.name == key).ok_or_else(|| {
+        let sources: Vec<&str> = formats.iter().map(|f| f.values_of).collect();
+        let known: Vec<String> = all().map(|v| format!("${}", v.name)).collect();
+        value
+            .error(format!("`${key}` is no value of {}", sources.join(" or ")))
+            .hint(format!("there are {}", known.join(", ")))
+    })
 }
 
 fn lights(root: &mut Table) -> Result<Vec<LightSpec>, SceneError> {
@@ -384,15 +422,15 @@ fn quad(table: &mut Table) -> Result<LightSpec, SceneError> {
         quad.corner + quad.u,
         quad.corner + quad.u + quad.v,
     ];
-    match super::mesh::has_area(&corners) {
-        true => Ok(LightSpec {
-            light: Light::Quad(quad),
-            corner: Some(corner),
-        }),
-        false => Err(table
+    if !super::mesh::has_area(&corners) {
+        return Err(table
             .error("the quad light has no area")
-            .hint("its edges `u` and `v` must not be zero or parallel")),
+            .hint("its edges `u` and `v` must not be zero or parallel"));
     }
+    Ok(LightSpec {
+        light: Light::Quad(quad),
+        corner: Some(corner),
+    })
 }
 
 fn distant(table: &mut Table) -> Result<DistantLight, SceneError> {

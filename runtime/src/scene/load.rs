@@ -7,11 +7,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::assemble::assemble;
-use super::bindings::Library;
 use super::description::{Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec};
 use super::document::Document;
-use super::obj::{self, Obj};
-use super::{Environment, EnvironmentMap, EnvironmentSource, Scene, mtl};
+use super::formats::{FORMATS, Format, Geometry};
+use super::{Environment, EnvironmentMap, EnvironmentSource, Scene};
 use crate::error::SceneError;
 use crate::image_file;
 
@@ -25,15 +24,23 @@ const MAX_ENVIRONMENT: usize = 8192 * 4096;
 /// # Errors
 /// The first thing that is wrong, with its place.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
+    load_with(path, FORMATS)
+}
+
+/// [`load`] for scenes whose geometry is of other formats than [`FORMATS`].
+///
+/// # Errors
+/// As those of [`load`].
+pub fn load_with(path: &Path, formats: &[Format]) -> Result<Scene, SceneError> {
     let text = std::fs::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
     let text = String::from_utf8(text)
         .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
-    let description = Description::read(&Document::new(path, &text))?;
+    let description = Description::read(&Document::new(path, &text), formats)?;
     let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let mut warnings = Vec::new();
     let sources = load_sources(&base, &description.geometry)?;
-    let assembled = assemble(path, &base, &description, &sources, &mut warnings)?;
+    let assembled = assemble(path, formats, &description, &sources, &mut warnings)?;
     drop(sources);
     let environment = description.environment.as_ref();
     let environment = environment
@@ -64,52 +71,33 @@ fn default_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// An OBJ file with its MTL values.
-pub(super) struct Source {
+/// A geometry file.
+pub(super) struct Source<'f> {
     pub(super) path: PathBuf,
-    pub(super) obj: Obj,
-    pub(super) library: Library,
+    pub(super) format: &'f Format,
+    pub(super) geometry: Geometry,
 }
 
-/// Every OBJ file that entries name, read once, by the name they use.
-fn load_sources(
+/// Every geometry file that entries name, read once, by the name they use.
+fn load_sources<'f>(
     base: &Path,
-    geometry: &[GeometrySpec],
-) -> Result<BTreeMap<String, Source>, SceneError> {
-    let mut names: Vec<&String> = geometry.iter().map(|g| &g.obj).collect();
-    names.sort_unstable();
-    names.dedup();
-    let load = |name: &&String| {
-        let path = base.join(name);
-        let obj = obj::load(&path)?;
-        let library = load_library(base, name, &obj);
-        Ok(((*name).clone(), Source { path, obj, library }))
+    entries: &[GeometrySpec<'f>],
+) -> Result<BTreeMap<String, Source<'f>>, SceneError> {
+    let formats = entries.iter().map(|entry| (&entry.file, entry.format));
+    let files: BTreeMap<&String, &Format> = formats.collect();
+    let files: Vec<(&String, &Format)> = files.into_iter().collect();
+    let load = |(name, format): &(&String, &'f Format)| {
+        let geometry = (format.read)(base, name)?;
+        let source = Source {
+            path: base.join(name),
+            format,
+            geometry,
+        };
+        Ok(((*name).clone(), source))
     };
     // Collected first, so that of several errors it is always the same one that is told.
-    let loaded: Vec<Result<(String, Source), SceneError>> = names.par_iter().map(load).collect();
+    let loaded: Vec<Result<(String, Source), SceneError>> = files.par_iter().map(load).collect();
     loaded.into_iter().collect()
-}
-
-/// The MTL files of the OBJ file `name`. A line may name several, or one with spaces.
-fn load_library(base: &Path, name: &str, obj: &Obj) -> Library {
-    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
-    let mut library = Library::default();
-    for line in &obj.mtl_files {
-        let whole = [line.as_str()];
-        let is_one = base.join(folder).join(line).exists();
-        let several: Vec<&str> = line.split_whitespace().collect();
-        for file in if is_one { &whole[..] } else { &several[..] } {
-            let file = folder.join(file);
-            match mtl::load(&base.join(&file)) {
-                Ok(materials) => library.materials.extend(materials.into_iter().map(|m| {
-                    let folder = file.parent().unwrap_or(Path::new("")).to_path_buf();
-                    (m.name.clone(), (folder, m))
-                })),
-                Err(error) => library.missing = library.missing.or(Some(error)),
-            }
-        }
-    }
-    library
 }
 
 fn load_environment(

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::obj::{Obj, ObjTriangle};
+use super::formats::{Geometry, Triangle};
 use super::{QuadLight, Transform};
 use crate::error::SceneError;
 
@@ -81,38 +81,38 @@ impl Mesh {
         }
     }
 
-    /// Adds the triangles of an OBJ file, whose materials have the indices `materials`, where
+    /// Adds the triangles of the geometry file at `path`, whose materials have the indices `materials`, where
     /// `transform` puts them, in coordinates that count from `origin`.
-    pub(super) fn push_obj(
+    pub(super) fn push_geometry(
         &mut self,
         path: &Path,
-        obj: &Obj,
+        geometry: &Geometry,
         transform: &Transform,
         origin: DVec3,
         materials: &[u32],
-    ) -> Result<Oddities, SceneError> {
-        let mut oddities = Oddities::default();
+    ) -> Result<Repairs, SceneError> {
+        let mut repairs = Repairs::default();
         let mirrored = transform.is_mirrored();
-        for triangle in &obj.triangles {
+        for triangle in &geometry.triangles {
             let places = triangle.positions.map(|p| transform.place(p));
             check_range(path, &places)?;
             let positions = places.map(|p| (p - origin).as_vec3());
             if !has_area(&positions) {
-                oddities.without_area += 1;
+                repairs.degenerate += 1;
                 continue;
             }
             let normals = vertex_normals(triangle, transform);
             let uvs = triangle.uvs.unwrap_or_default();
             self.push(positions, normals, uvs, materials[triangle.material]);
             if mirrored {
-                self.turn_last();
+                self.flip_last();
             }
             if self.is_last_against_its_normals() {
-                self.turn_last();
-                oddities.turned += 1;
+                self.flip_last();
+                repairs.flipped += 1;
             }
         }
-        Ok(oddities)
+        Ok(repairs)
     }
 
     /// Adds a copy of the triangles of `object` that `keep` keeps, with its materials looked up
@@ -136,7 +136,7 @@ impl Mesh {
             let material = materials[object.materials[triangle] as usize];
             self.push(positions, normals, uvs, material);
             if mirrored {
-                self.turn_last();
+                self.flip_last();
             }
         }
     }
@@ -156,7 +156,7 @@ impl Mesh {
     }
 
     /// Makes the other side of the last triangle the outside.
-    fn turn_last(&mut self) {
+    fn flip_last(&mut self) {
         if let Some(corners) = self.positions.last_mut() {
             corners.swap(1, 2);
         }
@@ -215,13 +215,20 @@ fn check_range(path: &Path, places: &[DVec3; 3]) -> Result<(), SceneError> {
     )))
 }
 
-/// What was strange about the triangles of a file.
+/// What was done to the triangles of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Oddities {
-    /// Left out.
-    pub(super) without_area: usize,
-    /// Corners were in the order of the side that the vertex normals call the inside.
-    pub(super) turned: usize,
+pub(super) struct Repairs {
+    /// Left out, since they have no area.
+    pub(super) degenerate: usize,
+    /// Turned over: their vertex normals pointed to the inside.
+    pub(super) flipped: usize,
+}
+
+impl std::ops::AddAssign for Repairs {
+    fn add_assign(&mut self, other: Repairs) {
+        self.degenerate += other.degenerate;
+        self.flipped += other.flipped;
+    }
 }
 
 /// Does the triangle have an area that single precision can tell from none, and so a normal?
@@ -238,7 +245,7 @@ fn faces_away([a, b, c]: &[Vec3; 3], normals: &[Vec3; 3]) -> bool {
 }
 
 /// Unit vertex normals in world space, if the triangle has three that are not zero.
-fn vertex_normals(triangle: &ObjTriangle, transform: &Transform) -> Option<[Vec3; 3]> {
+fn vertex_normals(triangle: &Triangle, transform: &Transform) -> Option<[Vec3; 3]> {
     let normals = triangle.normals?.map(|n| transform.normal(n));
     normals.iter().all(|n| *n != Vec3::ZERO).then_some(normals)
 }

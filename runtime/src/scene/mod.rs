@@ -7,21 +7,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use impasto_compiler::ParameterValue;
 
 mod assemble;
 mod bindings;
 mod bound;
 mod description;
 mod document;
+pub mod formats;
 mod load;
 mod mesh;
-mod mtl;
-mod obj;
 mod origin;
 mod placements;
 mod transform;
 
-pub use load::load;
+pub use load::{load, load_with};
 pub(crate) use mesh::MAX_TRIANGLES;
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use transform::Transform;
@@ -68,7 +68,7 @@ pub struct Scene {
 /// A mesh in coordinates of its own, shared by all of its placements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// The OBJ file, as the scene names it.
+    /// The geometry file, as the scene names it.
     pub name: String,
     /// Its triangles; their materials are indices into [`Placement::materials`].
     pub mesh: Mesh,
@@ -130,7 +130,7 @@ pub struct Integrator {
 }
 
 /// A material of the scene: fields of an `impasto_compiler::MaterialRequest`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MaterialBinding {
     /// The name that the scene binds, unique in it.
     pub name: String,
@@ -138,8 +138,8 @@ pub struct MaterialBinding {
     pub file: String,
     /// Which material of the file, when it defines several.
     pub material: Option<String>,
-    /// Parameters with Impasto constant expressions, such as `("flake_size", "0.6 mm")`.
-    pub params: Vec<(String, String)>,
+    /// Parameters that are not at their defaults.
+    pub params: Vec<(String, ParameterValue)>,
     /// Is it compiled to code of its own, with its parameters as constants?
     pub bake: bool,
 }

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::Transform;
-use super::obj::Obj;
+use super::formats::Geometry;
 
 /// A box around something, in double precision; without anything in it at first.
 #[derive(Clone, Copy, Debug)]
@@ -26,10 +26,10 @@ impl Default for Extent {
 }
 
 impl Extent {
-    /// The box around the triangles of an OBJ file.
-    pub(super) fn of(obj: &Obj) -> Extent {
+    /// The box around the triangles of a geometry file.
+    pub(super) fn of(geometry: &Geometry) -> Extent {
         let mut extent = Extent::default();
-        let corners = obj.triangles.iter().flat_map(|t| t.positions);
+        let corners = geometry.triangles.iter().flat_map(|t| t.positions);
         corners.for_each(|corner| extent.add(corner));
         extent
     }
@@ -73,9 +73,10 @@ pub(super) fn of(extent: &Extent) -> DVec3 {
     let half = extent.half().max_element();
     let step = (4.0 * half).log2().ceil().exp2();
     let origin = (extent.center() / step).round() * step;
-    match half > 0.0 && origin.is_finite() {
-        true => origin,
-        false => DVec3::ZERO,
+    if half > 0.0 && origin.is_finite() {
+        origin
+    } else {
+        DVec3::ZERO
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where an OBJ file is placed: the transform of a `[[geometry]]` entry, and its `placements`,
+//! Where a geometry file is placed: the transform of a `[[geometry]]` entry, and its `placements`,
 //! listed in the scene or in a file of their own. `docs/scenes.md` describes both.
 
 use std::path::Path;
@@ -19,7 +19,7 @@ const SINGULAR: &str = "flattens what it places";
 const SINGULAR_HINT: &str =
     "no direction may be scaled to nothing, or a million times less than another";
 
-/// Where an OBJ file is placed, relative to its entry.
+/// Where a geometry file is placed, relative to its entry.
 #[derive(Default)]
 pub(super) struct Places {
     pub(super) list: Vec<Place>,
@@ -91,15 +91,14 @@ pub(super) fn transform(table: &mut Table) -> Result<Transform, SceneError> {
             Transform::new(scale, rotate, Vec3::ZERO).moved(vector(translate_value)?)
         }
     };
-    match (transform.is_invertible(), matrix) {
-        (true, _) => Ok(transform),
-        (false, Some(rows)) => Err(rows
-            .error(format!("the matrix {SINGULAR}"))
-            .hint(SINGULAR_HINT)),
-        (false, None) => Err(table
-            .error(format!("the scale {SINGULAR}"))
-            .hint(SINGULAR_HINT)),
+    if transform.is_invertible() {
+        return Ok(transform);
     }
+    let error = match matrix {
+        Some(rows) => rows.error(format!("the matrix {SINGULAR}")),
+        None => table.error(format!("the scale {SINGULAR}")),
+    };
+    Err(error.hint(SINGULAR_HINT))
 }
 
 /// A factor, or one an axis. Negative ones mirror.
@@ -134,10 +133,10 @@ pub(super) fn places(table: &mut Table) -> Result<PlacesSpec, SceneError> {
             material,
         });
     }
-    match places.list.is_empty() {
-        false => Ok(PlacesSpec::Listed(places)),
-        true => Err(value.mismatch("a list with something in it")),
+    if places.list.is_empty() {
+        return Err(value.mismatch("a list with something in it"));
     }
+    Ok(PlacesSpec::Listed(places))
 }
 
 /// Columns that hold numbers, in the order of [`Line::numbers`], and what they are if left out.
@@ -191,12 +190,12 @@ pub(super) fn read_file(path: &Path) -> Result<Places, SceneError> {
             }
         }
     }
-    match places.list.is_empty() {
-        false => Ok(places),
-        true => Err(SceneError::in_file(path, "the file places nothing").hint(
+    if places.list.is_empty() {
+        return Err(SceneError::in_file(path, "the file places nothing").hint(
             "its first line names columns, such as `x y z ry scale`; then each line is a place",
-        )),
+        ));
     }
+    Ok(places)
 }
 
 /// The error for more placements than there can be.
@@ -288,25 +287,22 @@ impl Header {
             }
         }
         let transform = self.transform(&numbers);
-        match transform.is_invertible() {
-            true => Ok(Place {
-                transform,
-                material,
-            }),
-            false => Err(error(format!("the line {SINGULAR}")).hint(SINGULAR_HINT)),
+        if !transform.is_invertible() {
+            return Err(error(format!("the line {SINGULAR}")).hint(SINGULAR_HINT));
         }
+        Ok(Place {
+            transform,
+            material,
+        })
     }
 
     fn transform(&self, numbers: &[f64; COLUMNS.len()]) -> Transform {
         let [x, y, z, rx, ry, rz, sx, sy, sz, scale, rows @ ..] = *numbers;
-        match self.has_matrix {
-            true => Transform::from_rows(rows),
-            false => Transform::new(
-                (scale * DVec3::new(sx, sy, sz)).as_vec3(),
-                DVec3::new(rx, ry, rz).as_vec3(),
-                Vec3::ZERO,
-            )
-            .moved(DVec3::new(x, y, z)),
+        if self.has_matrix {
+            return Transform::from_rows(rows);
         }
+        let scale = scale * DVec3::new(sx, sy, sz);
+        let rotate = DVec3::new(rx, ry, rz);
+        Transform::new(scale.as_vec3(), rotate.as_vec3(), Vec3::ZERO).moved(DVec3::new(x, y, z))
     }
 }

@@ -12,9 +12,7 @@ fn problems(source: &str, params: &[(&str, &str)]) -> String {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", source.to_owned());
     let mut request = MaterialRequest::new("m", "m.impasto");
-    let owned = params
-        .iter()
-        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
+    let owned = params.iter().map(|(k, v)| ((*k).to_owned(), (*v).into()));
     request.params = owned.collect();
     let compiled = compile(&[request], &mut files);
     let text = diag::render::text(&compiled.sources, &compiled.diagnostics, false);

@@ -1,75 +1,62 @@
-//! MTL files: the values of their materials that a scene can bind to parameters.
+//! MTL files, which say what the materials of OBJ files look like.
 
 use std::path::Path;
 
-use super::description::{array_source, float_source};
+use impasto_compiler::ParameterValue;
+
 use crate::error::SceneError;
+use crate::scene::formats::{FileMaterial, FileValue};
 
-/// A value of an MTL material, written `$Kd` and so on in a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MtlValue {
-    Kd,
-    Ks,
-    Ke,
-    Ns,
-    Ni,
-    D,
-    MapKd,
+/// The values that are read, by their keys in MTL files.
+pub(super) const VALUES: &[FileValue] = &[
+    value("Kd", &[0.8; 3]),
+    value("Ks", &[0.0; 3]),
+    value("Ke", &[0.0; 3]),
+    value("Ns", &[10.0]),
+    value("Ni", &[1.5]),
+    value("d", &[1.0]),
+    value("map_Kd", &[]),
+];
+
+const fn value(name: &'static str, fallback: &'static [f64]) -> FileValue {
+    FileValue { name, fallback }
 }
 
-impl MtlValue {
-    pub(super) const ALL: [MtlValue; 7] = [
-        MtlValue::Kd,
-        MtlValue::Ks,
-        MtlValue::Ke,
-        MtlValue::Ns,
-        MtlValue::Ni,
-        MtlValue::D,
-        MtlValue::MapKd,
-    ];
-
-    /// The key in MTL files.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            MtlValue::Kd => "Kd",
-            MtlValue::Ks => "Ks",
-            MtlValue::Ke => "Ke",
-            MtlValue::Ns => "Ns",
-            MtlValue::Ni => "Ni",
-            MtlValue::D => "d",
-            MtlValue::MapKd => "map_Kd",
-        }
-    }
-
-    /// The value in `mtl` as an Impasto constant expression, or what stands for a value that is
-    /// not given. `None` leaves the parameter at its default. Pictures are resolved against
-    /// `folder`, that of the MTL file.
-    pub(super) fn source(self, mtl: Option<&tobj::Material>, folder: &Path) -> Option<String> {
-        let color = |value: Option<[f64; 3]>, missing| array_source(&value.unwrap_or([missing; 3]));
-        let float = |value: Option<f64>, missing| float_source(value.unwrap_or(missing) as f32);
-        Some(match self {
-            MtlValue::Kd => color(mtl.and_then(|m| m.diffuse), 0.8),
-            MtlValue::Ks => color(mtl.and_then(|m| m.specular), 0.0),
-            MtlValue::Ke => color(mtl.and_then(|m| m.emissive), 0.0),
-            MtlValue::Ns => float(mtl.and_then(|m| m.shininess), 10.0),
-            MtlValue::Ni => float(mtl.and_then(|m| m.optical_density), 1.5),
-            MtlValue::D => float(mtl.and_then(|m| m.dissolve), 1.0),
-            MtlValue::MapKd => {
-                let file = mtl?.diffuse_texture.as_ref()?;
-                format!("\"{}\"", folder.join(file).to_str()?)
-            }
-        })
-    }
-}
-
-/// Reads the materials of an MTL file.
-pub(super) fn load(path: &Path) -> Result<Vec<tobj::Material>, SceneError> {
+/// Reads the materials of the MTL file `name`, which is relative to the folder `base` of the scene.
+pub(super) fn load(base: &Path, name: &Path) -> Result<Vec<FileMaterial>, SceneError> {
+    let path = &base.join(name);
     let bytes = std::fs::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the MTL file: {e}")))?;
     let text = normalise(path, &String::from_utf8_lossy(&bytes))?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
         .map_err(|e| SceneError::in_file(path, format!("not a valid MTL file: {e}")))?;
-    Ok(materials)
+    let folder = name.parent().unwrap_or(Path::new(""));
+    Ok(materials.into_iter().map(|m| read(m, folder)).collect())
+}
+
+/// What a material says, with its pictures in `folder`.
+fn read(material: tobj::Material, folder: &Path) -> FileMaterial {
+    let color = |name, value: Option<[f64; 3]>| {
+        value.map(|rgb| (name, ParameterValue::Floats(rgb.to_vec())))
+    };
+    let float = |name, value: Option<f64>| value.map(|x| (name, ParameterValue::Float(x)));
+    let picture = |name, file: Option<String>| {
+        let path = folder.join(file?).to_str()?.to_owned();
+        Some((name, ParameterValue::Texture(path)))
+    };
+    let values = [
+        color("Kd", material.diffuse),
+        color("Ks", material.specular),
+        color("Ke", material.emissive),
+        float("Ns", material.shininess),
+        float("Ni", material.optical_density),
+        float("d", material.dissolve),
+        picture("map_Kd", material.diffuse_texture),
+    ];
+    FileMaterial {
+        name: material.name,
+        values: values.into_iter().flatten().collect(),
+    }
 }
 
 /// The lines that matter here, in the one form that tobj reads; it knows no line numbers for
@@ -163,12 +150,17 @@ mod tests {
                     map_Kd -s 2 2 -clamp on -o 0.5 wood\\old oak.png\nillum 2\nnewmtl plain\n";
         let text = normalise(Path::new("a.mtl"), text).expect("it is valid");
         let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).expect("tobj reads it");
-        let source =
-            |value: MtlValue, m: usize| value.source(Some(&materials[m]), Path::new("tex"));
+        let materials: Vec<FileMaterial> = materials
+            .into_iter()
+            .map(|m| read(m, Path::new("tex")))
+            .collect();
         assert_eq!(materials[0].name, "a b");
-        let first: Vec<_> = MtlValue::ALL
-            .map(|v| source(v, 0).unwrap_or_default())
-            .into();
+        let values = |material: &FileMaterial| -> Vec<String> {
+            let values = VALUES.iter().map(|v| v.of(Some(material)));
+            values
+                .map(|v| v.map_or(String::new(), |v| v.to_string()))
+                .collect()
+        };
         let expected = [
             "color(0.5, 0.5, 0.5)",
             "color(0.1, 0.2, 0.3)",
@@ -178,11 +170,8 @@ mod tests {
             "0.75",
             "\"tex/wood/old oak.png\"",
         ];
-        assert_eq!(first, expected);
-        assert_eq!(
-            source(MtlValue::Kd, 1).as_deref(),
-            Some("color(0.8, 0.8, 0.8)")
-        );
-        assert_eq!(source(MtlValue::MapKd, 1), None);
+        assert_eq!(values(&materials[0]), expected);
+        let plain = values(&materials[1]);
+        assert_eq!((&plain[0][..], &plain[6][..]), ("color(0.8, 0.8, 0.8)", ""));
     }
 }

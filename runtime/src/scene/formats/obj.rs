@@ -3,36 +3,31 @@
 //! tobj parses them, from a normalised copy: by itself it tells no line numbers, takes polylines
 //! for faces, invents normals for faces that lack them, and fails on some legal files.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3};
+use impasto_compiler::ParameterValue;
 
+use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning};
 use crate::error::SceneError;
 
-/// The triangles of an OBJ file, in its order.
-pub(super) struct Obj {
-    pub(super) triangles: Vec<ObjTriangle>,
-    /// Names after `usemtl` that faces use, in order of first use; faces before any `usemtl` use
-    /// the empty name.
-    pub(super) materials: Vec<String>,
-    /// The files that `mtllib` lines name.
-    pub(super) mtl_files: Vec<String>,
-    /// Faces with fewer than three corners, which were left out.
-    pub(super) thin_faces: usize,
-}
+mod mtl;
 
-/// One triangle as the file has it.
-pub(super) struct ObjTriangle {
-    pub(super) positions: [DVec3; 3],
-    pub(super) normals: Option<[Vec3; 3]>,
-    pub(super) uvs: Option<[Vec2; 3]>,
-    /// Index into [`Obj::materials`].
-    pub(super) material: usize,
-}
+/// The row of OBJ files.
+pub(super) const FORMAT: Format = Format {
+    name: "OBJ",
+    extensions: &["obj"],
+    read,
+    without_material: "faces without `usemtl`",
+    values: mtl::VALUES,
+    values_of: "an MTL file",
+};
 
 /// Reads an OBJ file and cuts its faces into fans of triangles.
-pub(super) fn load(path: &Path) -> Result<Obj, SceneError> {
+fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
+    let path = &base.join(name);
     let bytes = std::fs::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
     if bytes.contains(&0) {
@@ -45,18 +40,65 @@ pub(super) fn load(path: &Path) -> Result<Obj, SceneError> {
         scan.line(index + 1, line)?;
     }
     scan.check_ranges()?;
+    scan.parts.retain(|part| !part.triangles.is_empty());
     if scan.attributes.is_empty() {
         return Err(SceneError::in_file(path, "the OBJ file has no faces")
             .hint("is it complete? faces are lines that start with `f`"));
     }
     let triangles = parse(&scan)
         .map_err(|e| SceneError::in_file(path, format!("the OBJ file cannot be read: {e}")))?;
-    Ok(Obj {
+    let mut library = Library::load(base, name, &scan.mtl_files);
+    let of_faces = |name: String| FileMaterial {
+        values: library.materials.remove(&name).unwrap_or_default(),
+        name,
+    };
+    Ok(Geometry {
         triangles,
-        materials: scan.materials,
-        mtl_files: scan.mtl_files,
-        thin_faces: scan.thin_faces,
+        materials: scan.materials.into_iter().map(of_faces).collect(),
+        parts: scan.parts,
+        missing: library.missing,
+        warnings: left_out(scan.degenerate_faces).into_iter().collect(),
     })
+}
+
+fn left_out(degenerate_faces: usize) -> Option<Warning> {
+    (degenerate_faces > 0).then(|| Warning {
+        line: None,
+        message: format!("faces of fewer than three corners, left out: {degenerate_faces}"),
+    })
+}
+
+/// What the MTL files of an OBJ file say.
+#[derive(Default)]
+struct Library {
+    /// The values of materials by name. Of materials with one name the last counts.
+    materials: HashMap<String, Vec<(&'static str, ParameterValue)>>,
+    /// The first MTL file that could not be read.
+    missing: Option<SceneError>,
+}
+
+impl Library {
+    /// The files that the `mtllib` lines of the OBJ file `name` say. A line may name several, or one
+    /// with spaces.
+    fn load(base: &Path, name: &str, lines: &[String]) -> Library {
+        let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+        let mut library = Library::default();
+        for line in lines {
+            let whole = [line.as_str()];
+            let is_one = base.join(folder).join(line).exists();
+            let several: Vec<&str> = line.split_whitespace().collect();
+            for file in if is_one { &whole[..] } else { &several[..] } {
+                match mtl::load(base, &folder.join(file)) {
+                    Ok(materials) => {
+                        let named = materials.into_iter().map(|m| (m.name, m.values));
+                        library.materials.extend(named);
+                    }
+                    Err(error) => library.missing = library.missing.or(Some(error)),
+                }
+            }
+        }
+        library
+    }
 }
 
 /// The three lists that faces index, in the order of indices in `1/2/3`.
@@ -79,7 +121,12 @@ struct Scan<'p> {
     current: String,
     current_written: bool,
     mtl_files: Vec<String>,
-    thin_faces: usize,
+    /// What `o` and `g` lines name.
+    parts: Vec<Part>,
+    /// The object and the group that faces belong to, as indices into `parts`.
+    open: [Option<usize>; 2],
+    /// Faces with fewer than three corners, which are left out.
+    degenerate_faces: usize,
 }
 
 impl<'p> Scan<'p> {
@@ -95,7 +142,9 @@ impl<'p> Scan<'p> {
             current: String::new(),
             current_written: false,
             mtl_files: Vec::new(),
-            thin_faces: 0,
+            parts: Vec::new(),
+            open: [None; 2],
+            degenerate_faces: 0,
         }
     }
 
@@ -123,12 +172,30 @@ impl<'p> Scan<'p> {
                 self.current_written = false;
                 Ok(())
             }
+            "o" | "g" => {
+                self.part(key, rest.trim());
+                Ok(())
+            }
             "mtllib" => {
                 self.mtl_files.push(rest.trim().replace('\\', "/"));
                 Ok(())
             }
             _ => Ok(()),
         }
+    }
+
+    /// Begins an object, which ends the last one and its group, or a group.
+    fn part(&mut self, key: &str, name: &str) {
+        let index = Some(self.parts.len());
+        self.open = match key {
+            "o" => [index, None],
+            _ => [self.open[0], index],
+        };
+        let first = self.attributes.len();
+        self.parts.push(Part {
+            name: name.to_owned(),
+            triangles: first..first,
+        });
     }
 
     /// A line of at least `needed` numbers. What a fourth number of `v` divides by is kept,
@@ -200,11 +267,14 @@ impl<'p> Scan<'p> {
         if corners < 3 {
             self.faces.truncate(start);
             self.current_written = false;
-            self.thin_faces += 1;
+            self.degenerate_faces += 1;
             return Ok(());
         }
         self.attributes
             .extend(std::iter::repeat_n(has, corners - 2));
+        for part in self.open.into_iter().flatten() {
+            self.parts[part].triangles.end = self.attributes.len();
+        }
         Ok(())
     }
 
@@ -274,7 +344,7 @@ impl<'p> Scan<'p> {
     }
 }
 
-fn parse(scan: &Scan) -> Result<Vec<ObjTriangle>, tobj::LoadError> {
+fn parse(scan: &Scan) -> Result<Vec<Triangle>, tobj::LoadError> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ..tobj::LoadOptions::default()
@@ -302,7 +372,7 @@ fn parse(scan: &Scan) -> Result<Vec<ObjTriangle>, tobj::LoadError> {
                 let first = 2 * mesh.texcoord_indices[k] as usize;
                 DVec2::from_slice(&mesh.texcoords[first..]).as_vec2()
             };
-            triangles.push(ObjTriangle {
+            triangles.push(Triangle {
                 positions: triple(&mesh.positions, &mesh.indices),
                 normals: has_normal
                     .then(|| triple(&mesh.normals, &mesh.normal_indices).map(|n| n.as_vec3())),
