@@ -10,6 +10,7 @@ use xtask::{adapter, shell};
 
 mod bless;
 mod demo;
+mod layers;
 mod test;
 
 #[derive(Parser)]
@@ -25,6 +26,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Build and run every test of the workspace
     Test(test::TestArgs),
+    /// Draw the folders of each crate with the folders that they name; fail if one may not
+    Layers(layers::LayersArgs),
     /// Accept the present output as the expected one of the snapshot tests
     Bless,
 }
@@ -33,6 +36,7 @@ fn main() -> ExitCode {
     shell::exit_code(match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
+        Command::Layers(args) => layers::run(&args),
         Command::Bless => bless::run(),
     })
 }
