@@ -9,11 +9,11 @@ use wgpu::naga::{Expression, Function, Module};
 
 use crate::error::RuntimeError;
 use crate::gpu::shader::validate;
-use crate::kernels::layout::Layout;
+use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Kernel, Sizes};
 use crate::kernels::stages::STAGES;
 use crate::kernels::state;
-use crate::render::Makings;
+use crate::render::CompositionInputs;
 use crate::technique::Technique;
 use crate::world::needs::{Decision, Forcing, Need, NeedInputs, Needs, ROWS, Row};
 use crate::world::{MaterialSource, World};
@@ -133,9 +133,13 @@ pub fn kernels(
     let decision = world.decide(&source.infos(), &technique);
     let (_, kernels) = compose(world, source, technique, decision)?;
     let text = |kernel: Kernel| KernelText {
-        name: kernel.recipe.name,
+        name: kernel.desc.name,
         wgsl: kernel.wgsl,
-        bindings: kernel.bindings.into_iter().map(|b| b.name).collect(),
+        bindings: kernel
+            .bindings
+            .into_iter()
+            .map(|b| b.name.to_owned())
+            .collect(),
     };
     Ok(kernels.into_iter().map(text).collect())
 }
@@ -215,7 +219,7 @@ impl<'a> Scale<'a> {
         if let Some(known) = self.operations.get(&kernel.wgsl) {
             return Ok(*known);
         }
-        let (module, _) = validate(&kernel.recipe.name, &kernel.wgsl)?;
+        let (module, _) = validate(&kernel.desc.name, &kernel.wgsl)?;
         let count = operations(&module);
         self.operations.insert(kernel.wgsl.clone(), count);
         Ok(count)
@@ -240,11 +244,11 @@ fn compose(
     source: &dyn MaterialSource,
     technique: Technique,
     decision: Decision,
-) -> Result<(Layout, Vec<Kernel>), RuntimeError> {
-    let makings = Makings::decided(SUBGROUP_SIZE, world, source, technique, decision)?;
-    let plan = world.own_plan(&makings.materials);
-    let layout = makings.layout(&plan)?;
-    let kernels = makings.composer(&plan, layout, SIZES).kernels();
+) -> Result<(PlanLayout, Vec<Kernel>), RuntimeError> {
+    let inputs = CompositionInputs::decided(SUBGROUP_SIZE, world, source, technique, decision)?;
+    let plan = world.own_plan(&inputs.materials);
+    let layout = inputs.layout(&plan)?;
+    let kernels = inputs.composer(&plan, layout, SIZES).kernels();
     Ok((layout, kernels))
 }
 

@@ -59,6 +59,14 @@ pub enum RuntimeError {
         /// What naga or the driver says, with the line it concerns.
         message: String,
     },
+    /// The table of stages cannot be made kernels of; always a defect of Impasto.
+    #[error("internal error: the stage `{stage}` {problem}; please report this")]
+    Stage {
+        /// The stage's name.
+        stage: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// wgpu refused a call; always a defect of Impasto.
     #[error("internal error: the GPU interface refused a call; please report this\n{0}")]
     Validation(String),

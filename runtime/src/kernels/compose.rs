@@ -8,11 +8,13 @@ use impasto_compiler::abi::{InputSet, MATERIAL_OF};
 
 use crate::film;
 use crate::fingerprint::Fingerprint;
+use crate::kernels::buffers::{Access, BUFFERS};
 use crate::kernels::cones;
-use crate::kernels::modules::{Composer, Kernel, Recipe};
+use crate::kernels::modules::{Composer, Kernel, KernelDesc};
 use crate::kernels::order;
 use crate::kernels::profile;
-use crate::kernels::stages::{Part, StageId};
+use crate::kernels::run;
+use crate::kernels::stages::{Part, Stage};
 use crate::kernels::state::{self, Storage};
 use crate::wgsl;
 use crate::wgsl::template::Flag;
@@ -26,44 +28,15 @@ pub(crate) struct Binding {
     /// The index, the same in all kernels of a plan.
     pub index: u32,
     /// The WGSL variable.
-    pub name: String,
+    pub name: &'static str,
     /// What kernels may do with it.
     pub access: Access,
 }
 
-/// What kernels may do with a buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Access {
-    Uniform,
-    Read,
-    ReadWrite,
-}
-
-/// The runtime's own buffers: name, type, access.
-pub(crate) const OWN_BUFFERS: [(&str, &str, Access); 13] = [
-    ("run", "Run", Access::Uniform),
-    ("state", "array<vec4<u32>>", Access::ReadWrite),
-    ("queues", "array<u32>", Access::ReadWrite),
-    ("counters", "array<atomic<u32>>", Access::ReadWrite),
-    ("film", "array<atomic<u32>>", Access::ReadWrite),
-    ("arguments", "array<u32>", Access::ReadWrite),
-    ("bins", "array<atomic<u32>>", Access::ReadWrite),
-    ("extension_rays", "array<vec4<u32>>", Access::ReadWrite),
-    ("extension_hits", "array<vec4<u32>>", Access::ReadWrite),
-    ("shadow_rays", "array<vec4<u32>>", Access::ReadWrite),
-    ("shadow_results", "array<u32>", Access::ReadWrite),
-    ("queue_table", "array<u32>", Access::Read),
-    ("pixel_list", "array<u32>", Access::Read),
-];
-
-/// Members of the uniform `run`, the settings that do not change a kernel's text.
-/// `none` is 0, which compilers do not know.
-pub(crate) const RUN_MEMBERS: [&str; 5] = ["seed", "first_sample", "samples", "pixels", "none"];
-
 impl Composer<'_> {
     /// Writes the text of the kernel that comes `index`-th in an iteration.
-    pub(crate) fn compose(&self, index: usize, recipe: Recipe) -> Kernel {
-        let (stages, members) = (&recipe.stages, &recipe.members);
+    pub(crate) fn compose(&self, index: usize, desc: KernelDesc) -> Kernel {
+        let (stages, members) = (&desc.stages, &desc.members);
         let storage = if self.layout.wavefront {
             Storage::Memory(self.technique.state)
         } else {
@@ -73,7 +46,7 @@ impl Composer<'_> {
         text += &state::accessors(self.layout.needs, stages, storage);
         let mut parts: Vec<Part> = stages
             .iter()
-            .flat_map(|s| s.stage().parts)
+            .flat_map(|stage| stage.parts)
             .filter(|(_, need)| self.layout.needs.met(*need))
             .map(|(part, _)| *part)
             .collect();
@@ -82,13 +55,10 @@ impl Composer<'_> {
         for part in parts {
             text += &self.part(part, members);
         }
-        if stages.contains(&StageId::Logic) {
-            text += &self.fates();
+        for stage in stages {
+            text += &stage.body.wgsl(&self.flags(stage, members));
         }
-        for id in stages {
-            text += &id.stage().body.wgsl(&self.flags(*id, members));
-        }
-        text += &recipe.shell;
+        text += &desc.shell;
         if mentions(&without_comments(&text), MATERIAL_OF) {
             text += &self.source.lookup_wgsl();
         }
@@ -98,18 +68,15 @@ impl Composer<'_> {
         let text = reachable(&text);
         let (declarations, bindings) = self.declarations(&text);
         Kernel {
-            recipe,
+            desc,
             wgsl: declarations + &text,
             bindings,
         }
     }
 
     /// The conditions of a stage's text.
-    fn flags(&self, stage: StageId, members: &[usize]) -> Vec<Flag> {
-        let needs = match stage {
-            StageId::Material => self.needs_of(members),
-            _ => self.layout.needs,
-        };
+    fn flags(&self, stage: &Stage, members: &[usize]) -> Vec<Flag> {
+        let needs = self.needs_in(stage, members);
         let derived = [
             ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
             ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
@@ -165,6 +132,7 @@ impl Composer<'_> {
             Part::Order => order::bins(self.technique.ray_order, world.parts.bounds),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
+            Part::Fates => self.fates(),
         }
     }
 
@@ -205,13 +173,14 @@ impl Composer<'_> {
         let scene = scene.map(|b| (b.name, b.wgsl_type, Access::Read));
         let mut out = String::new();
         let mut bindings = Vec::new();
-        for (index, (name, ty, access)) in OWN_BUFFERS.into_iter().chain(scene).enumerate() {
+        let own = BUFFERS.iter().map(|b| (b.name, b.wgsl_type, b.access));
+        for (index, (name, ty, access)) in own.chain(scene).enumerate() {
             if !mentions(&code, name) {
                 continue;
             }
             let space = match access {
                 Access::Uniform => {
-                    out += &format!("struct {ty} {{ {}: u32 }}\n", RUN_MEMBERS.join(": u32, "));
+                    out += &run::declaration(ty);
                     "uniform"
                 }
                 Access::Read => "storage, read",
@@ -220,7 +189,7 @@ impl Composer<'_> {
             out += &format!("@group(0) @binding({index}) var<{space}> {name}: {ty};\n");
             bindings.push(Binding {
                 index: index as u32,
-                name: name.to_string(),
+                name,
                 access,
             });
         }
@@ -297,9 +266,10 @@ fn both(a: InputSet, b: InputSet) -> InputSet {
 /// The function that fills a material's inputs, those that some member reads; the others get
 /// what is at hand.
 fn surface_point(needs: Needs, seen: InputSet) -> String {
-    let cone = match needs.has(Need::RayCones) {
-        true => ", wo: vec3<f32>, width: f32",
-        false => "",
+    let cone = if needs.has(Need::RayCones) {
+        ", wo: vec3<f32>, width: f32"
+    } else {
+        ""
     };
     let (footprint, axes) = cones::footprint(needs, seen);
     let geometric = "hit_geometric_normal(hit.primitive)";

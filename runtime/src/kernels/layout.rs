@@ -5,23 +5,16 @@ use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::{Organisation, Plan};
 
 use crate::error::RuntimeError;
+use crate::kernels::check::check;
 use crate::kernels::queues::{Counters, Queues};
+use crate::kernels::stages::{STAGES, Stage};
 use crate::kernels::state;
 use crate::technique::{RayData, Technique};
 use crate::world::needs::{Decision, Need, Needs};
 
-/// The buffers of rays and of their results in the order of requests: the name, bytes a path, and
-/// whether it is of shadow rays.
-pub(crate) const RAY_BUFFERS: [(&str, u64, bool); 4] = [
-    ("extension_rays", 32, false),
-    ("extension_hits", 16, false),
-    ("shadow_rays", 32, true),
-    ("shadow_results", 4, true),
-];
-
-/// The layout of one plan.
+/// What the kernels of one plan share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
+pub(crate) struct PlanLayout {
     /// What must exist.
     pub needs: Needs,
     /// The queues of a wavefront.
@@ -32,7 +25,7 @@ pub(crate) struct Layout {
     pub wavefront: bool,
 }
 
-impl Layout {
+impl PlanLayout {
     /// Of a plan for `materials`, of which it may leave out those that are `unbound`.
     pub(crate) fn new(
         decision: &Decision,
@@ -40,18 +33,29 @@ impl Layout {
         unbound: &[usize],
         plan: &Plan,
     ) -> Result<Self, RuntimeError> {
+        Self::of_stages(&STAGES, decision, materials, unbound, plan)
+    }
+
+    /// The same of other stages.
+    pub(crate) fn of_stages(
+        stages: &'static [Stage],
+        decision: &Decision,
+        materials: &[MaterialInfo],
+        unbound: &[usize],
+        plan: &Plan,
+    ) -> Result<Self, RuntimeError> {
+        check(stages)?;
         check_plan(plan, materials, unbound)?;
         let wavefront = plan.organisation == Organisation::Wavefront;
         let needs = decision.of_plan(wavefront);
-        let of_kernels = Queues::of_kernels(plan);
         let queues = Queues {
-            materials: of_kernels.iter().map(|queues| queues.len()).sum(),
-            shadow_rays: needs.has(Need::ShadowRays),
-            ordered: needs.has(Need::Order),
+            stages,
+            needs,
+            materials: Queues::of_plan(plan).sum(),
         };
         let counters = Counters {
             queues: if wavefront { queues.count() } else { 0 },
-            binned: wavefront && of_kernels.iter().any(|queues| queues.len() > 1),
+            binned: wavefront && Queues::of_plan(plan).any(|count| count > 1),
             materials: materials.len(),
             profiled: 0,
             hits: 0,
@@ -62,6 +66,11 @@ impl Layout {
             counters,
             wavefront,
         })
+    }
+
+    /// The stages.
+    pub(crate) fn stages(&self) -> &'static [Stage] {
+        self.queues.stages
     }
 
     /// The technique as this layout has it: not every scene allows for each.
@@ -79,27 +88,6 @@ impl Layout {
             true => self.queues.regions() as u64,
             false => 0,
         }
-    }
-
-    /// Bytes of the buffers of rays and their results for a path, by the buffer's name.
-    pub(crate) fn ray_bytes(&self, buffer: &str) -> u64 {
-        let exists = |of_shadows: bool| {
-            self.needs.has(Need::Requests) && (!of_shadows || self.needs.has(Need::ShadowRays))
-        };
-        let found = RAY_BUFFERS.iter().find(|(name, ..)| *name == buffer);
-        found.map_or(0, |(_, bytes, of_shadows)| {
-            u64::from(exists(*of_shadows)) * bytes
-        })
-    }
-
-    /// Bytes of memory for a path: its state, and its rays where they are apart from it; a
-    /// megakernel has it in registers.
-    pub(crate) fn memory(&self) -> u64 {
-        let rays: u64 = RAY_BUFFERS
-            .iter()
-            .map(|(name, ..)| self.ray_bytes(name))
-            .sum();
-        self.path_bytes() + rays
     }
 
     /// Bytes of the state of a path in memory.

@@ -9,7 +9,9 @@
 #endif
 
 var<private> wanted_instance: u32 = NOTHING;
-var<private> wants_extension: bool = false;
+#each sure
+$variable
+#end
 
 // A turn ends without a material instead: what the path gathered is in the film.
 fn request_new_path() {}
@@ -18,35 +20,37 @@ fn request_material(instance: u32) {
     wanted_instance = instance;
 }
 
-fn request_extension(origin: vec3<f32>, direction: vec3<f32>, skip: u32) {
-    wants_extension = true;
-}
+#each sure
+$request
 
-#if shadow_rays
-var<private> wants_shadow: bool = false;
+#end
+#each possible
+$variable
 
-fn request_shadow(origin: vec3<f32>, skip: u32, direction: vec3<f32>, distance: f32) {
-    wants_shadow = true;
-}
+$request
 
-#endif
+#end
 // Takes a path over one segment; whether it goes on.
 fn advance(item: u32) -> bool {
-#if shadow_rays
-    if wants_shadow {
-        wants_shadow = false;
-        shadow(item);
+#each before
+    if $wanted {
+        $wanted = false;
+        $call;
     }
-#endif
-    if wants_extension {
-        wants_extension = false;
-        extension(item);
-    }
+#end
     wanted_instance = NOTHING;
-    logic(item);
+#each each_turn
+    $call;
+#end
     if wanted_instance == NOTHING {
         return false;
     }
+#each beside
+    if $wanted {
+        $wanted = false;
+        $call;
+    }
+#end
     material(item, wanted_instance);
     return true;
 }

@@ -1,5 +1,7 @@
 //! The kernels of a plan as text: which there are, what each is made of, and what they share.
 
+pub(crate) mod buffers;
+mod check;
 pub(crate) mod compose;
 pub(crate) mod cones;
 pub mod dropped;
@@ -10,7 +12,12 @@ pub(crate) mod parts;
 pub(crate) mod profile;
 pub(crate) mod queues;
 pub mod random;
+mod requests;
+pub(crate) mod run;
 pub(crate) mod shells;
 pub(crate) mod stages;
 pub(crate) mod state;
 mod wavefront;
+
+#[cfg(test)]
+mod tests;

@@ -9,10 +9,9 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Form, Organisation, Plan};
 
 use crate::kernels::compose::Binding;
-use crate::kernels::layout::Layout;
-use crate::kernels::queues::Queues;
+use crate::kernels::layout::PlanLayout;
 use crate::kernels::shells::SUBGROUP;
-use crate::kernels::stages::{STAGES, StageId};
+use crate::kernels::stages::Stage;
 use crate::technique::{Regeneration, Technique};
 use crate::wgsl;
 use crate::wgsl::template::template;
@@ -21,12 +20,18 @@ use crate::world::bvh;
 use crate::world::needs::{Decision, Need, Needs};
 use crate::world::{KernelParts, MaterialSource, World};
 
+/// The roles of kernels that are no stage's: those that run between stages, and that of all stages.
+pub(crate) const PREPARE: &str = "prepare";
+pub(crate) const SCAN: &str = "scan";
+pub(crate) const SCATTER: &str = "scatter";
+pub(crate) const MEGA: &str = "mega";
+
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
 
-/// What decides how many threads a kernel gets.
+/// Where the items come from that a kernel works on, which decides how many threads it gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Feed {
+pub(crate) enum DispatchSource {
     /// One for every slot of the pool.
     Pool,
     /// As many as fill the GPU; they fetch items until the pool's number is used up.
@@ -50,32 +55,45 @@ pub(crate) enum Feed {
 
 /// What a kernel is made of, before its text.
 #[derive(Clone, Debug)]
-pub(crate) struct Recipe {
+pub(crate) struct KernelDesc {
     /// Its name in reports and GPU captures.
     pub name: String,
+    /// What it is there for, whatever its name: its stage, or what it does between stages.
+    pub role: &'static str,
     /// How it treats its materials, if it evaluates any.
     pub form: Option<Form>,
     /// The stages it runs.
-    pub stages: Vec<StageId>,
+    pub stages: Vec<&'static Stage>,
     /// The materials it evaluates.
     pub members: Vec<usize>,
     /// How many threads it gets.
-    pub feed: Feed,
+    pub source: DispatchSource,
     /// WGSL of its requests and entry point.
     pub shell: String,
 }
 
-impl Recipe {
+impl KernelDesc {
     /// Of a kernel that evaluates no material.
-    pub(crate) fn plain(name: &str, stages: Vec<StageId>, feed: Feed, shell: String) -> Self {
+    pub(crate) fn plain(
+        name: &str,
+        stages: Vec<&'static Stage>,
+        source: DispatchSource,
+        shell: String,
+    ) -> Self {
         Self {
             name: name.to_string(),
+            role: stages.first().map_or(PREPARE, |stage| stage.name),
             form: None,
             stages,
             members: Vec::new(),
-            feed,
+            source,
             shell,
         }
+    }
+
+    /// Whether it adds to the picture.
+    pub(crate) fn fills_film(&self) -> bool {
+        self.stages.iter().any(|stage| stage.fills_film())
     }
 }
 
@@ -83,7 +101,7 @@ impl Recipe {
 #[derive(Clone, Debug)]
 pub(crate) struct Kernel {
     /// What it is made of.
-    pub recipe: Recipe,
+    pub desc: KernelDesc,
     /// Its text, entry point `main`.
     pub wgsl: String,
     /// The buffers it binds.
@@ -116,7 +134,7 @@ pub(crate) struct Composer<'a> {
     pub instances: &'a [InstanceInfo],
     pub tables: &'a [BufferData],
     pub plan: &'a Plan,
-    pub layout: Layout,
+    pub layout: PlanLayout,
     pub sizes: Sizes,
     pub technique: Technique,
     /// Whether kernels look the queue of a material up in the buffer `queue_table`, so that one logic
@@ -131,24 +149,24 @@ pub(crate) struct Composer<'a> {
 impl Composer<'_> {
     /// Every kernel, in the order of an iteration.
     pub(crate) fn kernels(&self) -> Vec<Kernel> {
-        let recipes = self.recipes().into_iter().enumerate();
-        recipes
-            .map(|(index, recipe)| self.compose(index, recipe))
+        let descs = self.descs().into_iter().enumerate();
+        descs
+            .map(|(index, desc)| self.compose(index, desc))
             .collect()
     }
 
     /// What every kernel is made of, in the same order. Each has a name of its own.
-    pub(crate) fn recipes(&self) -> Vec<Recipe> {
-        let mut recipes = match self.plan.organisation {
+    pub(crate) fn descs(&self) -> Vec<KernelDesc> {
+        let mut descs = match self.plan.organisation {
             Organisation::Wavefront => self.wavefront(),
             Organisation::Mega => vec![self.prepare("prepare", 0..0, true), self.mega()],
         };
         let mut taken = BTreeSet::new();
-        for recipe in &mut recipes {
-            recipe.name = unused_name(&recipe.name, &taken);
-            taken.insert(recipe.name.clone());
+        for desc in &mut descs {
+            desc.name = unused_name(&desc.name, &taken);
+            taken.insert(desc.name.clone());
         }
-        recipes
+        descs
     }
 
     /// The materials that some kernel evaluates, ascending.
@@ -170,14 +188,35 @@ impl Composer<'_> {
         self.decision.of_members(self.layout.needs, members)
     }
 
+    /// The needs of a stage in a kernel that evaluates `members` only.
+    pub(crate) fn needs_in(&self, stage: &Stage, members: &[usize]) -> Needs {
+        if stage.evaluates_materials() {
+            self.needs_of(members)
+        } else {
+            self.layout.needs
+        }
+    }
+
+    /// The stages that exist.
+    pub(crate) fn stages(&self) -> impl Iterator<Item = &'static Stage> {
+        let needs = self.layout.needs;
+        let rows = self.layout.stages().iter();
+        rows.filter(move |stage| needs.met(stage.need))
+    }
+
     /// A kernel that turns the lengths of the `consumed` queues into indirect arguments.
-    pub(crate) fn prepare(&self, name: &str, consumed: Range<usize>, hands_out: bool) -> Recipe {
-        let of_kernels = Queues::of_kernels(self.plan);
+    pub(crate) fn prepare(
+        &self,
+        name: &str,
+        consumed: Range<usize>,
+        hands_out: bool,
+    ) -> KernelDesc {
+        let of_kernels = self.layout.queues.of_kernels(self.plan);
         let binned: Vec<_> = of_kernels
             .into_iter()
             .filter(|queues| queues.len() > 1 && consumed.contains(&queues.start))
             .collect();
-        let fetched = STAGES.iter().any(|stage| self.fetches(stage.id));
+        let fetched = self.layout.stages().iter().any(|stage| self.fetches(stage));
         let flags = [
             ("queues", !consumed.is_empty()),
             ("binned", !binned.is_empty()),
@@ -194,17 +233,17 @@ impl Composer<'_> {
             ])
             + &first_of_kernel(&binned)
             + &template!("prepare.wgsl").wgsl(&flags);
-        Recipe::plain(name, Vec::new(), Feed::Once, text)
+        KernelDesc::plain(name, Vec::new(), DispatchSource::Once, text)
     }
 
     /// All stages in one kernel.
-    fn mega(&self) -> Recipe {
+    fn mega(&self) -> KernelDesc {
         let flags = [
-            ("shadow_rays", self.layout.needs.has(Need::ShadowRays)),
             ("regenerates", self.regenerates()),
             ("walk_lane", bvh::asks_for_lane(&self.parts.bvh)),
         ];
-        let mut shell = template!("mega.wgsl").wgsl(&flags);
+        let template = template!("mega.wgsl");
+        let mut shell = template.with_sets(&flags, &self.turn_sets());
         if self.regenerates() {
             // Idle lanes times this must exceed the subgroup's lanes.
             let share = match self.technique.regeneration {
@@ -215,25 +254,22 @@ impl Composer<'_> {
             shell += &wgsl::constant_u32("FETCH_LIMIT", self.sizes.fetch_limit);
             shell += SUBGROUP;
         }
-        let stages = STAGES.iter().filter(|s| self.layout.needs.met(s.need));
-        let stages = stages.map(|s| s.id).collect();
-        Recipe {
+        let source = if self.regenerates() {
+            DispatchSource::Fetched
+        } else {
+            DispatchSource::Pool
+        };
+        KernelDesc {
+            role: MEGA,
             form: Some(Form::Inline),
             members: self.planned(),
-            ..Recipe::plain("mega", stages, self.mega_feed(), shell)
+            ..KernelDesc::plain("mega", self.stages().collect(), source, shell)
         }
     }
 
     /// Whether this is a megakernel whose threads begin further paths.
     fn regenerates(&self) -> bool {
         !self.layout.wavefront && self.technique.regeneration != Regeneration::Never
-    }
-
-    fn mega_feed(&self) -> Feed {
-        match self.regenerates() {
-            true => Feed::Fetched,
-            false => Feed::Pool,
-        }
     }
 }
 

@@ -31,7 +31,13 @@ fn is_missing(part: Part, parts: &KernelParts, needs: Needs) -> bool {
         Part::Media => parts.media.is_none(),
         Part::Materials => needs.has(Need::Textures) && parts.texture.is_none(),
         // The runtime's own.
-        Part::Random | Part::Camera | Part::Film | Part::Numbers | Part::Mis | Part::Order => false,
+        Part::Random
+        | Part::Camera
+        | Part::Film
+        | Part::Numbers
+        | Part::Mis
+        | Part::Order
+        | Part::Fates => false,
     }
 }
 

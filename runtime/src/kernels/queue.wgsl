@@ -14,36 +14,11 @@ fn request_material(instance: u32) {
     wanted_work = material_queue(instance);
 }
 #endif
-#if casts
-var<private> wants_extension: bool = false;
+#each asked
 
-#if requests
-var<private> extension_ray: array<vec4<u32>, 2>;
-#endif
-
-fn request_extension(origin: vec3<f32>, direction: vec3<f32>, skip: u32) {
-    wants_extension = true;
-#if requests
-    extension_ray[0] = vec4<u32>(bitcast<vec3<u32>>(origin), skip);
-    extension_ray[1] = vec4<u32>(bitcast<vec3<u32>>(direction), 0u);
-#endif
-}
-#endif
-#if casts_shadows
-var<private> wants_shadow: bool = false;
-
-#if requests
-var<private> shadow_ray: array<vec4<u32>, 2>;
-#endif
-
-fn request_shadow(origin: vec3<f32>, skip: u32, direction: vec3<f32>, distance: f32) {
-    wants_shadow = true;
-#if requests
-    shadow_ray[0] = vec4<u32>(bitcast<vec3<u32>>(origin), skip);
-    shadow_ray[1] = vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(distance));
-#endif
-}
-#endif
+$variable
+$request
+#end
 
 // Writes the slot to its place in a queue.
 #if requests
@@ -55,35 +30,26 @@ fn put(queue: u32, place: u32, slot: u32) {
     if place >= POOL_SIZE {
         return;
     }
-#if keeps
-    if queue == QUEUE_EXTENSION {
-        extension_rays[2u * place] = extension_ray[0];
-        extension_rays[2u * place + 1u] = extension_ray[1];
-        extension_place = place;
+#each kept
+    if queue == $queue {
+        $name_rays[2u * place] = $name_ray[0];
+        $name_rays[2u * place + 1u] = $name_ray[1];
+        $name_place = place;
         return;
     }
-#endif
-#if keeps_shadows
-    if queue == QUEUE_SHADOW {
-        shadow_rays[2u * place] = shadow_ray[0];
-        shadow_rays[2u * place + 1u] = shadow_ray[1];
-        shadow_place = place;
-        return;
-    }
-#endif
+#end
     queues[queue * POOL_SIZE + place] = slot;
 }
 #if keeps
 
 // The places of the thread's rays.
-var<private> extension_place: u32 = 0u;
-var<private> shadow_place: u32 = 0u;
+#each rays
+var<private> $name_place: u32 = 0u;
+#end
 
 fn is_ray_wanted() -> bool {
-#if casts_shadows
-    return wants_extension || wants_shadow;
-#else
-    return wants_extension;
-#endif
+#each any_kept
+    return $wanted;
+#end
 }
 #endif

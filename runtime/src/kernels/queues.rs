@@ -7,46 +7,95 @@ use std::ops::Range;
 use impasto_compiler::partition::Plan;
 
 use crate::kernels::dropped::{self, Row};
+use crate::kernels::stages::{Phase, Stage, Work};
+use crate::world::needs::{Need, Needs};
 
-/// Which queues a wavefront has, in the order of the buffer: new paths, those of material
-/// kernels, extension rays and, if light is sampled, shadow rays. Each has room for the pool. If rays
-/// are ordered, there is as much room for the queue in that order, and for each of its items'
-/// bin and rank.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Which queues a wavefront has: those of its stages, phase by phase, of each phase first those that every
+/// scene has. Each has room for the pool. If rays are ordered, there is as much room for the queue in
+/// that order, and for each of its items' bin and rank.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Queues {
-    /// Those of material kernels.
+    /// The stages.
+    pub stages: &'static [Stage],
+    /// What must exist.
+    pub needs: Needs,
+    /// How many queues material kernels have.
     pub materials: usize,
-    /// Whether shadow rays are cast.
-    pub shadow_rays: bool,
-    /// Whether rays are cast in an order of their own.
-    pub ordered: bool,
 }
 
 impl Queues {
-    pub(crate) const NEW_PATH: usize = 0;
+    /// How many queues each kernel of a plan has: none where materials are evaluated inline, one for each
+    /// member of a binned kernel, else one.
+    pub(crate) fn of_plan(plan: &Plan) -> impl Iterator<Item = usize> {
+        let kernels = plan.kernels.iter();
+        kernels.map(|kernel| kernel.form.queues(kernel.materials.len()))
+    }
 
-    /// Those of a plan's material kernels, in its order: none where materials are evaluated inline,
-    /// one for each member of a binned kernel, else one.
-    pub(crate) fn of_kernels(plan: &Plan) -> Vec<Range<usize>> {
-        let mut next = Self::NEW_PATH + 1;
-        let queues = plan.kernels.iter().map(|kernel| {
+    /// Those of a plan's material kernels, in its order.
+    pub(crate) fn of_kernels(self, plan: &Plan) -> Vec<Range<usize>> {
+        let is_material = |stage: &&Stage| matches!(stage.work, Work::Material { .. });
+        let material = self.order().find(is_material);
+        let mut next = material.map_or(0, |stage| self.of(stage.name).start);
+        let queues = Self::of_plan(plan).map(|count| {
             let begin = next;
-            next += kernel.form.queues(kernel.materials.len());
+            next += count;
             begin..next
         });
         queues.collect()
     }
 
-    pub(crate) fn extension(self) -> usize {
-        1 + self.materials
+    /// The stages that may have queues, in the order of the buffer.
+    pub(crate) fn order(self) -> impl Iterator<Item = &'static Stage> {
+        let of = move |phase, always| {
+            let rows = self.stages.iter();
+            let rows = rows.filter(move |s| s.phase == phase && s.work.is_asked_for());
+            rows.filter(move |s| s.need.is_always() == always)
+        };
+        let phases = Phase::ALL.into_iter();
+        phases.flat_map(move |(phase, _)| of(phase, true).chain(of(phase, false)))
     }
 
-    pub(crate) fn shadow(self) -> usize {
-        2 + self.materials
+    /// The stages with their queues.
+    fn ranges(self) -> impl Iterator<Item = (&'static Stage, Range<usize>)> {
+        let mut next = 0;
+        self.order().map(move |stage| {
+            let begin = next;
+            next += match stage.work {
+                Work::Material { .. } => self.materials,
+                _ => usize::from(self.needs.met(stage.need)),
+            };
+            (stage, begin..next)
+        })
+    }
+
+    /// The queues of a stage; empty if it has none.
+    pub(crate) fn of(self, name: &str) -> Range<usize> {
+        let found = self.ranges().find(|(stage, _)| stage.name == name);
+        found.map_or(0..0, |(_, range)| range)
+    }
+
+    /// The queues of a phase.
+    pub(crate) fn of_phase(self, phase: Phase) -> Range<usize> {
+        let ranges = self.ranges().filter(|(stage, _)| stage.phase == phase);
+        let ranges = ranges.map(|(_, range)| range);
+        let all = ranges.reduce(|all, range| all.start..range.end);
+        all.unwrap_or_default()
+    }
+
+    /// The queue of slots that are to begin a path.
+    pub(crate) fn new_paths(self) -> usize {
+        let begins = |(stage, _): &(&Stage, _)| matches!(stage.work, Work::Begin { .. });
+        let found = self.ranges().find(begins);
+        found.map_or(0, |(_, range)| range.start)
     }
 
     pub(crate) fn count(self) -> usize {
-        2 + self.materials + usize::from(self.shadow_rays)
+        self.ranges().last().map_or(0, |(_, range)| range.end)
+    }
+
+    /// Whether rays are cast in an order of their own.
+    fn ordered(self) -> bool {
+        self.needs.has(Need::Order)
     }
 
     /// Where a queue of rays is put in order, of those in the buffer.
@@ -56,19 +105,19 @@ impl Queues {
 
     /// How often the pool there is room for.
     pub(crate) fn regions(self) -> usize {
-        self.count() + if self.ordered { 3 } else { 0 }
+        self.count() + if self.ordered() { 3 } else { 0 }
     }
 
     pub(crate) fn constants(self) -> String {
-        let mut out = format!(
-            "const QUEUE_NEW_PATH: u32 = {}u;\nconst QUEUE_EXTENSION: u32 = {}u;\n",
-            Self::NEW_PATH,
-            self.extension()
-        );
-        if self.shadow_rays {
-            let _ = writeln!(out, "const QUEUE_SHADOW: u32 = {}u;", self.shadow());
+        let mut out = String::new();
+        for (stage, queues) in self.ranges() {
+            let is_one = !matches!(stage.work, Work::Material { .. });
+            if is_one && !queues.is_empty() {
+                let name = stage.name.to_uppercase();
+                let _ = writeln!(out, "const QUEUE_{name}: u32 = {}u;", queues.start);
+            }
         }
-        if self.ordered {
+        if self.ordered() {
             for (at, name) in (self.count()..).zip(["ORDERED", "BINS", "RANKS"]) {
                 let _ = writeln!(out, "const REGION_{name}: u32 = {at}u;");
             }
@@ -271,16 +320,27 @@ fn long(words: &[u32], at: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernels::stages::STAGES;
     use impasto_compiler::partition::{Form, PlanKernel};
+
+    /// The queues of a scene whose lights are sampled.
+    fn lit(materials: usize) -> Queues {
+        Queues {
+            stages: &STAGES,
+            needs: Needs::of_rows(&[Need::ShadowRays]),
+            materials,
+        }
+    }
 
     #[test]
     fn regions_do_not_overlap() {
-        let queues = Queues {
-            materials: 3,
-            shadow_rays: true,
-            ordered: false,
-        };
-        assert_eq!(queues.shadow() + 1, queues.count());
+        let queues = lit(3);
+        assert_eq!(queues.new_paths(), 0);
+        assert_eq!(queues.of("material"), 1..4);
+        assert_eq!(queues.of_phase(Phase::Materials), 0..4);
+        assert_eq!(queues.of("extension"), 4..5);
+        assert_eq!(queues.of("shadow"), 5..6);
+        assert_eq!(queues.of_phase(Phase::Rays), 4..queues.count());
         let counters = Counters {
             queues: queues.count(),
             binned: false,
@@ -329,6 +389,6 @@ mod tests {
             ],
             ..Plan::own(&names, &[])
         };
-        assert_eq!(Queues::of_kernels(&plan), [1..2, 2..2, 2..4]);
+        assert_eq!(lit(3).of_kernels(&plan), [1..2, 2..2, 2..4]);
     }
 }

@@ -52,7 +52,7 @@ fn main(
 #endif
 #if keeps
     if is_ray_wanted() {
-        keep_requests(slot, extension_place, shadow_place);
+        keep_requests(slot, $places);
     }
 #endif
 }

@@ -7,7 +7,7 @@ use impasto_compiler::partition::Form;
 use impasto_compiler::partition::workload::BLOCK;
 
 use crate::kernels::modules::Composer;
-use crate::kernels::queues::Queues;
+use crate::kernels::requests::Pushes;
 use crate::technique::{Append, Leaves};
 use crate::wgsl;
 use crate::wgsl::template::template;
@@ -33,12 +33,8 @@ pub(crate) struct Shell {
     pub consumes: Option<Consumed>,
     /// How many consecutive queues it reads from that one on, if several: each workgroup one.
     pub binned: Option<usize>,
-    /// Whether it pushes to the queues of new paths and materials.
-    pub sorts: bool,
-    /// Whether it pushes to the queue of extension rays.
-    pub casts: bool,
-    /// Whether it pushes to the queue of shadow rays.
-    pub casts_shadows: bool,
+    /// What it pushes to queues.
+    pub pushes: Pushes,
     /// Whether it traces rays.
     pub traverses: bool,
     /// Whether it counts hits of each material.
@@ -72,7 +68,7 @@ impl Consumed {
 }
 
 /// The entry point of a kernel whose threads work on one item each.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct EntryPoint {
     /// Whether items are those of a queue; all slots of the pool otherwise.
     pub queued: bool,
@@ -82,8 +78,8 @@ pub(crate) struct EntryPoint {
     pub slots: bool,
     /// Whether it appends to queues.
     pub pushes: bool,
-    /// Whether paths keep the places of their rays.
-    pub keeps: bool,
+    /// WGSL of the places of rays that paths keep, if they do.
+    pub keeps: Option<String>,
     /// Whether it counts hits of each material.
     pub counts_hits: bool,
     /// Whether threads must know their place in the subgroup.
@@ -108,12 +104,14 @@ impl EntryPoint {
             ("binned", self.binned),
             ("slots", self.slots),
             ("pushes", self.pushes),
-            ("keeps", self.keeps),
+            ("keeps", self.keeps.is_some()),
             ("counts_hits", self.counts_hits),
             ("subgroups", self.subgroups),
             ("walk_lane", self.walk_lane),
         ];
-        template!("shell.wgsl").wgsl(&flags)
+        let places = self.keeps.as_deref().unwrap_or_default();
+        let text = template!("shell.wgsl").wgsl(&flags);
+        text.replace("$places", places)
     }
 }
 
@@ -155,14 +153,14 @@ impl FetchShell<'_> {
 impl Composer<'_> {
     /// Constants, request functions and entry point of a kernel whose threads work on one item each.
     pub(crate) fn shell(&self, shell: &Shell) -> String {
-        let pushes = shell.sorts || shell.casts;
+        let pushes = !shell.pushes.is_empty();
         let requests = self.layout.needs.has(Need::Requests);
         let entry = EntryPoint {
             queued: shell.consumes.is_some(),
             binned: shell.binned.is_some(),
             slots: !(shell.traverses && requests),
             pushes,
-            keeps: shell.casts && requests,
+            keeps: (requests && shell.pushes.has_rays()).then(|| self.ray_places()),
             counts_hits: shell.counts_hits,
             subgroups: pushes && self.technique.append == Append::Subgroup,
             walk_lane: shell.traverses && bvh::asks_for_lane(&self.parts.bvh),
@@ -175,9 +173,9 @@ impl Composer<'_> {
             out += &wgsl::constant_u32("CONSUMED_QUEUES", count as u32);
         }
         if pushes {
-            out += &self.pushes(shell);
+            out += &self.push_text(&shell.pushes);
         }
-        if shell.sorts {
+        if shell.pushes.sorts {
             out += &self.material_queue();
         }
         if shell.counts_hits {
@@ -195,36 +193,6 @@ impl Composer<'_> {
             ("BLOCK", BLOCK),
             ("BLOCK_WORDS", materials.div_ceil(32)),
         ]) + include_str!("hits.wgsl")
-    }
-
-    /// The functions by which a stage asks for work, and how they append to queues.
-    fn pushes(&self, shell: &Shell) -> String {
-        let queues = self.layout.queues;
-        let rays = queues.extension();
-        let first = if shell.sorts { Queues::NEW_PATH } else { rays };
-        let end = if shell.casts { queues.count() } else { rays };
-        let requests = self.layout.needs.has(Need::Requests);
-        let keeps = shell.casts && requests;
-        let flags = [
-            ("sorts", shell.sorts),
-            ("casts", shell.casts),
-            ("casts_shadows", shell.casts_shadows),
-            ("requests", requests),
-            ("keeps", keeps),
-            ("keeps_shadows", keeps && shell.casts_shadows),
-            ("subgroups", self.technique.append == Append::Subgroup),
-        ];
-        let one_by_one = || template!("append/one_by_one.wgsl").wgsl(&flags);
-        let append = match self.technique.append {
-            Append::Workgroup => template!("append/workgroup.wgsl").wgsl(&flags),
-            Append::Subgroup => one_by_one() + include_str!("append/subgroup.wgsl") + SUBGROUP,
-            Append::Thread => one_by_one() + include_str!("append/thread.wgsl"),
-        };
-        wgsl::constants_u32(&[
-            ("FIRST_PUSHED", first as u32),
-            ("PUSHED_QUEUES", (end - first) as u32),
-        ]) + &template!("queue.wgsl").wgsl(&flags)
-            + &append
     }
 
     /// Constants and entry point of a kernel whose threads fetch the rays of a queue.
@@ -264,7 +232,8 @@ impl Composer<'_> {
 
     /// The materials that have a queue, ascending, each with that.
     pub(crate) fn queues_of_materials(&self) -> Vec<(usize, usize)> {
-        let kernels = self.plan.kernels.iter().zip(Queues::of_kernels(self.plan));
+        let queues = self.layout.queues.of_kernels(self.plan);
+        let kernels = self.plan.kernels.iter().zip(queues);
         let mut pairs: Vec<(usize, usize)> = kernels
             .filter(|(kernel, _)| kernel.form != Form::Inline)
             .flat_map(|(kernel, queues)| {

@@ -1,101 +1,113 @@
 //! The kernels of the wavefront, in the order of an iteration: which stages each runs, which queue
 //! feeds it, and what it asks for (Laine et al. 2013).
 
-use impasto_compiler::partition::Form;
+use std::ops::Range;
 
-use crate::kernels::modules::{Composer, Feed, Recipe};
+use impasto_compiler::partition::{Form, PlanKernel};
+
+use crate::kernels::modules::{Composer, DispatchSource, KernelDesc, SCAN, SCATTER};
 use crate::kernels::order;
-use crate::kernels::queues::Queues;
 use crate::kernels::shells::{Consumed, EntryPoint, Shell};
-use crate::kernels::stages::StageId;
+use crate::kernels::stages::{Phase, Stage, Work};
 use crate::technique::RayFetch;
 use crate::world::bvh;
-use crate::world::needs::Need;
 
 impl Composer<'_> {
-    /// The logic stage, the material stage with new paths, then ray casts. Kernels between
-    /// two prepare kernels may run in any order, but shadow rays before extension rays, which
-    /// overwrite the hit.
-    pub(crate) fn wavefront(&self) -> Vec<Recipe> {
-        let queues = self.layout.queues;
-        let rays = queues.extension();
-        let mut recipes = vec![
-            self.logic(),
-            self.prepare("prepare_materials", 0..rays, true),
-            self.stage(StageId::NewPath, Queues::NEW_PATH),
-        ];
-        recipes.extend(self.material_kernels());
-        recipes.push(self.prepare("prepare_rays", rays..queues.count(), false));
-        if self.layout.needs.has(Need::ShadowRays) {
-            recipes.extend(self.order(StageId::BinShadow, queues.shadow()));
-            recipes.push(self.stage(StageId::Shadow, queues.shadow()));
+    /// The stages of each phase, after a kernel that prepares the queues they consume. Kernels between
+    /// two prepare kernels may run in any order, but where a row of the table says `before`.
+    pub(crate) fn wavefront(&self) -> Vec<KernelDesc> {
+        let mut kernels = Vec::new();
+        for (phase, prepare) in Phase::ALL {
+            let stages: Vec<_> = self.stages().filter(|s| s.phase == phase).collect();
+            let consumed = self.layout.queues.of_phase(phase);
+            if !consumed.is_empty() {
+                let begins = |s: &&Stage| matches!(s.work, Work::Begin { .. });
+                let hands_out = stages.iter().any(begins);
+                kernels.push(self.prepare(prepare, consumed, hands_out));
+            }
+            kernels.extend(stages.into_iter().flat_map(|stage| self.kernels_of(stage)));
         }
-        recipes.extend(self.order(StageId::BinExtension, rays));
-        recipes.push(self.stage(StageId::Extension, rays));
-        recipes
+        kernels
     }
 
-    /// The logic kernel, which also evaluates the materials that have no queue.
-    fn logic(&self) -> Recipe {
+    fn kernels_of(&self, stage: &'static Stage) -> Vec<KernelDesc> {
+        let queue = |name: &str| self.layout.queues.of(name).start;
+        match stage.work {
+            Work::Pool => vec![self.over_pool(stage)],
+            Work::Material { .. } => self.material_kernels(stage).collect(),
+            Work::Begin { .. } | Work::Queue(_) => vec![self.over_queue(stage, queue(stage.name))],
+            Work::Sort { of } => self.order(stage, of, queue(of)),
+        }
+    }
+
+    /// The kernel of a stage that works on all slots, which also evaluates the materials that have no queue
+    /// if it is the one that finds them.
+    fn over_pool(&self, stage: &'static Stage) -> KernelDesc {
+        let mut stages = vec![stage];
+        let mut run = format!("{};", stage.call("slot", "item", ""));
+        let found = self.stages().find(|s| {
+            let is_material = matches!(s.work, Work::Material { .. });
+            is_material && s.work.from().contains(&stage.name)
+        });
         let inline = self.plan.kernels.iter();
-        let inline: Vec<_> = inline.filter(|k| k.form == Form::Inline).collect();
+        let inline = inline.filter(|k| k.form == Form::Inline && found.is_some());
+        let inline: Vec<&PlanKernel> = inline.collect();
         let members: Vec<usize> = inline.iter().flat_map(|k| k.materials.clone()).collect();
-        let mut stages = vec![StageId::Logic];
-        let mut run = "logic(slot);".to_string();
-        if !members.is_empty() {
-            stages.push(StageId::Material);
-            run += " if wanted_instance != NOTHING && wanted_work == NOTHING { \
-                     material(slot, wanted_instance); }";
+        if let Some(material) = found.filter(|_| !members.is_empty()) {
+            stages.push(material);
+            run += &format!(
+                " if wanted_instance != NOTHING && wanted_work == NOTHING {{ {}; }}",
+                material.call("slot", "item", "wanted_instance")
+            );
         }
         let shell = self.shell(&Shell {
             run,
-            sorts: true,
-            casts: !members.is_empty(),
-            casts_shadows: self.needs_of(&members).has(Need::ShadowRays),
-            counts_hits: self.layout.counters.hits > 0,
+            pushes: self.pushes(&stages, &members),
+            counts_hits: found.is_some() && self.layout.counters.hits > 0,
             ..Shell::default()
         });
-        Recipe {
-            name: StageId::Logic.stage().name.to_string(),
+        KernelDesc {
             form: inline.first().map(|kernel| kernel.form),
-            stages,
             members,
-            feed: Feed::Pool,
-            shell,
+            ..KernelDesc::plain(stage.name, stages, DispatchSource::Pool, shell)
         }
     }
 
     /// The kernels that evaluate the materials of queues.
-    fn material_kernels(&self) -> impl Iterator<Item = Recipe> {
+    fn material_kernels(&self, stage: &'static Stage) -> impl Iterator<Item = KernelDesc> {
         let kernels = self.plan.kernels.iter();
-        let kernels = kernels.zip(Queues::of_kernels(self.plan));
+        let kernels = kernels.zip(self.layout.queues.of_kernels(self.plan));
         let queued = kernels.filter(|(k, _)| k.form != Form::Inline);
-        queued.map(|(planned, queues)| {
-            let instance = match self.instances_of(&planned.materials)[..] {
-                [only] => format!("{only}u"),
-                _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
-            };
-            let (first, count) = (queues.start, queues.len());
-            let shell = self.shell(&Shell {
-                run: format!("material(slot, {instance});"),
-                consumes: Some(Consumed::unordered(first)),
-                binned: (count > 1).then_some(count),
-                casts: true,
-                casts_shadows: self.needs_of(&planned.materials).has(Need::ShadowRays),
-                ..Shell::default()
-            });
-            Recipe {
-                name: planned.name.clone(),
-                form: Some(planned.form),
-                stages: vec![StageId::Material],
-                members: planned.materials.clone(),
-                feed: match count {
-                    1 => Feed::Queue(first),
-                    _ => Feed::Queues { first, count },
-                },
-                shell,
-            }
-        })
+        queued.map(move |(planned, queues)| self.material_kernel(stage, planned, queues))
+    }
+
+    fn material_kernel(
+        &self,
+        stage: &'static Stage,
+        planned: &PlanKernel,
+        queues: Range<usize>,
+    ) -> KernelDesc {
+        let instance = match self.instances_of(&planned.materials)[..] {
+            [only] => format!("{only}u"),
+            _ => "primitive_instance(load_hit(slot).primitive)".to_string(),
+        };
+        let (first, count) = (queues.start, queues.len());
+        let shell = self.shell(&Shell {
+            run: format!("{};", stage.call("slot", "item", &instance)),
+            consumes: Some(Consumed::unordered(first)),
+            binned: (count > 1).then_some(count),
+            pushes: self.pushes(&[stage], &planned.materials),
+            ..Shell::default()
+        });
+        let source = match count {
+            1 => DispatchSource::Queue(first),
+            _ => DispatchSource::Queues { first, count },
+        };
+        KernelDesc {
+            form: Some(planned.form),
+            members: planned.materials.clone(),
+            ..KernelDesc::plain(&planned.name, vec![stage], source, shell)
+        }
     }
 
     /// The instances of some materials.
@@ -106,62 +118,48 @@ impl Composer<'_> {
     }
 
     /// A kernel of one stage that reads `queue` and evaluates no material.
-    fn stage(&self, id: StageId, queue: usize) -> Recipe {
-        let name = id.stage().name;
-        let consumed = self.consumed(id, queue);
-        if self.fetches(id) {
+    fn over_queue(&self, stage: &'static Stage, queue: usize) -> KernelDesc {
+        let consumed = self.consumed(stage, queue);
+        if self.fetches(stage) {
             let shell = self.fetch_shell(consumed);
-            return Recipe::plain(name, vec![id], Feed::FetchedQueue(queue), shell);
+            let source = DispatchSource::FetchedQueue(queue);
+            return KernelDesc::plain(stage.name, vec![stage], source, shell);
         }
-        let starts = id == StageId::NewPath;
-        let counts = matches!(id, StageId::BinShadow | StageId::BinExtension);
-        let traverses = !(starts || counts);
-        let arguments = if traverses { "slot" } else { "slot, item" };
         let shell = self.shell(&Shell {
-            run: format!("{name}({arguments});"),
+            run: format!("{};", stage.call("slot", "item", "")),
             consumes: Some(consumed),
-            casts: starts,
-            traverses,
+            pushes: self.pushes(&[stage], &[]),
+            traverses: stage.casts.is_some(),
             ..Shell::default()
         });
-        Recipe::plain(name, vec![id], Feed::Queue(queue), shell)
+        let source = DispatchSource::Queue(queue);
+        KernelDesc::plain(stage.name, vec![stage], source, shell)
     }
 
     /// A queue as a stage finds it: rays may have been put in order.
-    fn consumed(&self, stage: StageId, queue: usize) -> Consumed {
-        match stage {
-            StageId::Shadow | StageId::Extension if self.layout.needs.has(Need::Order) => {
-                Consumed {
-                    queue,
-                    region: self.layout.queues.region_ordered(),
-                }
+    fn consumed(&self, stage: &Stage, queue: usize) -> Consumed {
+        let sorts = |s: &Stage| matches!(s.work, Work::Sort { of } if of == stage.name);
+        if self.stages().any(sorts) {
+            Consumed {
+                queue,
+                region: self.layout.queues.region_ordered(),
             }
-            _ => Consumed::unordered(queue),
+        } else {
+            Consumed::unordered(queue)
         }
     }
 
-    /// Whether the threads of a stage stay, and take up one ray after another. Boundaries that are
-    /// crossed, and light that is turned, would have to be seen to in the midst of a cast.
-    pub(crate) fn fetches(&self, id: StageId) -> bool {
-        let possible = match id {
-            StageId::Shadow => true,
-            StageId::Extension => !self.layout.needs.any(&[Need::Overlap, Need::Scattering]),
-            _ => false,
-        };
+    /// Whether the threads of a stage stay, and take up one ray after another.
+    pub(crate) fn fetches(&self, stage: &Stage) -> bool {
+        let possible = stage.casts.is_some_and(|when| self.layout.needs.met(when));
         possible
             && self.layout.wavefront
             && self.technique.ray_fetch == RayFetch::Persistent
             && bvh::provides_steps(&self.parts.bvh)
     }
 
-    /// The kernels that put a queue of rays in order, if that is wanted: `count` is the stage that
-    /// counts them.
-    fn order(&self, count: StageId, queue: usize) -> Vec<Recipe> {
-        let stage = count.stage();
-        if !self.layout.needs.met(stage.need) {
-            return Vec::new();
-        }
-        let name = |what: &str| stage.name.replace("bin", what);
+    /// The kernels that put the queue of rays of the stage `of` in order: `stage` is the one that counts them.
+    fn order(&self, stage: &'static Stage, of: &str, queue: usize) -> Vec<KernelDesc> {
         let order = self.technique.ray_order;
         let scan = order::constants(order) + include_str!("order_scan.wgsl");
         let scatter = order::constants(order)
@@ -169,11 +167,15 @@ impl Composer<'_> {
             + &Consumed::unordered(queue).constants()
             + include_str!("order_scatter.wgsl")
             + &EntryPoint::of_slots_in_queue().wgsl();
-        let groups = Feed::Groups(order::scan_groups(order));
+        let groups = DispatchSource::Groups(order::scan_groups(order));
+        let kernel = |role, source, text| KernelDesc {
+            role,
+            ..KernelDesc::plain(&format!("{role}_{of}"), Vec::new(), source, text)
+        };
         vec![
-            self.stage(count, queue),
-            Recipe::plain(&name("scan"), Vec::new(), groups, scan),
-            Recipe::plain(&name("scatter"), Vec::new(), Feed::Queue(queue), scatter),
+            self.over_queue(stage, queue),
+            kernel(SCAN, groups, scan),
+            kernel(SCATTER, DispatchSource::Queue(queue), scatter),
         ]
     }
 }

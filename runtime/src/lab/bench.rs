@@ -10,8 +10,9 @@ use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::Schedule;
+use crate::kernels::buffers::BufferId;
 use crate::kernels::queues::Counters;
-use crate::render::status::{Flight, Status};
+use crate::render::status::{Status, Submission};
 
 /// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
 const WARM_UP: Duration = Duration::from_millis(200);
@@ -104,7 +105,7 @@ pub(super) fn time(
 /// A run with the buffers that bring its results back.
 struct Lane<'r> {
     run: &'r Run,
-    flight: Flight,
+    submission: Submission,
     queries: u32,
 }
 
@@ -112,33 +113,33 @@ impl<'r> Lane<'r> {
     fn each(gpu: &Gpu, runs: &'r [Run]) -> Result<Vec<Self>, RuntimeError> {
         let lane = |run: &'r Run| {
             let queries = run.schedule.timing.queries(run.schedule.steps.len() as u32);
-            let flight = Flight::new(gpu, run.counters.len(), queries)?;
+            let submission = Submission::new(gpu, run.counters.len(), queries)?;
             Ok(Self {
                 run,
-                flight,
+                submission,
                 queries,
             })
         };
         runs.iter().map(lane).collect()
     }
 
-    fn depart(&mut self, gpu: &Gpu, resources: &Resources, snapshot: &Snapshot) {
-        let (run, flight) = (self.run, &mut self.flight);
+    fn submit(&mut self, gpu: &Gpu, resources: &Resources, snapshot: &Snapshot) {
+        let (run, submission) = (self.run, &mut self.submission);
         if !run.table.is_empty() {
-            let table = resources.buffer("queue_table");
+            let table = resources.buffer(BufferId::QueueTable);
             gpu.queue
                 .write_buffer(table, 0, bytemuck::cast_slice(&run.table));
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         snapshot.restore(&mut encoder, resources);
-        run.schedule.record(&mut encoder, 1, flight.queries());
-        flight.copy(&mut encoder, resources.counters(), self.queries);
-        flight.depart(gpu, encoder, 1);
+        run.schedule.record(&mut encoder, 1, submission.queries());
+        submission.copy(&mut encoder, resources.counters(), self.queries);
+        submission.submit(gpu, encoder, 1);
     }
 
-    fn land(&mut self, gpu: &Gpu) -> Result<Sample, RuntimeError> {
+    fn wait(&mut self, gpu: &Gpu) -> Result<Sample, RuntimeError> {
         let mut status = Status::new(self.run.schedule.steps.len());
-        self.flight.land(gpu, &self.run.schedule, &mut status)?;
+        self.submission.wait(gpu, &self.run.schedule, &mut status)?;
         Ok(Sample {
             steps: status.step_seconds,
             total: status.gpu_seconds,
@@ -155,9 +156,9 @@ fn round(
     lanes: &mut [Lane<'_>],
 ) -> Result<Vec<Sample>, RuntimeError> {
     for lane in lanes.iter_mut() {
-        lane.depart(gpu, resources, snapshot);
+        lane.submit(gpu, resources, snapshot);
     }
-    lanes.iter_mut().map(|lane| lane.land(gpu)).collect()
+    lanes.iter_mut().map(|lane| lane.wait(gpu)).collect()
 }
 
 /// The median of each step.

@@ -12,7 +12,7 @@ use crate::error::RuntimeError;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::{Schedule, Step};
 use crate::gpu::{Gpu, KernelStatistics};
-use crate::kernels::modules::{Composer, Feed, Kernel, Recipe, Sizes};
+use crate::kernels::modules::{Composer, DispatchSource, Kernel, KernelDesc, PREPARE, Sizes};
 use crate::render::build_step;
 
 /// Kernels built so far, by their text; or why they could not be.
@@ -54,7 +54,7 @@ impl Lab<'_> {
         let kernels: Vec<Option<Kernel>> = candidates.iter().map(kernel).collect();
         crate::parallel::map(&kernels, |kernel| {
             let kernel = kernel.as_ref()?;
-            statistics.of(&kernel.recipe.name, &kernel.wgsl, &kernel.bindings)
+            statistics.of(&kernel.desc.name, &kernel.wgsl, &kernel.bindings)
         })
     }
 
@@ -62,7 +62,7 @@ impl Lab<'_> {
     pub(super) fn bare_logic(&mut self) -> Result<Run, RuntimeError> {
         let plan = self.own_plan();
         let composer = self.composer(&plan, false)?;
-        let logic = composer.recipes().swap_remove(0);
+        let logic = composer.descs().swap_remove(0);
         let composed = self.composed(&composer, vec![logic], Vec::new());
         self.build(composed.kernels.clone())?;
         let run = self.finish(composed);
@@ -78,13 +78,13 @@ impl Lab<'_> {
             });
         }
         let composer = self.composer(plan, false)?;
-        let composed = self.composed(&composer, composer.recipes(), Vec::new());
+        let composed = self.composed(&composer, composer.descs(), Vec::new());
         self.build(composed.kernels.clone())?;
         self.finish(composed).map_err(RuntimeError::Validation)
     }
 
-    pub(super) fn recipes(&self, plan: &Plan) -> Result<Vec<Recipe>, RuntimeError> {
-        Ok(self.composer(plan, false)?.recipes())
+    pub(super) fn descs(&self, plan: &Plan) -> Result<Vec<KernelDesc>, RuntimeError> {
+        Ok(self.composer(plan, false)?.descs())
     }
 
     fn compose(&self, candidate: &Candidate) -> Result<Composed, Unmeasured> {
@@ -92,33 +92,32 @@ impl Lab<'_> {
         let inline = candidate.form == Form::Inline;
         let composer = self.composer(&plan, !inline);
         let composer = composer.map_err(|error| error.to_string())?;
-        let mut recipes = composer.recipes();
+        let mut descs = composer.descs();
         if inline {
-            recipes.truncate(1);
-            return Ok(self.composed(&composer, recipes, Vec::new()));
+            descs.truncate(1);
+            return Ok(self.composed(&composer, descs, Vec::new()));
         }
-        let subject = recipes.iter().position(|recipe| {
-            recipe.form == Some(candidate.form) && recipe.members == candidate.members
+        let subject = descs.iter().position(|desc| {
+            desc.form == Some(candidate.form) && desc.members == candidate.members
         });
         let Some(subject) = subject else {
             return Err("the plan has no such kernel".into());
         };
-        // The logic kernel, and the one that counts what it has queued.
-        let recipes = vec![
-            recipes[0].clone(),
-            recipes[1].clone(),
-            recipes.swap_remove(subject),
-        ];
-        Ok(self.composed(&composer, recipes, composer.queue_table()))
+        // The logic kernel, and those until the one that counts what it has queued.
+        let subject = descs.swap_remove(subject);
+        let prepared = descs.iter().position(|desc| desc.role == PREPARE);
+        descs.truncate(prepared.map_or(0, |at| at + 1));
+        descs.push(subject);
+        Ok(self.composed(&composer, descs, composer.queue_table()))
     }
 
     /// A kernel a material that is on some surface.
     fn own_plan(&self) -> Plan {
-        self.makings.world.own_plan(&self.makings.materials)
+        self.inputs.world.own_plan(&self.inputs.materials)
     }
 
     fn names(&self) -> Vec<String> {
-        let materials = self.makings.materials.iter();
+        let materials = self.inputs.materials.iter();
         materials.map(|m| m.name.clone()).collect()
     }
 
@@ -126,7 +125,7 @@ impl Lab<'_> {
     fn plan_around(&self, candidate: &Candidate) -> Result<Plan, Unmeasured> {
         let (form, members) = (candidate.form, &candidate.members);
         let ascending = members.windows(2).all(|pair| pair[0] < pair[1]);
-        let known = members.iter().all(|m| *m < self.makings.materials.len());
+        let known = members.iter().all(|m| *m < self.inputs.materials.len());
         if members.is_empty() || !ascending || !known || form == Form::Own && members.len() > 1 {
             return Err(format!(
                 "there is no kernel of form {form:?} over {members:?}"
@@ -145,8 +144,13 @@ impl Lab<'_> {
         })
     }
 
-    fn composed(&self, composer: &Composer<'_>, recipes: Vec<Recipe>, table: Vec<u32>) -> Composed {
-        let subject = recipes.len() - 1;
+    fn composed(
+        &self,
+        composer: &Composer<'_>,
+        descs: Vec<KernelDesc>,
+        table: Vec<u32>,
+    ) -> Composed {
+        let subject = descs.len() - 1;
         let run = Run {
             schedule: Arc::new(Schedule {
                 steps: Vec::new(),
@@ -156,15 +160,15 @@ impl Lab<'_> {
             subject,
             table,
             counters: composer.layout.counters,
-            queues: match recipes[subject].feed {
-                Feed::Queue(queue) => vec![queue],
-                Feed::Queues { first, count } => (first..first + count).collect(),
+            queues: match descs[subject].source {
+                DispatchSource::Queue(queue) => vec![queue],
+                DispatchSource::Queues { first, count } => (first..first + count).collect(),
                 _ => Vec::new(),
             },
             pool: self.sizes.pool,
         };
-        let kernels = recipes.into_iter().enumerate();
-        let kernels = kernels.map(|(index, recipe)| composer.compose(index, recipe));
+        let kernels = descs.into_iter().enumerate();
+        let kernels = kernels.map(|(index, desc)| composer.compose(index, desc));
         Composed {
             kernels: kernels.collect(),
             run,

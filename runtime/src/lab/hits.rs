@@ -5,7 +5,7 @@ use impasto_compiler::partition::{Form, Plan};
 
 use super::{Candidate, Lab};
 use crate::error::RuntimeError;
-use crate::kernels::queues::Queues;
+use crate::kernels::buffers::BufferId;
 
 impl Lab<'_> {
     /// Counts the hits of each material, and the blocks of neighbouring slots with any.
@@ -24,7 +24,8 @@ impl Lab<'_> {
         let run = run.map_err(RuntimeError::Validation)?;
         let sample = self.time(std::slice::from_ref(&run))?.swap_remove(0);
         let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
-        for (kernel, queues) in own.kernels.iter().zip(Queues::of_kernels(own)) {
+        let queues = self.inputs.layout(own)?.queues.of_kernels(own);
+        for (kernel, queues) in own.kernels.iter().zip(queues) {
             let (material, queue) = (kernel.materials[0], queues.start);
             let taken = run.counters.taken_of(counters, queue);
             let mut met = vec![false; blocks];
@@ -46,7 +47,7 @@ impl Lab<'_> {
         if length == 0 {
             return Ok(Vec::new());
         }
-        let (gpu, queues) = (self.gpu, self.resources.buffer("queues"));
+        let (gpu, queues) = (self.gpu, self.resources.buffer(BufferId::Queues));
         let size = 4 * u64::from(length);
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("queue readback"),

@@ -16,7 +16,7 @@ use crate::gpu::{Gpu, KernelStatistics, Timing};
 use crate::kernels::modules::{Composer, Sizes};
 use crate::options::ENDLESS;
 use crate::options::RenderOptions;
-use crate::render::Makings;
+use crate::render::CompositionInputs;
 use crate::render::pool;
 use crate::render::settings;
 use crate::render::workload;
@@ -106,7 +106,7 @@ pub type Unmeasured = String;
 /// A scene in mid-render.
 pub struct Lab<'a> {
     gpu: &'a Gpu,
-    makings: Makings<'a>,
+    inputs: CompositionInputs<'a>,
     sizes: Sizes,
     repetitions: u32,
     statistics: Option<Statistics<'a>>,
@@ -138,17 +138,18 @@ impl<'a> Lab<'a> {
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;
-        let mut makings = Makings::new(gpu.subgroup_size(), world, source, render.technique)?;
-        let own = world.own_plan(&makings.materials);
+        let mut inputs =
+            CompositionInputs::new(gpu.subgroup_size(), world, source, render.technique)?;
+        let own = world.own_plan(&inputs.materials);
         // No plan has more queues or counters: buffers of this layout do for all.
-        let mut layout = makings.layout(&own)?;
+        let mut layout = inputs.layout(&own)?;
         layout.counters.binned = true;
         render.technique = layout.technique(render.technique);
-        makings.technique = render.technique;
+        inputs.technique = render.technique;
         let sizes = pool::sizes(gpu, world, &layout, &render)?;
         let composer = Composer {
             queue_table: true,
-            ..makings.composer(&own, layout, sizes)
+            ..inputs.composer(&own, layout, sizes)
         };
         let resources = Resources::new(gpu, &composer, &render)?;
         let mut lab = Self {
@@ -161,12 +162,12 @@ impl<'a> Lab<'a> {
             cache: Cache::default(),
             workload: workload::before_rendering(
                 world,
-                &makings.parts.surface,
-                &makings.materials,
+                &inputs.parts.surface,
+                &inputs.materials,
                 &layout,
                 sizes.pool,
             ),
-            makings,
+            inputs,
         };
         lab.begin(&own, options.warm_iterations)?;
         Ok(lab)
@@ -183,9 +184,9 @@ impl<'a> Lab<'a> {
         self.count_hits(own)?;
         let samples = self.time(&[run])?;
         let steps = bench::medians(&samples[0]);
-        let recipes = self.recipes(own)?;
-        let of_others = recipes.iter().zip(&steps).skip(1);
-        let of_others = of_others.filter(|(recipe, _)| recipe.form.is_none());
+        let descs = self.descs(own)?;
+        let of_others = descs.iter().zip(&steps).skip(1);
+        let of_others = of_others.filter(|(desc, _)| desc.form.is_none());
         self.workload.logic_seconds = steps.first().copied().unwrap_or(0.0);
         self.workload.other_seconds = of_others.map(|(_, seconds)| seconds).sum();
         Ok(())
@@ -310,10 +311,10 @@ impl<'a> Lab<'a> {
         plan: &'b Plan,
         queue_table: bool,
     ) -> Result<Composer<'b>, RuntimeError> {
-        let layout = self.makings.layout(plan)?;
+        let layout = self.inputs.layout(plan)?;
         Ok(Composer {
             queue_table,
-            ..self.makings.composer(plan, layout, self.sizes)
+            ..self.inputs.composer(plan, layout, self.sizes)
         })
     }
 }

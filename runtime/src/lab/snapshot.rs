@@ -7,10 +7,15 @@
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::gpu::resources::Resources;
+use crate::kernels::buffers::BufferId;
 use crate::kernels::queues::Counters;
 
 /// The buffers that paths live in.
-const BUFFERS: [&str; 3] = ["state", "extension_hits", "shadow_results"];
+const BUFFERS: [BufferId; 3] = [
+    BufferId::State,
+    BufferId::ExtensionHits,
+    BufferId::ShadowResults,
+];
 /// Bytes of the counters that every plan has in the same place.
 const SCALAR_BYTES: u64 = 4 * Counters::SCALARS as u64;
 
@@ -32,7 +37,7 @@ impl Snapshot {
             })
         };
         let snapshot = Self {
-            copies: BUFFERS.map(|name| room(name, resources.buffer(name).size())),
+            copies: BUFFERS.map(|id| room(id.row().name, resources.buffer(id).size())),
             scalars: room("counters", SCALAR_BYTES),
         };
         gpu.check()?;
@@ -42,8 +47,8 @@ impl Snapshot {
     /// Copies what is there now.
     pub(super) fn take(&self, gpu: &Gpu, resources: &Resources) {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        for (name, copy) in BUFFERS.into_iter().zip(&self.copies) {
-            encoder.copy_buffer_to_buffer(resources.buffer(name), 0, copy, 0, copy.size());
+        for (id, copy) in BUFFERS.into_iter().zip(&self.copies) {
+            encoder.copy_buffer_to_buffer(resources.buffer(id), 0, copy, 0, copy.size());
         }
         let counters = resources.counters();
         encoder.copy_buffer_to_buffer(counters, 0, &self.scalars, 0, SCALAR_BYTES);
@@ -52,8 +57,8 @@ impl Snapshot {
 
     /// Records that everything is put back, and that the queues are empty.
     pub(super) fn restore(&self, encoder: &mut wgpu::CommandEncoder, resources: &Resources) {
-        for (name, copy) in BUFFERS.into_iter().zip(&self.copies) {
-            encoder.copy_buffer_to_buffer(copy, 0, resources.buffer(name), 0, copy.size());
+        for (id, copy) in BUFFERS.into_iter().zip(&self.copies) {
+            encoder.copy_buffer_to_buffer(copy, 0, resources.buffer(id), 0, copy.size());
         }
         let counters = resources.counters();
         encoder.clear_buffer(counters, 0, None);

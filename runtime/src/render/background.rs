@@ -9,7 +9,7 @@ use std::time::Instant;
 use impasto_compiler::partition::{Organisation, Plan, Workload};
 
 use super::Planner;
-use super::build::{Makings, Ready, build_all, build_step};
+use super::build::{BuiltPlan, CompositionInputs, build_all, build_step};
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::gpu::schedule::{Schedule, Step};
@@ -29,7 +29,7 @@ pub(super) struct Job {
     pub source: Arc<dyn MaterialSource + Send + Sync>,
     pub technique: Technique,
     /// The plan that runs meanwhile.
-    pub present: Ready,
+    pub present: BuiltPlan,
     /// Set when nobody waits for it any more.
     pub cancelled: Arc<AtomicBool>,
 }
@@ -49,13 +49,13 @@ impl Job {
         self,
         planner: Planner,
         workload: Workload,
-    ) -> std::io::Result<JoinHandle<(Made, Result<Ready, String>)>> {
+    ) -> std::io::Result<JoinHandle<(Made, Result<BuiltPlan, String>)>> {
         let builder = Builder::new().name("plan".into());
         let work = move || self.run(planner, &workload);
         builder.stack_size(STACK_BYTES).spawn(work)
     }
 
-    fn run(self, planner: Planner, workload: &Workload) -> (Made, Result<Ready, String>) {
+    fn run(self, planner: Planner, workload: &Workload) -> (Made, Result<BuiltPlan, String>) {
         let begin = Instant::now();
         let planned = planner(workload);
         let mut made = Made {
@@ -67,13 +67,13 @@ impl Job {
             Err(why) => return (made, Err(why)),
         };
         let begin = Instant::now();
-        let ready = self.gpu.guarded(|| self.compile(&plan));
+        let built = self.gpu.guarded(|| self.compile(&plan));
         made.compile_seconds = begin.elapsed().as_secs_f64();
         made.plan = Some(plan);
-        (made, ready.map_err(|error| error.to_string()))
+        (made, built.map_err(|error| error.to_string()))
     }
 
-    fn compile(&self, plan: &Plan) -> Result<Ready, RuntimeError> {
+    fn compile(&self, plan: &Plan) -> Result<BuiltPlan, RuntimeError> {
         let (gpu, present) = (&self.gpu, &self.present);
         let sizes = present.sizes;
         if plan.organisation != Organisation::Wavefront {
@@ -82,17 +82,17 @@ impl Job {
                 reason: "a megakernel cannot go on with paths that are under way".into(),
             });
         }
-        let mut makings = Makings::new(
+        let mut inputs = CompositionInputs::new(
             gpu.subgroup_size(),
             &self.world,
             &*self.source,
             self.technique,
         )?;
-        makings.some_pixels = present.layout.needs.has(Need::SomePixels);
-        let layout = makings.layout(plan)?;
+        inputs.some_pixels = present.layout.needs.has(Need::SomePixels);
+        let layout = inputs.layout(plan)?;
         let queues = 4 * u64::from(sizes.pool) * layout.queue_words();
         gpu.check_binding_size("the queues of the new plan", queues)?;
-        let composer = makings.composer(plan, layout, sizes);
+        let composer = inputs.composer(plan, layout, sizes);
         // Without other queues nothing differs but the logic kernel, which counted hits.
         let same = does_the_same(plan, &present.plan);
         let resources = match same {
@@ -110,7 +110,7 @@ impl Job {
             )
         };
         let (kernels, steps) = build_all(&composer, build)?;
-        Ok(Ready {
+        Ok(BuiltPlan {
             plan: plan.clone(),
             layout: composer.layout,
             sizes,

@@ -13,8 +13,9 @@ use crate::film::file::Identity;
 use crate::gpu::Gpu;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::{Schedule, Size, Step};
-use crate::kernels::layout::Layout;
-use crate::kernels::modules::{Composer, Feed, Kernel, Sizes};
+use crate::kernels::buffers::ARGUMENT_BYTES;
+use crate::kernels::layout::PlanLayout;
+use crate::kernels::modules::{Composer, DispatchSource, Kernel, Sizes};
 use crate::kernels::parts;
 use crate::kernels::random::{self, Demand};
 use crate::render::pool;
@@ -29,9 +30,9 @@ use crate::world::{KernelParts, MaterialSource, World};
 
 /// A plan that can run: its kernels, and the buffers they work in.
 #[derive(Clone, Debug)]
-pub(super) struct Ready {
+pub(super) struct BuiltPlan {
     pub plan: Plan,
-    pub layout: Layout,
+    pub layout: PlanLayout,
     pub sizes: Sizes,
     pub kernels: Vec<Kernel>,
     pub resources: Resources,
@@ -39,7 +40,7 @@ pub(super) struct Ready {
 }
 
 /// What the kernels of every plan for a world are made of.
-pub(crate) struct Makings<'a> {
+pub(crate) struct CompositionInputs<'a> {
     pub world: &'a World,
     source: &'a dyn MaterialSource,
     pub materials: Vec<MaterialInfo>,
@@ -80,13 +81,14 @@ impl<'g> Renderer<'g> {
         let mut options = options.clone();
         options.technique = options.technique.within(gpu.has_subgroups());
         settings::check(world, &options)?;
-        let mut makings = Makings::new(gpu.subgroup_size(), world, source, options.technique)?;
-        makings.some_pixels = options.pixels.is_some();
-        let layout = makings.layout(plan)?;
+        let mut inputs =
+            CompositionInputs::new(gpu.subgroup_size(), world, source, options.technique)?;
+        inputs.some_pixels = options.pixels.is_some();
+        let layout = inputs.layout(plan)?;
         options.technique = layout.technique(options.technique);
-        makings.technique = options.technique;
+        inputs.technique = options.technique;
         let sizes = pool::sizes(gpu, world, &layout, &options)?;
-        let mut composer = makings.composer(plan, layout, sizes);
+        let mut composer = inputs.composer(plan, layout, sizes);
         if options.count_hits {
             composer.layout.counters.hits = counted_materials(gpu, &composer);
         }
@@ -105,7 +107,7 @@ impl<'g> Renderer<'g> {
             gpu,
             texts: options.count_hits.then(|| world.without_contents()),
             options,
-            ready: Ready {
+            built: BuiltPlan {
                 plan: plan.clone(),
                 layout: composer.layout,
                 sizes,
@@ -135,20 +137,20 @@ pub fn identity(
     options: &RenderOptions,
 ) -> Result<Identity, RuntimeError> {
     settings::check(world, options)?;
-    let makings = Makings::new(
+    let inputs = CompositionInputs::new(
         gpu.subgroup_size(),
         world,
         source,
         options.technique.within(gpu.has_subgroups()),
     )?;
-    let plan = world.own_plan(&makings.materials);
-    let layout = makings.layout(&plan)?;
+    let plan = world.own_plan(&inputs.materials);
+    let layout = inputs.layout(&plan)?;
     let sizes = pool::sizes(gpu, world, &layout, options)?;
-    let composer = makings.composer(&plan, layout, sizes);
+    let composer = inputs.composer(&plan, layout, sizes);
     Ok(ReportInputs::of(&composer, options).identity)
 }
 
-impl<'a> Makings<'a> {
+impl<'a> CompositionInputs<'a> {
     /// Decides what `world` needs, and writes its parts accordingly.
     ///
     /// # Errors
@@ -190,11 +192,12 @@ impl<'a> Makings<'a> {
         })
     }
 
-    pub(crate) fn layout(&self, plan: &Plan) -> Result<Layout, RuntimeError> {
+    pub(crate) fn layout(&self, plan: &Plan) -> Result<PlanLayout, RuntimeError> {
         let unbound = &self.world.parts.unbound;
-        let mut layout = Layout::new(&self.decision, &self.materials, unbound, plan)?;
+        let mut layout = PlanLayout::new(&self.decision, &self.materials, unbound, plan)?;
         if self.some_pixels {
             layout.needs = layout.needs.with(Need::SomePixels);
+            layout.queues.needs = layout.needs;
         }
         Ok(layout)
     }
@@ -203,7 +206,7 @@ impl<'a> Makings<'a> {
     pub(crate) fn composer<'b>(
         &'b self,
         plan: &'b Plan,
-        layout: Layout,
+        layout: PlanLayout,
         sizes: Sizes,
     ) -> Composer<'b> {
         let mut composer = Composer {
@@ -223,7 +226,7 @@ impl<'a> Makings<'a> {
             random: &self.random,
         };
         if self.technique.profile {
-            composer.layout.counters.profiled = composer.recipes().len();
+            composer.layout.counters.profiled = composer.descs().len();
         }
         composer
     }
@@ -319,25 +322,27 @@ pub(crate) fn build_step(
     resources: &Resources,
     sizes: Sizes,
 ) -> Result<Step, RuntimeError> {
-    let name = &kernel.recipe.name;
+    let name = &kernel.desc.name;
     crate::gpu::shader::validate(name, &kernel.wgsl)?;
     let layout = resources.bind_group_layout(gpu, kernel)?;
     Ok(Step {
         name: name.clone(),
         pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
         bind_group: resources.bind_group(gpu, kernel, &layout),
-        size: dispatch_size(kernel.recipe.feed, sizes),
+        size: dispatch_size(kernel.desc.source, sizes),
     })
 }
 
 /// How many workgroups a kernel gets.
-fn dispatch_size(feed: Feed, sizes: Sizes) -> Size {
+fn dispatch_size(source: DispatchSource, sizes: Sizes) -> Size {
     let threads = |count| Size::for_items(count, sizes.workgroup, sizes.row_groups);
-    match feed {
-        Feed::Once => Size::Direct(1, 1),
-        Feed::Groups(groups) => Size::Direct(groups, 1),
-        Feed::Pool => threads(sizes.pool),
-        Feed::Fetched | Feed::FetchedQueue(_) => threads(sizes.threads),
-        Feed::Queue(queue) | Feed::Queues { first: queue, .. } => Size::Indirect(12 * queue as u64),
+    match source {
+        DispatchSource::Once => Size::Direct(1, 1),
+        DispatchSource::Groups(groups) => Size::Direct(groups, 1),
+        DispatchSource::Pool => threads(sizes.pool),
+        DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => threads(sizes.threads),
+        DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
+            Size::Indirect(ARGUMENT_BYTES * queue as u64)
+        }
     }
 }

@@ -9,21 +9,21 @@ use std::ops::ControlFlow;
 
 use super::{Progress, Renderer};
 use crate::error::RuntimeError;
-use crate::kernels::queues::{Queues, Scalar};
+use crate::kernels::queues::Scalar;
 use crate::render::passes::Pass;
 use crate::render::pool::{self, Pace};
-use crate::render::status::{Flight, Status};
+use crate::render::status::{Status, Submission};
 
 /// Submissions in flight.
-const FLIGHTS: usize = 2;
+const IN_FLIGHT: usize = 2;
 
 /// A pass under way.
 struct Run<'r> {
     pass: &'r mut Pass,
     status: &'r mut Status,
     /// Submissions in flight, and those that can be used again.
-    flights: VecDeque<Flight>,
-    spare: Vec<Flight>,
+    in_flight: VecDeque<Submission>,
+    spare: Vec<Submission>,
     pace: Pace,
     now: Progress,
     /// The iteration that a path was last finished in.
@@ -46,16 +46,16 @@ impl Renderer<'_> {
         if let Some(replan) = &mut self.replan {
             replan.begin_pass(status.iterations);
         }
-        let ready = &self.ready;
+        let built = &self.built;
         let options = pass.options(&self.options);
-        ready
+        built
             .resources
-            .begin_pass(self.gpu, &options, &ready.layout);
+            .begin_pass(self.gpu, &options, &built.layout);
         let mut run = Run {
             now: self.progress(None, pass),
             finished_at: status.iterations,
             pace: Pace::new(self.max_iterations()),
-            flights: VecDeque::new(),
+            in_flight: VecDeque::new(),
             spare: Vec::new(),
             going: true,
             cut: false,
@@ -66,10 +66,10 @@ impl Renderer<'_> {
             // With a new plan at hand, what is under way is waited for.
             let changes = run.going && self.is_replanned();
             if !changes {
-                run.depart(self)?;
+                run.submit(self)?;
             }
-            if let Some(flight) = run.flights.pop_front() {
-                run.land(self, flight)?;
+            if let Some(submission) = run.in_flight.pop_front() {
+                run.wait(self, submission)?;
                 if progress(&self.progress_of_all(&run.now, run.pass)).is_break() {
                     run.stop();
                 }
@@ -85,17 +85,17 @@ impl Renderer<'_> {
 
     /// The most iterations whose timestamps a submission has room for.
     fn max_iterations(&self) -> u32 {
-        let schedule = &self.ready.schedule;
+        let schedule = &self.built.schedule;
         schedule.timing.max_dispatches() / schedule.steps.len() as u32
     }
 
     /// Ends a pass with the sample whose paths were begun last.
     fn cut(&self, pass: &mut Pass, status: &Status) {
-        let ready = &self.ready;
-        let scalar = |s| ready.layout.counters.scalar(&status.counters, s);
+        let built = &self.built;
+        let scalar = |s| built.layout.counters.scalar(&status.counters, s);
         let begun = u32::from(scalar(Scalar::NextPixel) > 0);
         pass.samples = pass.samples.min(scalar(Scalar::NextSample) + begun);
-        ready
+        built
             .resources
             .set_run(self.gpu, &pass.options(&self.options));
     }
@@ -114,40 +114,40 @@ impl Renderer<'_> {
         })
     }
 
-    pub(super) fn new_flight(&self, max_iterations: u32) -> Result<Flight, RuntimeError> {
-        let (schedule, counters) = (&self.ready.schedule, self.ready.layout.counters);
+    pub(super) fn new_submission(&self, max_iterations: u32) -> Result<Submission, RuntimeError> {
+        let (schedule, counters) = (&self.built.schedule, self.built.layout.counters);
         let dispatches = max_iterations * schedule.steps.len() as u32;
-        Flight::new(
+        Submission::new(
             self.gpu,
             counters.len(),
             schedule.timing.queries(dispatches),
         )
     }
 
-    pub(super) fn submit(&self, mut flight: Flight, iterations: u32) -> Flight {
-        let schedule = &self.ready.schedule;
+    pub(super) fn submit(&self, mut submission: Submission, iterations: u32) -> Submission {
+        let schedule = &self.built.schedule;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        schedule.record(&mut encoder, iterations, flight.queries());
+        schedule.record(&mut encoder, iterations, submission.queries());
         let dispatches = iterations * schedule.steps.len() as u32;
         let queries = schedule.timing.queries(dispatches);
-        flight.copy(&mut encoder, self.ready.resources.counters(), queries);
-        flight.depart(self.gpu, encoder, iterations);
-        flight
+        submission.copy(&mut encoder, self.built.resources.counters(), queries);
+        submission.submit(self.gpu, encoder, iterations);
+        submission
     }
 
     /// How many paths of this run the counters say are finished, of those until the end of the
     /// pass. A slot asks for a path when a pass begins and whenever one is finished; a megakernel
     /// finishes what it was handed. `None` if nothing is known of this pass yet.
     fn progress(&self, status: Option<&Status>, pass: &Pass) -> Progress {
-        let layout = &self.ready.layout;
+        let layout = &self.built.layout;
         let pixels = self.pixels();
         let before = pixels * u64::from(pass.done - pass.resumed);
         let paths = status.map_or(before, |status| {
             let words = &status.counters;
             let scalar = |s| u64::from(layout.counters.scalar(words, s));
             if layout.wavefront {
-                let asked = layout.counters.items_of(words, Queues::NEW_PATH);
-                let begun = u64::from(self.ready.sizes.pool) * pass.number;
+                let asked = layout.counters.items_of(words, layout.queues.new_paths());
+                let begun = u64::from(self.built.sizes.pool) * pass.number;
                 (status.before.asked + asked).saturating_sub(begun)
             } else {
                 before + scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)
@@ -182,26 +182,27 @@ impl Renderer<'_> {
 
 impl Run<'_> {
     /// Submits as much as may be in flight.
-    fn depart(&mut self, renderer: &Renderer<'_>) -> Result<(), RuntimeError> {
-        while self.going && self.flights.len() < FLIGHTS {
-            let ahead = self.flights.iter().map(Flight::iterations).sum();
+    fn submit(&mut self, renderer: &Renderer<'_>) -> Result<(), RuntimeError> {
+        while self.going && self.in_flight.len() < IN_FLIGHT {
+            let ahead = self.in_flight.iter().map(Submission::iterations).sum();
             let iterations = self.pace.next(&self.now, self.status.iterations, ahead);
             let spare = self.spare.pop();
-            let flight = spare.map_or_else(|| renderer.new_flight(self.pace.max), Ok)?;
-            self.flights.push_back(renderer.submit(flight, iterations));
+            let submission = spare.map_or_else(|| renderer.new_submission(self.pace.max), Ok)?;
+            self.in_flight
+                .push_back(renderer.submit(submission, iterations));
         }
         Ok(())
     }
 
     /// Waits for a submission, and learns what it brings.
-    fn land(
+    fn wait(
         &mut self,
         renderer: &mut Renderer<'_>,
-        mut flight: Flight,
+        mut submission: Submission,
     ) -> Result<(), RuntimeError> {
-        flight.land(renderer.gpu, &renderer.ready.schedule, self.status)?;
+        submission.wait(renderer.gpu, &renderer.built.schedule, self.status)?;
         self.pace.adapt();
-        self.spare.push(flight);
+        self.spare.push(submission);
         let before = self.now.paths;
         self.now = renderer.progress(Some(self.status), self.pass);
         let (paths, seconds) = (self.now.paths, self.status.gpu_seconds);

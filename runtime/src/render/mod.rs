@@ -17,7 +17,7 @@ pub mod until;
 pub(crate) mod workload;
 
 pub use build::identity;
-pub(crate) use build::{Makings, build_step};
+pub(crate) use build::{CompositionInputs, build_step};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
 pub use selection::Samples;
@@ -40,7 +40,7 @@ use crate::render::status::Status;
 use crate::render::workload::Mark;
 use crate::world::GeometryCounts;
 use crate::world::World;
-use build::Ready;
+use build::BuiltPlan;
 use replan::{Change, Replan};
 
 /// A finished (or stopped) render.
@@ -59,7 +59,7 @@ pub struct Rendering {
 pub struct Renderer<'g> {
     gpu: &'g Gpu,
     options: RenderOptions,
-    ready: Ready,
+    built: BuiltPlan,
     facts: ReportInputs,
     /// What kernels of another plan would be composed from, if hits are counted.
     texts: Option<World>,
@@ -87,10 +87,10 @@ struct ReportInputs {
 impl<'g> Renderer<'g> {
     /// The kernels' names and their WGSL, in the order of an iteration.
     pub fn kernels(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.ready
+        self.built
             .kernels
             .iter()
-            .map(|k| (k.recipe.name.as_str(), k.wgsl.as_str()))
+            .map(|k| (k.desc.name.as_str(), k.wgsl.as_str()))
     }
 
     /// Renders. `progress` is called after each submission; when it breaks, the samples that
@@ -114,7 +114,7 @@ impl<'g> Renderer<'g> {
 
     /// Paths in flight.
     pub fn pool(&self) -> u32 {
-        self.ready.sizes.pool
+        self.built.sizes.pool
     }
 
     /// What the samples of this render must have in common with others to be merged with them.
@@ -132,7 +132,7 @@ impl<'g> Renderer<'g> {
         let start = keeping.as_mut().and_then(|k| k.start.take());
         let resumed = self.take_up(start.as_ref())?;
         drop(start);
-        let mut status = Status::new(self.ready.schedule.steps.len());
+        let mut status = Status::new(self.built.schedule.steps.len());
         let mut pass = Pass::new(begin, resumed.samples);
         let every = keeping.as_ref().map(|k| k.every);
         let mut passes = Passes::new(self.options.samples - resumed.samples, every);
@@ -166,14 +166,14 @@ impl<'g> Renderer<'g> {
 
     /// Empties everything, then fills the film with the sums that are gone on from.
     fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
-        self.ready.resources.clear(self.gpu);
+        self.built.resources.clear(self.gpu);
         let Some(start) = start else {
             return Ok(Resumed::default());
         };
         let (identity, options) = (self.identity(), &self.options);
         let done = start.done_of(identity, options.first_sample, options.samples);
         let samples = done.map_err(RuntimeError::OtherRender)?;
-        self.ready
+        self.built
             .resources
             .write_film(self.gpu, start.sums.words());
         Ok(Resumed {
@@ -191,10 +191,10 @@ impl<'g> Renderer<'g> {
         done: u32,
     ) -> Result<FilmFile, RuntimeError> {
         let (width, height) = (self.facts.width, self.facts.height);
-        let words = self.ready.resources.read_film(self.gpu)?;
+        let words = self.built.resources.read_film(self.gpu)?;
         let sums = Sums::new(width, height, words);
         let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
-        let (counters, read) = (self.ready.layout.counters, &status.counters);
+        let (counters, read) = (self.built.layout.counters, &status.counters);
         let before: u64 = status.before.dropped.iter().map(Dropped::samples).sum();
         Ok(FilmFile {
             identity: self.facts.identity,
@@ -218,8 +218,8 @@ impl<'g> Renderer<'g> {
     fn workload(&self, status: &Status) -> Option<Workload> {
         let planned = self.replan.as_ref().and_then(Replan::workload);
         planned.or_else(|| {
-            let (ready, before) = (&self.ready, &self.facts.workload);
-            Mark::default().workload(status, &ready.layout, &ready.kernels, before)
+            let (built, before) = (&self.built, &self.facts.workload);
+            Mark::default().workload(status, &built.layout, &built.kernels, before)
         })
     }
 
@@ -228,14 +228,14 @@ impl<'g> Renderer<'g> {
             resumed,
             gpu: self.gpu.info(),
             options: &self.options,
-            layout: &self.ready.layout,
-            kernels: &self.ready.kernels,
-            timed: self.ready.schedule.timing != Timing::None,
+            layout: &self.built.layout,
+            kernels: &self.built.kernels,
+            timed: self.built.schedule.timing != Timing::None,
             strategy: &self.facts.strategy,
-            plan: &self.ready.plan,
+            plan: &self.built.plan,
             replanned: self.replan_report(status),
             geometry: self.facts.geometry,
-            pool: self.ready.sizes.pool,
+            pool: self.built.sizes.pool,
             materials: &self.facts.materials,
             workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,

@@ -7,7 +7,7 @@ use super::Renderer;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::options::{ENDLESS, RenderOptions};
-use crate::render::status::{Flight, Status};
+use crate::render::status::{Status, Submission};
 use crate::render::workload::Mark;
 use crate::technique::Technique;
 use crate::world::{MaterialSource, World};
@@ -45,18 +45,18 @@ impl Renderer<'_> {
     /// The workload of `iterations` iterations after `warm` others, from empty slots on. The film is
     /// left with what they added.
     fn observe(&self, warm: u32, iterations: u32) -> Result<Workload, RuntimeError> {
-        self.ready.resources.clear(self.gpu);
-        self.ready
+        self.built.resources.clear(self.gpu);
+        self.built
             .resources
-            .begin_pass(self.gpu, &self.options, &self.ready.layout);
-        let mut status = Status::new(self.ready.schedule.steps.len());
+            .begin_pass(self.gpu, &self.options, &self.built.layout);
+        let mut status = Status::new(self.built.schedule.steps.len());
         self.advance(warm, &mut status)?;
         let mark = Mark::of(&status);
         self.advance(iterations, &mut status)?;
         let workload = mark.workload(
             &status,
-            &self.ready.layout,
-            &self.ready.kernels,
+            &self.built.layout,
+            &self.built.kernels,
             &self.facts.workload,
         );
         workload.ok_or_else(|| RuntimeError::Setting {
@@ -68,10 +68,10 @@ impl Renderer<'_> {
 
     /// Runs iterations one by one, so that no submission takes long.
     fn advance(&self, iterations: u32, status: &mut Status) -> Result<(), RuntimeError> {
-        let mut flight: Flight = self.new_flight(1)?;
+        let mut submission: Submission = self.new_submission(1)?;
         for _ in 0..iterations {
-            flight = self.submit(flight, 1);
-            flight.land(self.gpu, &self.ready.schedule, status)?;
+            submission = self.submit(submission, 1);
+            submission.wait(self.gpu, &self.built.schedule, status)?;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::error::RuntimeError;
 use crate::film;
 use crate::gpu::Gpu;
-use crate::kernels::layout::Layout;
+use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
 use crate::options::{Progress, RenderOptions};
 use crate::technique::Technique;
@@ -43,7 +43,7 @@ const LAST_ITERATIONS: u64 = 8;
 pub(crate) fn sizes(
     gpu: &Gpu,
     world: &World,
-    layout: &Layout,
+    layout: &PlanLayout,
     options: &RenderOptions,
 ) -> Result<Sizes, RuntimeError> {
     let limits = gpu.device.limits();
@@ -116,7 +116,7 @@ fn workgroup_size(limits: &wgpu::Limits, wanted: Option<u32>) -> Result<u32, Run
     }
 }
 
-fn default_pool(gpu: &Gpu, layout: &Layout, slot_bytes: u64) -> u32 {
+fn default_pool(gpu: &Gpu, layout: &PlanLayout, slot_bytes: u64) -> u32 {
     if gpu.is_software() {
         return SOFTWARE_POOL;
     }

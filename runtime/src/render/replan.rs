@@ -13,9 +13,9 @@ use impasto_compiler::partition::{Form, Plan, Workload};
 
 use super::Renderer;
 use super::background::{Job, Made};
-use super::build::Ready;
+use super::build::BuiltPlan;
 use crate::kernels::dropped::Dropped;
-use crate::kernels::queues::{Counters, Queues};
+use crate::kernels::queues::Counters;
 use crate::render::report::{Ran, ReplanReport, partition};
 use crate::render::status::{Before, Status};
 use crate::render::workload::Mark;
@@ -86,9 +86,9 @@ enum Stage {
     /// Hits are counted.
     Counting(Mark),
     /// A plan is made and compiled.
-    Working(JoinHandle<(Made, Result<Ready, String>)>),
+    Working(JoinHandle<(Made, Result<BuiltPlan, String>)>),
     /// It is there.
-    Made(Made, Box<Ready>),
+    Made(Made, Box<BuiltPlan>),
     /// There is none, or it cannot take over.
     Failed(Made, String),
     /// Nothing is left to do.
@@ -116,7 +116,7 @@ impl Renderer<'_> {
     /// Renews the plan once, in the midst of the next render, if hits are counted
     /// ([`RenderOptions::count_hits`](super::RenderOptions::count_hits)) and it lasts long enough.
     pub fn replan(&mut self, replanning: Replanning) {
-        if self.ready.layout.counters.hits == 0 {
+        if self.built.layout.counters.hits == 0 {
             return;
         }
         self.replan = Some(Replan {
@@ -159,12 +159,12 @@ impl Renderer<'_> {
     /// Goes on with the new plan. Nothing may be in flight.
     pub(super) fn change_plan(&mut self, status: &mut Status, elapsed: Duration) {
         let made = self.replan.as_mut().and_then(Replan::take);
-        let Some((made, ready)) = made else {
+        let Some((made, built)) = made else {
             return;
         };
         let mut change = self.change(&made, status, elapsed);
-        let old = std::mem::replace(&mut self.ready, ready);
-        if self.ready.resources.counters() != old.resources.counters() {
+        let old = std::mem::replace(&mut self.built, built);
+        if self.built.resources.counters() != old.resources.counters() {
             change.report.kernels = self.ran(&old).report(status, 0);
             change.logic_before = 0.0;
             self.take_over(&old, status);
@@ -172,12 +172,12 @@ impl Renderer<'_> {
         self.replanned = Some(change);
     }
 
-    pub(super) fn ran<'r>(&'r self, ready: &'r Ready) -> Ran<'r> {
+    pub(super) fn ran<'r>(&'r self, built: &'r BuiltPlan) -> Ran<'r> {
         Ran {
-            layout: &ready.layout,
-            kernels: &ready.kernels,
+            layout: &built.layout,
+            kernels: &built.kernels,
             materials: &self.facts.materials,
-            pool: ready.sizes.pool,
+            pool: built.sizes.pool,
         }
     }
 
@@ -192,7 +192,7 @@ impl Renderer<'_> {
                 at_seconds: elapsed.as_secs_f64(),
                 planning_seconds: made.planning_seconds,
                 compile_seconds: made.compile_seconds,
-                from: string(&self.ready.plan),
+                from: string(&self.built.plan),
                 to: made.plan.as_ref().map(string),
                 kept: None,
                 gpu_seconds: status.gpu_seconds,
@@ -206,7 +206,7 @@ impl Renderer<'_> {
     }
 
     /// Makes the present plan's counters go on from those of the `old` one.
-    fn take_over(&self, old: &Ready, status: &mut Status) {
+    fn take_over(&self, old: &BuiltPlan, status: &mut Status) {
         let (width, seed) = (self.facts.width, self.options.seed);
         let dropped = self.ran(old).dropped(status, width, seed);
         let dropped = status.before.dropped.drain(..).chain(dropped);
@@ -214,16 +214,16 @@ impl Renderer<'_> {
         let (counters, words) = (old.layout.counters, &status.counters);
         let before = Before {
             iterations: status.iterations,
-            asked: status.before.asked + counters.items_of(words, Queues::NEW_PATH),
+            asked: status.before.asked + counters.items_of(words, old.layout.queues.new_paths()),
             dropped,
         };
-        let (from, to) = (old.resources.counters(), self.ready.resources.counters());
+        let (from, to) = (old.resources.counters(), self.built.resources.counters());
         let bytes = 4 * Counters::SCALARS as u64;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
         self.gpu.queue.submit([encoder.finish()]);
-        let steps = self.ready.schedule.steps.len();
-        status.go_on(before, steps, self.ready.layout.counters.len());
+        let steps = self.built.schedule.steps.len();
+        status.go_on(before, steps, self.built.layout.counters.len());
     }
 
     /// What the report says of a change of plans.
@@ -231,7 +231,7 @@ impl Renderer<'_> {
         let change = self.replanned.as_ref()?;
         let mut report = change.report.clone();
         let since = status.iterations - change.iterations;
-        let inline = self.ready.plan.kernels.iter();
+        let inline = self.built.plan.kernels.iter();
         let inline = inline.filter(|k| k.form == Form::Inline).count();
         let logic = status.step_seconds.first().copied().unwrap_or(0.0);
         if report.kept.is_none() && inline == 0 && since > 0 && logic > 0.0 {
@@ -275,8 +275,8 @@ impl Replan {
         if iterations < self.settings.counted {
             return Stage::Counting(mark);
         }
-        let (ready, before) = (&renderer.ready, &renderer.facts.workload);
-        let workload = mark.workload(status, &ready.layout, &ready.kernels, before);
+        let (built, before) = (&renderer.built, &renderer.facts.workload);
+        let workload = mark.workload(status, &built.layout, &built.kernels, before);
         let Some(workload) = workload else {
             return Stage::Done;
         };
@@ -302,7 +302,7 @@ impl Replan {
             world: texts.clone(),
             source: self.source.clone(),
             technique: renderer.options.technique,
-            present: renderer.ready.clone(),
+            present: renderer.built.clone(),
             cancelled: self.cancelled.clone(),
         };
         match job.spawn(planner, workload) {
@@ -324,18 +324,18 @@ impl Replan {
     }
 
     /// The new plan, if it is there.
-    fn take(&mut self) -> Option<(Made, Ready)> {
+    fn take(&mut self) -> Option<(Made, BuiltPlan)> {
         match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Made(made, ready) => Some((made, *ready)),
+            Stage::Made(made, built) => Some((made, *built)),
             _ => None,
         }
     }
 }
 
 /// What a thread came to.
-fn joined(thread: JoinHandle<(Made, Result<Ready, String>)>) -> Stage {
+fn joined(thread: JoinHandle<(Made, Result<BuiltPlan, String>)>) -> Stage {
     match thread.join() {
-        Ok((made, Ok(ready))) => Stage::Made(made, Box::new(ready)),
+        Ok((made, Ok(built))) => Stage::Made(made, Box::new(built)),
         Ok((made, Err(why))) => Stage::Failed(made, why),
         Err(_) => failed("planning broke off".into()),
     }

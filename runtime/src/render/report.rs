@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::film::Film;
 use crate::gpu::GpuInfo;
 use crate::kernels::dropped::Dropped;
-use crate::kernels::layout::Layout;
-use crate::kernels::modules::{Feed, Kernel, Recipe};
+use crate::kernels::layout::PlanLayout;
+use crate::kernels::modules::{DispatchSource, Kernel, KernelDesc};
 use crate::kernels::queues::Scalar;
-use crate::kernels::stages::StageId;
 use crate::options::RenderOptions;
 use crate::render::status::Status;
 use crate::render::until::{Check, Ending};
@@ -186,6 +185,10 @@ impl From<GpuInfo> for AdapterReport {
 pub struct KernelReport {
     /// Its name.
     pub name: String,
+    /// The stage that it runs: `logic`, `new_path`, `material`, `shadow`, `extension`, or `bin_shadow` and
+    /// `bin_extension` of rays that are ordered; of kernels between stages `prepare`, `scan` or `scatter`;
+    /// and of a megakernel, which runs all, `mega`.
+    pub stage: String,
     /// How it treats its materials (`own`, `mixed`, `binned`, `inline`); absent if it evaluates none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<impasto_compiler::partition::Form>,
@@ -248,7 +251,7 @@ pub(crate) struct Inputs<'a> {
     pub resumed: Resumed,
     pub gpu: GpuInfo,
     pub options: &'a RenderOptions,
-    pub layout: &'a Layout,
+    pub layout: &'a PlanLayout,
     pub kernels: &'a [Kernel],
     pub timed: bool,
     pub strategy: &'a str,
@@ -344,7 +347,7 @@ pub(crate) fn partition(plan: &Plan, materials: &[MaterialReport]) -> String {
 
 /// The kernels of a plan that ran.
 pub(crate) struct Ran<'a> {
-    pub layout: &'a Layout,
+    pub layout: &'a PlanLayout,
     pub kernels: &'a [Kernel],
     pub materials: &'a [MaterialReport],
     pub pool: u32,
@@ -363,26 +366,27 @@ impl Ran<'_> {
 
     fn kernel(&self, kernel: &Kernel, seconds: f64, status: &Status, paths: u64) -> KernelReport {
         let iterations = status.iterations - status.before.iterations;
-        let (recipe, counters) = (&kernel.recipe, self.layout.counters);
+        let (desc, counters) = (&kernel.desc, self.layout.counters);
         let name = |index: &usize| self.materials.get(*index).map(|m| m.name.clone());
         KernelReport {
-            name: recipe.name.clone(),
-            form: recipe.form,
-            materials: recipe.members.iter().filter_map(name).collect(),
-            items: match recipe.feed {
-                Feed::Queue(queue) | Feed::FetchedQueue(queue) => {
+            name: desc.name.clone(),
+            stage: desc.role.to_owned(),
+            form: desc.form,
+            materials: desc.members.iter().filter_map(name).collect(),
+            items: match desc.source {
+                DispatchSource::Queue(queue) | DispatchSource::FetchedQueue(queue) => {
                     counters.items_of(&status.counters, queue)
                 }
-                Feed::Queues { first, count } => (first..first + count)
+                DispatchSource::Queues { first, count } => (first..first + count)
                     .map(|queue| counters.items_of(&status.counters, queue))
                     .sum(),
-                Feed::Pool if self.layout.wavefront => iterations * u64::from(self.pool),
-                Feed::Pool | Feed::Fetched => paths,
-                Feed::Once | Feed::Groups(_) => iterations,
+                DispatchSource::Pool if self.layout.wavefront => iterations * u64::from(self.pool),
+                DispatchSource::Pool | DispatchSource::Fetched => paths,
+                DispatchSource::Once | DispatchSource::Groups(_) => iterations,
             },
             gpu_seconds: seconds,
             utilisation: None,
-            nonfinite_samples: rows(recipe)
+            nonfinite_samples: rows(desc)
                 .filter_map(|row| counters.dropped_row(&status.counters, row))
                 .map(|row| row.samples())
                 .sum(),
@@ -394,12 +398,12 @@ impl Ran<'_> {
     pub(crate) fn dropped(&self, status: &Status, width: u32, seed: u32) -> Vec<Dropped> {
         let counters = self.layout.counters;
         let mut out = Vec::new();
-        for Kernel { recipe, .. } in self.kernels {
-            let fills = recipe.stages.contains(&StageId::Logic);
-            for row in rows(recipe).chain(fills.then_some(counters.film_row())) {
+        for Kernel { desc, .. } in self.kernels {
+            let fills = desc.fills_film();
+            for row in rows(desc).chain(fills.then_some(counters.film_row())) {
                 let material = self.materials.get(row).map(|m| m.name.as_str());
                 if let Some(found) = counters.dropped_row(&status.counters, row) {
-                    out.push(Dropped::new(&recipe.name, material, &found, width, seed));
+                    out.push(Dropped::new(&desc.name, material, &found, width, seed));
                 }
             }
         }
@@ -408,6 +412,6 @@ impl Ran<'_> {
 }
 
 /// The rows of the samples that a kernel drops at materials: it alone evaluates those.
-fn rows(recipe: &Recipe) -> impl Iterator<Item = usize> {
-    recipe.members.iter().copied()
+fn rows(desc: &KernelDesc) -> impl Iterator<Item = usize> {
+    desc.members.iter().copied()
 }

@@ -71,7 +71,7 @@ impl Renderer<'_> {
                 expected: "a renderer that was built with `RenderOptions::pixels`".into(),
             });
         }
-        self.ready.resources.set_pixels(self.gpu, &pixels);
+        self.built.resources.set_pixels(self.gpu, &pixels);
         self.options.pixels = Some(pixels);
         self.facts.identity.scene = self.options.fingerprint(self.facts.scene);
         Ok(())

@@ -67,9 +67,9 @@ impl Status {
     }
 }
 
-/// A submission and the buffer that brings its status back. It is used again and again.
+/// A submission and the buffer that brings its status back, for one submission after another.
 #[derive(Debug)]
-pub(crate) struct Flight {
+pub(crate) struct Submission {
     readback: wgpu::Buffer,
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     counter_bytes: u64,
@@ -78,7 +78,7 @@ pub(crate) struct Flight {
     index: Option<wgpu::SubmissionIndex>,
 }
 
-impl Flight {
+impl Submission {
     /// Room for `counters` words and `queries` timestamps.
     pub(crate) fn new(gpu: &Gpu, counters: usize, queries: u32) -> Result<Self, RuntimeError> {
         let counter_bytes = (4 * counters as u64).next_multiple_of(8);
@@ -101,7 +101,7 @@ impl Flight {
             (set, buffer("timestamps", query_bytes, usage))
         });
         let size = counter_bytes + query_bytes;
-        let flight = Self {
+        let submission = Self {
             readback: buffer("status", size, wgpu::BufferUsages::MAP_READ),
             queries: timestamps,
             counter_bytes,
@@ -110,7 +110,7 @@ impl Flight {
             index: None,
         };
         gpu.check()?;
-        Ok(flight)
+        Ok(submission)
     }
 
     /// Iterations of the submission that is under way.
@@ -140,13 +140,13 @@ impl Flight {
     }
 
     /// Submits what was recorded.
-    pub(crate) fn depart(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder, iterations: u32) {
+    pub(crate) fn submit(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder, iterations: u32) {
         self.iterations = iterations;
         self.index = Some(gpu.queue.submit([encoder.finish()]));
     }
 
     /// Waits for the submission and adds what it brought to `status`.
-    pub(crate) fn land(
+    pub(crate) fn wait(
         &mut self,
         gpu: &Gpu,
         schedule: &Schedule,

@@ -5,14 +5,13 @@ use impasto_compiler::abi::MaterialInfo;
 use impasto_compiler::partition::workload::BLOCK;
 use impasto_compiler::partition::{Hits, Workload};
 
-use crate::kernels::layout::Layout;
+use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Kernel;
-use crate::kernels::stages::StageId;
 use crate::kernels::state;
 use crate::render::status::Status;
 use crate::wgsl::ShaderPart;
 use crate::world::World;
-use crate::world::needs::{Need, Needs};
+use crate::world::needs::Need;
 
 /// Bytes of a triangle's corners, with what they carry beside positions.
 const TRIANGLE_BYTES: u64 = 48;
@@ -24,7 +23,7 @@ pub(crate) fn before_rendering(
     world: &World,
     surface: &ShaderPart,
     materials: &[MaterialInfo],
-    layout: &Layout,
+    layout: &PlanLayout,
     pool: u32,
 ) -> Workload {
     let unbound = &world.parts.unbound;
@@ -34,8 +33,8 @@ pub(crate) fn before_rendering(
         on_surface: !unbound.contains(&index),
         share: 0.0,
         present: 0.0,
-        loads: (traffic(layout.needs, material)[0] + geometry) as f64,
-        stores: traffic(layout.needs, material)[1] as f64,
+        loads: (traffic(layout, material)[0] + geometry) as f64,
+        stores: traffic(layout, material)[1] as f64,
     };
     Workload {
         pool,
@@ -47,12 +46,14 @@ pub(crate) fn before_rendering(
 
 /// Bytes of state that a hit of a material loads and stores: none is asked for a light sample where light
 /// cannot be sampled.
-fn traffic(needs: Needs, material: &MaterialInfo) -> [u64; 2] {
-    let needs = match material.delta_only {
-        true => needs.without(Need::ShadowRays),
-        false => needs,
+fn traffic(layout: &PlanLayout, material: &MaterialInfo) -> [u64; 2] {
+    let needs = if material.delta_only {
+        layout.needs.without(Need::ShadowRays)
+    } else {
+        layout.needs
     };
-    state::traffic(needs, StageId::Material)
+    let material = layout.stages().iter().find(|s| s.evaluates_materials());
+    material.map_or([0; 2], |stage| state::traffic(needs, stage))
 }
 
 /// Bytes of the triangle that was hit, as far as some material asks for it.
@@ -91,7 +92,7 @@ impl Mark {
     pub(crate) fn workload(
         &self,
         status: &Status,
-        layout: &Layout,
+        layout: &PlanLayout,
         kernels: &[Kernel],
         before: &Workload,
     ) -> Option<Workload> {
@@ -122,10 +123,10 @@ impl Mark {
         let begin = self.step_seconds.iter().copied();
         let begin = begin.chain(std::iter::repeat(0.0));
         for ((kernel, end), begin) in kernels.iter().zip(&status.step_seconds).zip(begin) {
-            let recipe = &kernel.recipe;
-            if recipe.stages.contains(&StageId::Logic) {
+            let desc = &kernel.desc;
+            if desc.fills_film() {
                 sum.logic += end - begin;
-            } else if recipe.form.is_some() {
+            } else if desc.form.is_some() {
                 sum.materials += end - begin;
             }
         }

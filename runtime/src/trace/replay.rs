@@ -19,11 +19,11 @@ use super::record::{self, Names, Recorder};
 use super::textures::Textures;
 use super::{LIMIT, lower};
 use crate::film::{self, Sums};
-use crate::gpu::resources::run_words;
 use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
+use crate::kernels::run;
 use crate::options::RenderOptions;
-use crate::render::{Makings, settings};
+use crate::render::{CompositionInputs, settings};
 use crate::technique::{Regeneration, Sampler, Technique};
 use crate::wgsl::BufferData;
 use crate::world::{MaterialSource, World};
@@ -120,11 +120,11 @@ impl<'p> Replayer<'p> {
             regeneration: Regeneration::Never,
             ..Technique::default()
         };
-        let makings = Makings::new(1, world, source, technique)?;
-        let materials = makings.materials.iter();
+        let inputs = CompositionInputs::new(1, world, source, technique)?;
+        let materials = inputs.materials.iter();
         let names: Vec<String> = materials.map(|m| m.name.clone()).collect();
         let plan = Plan::mega(&names, &world.parts.unbound);
-        let layout = makings.layout(&plan)?;
+        let layout = inputs.layout(&plan)?;
         // One slot, one thread.
         let sizes = Sizes {
             pool: 1,
@@ -133,12 +133,12 @@ impl<'p> Replayer<'p> {
             fetch_limit: 1,
             row_groups: 1,
         };
-        let composer = makings.composer(&plan, layout, sizes);
-        let kernels = composer.recipes().into_iter().enumerate();
-        let mega = kernels.rev().find(|(_, recipe)| recipe.form.is_some());
-        let (index, recipe) = mega.ok_or_else(|| lower::unsupported("megakernel", "main"))?;
-        let kernel = composer.compose(index, recipe);
-        let (module, info) = crate::gpu::shader::validate(&kernel.recipe.name, &kernel.wgsl)?;
+        let composer = inputs.composer(&plan, layout, sizes);
+        let kernels = composer.descs().into_iter().enumerate();
+        let mega = kernels.rev().find(|(_, desc)| desc.form.is_some());
+        let (index, desc) = mega.ok_or_else(|| lower::unsupported("megakernel", "main"))?;
+        let kernel = composer.compose(index, desc);
+        let (module, info) = crate::gpu::shader::validate(&kernel.desc.name, &kernel.wgsl)?;
         let words = |buffer: &BufferData| {
             (
                 buffer.name,
@@ -218,7 +218,7 @@ impl<'p> Replayer<'p> {
         let pixels = self.width as usize * self.height as usize;
         let of_scene = self.buffers.iter().find(|(buffer, _)| *buffer == name);
         match (name, of_scene) {
-            ("run", _) => Ok(run_words(&RenderOptions::default()).to_vec()),
+            ("run", _) => Ok(run::words(&RenderOptions::default()).to_vec()),
             ("counters", _) => Ok(vec![0; self.counters.len()]),
             ("film", _) => Ok(vec![0; pixels * film::PLANES]),
             (_, Some((_, words))) => Ok(words.clone()),
@@ -282,7 +282,7 @@ impl<F: Float> Session<'_, F> {
         let pixels = self.replayer.width as usize * self.replayer.height as usize;
         for (name, words) in self.code.buffers.iter().zip(&mut self.machine.buffers) {
             match name.as_str() {
-                "run" => words.copy_from_slice(&run_words(options)),
+                "run" => words.copy_from_slice(&run::words(options)),
                 "counters" => {
                     words.fill(0);
                     words[counters.index(Scalar::WorkPixel)] = pixel as u32;

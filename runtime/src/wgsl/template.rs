@@ -5,6 +5,7 @@
 //! | `#if CONDITION` | stay if the condition holds |
 //! | `#else` | stay if it does not |
 //! | `#endif` | stay as they did before `#if` |
+//! | `#each SET`, until `#end` | are repeated for each member of a set, with its words in place of `$WORD` |
 //!
 //! A condition is one flag or several, all of which must be set: `a && !b`; `!` asks that a flag is not.
 //! Directives nest. Whoever makes text of a file names every flag that the file asks for: one that was not
@@ -14,6 +15,12 @@ use std::fmt;
 
 /// A name of conditions, and whether it is set.
 pub(crate) type Flag = (&'static str, bool);
+
+/// Words by the names that a text has for them.
+pub(crate) type Words = Vec<(&'static str, String)>;
+
+/// The name of a set, and the words of its members.
+pub(crate) type Set = (&'static str, Vec<Words>);
 
 /// A file of WGSL.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +73,17 @@ impl Template {
     /// If the file has a mistake, which names the file, the line and the flag. No scene can bring it
     /// about: files are part of the program, and the flags that they are given are fixed in its sources.
     pub(crate) fn wgsl(&self, flags: &[Flag]) -> String {
-        resolve(self.text, flags).unwrap_or_else(|mistake| panic!("{self}: {mistake}"))
+        self.with_sets(flags, &[])
+    }
+
+    /// The same of a text that repeats lines for the members of sets.
+    ///
+    /// # Panics
+    /// As [`Template::wgsl`].
+    pub(crate) fn with_sets(&self, flags: &[Flag], sets: &[Set]) -> String {
+        let repeated = repeat(self.text, sets);
+        let resolved = repeated.and_then(|text| resolve(&text, flags));
+        resolved.unwrap_or_else(|mistake| panic!("{self}: {mistake}"))
     }
 }
 
@@ -80,6 +97,42 @@ impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}: {}", self.line, self.what)
     }
+}
+
+/// `text` with lines between `#each` and `#end` repeated for the members of a set.
+fn repeat(text: &str, sets: &[(&str, Vec<Words>)]) -> Result<String, Mistake> {
+    let mut out = String::with_capacity(text.len());
+    let mut lines = (1..).zip(text.lines());
+    while let Some((number, line)) = lines.next() {
+        let Some(name) = line.strip_prefix("#each ") else {
+            out += line;
+            out.push('\n');
+            continue;
+        };
+        let mistake = |what| Mistake { line: number, what };
+        let set = sets.iter().find(|(set, _)| *set == name);
+        let (_, members) =
+            set.ok_or_else(|| mistake(format!("`{name}` is no set of this text")))?;
+        let mut repeated = String::new();
+        loop {
+            let (_, line) = lines
+                .next()
+                .ok_or_else(|| mistake("`#each` without `#end`".into()))?;
+            if line == "#end" {
+                break;
+            }
+            repeated += line;
+            repeated.push('\n');
+        }
+        out.extend(members.iter().map(|words| filled(&repeated, words)));
+    }
+    Ok(out)
+}
+
+fn filled(text: &str, words: &Words) -> String {
+    let fill =
+        |text: String, (name, word): &(&str, String)| text.replace(&format!("${name}"), word);
+    words.iter().fold(text.to_owned(), fill)
 }
 
 fn resolve(text: &str, flags: &[(&str, bool)]) -> Result<String, Mistake> {
@@ -215,6 +268,24 @@ mod tests {
     }
 
     #[test]
+    fn lines_are_repeated_for_the_members_of_a_set() {
+        let text = "a\n#each ray\n$name wants_$name\n#if x\n#endif\n#end\nb\n";
+        let members = ["c", "d"].map(|name| vec![("name", name.to_owned())]);
+        let repeated = |sets: &[(&str, Vec<Words>)]| repeat(text, sets);
+        assert_eq!(
+            repeated(&[("ray", members.into())]),
+            Ok("a\nc wants_c\n#if x\n#endif\nd wants_d\n#if x\n#endif\nb\n".into())
+        );
+        assert_eq!(repeated(&[("ray", Vec::new())]), Ok("a\nb\n".into()));
+        let mistake = repeated(&[("rays", Vec::new())]).expect_err("no such set");
+        assert_eq!(mistake.to_string(), "line 2: `ray` is no set of this text");
+        let endless = repeat("#each ray\na\n", &[("ray", Vec::new())]);
+        let mistake = endless.expect_err("no end");
+        assert_eq!(mistake.to_string(), "line 1: `#each` without `#end`");
+        refused("a\n#end\n", 2, "`#end` is no directive");
+    }
+
+    #[test]
     #[should_panic(expected = "a.wgsl (included by b.rs): line 1: `shadow_ray` is no flag")]
     fn a_mistake_names_the_file() {
         let template = Template {
@@ -256,7 +327,14 @@ mod tests {
                 assert!(named, "{}: no source has the flag `{name}`", path.display());
             }
             let flags: Vec<(&str, bool)> = names.iter().map(|name| (*name, true)).collect();
-            if let Err(mistake) = resolve(&text, &flags) {
+            let sets = text.lines().filter_map(|line| line.strip_prefix("#each "));
+            let sets: Vec<(&str, Vec<Words>)> = sets.map(|set| (set, vec![Vec::new()])).collect();
+            for (set, _) in &sets {
+                let literal = format!("\"{set}\"");
+                let named = sources.iter().any(|(_, source)| source.contains(&literal));
+                assert!(named, "{}: no source has the set `{set}`", path.display());
+            }
+            if let Err(mistake) = repeat(&text, &sets).and_then(|text| resolve(&text, &flags)) {
                 panic!("{}: {mistake}", path.display());
             }
             conditions += flags.len();

@@ -11,7 +11,8 @@ use wgpu::naga::back::spv;
 
 use super::KernelStatistics;
 use crate::gpu::{Gpu, shader};
-use crate::kernels::compose::{Access, Binding};
+use crate::kernels::buffers::Access;
+use crate::kernels::compose::Binding;
 
 /// A device of its own, on which kernels are built to be asked.
 pub(crate) struct Statistics<'g> {

@@ -7,14 +7,8 @@ fn push_requests(lane: u32, slot: u32) {
     // Stages diverge; here the threads come together again.
     subgroupBarrier();
 #endif
-#if sorts
-    append(wanted_work, wanted_work != NOTHING, slot);
-#endif
-#if casts
-    append(QUEUE_EXTENSION, wants_extension, slot);
-#endif
-#if casts_shadows
-    append(QUEUE_SHADOW, wants_shadow, slot);
-#endif
+#each wishes
+    append($queue, $wanted, slot);
+#end
 }
 

@@ -9,15 +9,9 @@ var<workgroup> group_base: array<u32, PUSHED_QUEUES>;
 
 // Appends the slot to every queue that its stage asked for. All threads of a workgroup call it.
 fn push_requests(lane: u32, slot: u32) {
-#if sorts
-    let work_rank = reserve(wanted_work, wanted_work != NOTHING);
-#endif
-#if casts
-    let extension_rank = reserve(QUEUE_EXTENSION, wants_extension);
-#endif
-#if casts_shadows
-    let shadow_rank = reserve(QUEUE_SHADOW, wants_shadow);
-#endif
+#each wishes
+    let $name_rank = reserve($queue, $wanted);
+#end
     workgroupBarrier();
     for (var index = lane; index < PUSHED_QUEUES; index += WORKGROUP_SIZE) {
         let count = atomicLoad(&group_count[index]);
@@ -27,15 +21,9 @@ fn push_requests(lane: u32, slot: u32) {
         }
     }
     workgroupBarrier();
-#if sorts
-    push(wanted_work, wanted_work != NOTHING, work_rank, slot);
-#endif
-#if casts
-    push(QUEUE_EXTENSION, wants_extension, extension_rank, slot);
-#endif
-#if casts_shadows
-    push(QUEUE_SHADOW, wants_shadow, shadow_rank, slot);
-#endif
+#each wishes
+    push($queue, $wanted, $name_rank, slot);
+#end
 }
 
 fn reserve(queue: u32, wanted: bool) -> u32 {

@@ -8,7 +8,7 @@ use crate::gpu::schedule::{Schedule, Size, Step};
 use crate::gpu::{Gpu, Timing};
 use crate::kernels::shells::{EntryPoint, FetchShell};
 use crate::render::pool;
-use crate::render::status::{Flight, Status};
+use crate::render::status::{Status, Submission};
 use crate::scene::Scene;
 use crate::technique::{Leaves, RayFetch, Technique};
 use crate::wgsl;
@@ -128,14 +128,14 @@ impl<'g> Caster<'g> {
 
     fn run(&self, schedule: &Schedule, counters: &wgpu::Buffer) -> Result<f64, RuntimeError> {
         let queries = schedule.timing.queries(1);
-        let mut flight = Flight::new(self.gpu, COUNTERS as usize, queries)?;
+        let mut submission = Submission::new(self.gpu, COUNTERS as usize, queries)?;
         let mut status = Status::new(1);
         let begin = Instant::now();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        schedule.record(&mut encoder, 1, flight.queries());
-        flight.copy(&mut encoder, counters, queries);
-        flight.depart(self.gpu, encoder, 1);
-        flight.land(self.gpu, schedule, &mut status)?;
+        schedule.record(&mut encoder, 1, submission.queries());
+        submission.copy(&mut encoder, counters, queries);
+        submission.submit(self.gpu, encoder, 1);
+        submission.wait(self.gpu, schedule, &mut status)?;
         Ok(match schedule.timing {
             Timing::None => begin.elapsed().as_secs_f64(),
             _ => status.gpu_seconds,

@@ -71,7 +71,7 @@ impl Renderer<'_> {
         let resumed = self.take_up(None)?;
         let limit = self.options.samples;
         let seeds = [self.options.seed, second_seed(self.options.seed)];
-        let status = Status::new(self.ready.schedule.steps.len());
+        let status = Status::new(self.built.schedule.steps.len());
         let mut course = Course {
             halves: Halves::new(self.sums(&status, &resumed, 0)?.sums),
             pass: Pass::new(begin, 0),
@@ -148,7 +148,7 @@ impl Renderer<'_> {
     /// What was left out so far, with the present seed in examples.
     fn dropped(&self, status: &Status) -> Vec<Dropped> {
         let now = self
-            .ran(&self.ready)
+            .ran(&self.built)
             .dropped(status, self.facts.width, self.options.seed);
         status.before.dropped.iter().cloned().chain(now).collect()
     }

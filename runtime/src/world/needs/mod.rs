@@ -33,6 +33,13 @@ pub(crate) struct When {
 /// Always.
 pub(crate) const ALWAYS: When = when(&[]);
 
+impl When {
+    /// Whether it holds for every scene.
+    pub(crate) fn is_always(&self) -> bool {
+        self.all.is_empty() && self.none.is_empty()
+    }
+}
+
 /// If all of some rows are on.
 pub(crate) const fn when(all: &'static [Need]) -> When {
     When { all, none: &[] }

@@ -1,0 +1,236 @@
+//! The one table of stages.
+
+use super::{Entry, Part, Phase, Request, Stage, Work};
+use crate::wgsl::template::template;
+use crate::world::needs::{ALWAYS, Need, When, when};
+
+const ABSORPTION: When = when(&[Need::Absorption]);
+const MEDIA: When = when(&[Need::Media]);
+const MIS: When = when(&[Need::Mis]);
+const OVERLAP: When = when(&[Need::Overlap]);
+const SCATTERING: When = when(&[Need::Scattering]);
+
+/// Every stage, in the order of an iteration.
+pub(crate) static STAGES: [Stage; 7] = [
+    // Ends or goes on with every path, and samples a light.
+    Stage {
+        name: "logic",
+        body: template!("../logic.wgsl"),
+        arguments: "slot",
+        need: ALWAYS,
+        phase: Phase::Logic,
+        work: Work::Pool,
+        before: &[],
+        casts: None,
+        parts: &[
+            (Part::Random, ALWAYS),
+            (Part::Numbers, ALWAYS),
+            (Part::Film, ALWAYS),
+            (Part::Geometry, ALWAYS),
+            (Part::Surface, ALWAYS),
+            (Part::Mis, MIS),
+            (Part::Lights, ALWAYS),
+            (Part::Media, ABSORPTION),
+            (Part::Fates, ALWAYS),
+        ],
+        loads: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "ray_direction",
+                "hit",
+                "throughput",
+                "radiance",
+                "contribution",
+                "requests",
+                "media",
+            ],
+        )],
+        stores: &[(
+            ALWAYS,
+            &[
+                "light_direction",
+                "hit",
+                "throughput",
+                "carried",
+                "radiance",
+                "light",
+            ],
+        )],
+    },
+    // Starts a path.
+    Stage {
+        name: "new_path",
+        body: template!("../new_path.wgsl"),
+        arguments: "slot, item",
+        need: ALWAYS,
+        phase: Phase::Materials,
+        work: Work::Begin { from: &["logic"] },
+        before: &[],
+        casts: None,
+        parts: &[(Part::Random, ALWAYS), (Part::Camera, ALWAYS)],
+        loads: &[],
+        stores: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "ray_direction",
+                "hit",
+                "throughput",
+                "radiance",
+                "requests",
+                "cone",
+                "media",
+            ],
+        )],
+    },
+    // Evaluates the material that was hit.
+    Stage {
+        name: "material",
+        body: template!("../material.wgsl"),
+        arguments: "slot, instance",
+        need: ALWAYS,
+        phase: Phase::Materials,
+        work: Work::Material { from: &["logic"] },
+        before: &[],
+        casts: None,
+        parts: &[
+            (Part::Random, ALWAYS),
+            (Part::Numbers, ALWAYS),
+            (Part::Geometry, ALWAYS),
+            (Part::Surface, ALWAYS),
+            (Part::Mis, MIS),
+            (Part::Media, MEDIA),
+            (Part::Materials, ALWAYS),
+        ],
+        loads: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "light_direction",
+                "ray_direction",
+                "hit",
+                "throughput",
+                "carried",
+                "radiance",
+                "light",
+                "cone",
+                "media",
+            ],
+        )],
+        stores: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "shadow_origin",
+                "ray_direction",
+                "shadow_direction",
+                "throughput",
+                "radiance",
+                "contribution",
+                "requests",
+                "cone",
+                "media",
+            ],
+        )],
+    },
+    // Counts shadow rays by what they will meet.
+    Stage {
+        name: "bin_shadow",
+        body: template!("../bin_shadow.wgsl"),
+        arguments: "slot, item",
+        need: when(&[Need::Order, Need::ShadowRays]),
+        phase: Phase::Rays,
+        work: Work::Sort { of: "shadow" },
+        before: &["shadow"],
+        casts: None,
+        parts: &[(Part::Order, ALWAYS)],
+        loads: &[(ALWAYS, &["shadow_origin", "shadow_direction"])],
+        stores: &[],
+    },
+    // Asks whether a light sample is seen. The primitive that both kinds of ray start on is overwritten by
+    // extension rays.
+    Stage {
+        name: "shadow",
+        body: template!("../shadow.wgsl"),
+        arguments: "slot",
+        need: when(&[Need::ShadowRays]),
+        phase: Phase::Rays,
+        work: Work::Queue(Request {
+            from: &["material"],
+            parameters: "origin: vec3<f32>, skip: u32, direction: vec3<f32>, distance: f32",
+            entry: Entry::Ray([
+                "vec4<u32>(bitcast<vec3<u32>>(origin), skip)",
+                "vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(distance))",
+            ]),
+        }),
+        before: &["extension"],
+        casts: Some(ALWAYS),
+        parts: &[(Part::Geometry, ALWAYS), (Part::Traversal, ALWAYS)],
+        loads: &[(
+            ALWAYS,
+            &["shadow_origin", "shadow_direction", "contribution"],
+        )],
+        stores: &[(ALWAYS, &["contribution"])],
+    },
+    // Counts extension rays by what they will meet.
+    Stage {
+        name: "bin_extension",
+        body: template!("../bin_extension.wgsl"),
+        arguments: "slot, item",
+        need: when(&[Need::Order]),
+        phase: Phase::Rays,
+        work: Work::Sort { of: "extension" },
+        before: &["extension"],
+        casts: None,
+        parts: &[(Part::Order, ALWAYS)],
+        loads: &[(ALWAYS, &["ray_origin", "ray_direction"])],
+        stores: &[],
+    },
+    // Finds what the path's next segment hits.
+    Stage {
+        name: "extension",
+        body: template!("../extension.wgsl"),
+        arguments: "slot",
+        need: ALWAYS,
+        phase: Phase::Rays,
+        work: Work::Queue(Request {
+            from: &["new_path", "material"],
+            parameters: "origin: vec3<f32>, direction: vec3<f32>, skip: u32",
+            entry: Entry::Ray([
+                "vec4<u32>(bitcast<vec3<u32>>(origin), skip)",
+                "vec4<u32>(bitcast<vec3<u32>>(direction), 0u)",
+            ]),
+        }),
+        before: &[],
+        // Boundaries that are crossed, and light that is turned, would have to be seen to in the midst
+        // of a cast.
+        casts: Some(When {
+            all: &[],
+            none: &[Need::Overlap, Need::Scattering],
+        }),
+        parts: &[
+            (Part::Geometry, ALWAYS),
+            (Part::Traversal, ALWAYS),
+            (Part::Surface, OVERLAP),
+            (Part::Media, OVERLAP),
+            (Part::Media, SCATTERING),
+            (Part::Random, SCATTERING),
+            (Part::Numbers, SCATTERING),
+        ],
+        loads: &[
+            (
+                ALWAYS,
+                &["ray_origin", "ray_direction", "hit", "throughput", "media"],
+            ),
+            (OVERLAP, &["cone"]),
+            // Turns have random numbers by the vertex at which the ray was cast.
+            (SCATTERING, &["cone", "radiance"]),
+        ],
+        stores: &[
+            (ALWAYS, &["hit", "throughput", "media"]),
+            (OVERLAP, &["cone"]),
+            (SCATTERING, &["cone", "ray_direction"]),
+        ],
+    },
+];

@@ -1,0 +1,243 @@
+//! The WGSL through which stages reach the state of paths. In the wavefront it accesses a structure of arrays or
+//! an array of structures (Laine et al. 2013, section 4.3); in the megakernel the same names access private
+//! variables.
+
+use std::fmt::Write;
+
+use super::{Field, Type, Use, fields};
+use crate::kernels::stages::Stage;
+use crate::technique::StateLayout;
+use crate::world::needs::Needs;
+
+/// Where accessors find the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Storage {
+    /// The buffer `state`.
+    Memory(StateLayout),
+    /// Private variables; a slot is ignored.
+    Registers,
+}
+
+/// Structures and accessors for the uses of fields that `stages` access; nothing else is declared, so
+/// that a stage that reaches for what it does not list fails validation.
+pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> String {
+    let mut out = String::new();
+    let count = fields(needs).count();
+    for (region, field) in fields(needs).enumerate() {
+        let place = place(field, region, count, storage);
+        let mut accessed = String::new();
+        for u in field.uses(needs) {
+            let read = stages.iter().any(|s| s.loads(u.name, needs));
+            let written = stages.iter().any(|s| s.stores(u.name, needs));
+            if read || written {
+                accessed += &structure(u);
+            }
+            if read {
+                accessed += &load(u, &place);
+            }
+            if written {
+                accessed += &store(u, &place);
+            }
+        }
+        if !accessed.is_empty() && storage == Storage::Registers {
+            let _ = writeln!(out, "var<private> {place}: vec4<u32>;");
+        }
+        out += &accessed;
+    }
+    out
+}
+
+/// Where the words of a field are, the `region`-th of `count`.
+fn place(field: &Field, region: usize, count: usize, storage: Storage) -> String {
+    match storage {
+        Storage::Memory(StateLayout::Arrays) => format!("state[{region}u * POOL_SIZE + slot]"),
+        Storage::Memory(StateLayout::Pairs) => {
+            let (first, half) = (region - region % 2, region % 2);
+            if first + 1 < count {
+                format!("state[{first}u * POOL_SIZE + 2u * slot + {half}u]")
+            } else {
+                format!("state[{first}u * POOL_SIZE + slot]")
+            }
+        }
+        Storage::Memory(StateLayout::Structures) => format!("state[{count}u * slot + {region}u]"),
+        Storage::Registers => format!("state_{}", field.name()),
+    }
+}
+
+fn type_name(u: &Use) -> String {
+    let camel = u.name.split('_').map(|word| {
+        let (first, rest) = word.split_at(1);
+        first.to_uppercase() + rest
+    });
+    format!("Path{}", camel.collect::<String>())
+}
+
+fn structure(u: &Use) -> String {
+    let member = |(name, ty): &(&str, Type)| format!("{name}: {}", ty.wgsl());
+    let members: Vec<String> = u.components.iter().map(member).collect();
+    format!("struct {} {{ {} }}\n", type_name(u), members.join(", "))
+}
+
+/// Reads the words at `place`.
+fn load(u: &Use, place: &str) -> String {
+    let (name, ty) = (u.name, type_name(u));
+    let mut first = 0;
+    let part = |(_, component): &(&str, Type)| {
+        let swizzle = &"xyzw"[first..first + component.words()];
+        first += component.words();
+        match component {
+            Type::U32 | Type::Words => format!("words.{swizzle}"),
+            _ => format!("bitcast<{}>(words.{swizzle})", component.wgsl()),
+        }
+    };
+    let parts: Vec<String> = u.components.iter().map(part).collect();
+    format!(
+        "fn load_{name}(slot: u32) -> {ty} {{\n    \
+         let words = {place};\n    \
+         return {ty}({});\n}}\n",
+        parts.join(", ")
+    )
+}
+
+/// Writes the words at `place`.
+fn store(u: &Use, place: &str) -> String {
+    let (name, ty) = (u.name, type_name(u));
+    let part = |(component, ty): &(&str, Type)| match ty {
+        Type::U32 | Type::Words => format!("value.{component}"),
+        _ => format!("bitcast<{}>(value.{component})", ty.words_type()),
+    };
+    let parts: Vec<String> = u.components.iter().map(part).collect();
+    format!(
+        "fn store_{name}(slot: u32, value: {ty}) {{\n    \
+         {place} = vec4<u32>({});\n}}\n",
+        parts.join(", ")
+    )
+}
+
+impl Type {
+    fn wgsl(self) -> &'static str {
+        match self {
+            Type::U32 => "u32",
+            Type::F32 => "f32",
+            Type::Vec3 => "vec3<f32>",
+            Type::Words => "vec4<u32>",
+        }
+    }
+
+    /// How many of a field's four words it takes.
+    fn words(self) -> usize {
+        match self {
+            Type::U32 | Type::F32 => 1,
+            Type::Vec3 => 3,
+            Type::Words => 4,
+        }
+    }
+
+    /// The same number of words as unsigned integers.
+    fn words_type(self) -> &'static str {
+        match self {
+            Type::U32 | Type::F32 => "u32",
+            Type::Vec3 => "vec3<u32>",
+            Type::Words => "vec4<u32>",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use wgpu::naga;
+
+    use super::*;
+    use crate::kernels::stages::STAGES;
+    use crate::kernels::state::{FIELD_BYTES, FIELDS, path_bytes};
+    use crate::world::needs::Need;
+
+    const EVERYTHING: Needs = Needs::of_rows(&[
+        Need::ShadowRays,
+        Need::CrossingShadows,
+        Need::Media,
+        Need::Absorption,
+        Need::Overlap,
+        Need::Order,
+        Need::RayCones,
+    ]);
+    /// naga lays a field's structure out on exactly the words that the accessors pack.
+    #[test]
+    fn fields_fill_four_words_as_naga_lays_them_out() {
+        let requests = EVERYTHING.with(Need::Requests);
+        let shared = EVERYTHING.without(Need::CrossingShadows);
+        for needs in [EVERYTHING, requests, shared] {
+            let text = format!(
+                "const POOL_SIZE: u32 = 1u;\n\
+                 @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
+                accessors(needs, &every_stage(), Storage::Memory(StateLayout::Arrays))
+            );
+            let (module, _) = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
+            let mut layouter = naga::proc::Layouter::default();
+            layouter.update(module.to_ctx()).expect("a layout");
+            for u in fields(needs).flat_map(|f| f.uses(needs)) {
+                check_layout(u, &module, &layouter);
+            }
+        }
+    }
+
+    fn check_layout(u: &Use, module: &naga::Module, layouter: &naga::proc::Layouter) {
+        let (handle, ty) = module
+            .types
+            .iter()
+            .find(|(_, ty)| ty.name.as_deref() == Some(&type_name(u)))
+            .expect("the use's structure");
+        assert_eq!(u64::from(layouter[handle].size), FIELD_BYTES, "{}", u.name);
+        let naga::TypeInner::Struct { members, .. } = &ty.inner else {
+            panic!("{} is no structure", u.name);
+        };
+        let mut words = 0;
+        for ((name, ty), member) in u.components.iter().zip(members) {
+            assert_eq!(member.name.as_deref(), Some(*name));
+            assert_eq!(member.offset as usize, words * 4, "{}.{name}", u.name);
+            words += ty.words();
+        }
+        assert_eq!(words * 4, FIELD_BYTES as usize);
+    }
+
+    /// A stage that stores one use and one that loads another of the same field mean the same words, so
+    /// components that both have must be at the same place.
+    #[test]
+    fn uses_of_a_field_agree_on_what_they_share() {
+        let offset = |u: &Use, name: &str| {
+            let before = u.components.iter().take_while(|(n, _)| *n != name);
+            before.map(|(_, ty)| ty.words()).sum::<usize>()
+        };
+        for field in &FIELDS {
+            for (a, b) in field
+                .uses
+                .iter()
+                .flat_map(|a| field.uses.iter().map(move |b| (a, b)))
+            {
+                for shared in a.components.iter().filter(|c| b.components.contains(c)) {
+                    assert_eq!(offset(a, shared.0), offset(b, shared.0), "{}", a.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_without_sampled_lights_stores_no_shadow_rays() {
+        assert_eq!(path_bytes(Needs::default()), 80);
+        let lit = Needs::of_rows(&[Need::ShadowRays]);
+        assert_eq!(path_bytes(lit), 96);
+        assert_eq!(path_bytes(EVERYTHING), 144);
+        let text = accessors(
+            Needs::default(),
+            &every_stage(),
+            Storage::Memory(StateLayout::Arrays),
+        );
+        assert!(!text.contains("shadow"), "{text}");
+        assert!(!text.contains("media"), "{text}");
+        assert!(!text.contains("cone"), "{text}");
+    }
+
+    fn every_stage() -> Vec<&'static Stage> {
+        STAGES.iter().collect()
+    }
+}

@@ -1,0 +1,163 @@
+//! The one table of the fields of a path's state. Which stages read and write them is in the table of stages.
+
+use super::Type::{F32, U32, Vec3, Words};
+use super::{Field, Use};
+use crate::world::needs::{ALWAYS, Need, When, when};
+
+/// Shadow rays, where they are part of the path's state.
+pub(crate) const SLOT_SHADOWS: When = When {
+    all: &[Need::ShadowRays],
+    none: &[Need::Requests],
+};
+/// Those that may begin on another side of a surface than extension rays.
+pub(crate) const OWN_SHADOW_ORIGINS: When = When {
+    all: &[Need::ShadowRays, Need::CrossingShadows],
+    none: &[Need::Requests],
+};
+/// Those that do not.
+const SHARED_ORIGINS: When = When {
+    all: &[Need::ShadowRays],
+    none: &[Need::Requests, Need::CrossingShadows],
+};
+/// Shadow rays, wherever they are.
+const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
+
+/// Every field there is, in the order of memory. Those that follow each other in pairs are those that
+/// stages access together.
+pub(crate) const FIELDS: [Field; 10] = [
+    Field {
+        uses: &[
+            // The extension ray: from the camera or the last vertex.
+            Use {
+                name: "ray_origin",
+                components: &[("origin", Vec3), ("pixel", U32)],
+                need: ALWAYS,
+            },
+            // Where a light was sampled, the way to it: when that is asked for, where the ray began
+            // is known no longer, since the hit says where the vertex is.
+            Use {
+                name: "light_direction",
+                components: &[("direction", Vec3), ("pixel", U32)],
+                need: SHADOW_RAYS,
+            },
+            // Where no material is crossed, both rays begin at the same place.
+            Use {
+                name: "shadow_origin",
+                components: &[("origin", Vec3), ("pixel", U32)],
+                need: SHARED_ORIGINS,
+            },
+        ],
+    },
+    Field {
+        // Until the ray is cast, the direction in which it begins; then that in which it arrives, which is
+        // another where light is turned on its way.
+        uses: &[Use {
+            name: "ray_direction",
+            components: &[("direction", Vec3), ("sample", U32)],
+            need: ALWAYS,
+        }],
+    },
+    Field {
+        uses: &[
+            // What the extension ray hit: distance, barycentrics, primitive. Until the next is cast,
+            // the primitive is the one that both kinds of ray start on.
+            Use {
+                name: "hit",
+                components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
+                need: ALWAYS,
+            },
+            // The shadow ray's direction, once the material has been evaluated at the hit.
+            Use {
+                name: "shadow_direction",
+                components: &[("direction", Vec3), ("primitive", U32)],
+                need: SLOT_SHADOWS,
+            },
+        ],
+    },
+    Field {
+        uses: &[
+            // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle
+            // with which the extension ray was sampled (0: a discrete direction).
+            Use {
+                name: "throughput",
+                components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
+                need: ALWAYS,
+            },
+            // What is carried to the next vertex, and the density with which a light was
+            // sampled there (0: a discrete light), once emission has been weighed by the former.
+            Use {
+                name: "carried",
+                components: &[("throughput", Vec3), ("light_pdf", F32)],
+                need: SHADOW_RAYS,
+            },
+        ],
+    },
+    Field {
+        // Radiance gathered so far; the flags are declared in `constants`.
+        uses: &[Use {
+            name: "radiance",
+            components: &[("radiance", Vec3), ("flags", U32)],
+            need: ALWAYS,
+        }],
+    },
+    Field {
+        uses: &[
+            // The sample of a light: its radiance over its density, and how far it is.
+            Use {
+                name: "light",
+                components: &[("radiance", Vec3), ("distance", F32)],
+                need: SHADOW_RAYS,
+            },
+            // What of it reaches the camera unless the shadow ray is blocked (then 0), and how far
+            // that goes.
+            Use {
+                name: "contribution",
+                components: &[("radiance", Vec3), ("distance", F32)],
+                need: SHADOW_RAYS,
+            },
+        ],
+    },
+    Field {
+        // Where the shadow ray begins if that may be on another side than where the extension ray does.
+        uses: &[Use {
+            name: "shadow_origin",
+            components: &[("origin", Vec3), ("pixel", U32)],
+            need: OWN_SHADOW_ORIGINS,
+        }],
+    },
+    Field {
+        // The places of its rays in buffers of their own, where their results will be.
+        uses: &[Use {
+            name: "requests",
+            components: &[
+                ("extension", U32),
+                ("shadow", U32),
+                ("unused0", U32),
+                ("unused1", U32),
+            ],
+            need: when(&[Need::Requests]),
+        }],
+    },
+    Field {
+        // The cone that its ray stands for: how wide it is where the ray begins, in metres, and by how
+        // much a metre it widens; see docs/filtering.md.
+        uses: &[Use {
+            name: "cone",
+            components: &[
+                ("width", F32),
+                ("spread", F32),
+                ("unused0", U32),
+                ("unused1", U32),
+            ],
+            need: when(&[Need::RayCones]),
+        }],
+    },
+    Field {
+        // The media it is in; see `world/media.wgsl`.
+        uses: &[Use {
+            name: "media",
+            components: &[("stack", Words)],
+            need: when(&[Need::Media]),
+        }],
+    },
+];
