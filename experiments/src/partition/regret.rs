@@ -28,8 +28,12 @@ pub(super) fn picture(scenes: &[Measured]) -> Result<String> {
             names.push(&scene.scene.name);
         }
     }
+    // Whole renders by mega may be faster than the best plan with iterations.
     let regrets = scenes.iter().flat_map(marks).map(|(_, regret)| regret);
-    let range = [0.97, 1.08 * regrets.fold(1.2, f64::max)];
+    let (low, high) = regrets.fold((1.0, 1.2), |(low, high): (f64, f64), regret| {
+        (low.min(regret), high.max(regret))
+    });
+    let range = [0.96 * low, 1.08 * high];
     let rows = ROW * names.len() as u32;
     let width = (NAMES + pools.len() as u32 * PITCH).max(NAMES + 8 * PANEL / 5);
     let size = (width, HEAD + TITLE + rows + AXIS);

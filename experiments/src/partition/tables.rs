@@ -230,7 +230,7 @@ pub(super) fn differences(scenes: &[Measured]) -> String {
     let count = scenes.iter().filter(|s| s.auto == s.best).count();
     format!(
         "## Where another plan was faster\n\n\
-         The chosen plan is the best in {count} of {} cases. In the others the loss is this share of an iteration:\n\n\
+         The chosen plan is the best in {count} of {} cases. In the others the loss is a share of an iteration:\n\n\
          | scene | pool | chosen | best | loss |\n|---|---|---|---|---|\n{rows}",
         scenes.len()
     )
