@@ -3,7 +3,7 @@
 //! Told are values that are read only by the statements of the block that makes them: what a loop
 //! or a branch reads from outside stays until the function ends.
 
-use impasto_compiler::ir::{Block, ExprId, ExprKind, Function, Stmt};
+use impasto_compiler::ir::{Block, ExprId, Function, Stmt};
 
 /// No block, and so many reads that none is the last.
 const KEPT: u32 = u32::MAX;
@@ -97,10 +97,7 @@ impl Count<'_> {
     /// A statement of block `here` reads a value.
     fn read(&mut self, id: ExprId, here: u32) {
         let i = id.index();
-        let free = matches!(
-            self.f.expr(id).kind,
-            ExprKind::Const(_) | ExprKind::Param(_) | ExprKind::Uniform(_)
-        );
+        let free = self.f.expr(id).kind.is_free();
         if free || self.home[i] != here || self.total[i] == KEPT {
             self.total[i] = KEPT;
         } else {
