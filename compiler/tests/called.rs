@@ -46,7 +46,7 @@ fn user(text: &str) -> Asked {
         ..MaterialRequest::new("m", "user.impasto")
     };
     Asked {
-        program: compiled(&text, &[request]),
+        program: Box::leak(Box::new(compiled(&text, &[request]))),
     }
 }
 
@@ -59,7 +59,7 @@ fn model(params: &[(&str, &str)]) -> Asked {
         ..MaterialRequest::new("m", "model.impasto")
     };
     Asked {
-        program: compiled("", &[request]),
+        program: Box::leak(Box::new(compiled("", &[request]))),
     }
 }
 

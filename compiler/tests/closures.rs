@@ -1,13 +1,14 @@
 //! Functions that return closures, and the outputs of a material, seen from outside: a call means
 //! what its body would mean if it were written there, and no call can make the compiler hang.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::common::{codes, compilation, program};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprId, ExprKind, Material};
 use impasto_compiler::{Checked, MemoryLoader, Program, check, diag};
+use impasto_fuzz::Stopwatch;
 
 const USES: &str = "use std::bsdf::{diffuse, mirror, specular};\nuse std::edf::uniform;\n";
 
@@ -22,6 +23,7 @@ fn answers(program: &Program) -> Vec<Vec<f64>> {
         vector(&[0.7, 0.4]),
         Value::float(1.25),
     ];
+    let mut run = Interpreter::<f64>::new(program.ir(), u64::MAX);
     let ask = |i: i32| {
         let u = [0.37, 0.59, 0.71, 0.83].map(|g: f64| (g * f64::from(i)).fract());
         let turn = f64::from(i);
@@ -32,7 +34,6 @@ fn answers(program: &Program) -> Vec<Vec<f64>> {
             vector(&wl),
             vector(&u),
         ];
-        let mut run = Interpreter::<f64>::new(program.ir(), u64::MAX);
         let answer = run
             .run(&program.compiled()[0].evaluate, args)
             .expect("fuel");
@@ -272,7 +273,7 @@ const LONGEST: Duration = Duration::from_secs(3);
 /// The text is refused with `code` before long.
 #[track_caller]
 fn ends(text: &str, code: &str) {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let found = compilation(&format!("{USES}{text}"), &[]);
     let took = start.elapsed();
     let ids: Vec<&str> = found.diagnostics.iter().map(|d| d.code.id()).collect();
@@ -312,7 +313,7 @@ fn many_large_calls_end() {
         .collect();
     let text = format!("{large}{calls}material m {{ surface = g0(0.5); }}");
     assert!(text.len() < 80 << 10);
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let mut files = MemoryLoader::default();
     files.add("m.impasto", format!("{USES}{text}"));
     check("m.impasto", &mut files);

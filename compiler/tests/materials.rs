@@ -2,11 +2,15 @@
 //! keep: finite and not negative, no more light out than in, and one answer whether a direction
 //! was sampled or asked for. Run by the interpreter in f64 and in f32.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::{Real, Value};
 use impasto_compiler::{Loader, MaterialRequest, Program, compile, diag};
+
+use crate::common::kept;
 
 struct Files;
 
@@ -29,7 +33,15 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-fn program(file: &Path) -> Program {
+/// The program of a material, which is compiled once.
+fn program(file: &Path) -> &'static Program {
+    static MADE: Mutex<BTreeMap<PathBuf, &Program>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    let new = || &*Box::leak(Box::new(compiled(file)));
+    made.entry(file.to_owned()).or_insert_with(new)
+}
+
+fn compiled(file: &Path) -> Program {
     let compiled = compile(
         &[MaterialRequest::new("m", file.to_string_lossy())],
         &mut Files,
@@ -84,8 +96,8 @@ impl Query {
 }
 
 /// wi, pdf, throughput, light_pdf, light_throughput.
-fn ask<F: Real>(
-    program: &Program,
+fn ask<F: Real + 'static>(
+    program: &'static Program,
     q: &Query,
     wl: &[f64],
 ) -> (Vec<f64>, f64, Vec<f64>, f64, Vec<f64>) {
@@ -104,10 +116,9 @@ fn ask<F: Real>(
         Value::vector(wl),
         Value::vector(&q.u),
     ];
-    let mut run = Interpreter::<F>::new(program.ir(), u64::MAX);
-    let out = run
-        .run(&program.compiled()[0].evaluate, args)
-        .expect("fuel");
+    let evaluate = &program.compiled()[0].evaluate;
+    let run = |run: &mut Interpreter<'static, F>| run.run(evaluate, args);
+    let out = kept::interpreter(program.ir(), run).expect("fuel");
     let field = |i: usize| out.field(i).expect("field").to_f64();
     (field(0), field(1)[0], field(2), field(3)[0], field(4))
 }
@@ -121,8 +132,8 @@ fn answers_are_finite_and_not_negative() {
             let q = Query::new(&mut n);
             let wl = n.direction();
             for (bits, answer) in [
-                (64, ask::<f64>(&program, &q, &wl)),
-                (32, ask::<f32>(&program, &q, &wl)),
+                (64, ask::<f64>(program, &q, &wl)),
+                (32, ask::<f32>(program, &q, &wl)),
             ] {
                 let (wi, pdf, throughput, light_pdf, light) = answer;
                 let values = wi
@@ -155,10 +166,10 @@ fn a_sampled_direction_and_a_lights_get_one_answer() {
         let mut continuous = 0;
         for _ in 0..300 {
             let q = Query::new(&mut n);
-            let (wi, pdf, throughput, ..) = ask::<f64>(&program, &q, &[0.0; 3]);
+            let (wi, pdf, throughput, ..) = ask::<f64>(program, &q, &[0.0; 3]);
             if pdf > 0.0 && throughput.iter().any(|t| *t > 0.0) {
                 continuous += 1;
-                let (_, _, _, light_pdf, light) = ask::<f64>(&program, &q, &wi);
+                let (_, _, _, light_pdf, light) = ask::<f64>(program, &q, &wi);
                 let same = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
                 assert!(
                     same(light_pdf, pdf),
@@ -196,7 +207,7 @@ fn no_material_makes_light() {
             let mut sum = [0.0; 3];
             for _ in 0..samples {
                 q.u = std::array::from_fn(|_| n.next());
-                let (_, _, throughput, ..) = ask::<f64>(&program, &q, &[0.0; 3]);
+                let (_, _, throughput, ..) = ask::<f64>(program, &q, &[0.0; 3]);
                 (0..3).for_each(|c| sum[c] += throughput[c]);
             }
             let albedo = sum.map(|s| s / f64::from(samples));
@@ -220,7 +231,7 @@ fn single_precision_agrees_with_double() {
         for _ in 0..200 {
             let q = Query::new(&mut n);
             let wl = n.direction();
-            let (a, b) = (ask::<f64>(&program, &q, &wl), ask::<f32>(&program, &q, &wl));
+            let (a, b) = (ask::<f64>(program, &q, &wl), ask::<f32>(program, &q, &wl));
             for (x, y) in a.4.iter().chain([&a.3]).zip(b.4.iter().chain([&b.3])) {
                 compared += 1;
                 differing += usize::from((x - y).abs() > 1e-3 * x.abs().max(1e-3));

@@ -5,9 +5,10 @@
 //! verifier runs after each in debug builds.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use impasto_compiler::{MemoryLoader, check, diag};
+use impasto_fuzz::Stopwatch;
 use proptest::prelude::*;
 
 /// A material with one of everything that outputs and closures can be made of.
@@ -127,7 +128,7 @@ fn change(text: &mut Vec<String>, (kind, a, b, word): Change) {
 }
 
 fn compiled(text: &str) -> Result<(), TestCaseError> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let mut files = MemoryLoader::default();
     files.add("m.impasto", text);
     let checked = check("m.impasto", &mut files);

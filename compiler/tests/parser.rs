@@ -3,12 +3,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use impasto_compiler::diag::{Diagnostic, render};
 use impasto_compiler::lexer::{self, Token};
 use impasto_compiler::parser;
 use impasto_compiler::source::{FileId, MAX_SOURCE_BYTES, SourceMap};
+use impasto_fuzz::Stopwatch;
 
 fn folder(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(relative)
@@ -278,7 +279,7 @@ const PATIENCE: Duration = Duration::from_secs(if cfg!(debug_assertions) { 10 } 
 
 /// Parses and renders in time and gives the diagnostics.
 fn survives(name: &str, source: &str) -> Vec<Diagnostic> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let (sources, module, diagnostics) = parse(source);
     let _ = parser::print(&module);
     let _ = render::text(&sources, &diagnostics, true);
@@ -459,7 +460,7 @@ fn errors_inside_nesting_do_not_multiply() {
         ),
     ];
     for source in cases {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let (_, _, diagnostics) = parse(&source);
         assert!(!diagnostics.is_empty());
         let taken = start.elapsed();

@@ -74,6 +74,31 @@ fn timed(target: Target, input: &[u8]) -> Result<Duration, Failure> {
     }
 }
 
+/// Measures the processor's time that a thread takes, where the system tells it (Linux): a test that
+/// waits for others is not slow.
+pub struct Stopwatch {
+    begin: Instant,
+    taken: Option<Duration>,
+}
+
+impl Stopwatch {
+    /// From now on.
+    #[must_use]
+    pub fn start() -> Self {
+        Self {
+            begin: Instant::now(),
+            taken: processor_time(),
+        }
+    }
+
+    /// What this thread, which must be the one that started it, took since.
+    #[must_use]
+    pub fn elapsed(&self) -> Duration {
+        let now = processor_time().zip(self.taken);
+        now.map_or_else(|| self.begin.elapsed(), |(now, then)| now - then)
+    }
+}
+
 /// How long this thread has run.
 fn processor_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;

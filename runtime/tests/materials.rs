@@ -80,7 +80,7 @@ fn questions() -> Vec<Row> {
 }
 
 /// The interpreter's answer in single precision, in the order of the GPU's.
-fn interpreted(program: &Program, rows: &[Row]) -> Vec<f64> {
+fn interpreted<'a>(run: &mut Interpreter<'a, f32>, program: &'a Program, rows: &[Row]) -> Vec<f64> {
     let wide = |i: usize, n: usize| -> Value<f32> {
         let values: Vec<f64> = floats(rows[i]).iter().map(|&x| f64::from(x)).collect();
         Value::vector(&values[..n])
@@ -96,7 +96,6 @@ fn interpreted(program: &Program, rows: &[Row]) -> Vec<f64> {
         Value::float(1.0),
     ]);
     let args = vec![point, wide(2, 3), wide(3, 3), wide(4, 4)];
-    let mut run = Interpreter::<f32>::new(program.ir(), u64::MAX);
     let answer = run
         .run(&program.compiled()[0].evaluate, args)
         .expect("ends");
@@ -113,6 +112,7 @@ fn gpu_and_interpreter_agree() {
         if !program.textures().is_empty() {
             wgsl.push_str(TEXTURE);
         }
+        let mut interpreter = Interpreter::new(program.ir(), u64::MAX);
         let part = ShaderPart {
             wgsl,
             buffers: Vec::new(),
@@ -121,7 +121,7 @@ fn gpu_and_interpreter_agree() {
         let mut differing = 0;
         let mut lit = 0;
         for i in 0..QUERIES {
-            let expected = interpreted(&program, &asked[i * ASKED..][..ASKED]);
+            let expected = interpreted(&mut interpreter, &program, &asked[i * ASKED..][..ASKED]);
             let rows = &answered[i * ANSWERED..][..ANSWERED];
             let found = rows.iter().flat_map(|r| floats(*r)).map(f64::from);
             lit += usize::from(expected[4..7].iter().any(|t| *t > 0.0));

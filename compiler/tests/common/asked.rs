@@ -8,7 +8,7 @@ use impasto_compiler::ir::value::Value;
 
 /// A compiled material, asked as a kernel asks it.
 pub struct Asked {
-    pub program: Program,
+    pub program: &'static Program,
 }
 
 /// What it answered.
@@ -31,7 +31,7 @@ impl Asked {
     /// Compiles the only material of a text.
     pub fn material(text: &str) -> Self {
         Self {
-            program: super::program(text),
+            program: Box::leak(Box::new(super::program(text))),
         }
     }
 
@@ -51,10 +51,9 @@ impl Asked {
             Value::vector(&wl),
             Value::vector(&u),
         ];
-        let mut run = Interpreter::<f64>::new(self.program.ir(), u64::MAX);
-        let result = run
-            .run(&self.program.compiled()[0].evaluate, args)
-            .expect("fuel");
+        let evaluate = &self.program.compiled()[0].evaluate;
+        let run = |run: &mut Interpreter<'static, f64>| run.run(evaluate, args);
+        let result = super::kept::interpreter(self.program.ir(), run).expect("fuel");
         let vector = |i: usize| -> [f64; 3] {
             result
                 .field(i)

@@ -1,6 +1,7 @@
 //! Compiling texts in tests.
 
 pub mod asked;
+pub mod kept;
 pub mod listed;
 pub mod record;
 

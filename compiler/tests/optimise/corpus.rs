@@ -134,17 +134,17 @@ fn core(module: &Module) -> closure::Core {
 }
 
 /// What a function gives and how many operations it took; nothing if it takes too long.
-pub fn answer(
-    module: &Module,
-    f: &Function,
-    params: &[Const],
+pub fn answer<'a>(
+    run: &mut Interpreter<'a, f64>,
+    f: &'a Function,
     args: &[Value<f64>],
 ) -> Option<(Vec<f64>, u64)> {
-    let mut run = Interpreter::<f64>::new(module, FUEL).with_params(params);
+    run.refill(FUEL);
+    let before = run.executed();
     let value = run.run(f, args.to_vec()).ok()?;
     let mut flat = Vec::new();
     flatten(&value, &mut flat);
-    Some((flat, run.executed()))
+    Some((flat, run.executed() - before))
 }
 
 /// All numbers of a value.

@@ -213,7 +213,7 @@ fn cut(cell: &Cell, inside: &[[f64; 2]], rule: &Rule<'_>) -> Option<(bool, f64)>
         let axis = usize::from(!tall);
         let range = if tall { cell.z } else { cell.phi };
         let mut along: Vec<f64> = inside.iter().map(|p| p[axis]).collect();
-        along.sort_by(f64::total_cmp);
+        along.sort_unstable_by(f64::total_cmp);
         let cut = rule(range, &along);
         let fits = |c: &f64| range[0] + NARROWEST < *c && *c < range[1] - NARROWEST;
         if let Some(cut) = cut.filter(fits) {
@@ -237,22 +237,38 @@ fn flank(range: [f64; 2], first: f64, last: f64) -> Option<f64> {
 
 /// How many of `samples` fall into each cell.
 pub fn counts(cells: &[Cell], samples: &[[f64; 3]]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..cells.len()).collect();
-    order.sort_by(|&a, &b| cells[a].z[0].total_cmp(&cells[b].z[0]));
     let mut found = vec![0; cells.len()];
-    // A coarse index by z: cells are searched within the slab of a sample only.
-    let slab = |z: f64| (((z + 1.0) * 512.0) as usize).min(1023);
-    let mut slabs = vec![Vec::new(); 1024];
-    for &i in &order {
-        (slab(cells[i].z[0])..=slab(cells[i].z[1])).for_each(|s| slabs[s].push(i));
+    // Between two bounds of z, the cells lie beside each other around the pole.
+    let mut bounds: Vec<f64> = cells.iter().flat_map(|c| c.z).collect();
+    bounds.sort_unstable_by(f64::total_cmp);
+    bounds.dedup();
+    let strip = |z: f64| {
+        bounds
+            .partition_point(|b| *b <= z)
+            .clamp(1, bounds.len() - 1)
+            - 1
+    };
+    let mut strips = vec![Vec::new(); bounds.len() - 1];
+    for (i, cell) in cells.iter().enumerate() {
+        let [low, high] = cell.z.map(|z| bounds.partition_point(|b| *b < z));
+        strips[low..high].iter_mut().for_each(|s| s.push(i));
+    }
+    for strip in &mut strips {
+        strip.sort_unstable_by(|&a, &b| cells[a].phi[0].total_cmp(&cells[b].phi[0]));
     }
     for [z, phi] in samples.iter().map(place) {
-        let inside = |c: &Cell| {
+        let around = &strips[strip(z)];
+        let next = around.partition_point(|&i| cells[i].phi[0] <= phi);
+        let inside = |i: usize| {
+            let c = &cells[i];
             let in_z = c.z[0] <= z && (z < c.z[1] || (z >= 1.0 && c.z[1] >= 1.0));
             in_z && c.phi[0] <= phi && phi < c.phi[1]
         };
-        let cell = slabs[slab(z)].iter().find(|&&i| inside(&cells[i]));
-        found[*cell.expect("cells cover the sphere")] += 1;
+        let cell = next
+            .checked_sub(1)
+            .map(|k| around[k])
+            .filter(|&i| inside(i));
+        found[cell.expect("cells cover the sphere")] += 1;
     }
     found
 }

@@ -9,21 +9,23 @@ use impasto_compiler::{MemoryLoader, check, diag};
 use super::known::assert_near;
 use super::library::{arguments_of, documented};
 use super::statistics::direction;
+use crate::common::kept;
 
 /// An EDF with some parameters.
-struct Lamp<'a> {
+struct Lamp {
     label: String,
-    module: &'a Module,
+    module: &'static Module,
     emit: FunctionId,
     args: Vec<Const>,
 }
 
-impl Lamp<'_> {
+impl Lamp {
     /// The radiance toward the cosine `z`.
-    fn emit<F: Real>(&self, z: f64) -> Vec<f64> {
+    fn emit<F: Real + 'static>(&self, z: f64) -> Vec<f64> {
         let mut args: Vec<Value<F>> = self.args.iter().map(Value::constant).collect();
         args.push(Value::vector(&direction(z, 0.4)));
-        let value = Interpreter::<F>::new(self.module, u64::MAX).call(self.emit, args);
+        let call = |run: &mut Interpreter<'static, F>| run.call(self.emit, args);
+        let value = kept::interpreter(self.module, call);
         value.expect("enough fuel").to_f64()
     }
 
@@ -39,7 +41,7 @@ impl Lamp<'_> {
 }
 
 /// Does `job` for each argument list of `std::edf::name`.
-fn with_lamps(name: &str, calls: &[String], mut job: impl FnMut(&Lamp<'_>)) {
+fn with_lamps(name: &str, calls: &[String], mut job: impl FnMut(&Lamp)) {
     let materials = calls.iter().enumerate().map(|(i, call)| {
         format!("material case_{i} {{ surface = diffuse(); emission = {name}({call}); }}\n")
     });
@@ -53,7 +55,7 @@ fn with_lamps(name: &str, calls: &[String], mut job: impl FnMut(&Lamp<'_>)) {
     let problems = diag::render::text(&checked.sources, &checked.diagnostics, false);
     assert!(!diag::has_errors(&checked.diagnostics), "{problems}");
 
-    let module = &checked.ir;
+    let module: &'static Module = Box::leak(Box::new(checked.ir));
     let def = module.closures.iter().find(|c| c.name == name);
     let Some(Methods::Edf { emit }) = def.map(|d| d.methods) else {
         panic!("`{name}` is no edf")

@@ -166,7 +166,7 @@ fn held(bsdf: &Bsdf, space: &Space, goal: Goal, bound: Bound, seed: u64) -> Opti
 
 #[test]
 fn no_bsdf_gains_light_and_albedos_are_as_near_as_stated() {
-    super::each_in_parallel(&bsdfs(), |i, bsdf| {
+    super::each_in_parallel(bsdfs(), |i, bsdf| {
         let mut faults = Vec::new();
         if !super::asked_for(&bsdf.name) {
             return (bsdf.name.clone(), faults);

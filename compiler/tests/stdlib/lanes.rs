@@ -3,16 +3,22 @@
 //!
 //! Values are columns, one number a lane; a column of length one is the same in every lane. All
 //! lanes follow both sides of a branch and stores are masked. What is not written here as a loop
-//! goes through the op table; `lanes_and_interpreter_agree` holds both to the same bits.
+//! goes through the op table; `lanes_and_interpreter_agree` holds both to the same bits. Lanes are run
+//! in blocks, and values are dropped where they were read last, so that what is worked on stays in
+//! the cache of a processor.
 
 mod ops;
+mod uses;
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use impasto_compiler::ir::value::Real;
 use impasto_compiler::ir::{
     Block, Const, ExprId, ExprKind, Function, FunctionId, Module, Stmt, Type,
 };
+
+use uses::Uses;
 
 /// One component in every lane.
 #[derive(Clone, Debug)]
@@ -54,6 +60,39 @@ impl<F: Real> Column<F> {
             Column::Bool(v) => v.len(),
         }
     }
+
+    /// These lanes of it; all lanes of what is the same in all.
+    fn part(&self, lanes: &Range<usize>) -> Self {
+        let lanes = if self.len() == 1 { 0..1 } else { lanes.clone() };
+        match self {
+            Column::Float(v) => floats(v[lanes].to_vec()),
+            Column::Int(v) => Column::Int(Rc::new(v[lanes].to_vec())),
+            Column::Bool(v) => Column::Bool(Rc::new(v[lanes].to_vec())),
+        }
+    }
+
+    /// No lanes, of the same kind.
+    fn empty(&self) -> Self {
+        match self {
+            Column::Float(_) => floats(Vec::new()),
+            Column::Int(_) => Column::Int(Rc::default()),
+            Column::Bool(_) => Column::Bool(Rc::default()),
+        }
+    }
+
+    /// Adds `lanes` lanes.
+    fn append(&mut self, more: &Self, lanes: usize) {
+        match (self, more) {
+            (Column::Float(all), Column::Float(v)) => extend(all, v, lanes),
+            (Column::Int(all), Column::Int(v)) => extend(all, v, lanes),
+            (Column::Bool(all), Column::Bool(v)) => extend(all, v, lanes),
+            (all, more) => panic!("{more:?} does not fit {all:?}"),
+        }
+    }
+}
+
+fn extend<T: Copy>(all: &mut Rc<Vec<T>>, v: &[T], lanes: usize) {
+    Rc::make_mut(all).extend((0..lanes).map(|l| at(v, l)));
 }
 
 /// A column of floats.
@@ -111,8 +150,31 @@ pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> La
     run(module, &module.functions[id.index()], args)
 }
 
+/// Lanes that are run together.
+const BLOCK: usize = 512;
+
 /// Runs a function that need not be in the module.
 pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {
+    let lanes = args.iter().flatten().map(Column::len).max().unwrap_or(1);
+    if lanes <= BLOCK {
+        return run_block(module, f, args);
+    }
+    let mut out: Lanes<F> = Vec::new();
+    for start in (0..lanes).step_by(BLOCK) {
+        let lanes = start..lanes.min(start + BLOCK);
+        let part = |value: &Lanes<F>| value.iter().map(|c| c.part(&lanes)).collect();
+        let found = run_block(module, f, args.iter().map(part).collect());
+        if start == 0 {
+            out = found.iter().map(Column::empty).collect();
+        }
+        out.iter_mut()
+            .zip(&found)
+            .for_each(|(all, c)| all.append(c, lanes.len()));
+    }
+    out
+}
+
+fn run_block<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {
     let locals = f.locals.iter().map(|l| zero(module, l.ty)).collect();
     let mut frame = Frame {
         module,
@@ -120,6 +182,7 @@ pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes
         params: args,
         locals,
         values: vec![None; f.exprs.len()],
+        uses: Uses::of(f),
     };
     frame.block(&f.body, None);
     frame.get(f.value)
@@ -144,6 +207,7 @@ struct Frame<'a, F> {
     params: Vec<Lanes<F>>,
     locals: Vec<Lanes<F>>,
     values: Vec<Option<Lanes<F>>>,
+    uses: Uses,
 }
 
 /// How a block ended, in all lanes alike.
@@ -169,10 +233,11 @@ impl<F: Real> Frame<'_, F> {
         match stmt {
             Stmt::Eval(id) => {
                 let value = self.eval(*id);
+                self.uses.made(*id);
                 self.values[id.index()] = Some(value);
             }
             Stmt::Store(local, part, value) => {
-                let value = self.get(*value);
+                let value = self.take(*value);
                 let place = &mut self.locals[local.index()];
                 match part {
                     Some(part) => store(&mut place[usize::from(*part)], &value[0], mask),
@@ -183,7 +248,7 @@ impl<F: Real> Frame<'_, F> {
                 }
             }
             Stmt::If(cond, then, otherwise) => {
-                let cond = self.get(*cond);
+                let cond = self.take(*cond);
                 return self.branch(cond[0].bools(), then, otherwise, mask);
             }
             Stmt::For {
@@ -192,7 +257,7 @@ impl<F: Real> Frame<'_, F> {
                 high,
                 body,
             } => {
-                let (low, high) = (self.get(*low), self.get(*high));
+                let (low, high) = (self.take(*low), self.take(*high));
                 let (&[low], &[high]) = (low[0].ints(), high[0].ints()) else {
                     panic!("{}: the bounds of a loop differ between lanes", self.f.name);
                 };
@@ -270,9 +335,19 @@ impl<F: Real> Frame<'_, F> {
         }
     }
 
-    fn eval(&self, id: ExprId) -> Lanes<F> {
-        let e = self.f.expr(id);
-        let args: Vec<Lanes<F>> = e.kind.operands().iter().map(|&a| self.get(a)).collect();
+    /// The value for its reader, who may be the last.
+    fn take(&mut self, id: ExprId) -> Lanes<F> {
+        if self.uses.was_last(id) {
+            let value = self.values[id.index()].take();
+            return value.unwrap_or_else(|| zero(self.module, self.f.ty(id)));
+        }
+        self.get(id)
+    }
+
+    fn eval(&mut self, id: ExprId) -> Lanes<F> {
+        let f = self.f;
+        let e = f.expr(id);
+        let args: Vec<Lanes<F>> = e.kind.operands().iter().map(|&a| self.take(a)).collect();
         match &e.kind {
             ExprKind::Op(op, operands) => {
                 let types: Vec<Type> = operands.iter().map(|&a| self.f.ty(a)).collect();
@@ -339,6 +414,7 @@ fn agree<F: Real>() {
     use impasto_compiler::ir::value::Value;
     for bsdf in super::library::bsdfs() {
         let mut n = Numbers::new(1);
+        let mut interpreter = Interpreter::new(&bsdf.module, u64::MAX);
         for case in &bsdf.cases {
             let wo: Vec<[f64; 3]> = (0..25).map(|_| n.direction()).collect();
             let other: Vec<[f64; 3]> = (0..25).map(|_| n.direction().map(f64::abs)).collect();
@@ -362,9 +438,7 @@ fn agree<F: Real>() {
                     let mut args: Vec<Value<F>> = case.args.iter().map(Value::constant).collect();
                     args.push(Value::vector(&wo[l]));
                     args.extend(takes_two.then(|| Value::vector(&other[l])));
-                    let one = Interpreter::new(&bsdf.module, u64::MAX)
-                        .call(method, args)
-                        .expect("fuel");
+                    let one = interpreter.call(method, args).expect("fuel");
                     let found: Vec<f64> =
                         (0..lanes.len()).map(|c| float_at(&lanes, c, l)).collect();
                     assert_eq!(

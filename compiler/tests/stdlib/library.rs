@@ -14,6 +14,8 @@
 //! of the parameters and directions where single precision may be off by more (see `region`), and
 //! `Weights: at most 10`, of value over density.
 
+use std::sync::LazyLock;
+
 use impasto_compiler::ast::{ClosureKind, ItemKind};
 use impasto_compiler::ir::{
     Closure, ClosureId, Const, FunctionId, Local, Material, Methods, Module,
@@ -65,9 +67,10 @@ struct Tried {
     values: Vec<Option<String>>,
 }
 
-/// Every BSDF of `std::bsdf`, with its cases.
-pub fn bsdfs() -> Vec<Bsdf> {
-    bsdfs_with(&[])
+/// Every BSDF of `std::bsdf`, with its cases. They are compiled once.
+pub fn bsdfs() -> &'static [Bsdf] {
+    static ALL: LazyLock<Vec<Bsdf>> = LazyLock::new(|| bsdfs_with(&[]));
+    &ALL
 }
 
 /// Every BSDF of `std::bsdf`; its float parameters also try `values`.

@@ -32,7 +32,7 @@ fn mappings_have_the_densities_they_state() {
         let id = text.id(name);
         let sample = |u: &[[f64; 4]]| {
             let column = |c: usize| lanes::floats(u.iter().map(|u| u[c]).collect());
-            let w = lanes::call(&text.module, id, vec![vec![column(0), column(1)]]);
+            let w = lanes::call(text.module, id, vec![vec![column(0), column(1)]]);
             (0..u.len())
                 .map(|l| std::array::from_fn(|c| lanes::float_at(&w, c, l)))
                 .collect()
@@ -82,7 +82,7 @@ fn facets_cover_the_surface_once() {
             let columns = (0..3)
                 .map(|c| lanes::floats(m.iter().map(|m| m[c]).collect()))
                 .collect();
-            let d = lanes::call(&text.module, id, vec![columns, lanes::uniform(&alpha)]);
+            let d = lanes::call(text.module, id, vec![columns, lanes::uniform(&alpha)]);
             let value = |(l, m): (usize, &[f64; 3])| {
                 [lanes::float_at(&d, 0, l) * m[2].max(0.0), 0.0, 0.0, 0.0]
             };

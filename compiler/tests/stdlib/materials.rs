@@ -1,6 +1,8 @@
 //! Whole materials as distributions: the function that kernels call samples what it says it
 //! samples, under bumped normals and through layers.
 
+use std::sync::LazyLock;
+
 use impasto_compiler::ir::value::Real;
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, diag};
 
@@ -243,8 +245,13 @@ struct Variant {
 }
 
 /// Every material, with its defaults and with parameters drawn from their ranges, and every model
-/// with what it asks to try.
-fn variants() -> Vec<Variant> {
+/// with what it asks to try. They are compiled once.
+fn variants() -> &'static [Variant] {
+    static ALL: LazyLock<Vec<Variant>> = LazyLock::new(compiled_variants);
+    &ALL
+}
+
+fn compiled_variants() -> Vec<Variant> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../materials");
     let paths = std::fs::read_dir(folder)
         .expect("materials/")
@@ -406,7 +413,7 @@ const NEAR: f64 = 1e-3;
 fn every_material_is_near_double_precision_and_finite() {
     let variants = variants();
     let tally = Tally::default();
-    super::each_in_parallel(&variants, |i, variant| {
+    super::each_in_parallel(variants, |i, variant| {
         let mut n = Numbers::new(i as u64);
         let (mut far, mut count, mut unsound) = (0usize, 0usize, 0usize);
         for at in points() {

@@ -133,7 +133,7 @@ fn many(text: &Text, points: &[[f64; 3]]) -> Vec<Vec<f64>> {
     let columns: Lanes = (0..3)
         .map(|c| lanes::floats(points.iter().map(|p| p[c]).collect()))
         .collect();
-    let out = lanes::call(&text.module, text.id("f"), vec![columns]);
+    let out = lanes::call(text.module, text.id("f"), vec![columns]);
     (0..points.len())
         .map(|l| {
             (0..out.len())

@@ -28,7 +28,7 @@ fn many(text: &Text, function: &str, points: &[[f64; 3]]) -> Vec<f64> {
     let columns: Lanes<f64> = (0..3)
         .map(|c| lanes::floats(points.iter().map(|p| p[c]).collect()))
         .collect();
-    let out = lanes::call(&text.module, text.id(function), vec![columns]);
+    let out = lanes::call(text.module, text.id(function), vec![columns]);
     (0..points.len())
         .map(|l| lanes::float_at(&out, 0, l))
         .collect()

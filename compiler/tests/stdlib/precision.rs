@@ -40,7 +40,7 @@ fn single_precision_is_near_double_precision() {
             .map(|_| (0..space.dimensions()).map(|_| n.unit()).collect())
             .collect();
         let mut faults = Vec::new();
-        let found = measure(bsdf, &space, &Regions::of(bsdf), &points);
+        let found = measure(bsdf, &space, Regions::of(bsdf), &points);
         for m in found.iter().filter(|m| m.counts) {
             let worst = m.errors.iter().fold(0.0f64, |a, &b| a.max(b));
             if worst > m.within {

@@ -322,7 +322,7 @@ fn mean(f: &Promised, n: &mut Numbers, args: &[Vec<f64>], sides: &[f64]) -> f64 
         .collect();
     let rest = args[1..].iter().map(|a| lanes::uniform(a));
     let all: Vec<Lanes<f64>> = std::iter::once(columns).chain(rest).collect();
-    let out = lanes::call(&f.text.module, f.text.id("bare_"), all);
+    let out = lanes::call(f.text.module, f.text.id("bare_"), all);
     let last = value_of(f, out.len());
     let one = |l: usize| lanes::float_at(&out, last, l);
     (0..count).map(one).sum::<f64>() / count as f64

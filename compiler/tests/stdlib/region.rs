@@ -3,6 +3,9 @@
 //! the BSDF's parameters, `wo` and `wi`, so what people read is what the tests run. `a jump where`
 //! says that the formula itself jumps there, from one value to 0: rounding takes either side.
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
 use impasto_compiler::ir::FunctionId;
 use impasto_compiler::ir::Module;
 
@@ -69,13 +72,20 @@ const NAMED: &str = "
 
 /// The stated regions of a BSDF.
 pub struct Regions {
-    module: Option<Module>,
+    module: Option<&'static Module>,
     stated: Vec<(FunctionId, f64)>,
 }
 
 impl Regions {
-    /// Those that the documentation of `bsdf` states.
-    pub fn of(bsdf: &Bsdf) -> Self {
+    /// Those that the documentation of `bsdf` states. They are compiled once.
+    pub fn of(bsdf: &Bsdf) -> &'static Self {
+        static KNOWN: Mutex<BTreeMap<String, &Regions>> = Mutex::new(BTreeMap::new());
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let new = || &*Box::leak(Box::new(Self::compiled(bsdf)));
+        known.entry(bsdf.name.clone()).or_insert_with(new)
+    }
+
+    fn compiled(bsdf: &Bsdf) -> Self {
         let parsed = bsdf.said("Region:").map(|line| {
             let (what, condition) = line.split_once(" where ")?;
             let within = match what {
@@ -116,7 +126,7 @@ impl Regions {
     pub fn within(&self, args: &[Lanes], lanes: usize) -> Vec<f64> {
         let mut within = vec![FINE; lanes];
         for (id, stated) in &self.stated {
-            let module = self.module.as_ref().expect("regions have code");
+            let module = self.module.expect("regions have code");
             let holds = lanes::call::<f64>(module, *id, args.to_vec());
             let Column::Bool(holds) = &holds[0] else {
                 panic!("a condition is a bool")

@@ -30,7 +30,7 @@ fn scattered<const N: usize>(text: &Text, function: &str, reach: f64) -> Vec<[f6
     let all: Vec<[f64; N]> = (0..steps.pow(N as u32))
         .map(|cell| std::array::from_fn(|axis| place(cell, axis)))
         .collect();
-    let out = lanes::call(&text.module, text.id(function), vec![lanes::vectors(&all)]);
+    let out = lanes::call(text.module, text.id(function), vec![lanes::vectors(&all)]);
     let mut found: Vec<[f64; N]> = Vec::new();
     for (l, at) in all.iter().enumerate() {
         let way = |axis: usize| lanes::float_at::<f64>(&out, 3 + axis, l);
@@ -115,7 +115,7 @@ fn borders_of_cells_are_where_two_points_are_as_near() {
         .map(|_| std::array::from_fn(|_| n.between(-2.5, 2.5)))
         .collect();
     let all = lanes::call(
-        &text.module,
+        text.module,
         text.id("border2"),
         vec![lanes::vectors(&places)],
     );
@@ -137,7 +137,7 @@ fn spread<const N: usize>(text: &Text, function: &str, count: usize) -> (f64, f6
         .map(|_| std::array::from_fn(|_| n.between(-400.0, 400.0)))
         .collect();
     let out = lanes::call(
-        &text.module,
+        text.module,
         text.id(function),
         vec![lanes::vectors(&places)],
     );

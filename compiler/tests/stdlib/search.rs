@@ -217,7 +217,7 @@ fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Worst<Measured> {
         .collect();
     let dense: Vec<(Vec<f64>, Measured)> = points
         .chunks(BATCH)
-        .flat_map(|b| b.iter().cloned().zip(measure(bsdf, space, &regions, b)))
+        .flat_map(|b| b.iter().cloned().zip(measure(bsdf, space, regions, b)))
         .collect();
     let shape = [effort(16, 64), effort(6, 16), 32];
     let goals = GOALS.iter().map(|goal| {
@@ -227,7 +227,7 @@ fn searched(bsdf: &Bsdf, space: &Space, seed: u64) -> Worst<Measured> {
             .map(|(x, m)| (score(m), x.clone(), m.clone()))
             .collect();
         let ask = |points: &[Vec<f64>]| {
-            let measured = measure(bsdf, space, &regions, points);
+            let measured = measure(bsdf, space, regions, points);
             measured.into_iter().map(|m| (score(&m), m)).collect()
         };
         climb(first, shape, &mut n, &ask).swap_remove(0)
@@ -252,7 +252,7 @@ fn most_weight(bsdf: &Bsdf) -> f64 {
 #[expect(clippy::print_stdout, reason = "the table is read with --nocapture")]
 fn nothing_is_found_that_is_worse_than_stated() {
     let all = bsdfs();
-    super::each_in_parallel(&all, |i, bsdf| {
+    super::each_in_parallel(all, |i, bsdf| {
         let space = Space::of(bsdf, bsdf.cases[0].args.clone(), "");
         let mut faults = Vec::new();
         if !super::asked_for(&bsdf.name) {

@@ -5,9 +5,11 @@ use impasto_compiler::ir::value::{Real, Value};
 use impasto_compiler::ir::{FunctionId, Module, Type};
 use impasto_compiler::{MemoryLoader, check, diag};
 
-/// The IR of a text and what it reaches.
+use crate::common::kept;
+
+/// The IR of a text and what it reaches. It stays in memory, as do the interpreters that run it.
 pub struct Text {
-    pub module: Module,
+    pub module: &'static Module,
 }
 
 impl Text {
@@ -17,7 +19,9 @@ impl Text {
         let checked = check("t.impasto", &mut files);
         let problems = diag::render::text(&checked.sources, &checked.diagnostics, false);
         assert!(!diag::has_errors(&checked.diagnostics), "{problems}");
-        Self { module: checked.ir }
+        Self {
+            module: Box::leak(Box::new(checked.ir)),
+        }
     }
 
     pub fn id(&self, name: &str) -> FunctionId {
@@ -26,7 +30,7 @@ impl Text {
     }
 
     /// Calls a function with floats and vectors; the components of a struct come flattened.
-    pub fn call<F: Real>(&self, name: &str, args: &[&[f64]]) -> Vec<f64> {
+    pub fn call<F: Real + 'static>(&self, name: &str, args: &[&[f64]]) -> Vec<f64> {
         let id = self.id(name);
         let params = self.module.functions[id.index()].params.iter();
         let typed = params.zip(args).map(|(p, v)| match p.ty {
@@ -34,8 +38,9 @@ impl Text {
             Type::Bool => Value::Bool(v[0] != 0.0),
             _ => Value::vector(v),
         });
-        let mut run = Interpreter::<F>::new(&self.module, u64::MAX);
-        flatten(&run.call(id, typed.collect()).expect("enough fuel"))
+        let args = typed.collect();
+        let call = |run: &mut Interpreter<'static, F>| run.call(id, args);
+        flatten(&kept::interpreter(self.module, call).expect("enough fuel"))
     }
 }
 

@@ -41,6 +41,7 @@ pub struct Gpu {
     pub(crate) checked: bool,
     pub(crate) timing: Timing,
     failure: Arc<Mutex<Option<RuntimeError>>>,
+    pipelines: Arc<shader::Pipelines>,
 }
 
 /// Features that are used where they exist; nothing requires one.
@@ -80,6 +81,7 @@ impl Gpu {
             checked: options.checked,
             timing,
             failure,
+            pipelines: Arc::default(),
         })
     }
 
@@ -92,6 +94,7 @@ impl Gpu {
             checked: self.checked,
             timing: self.timing,
             failure: self.failure.clone(),
+            pipelines: self.pipelines.clone(),
         }
     }
 

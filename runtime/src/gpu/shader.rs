@@ -1,6 +1,9 @@
 //! From WGSL text to a pipeline: validation first, so that a defect of code generation is
 //! reported with the line it concerns and never reaches a driver.
 
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use wgpu::naga;
 
 use super::Gpu;
@@ -29,9 +32,57 @@ pub(crate) fn validate(
     Ok((module, info))
 }
 
+/// Pipelines of kernels that were built before, by their text, which also says what they bind: what is
+/// rendered again with another seed or number of samples is not compiled again.
+#[derive(Debug, Default)]
+pub(crate) struct Pipelines(Mutex<HashMap<String, wgpu::ComputePipeline>>);
+
+/// Most pipelines that are kept; beyond it all are forgotten.
+const MOST_KEPT: usize = 256;
+
+impl Pipelines {
+    fn locked(&self) -> MutexGuard<'_, HashMap<String, wgpu::ComputePipeline>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn get(&self, wgsl: &str) -> Option<wgpu::ComputePipeline> {
+        self.locked().get(wgsl).cloned()
+    }
+
+    fn keep(&self, wgsl: &str, pipeline: &wgpu::ComputePipeline) {
+        let mut kept = self.locked();
+        if kept.len() >= MOST_KEPT {
+            kept.clear();
+        }
+        kept.insert(wgsl.to_owned(), pipeline.clone());
+    }
+}
+
 impl Gpu {
-    /// Builds the pipeline of one validated kernel, whose entry point is `main`.
+    /// The pipeline of one kernel, whose entry point is `main`. What wgpu has to say against it comes
+    /// through [`Gpu::check`].
     pub(crate) fn pipeline(
+        &self,
+        kernel: &str,
+        wgsl: &str,
+        layout: &wgpu::BindGroupLayout,
+    ) -> Result<wgpu::ComputePipeline, RuntimeError> {
+        if let Some(known) = self.pipelines.get(wgsl) {
+            return Ok(known);
+        }
+        validate(kernel, wgsl)?;
+        let build = || Ok(self.build_pipeline(kernel, wgsl, layout));
+        Ok(match self.guarded(build) {
+            Ok(pipeline) => {
+                self.pipelines.keep(wgsl, &pipeline);
+                pipeline
+            }
+            // Once more, so that whoever listens hears of it.
+            Err(_) => self.build_pipeline(kernel, wgsl, layout),
+        })
+    }
+
+    fn build_pipeline(
         &self,
         kernel: &str,
         wgsl: &str,

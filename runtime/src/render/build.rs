@@ -314,7 +314,7 @@ pub(super) fn build_all(
     Ok((kernels, steps?))
 }
 
-/// Validates a kernel and builds its pipeline. What wgpu has to say against it comes through
+/// Validates a kernel and builds its pipeline, unless it was built before. What wgpu has to say against it comes through
 /// [`Gpu::check`].
 pub(crate) fn build_step(
     gpu: &Gpu,
@@ -323,11 +323,10 @@ pub(crate) fn build_step(
     sizes: Sizes,
 ) -> Result<Step, RuntimeError> {
     let name = &kernel.desc.name;
-    crate::gpu::shader::validate(name, &kernel.wgsl)?;
     let layout = resources.bind_group_layout(gpu, kernel)?;
     Ok(Step {
         name: name.clone(),
-        pipeline: gpu.pipeline(name, &kernel.wgsl, &layout),
+        pipeline: gpu.pipeline(name, &kernel.wgsl, &layout)?,
         bind_group: resources.bind_group(gpu, kernel, &layout),
         size: dispatch_size(kernel.desc.source, sizes),
     })

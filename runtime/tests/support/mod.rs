@@ -7,7 +7,8 @@
 pub(crate) mod light_scenes;
 pub(crate) mod worlds;
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use impasto_runtime::wgsl::ShaderPart;
 use wgpu::util::DeviceExt;
@@ -53,22 +54,7 @@ pub(crate) fn run(
 ) -> Vec<Row> {
     let gpu = gpu();
     let code = assemble(parts, body, count);
-    let module = gpu
-        .device
-        .create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: None,
-            source: wgpu::ShaderSource::Wgsl(code.into()),
-        });
-    let pipeline = gpu
-        .device
-        .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: None,
-            layout: None,
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+    let pipeline = pipeline(gpu, code);
 
     let size = (rows * size_of::<Row>()) as u64;
     let result = buffer(
@@ -108,6 +94,32 @@ pub(crate) fn run(
         .expect("the device answers");
     let view = mapped.get_mapped_range(..).expect("the result is mapped");
     bytemuck::cast_slice(&view).to_vec()
+}
+
+/// The pipeline of a module. What asks again finds it made.
+fn pipeline(gpu: &Gpu, code: String) -> wgpu::ComputePipeline {
+    static MADE: Mutex<BTreeMap<String, wgpu::ComputePipeline>> = Mutex::new(BTreeMap::new());
+    let made = || MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pipeline) = made().get(&code) {
+        return pipeline.clone();
+    }
+    let source = wgpu::ShaderSource::Wgsl(code.as_str().into());
+    let descriptor = wgpu::ShaderModuleDescriptor {
+        label: None,
+        source,
+    };
+    let module = gpu.device.create_shader_module(descriptor);
+    let descriptor = wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: Default::default(),
+        cache: None,
+    };
+    let pipeline = gpu.device.create_compute_pipeline(&descriptor);
+    made().insert(code, pipeline.clone());
+    pipeline
 }
 
 /// The whole module; every buffer is kept in the bind group by a reference to its length.

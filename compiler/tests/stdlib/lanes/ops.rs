@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use impasto_compiler::ir::Type;
 use impasto_compiler::ir::ops::{self, Op};
-use impasto_compiler::ir::value::{Real, Value};
+use impasto_compiler::ir::value::Real;
 
 use super::{Column, Lanes, at, floats};
 
@@ -131,54 +131,60 @@ fn choose<F: Real>(cond: &[bool], a: &[F], b: &[F]) -> Column<F> {
     )
 }
 
-/// Any op, lane by lane through the op table.
+/// Any op, lane by lane through the op table, as `ops::evaluate` does; what depends on the op alone is
+/// looked up once.
 pub fn by_table<F: Real>(op: Op, types: &[Type], args: &[Lanes<F>]) -> Lanes<F> {
     let lanes = args.iter().flatten().map(Column::len).max().unwrap_or(1);
-    let mut out: Lanes<F> = Vec::new();
-    let mut values = Vec::with_capacity(args.len());
+    let Some(result) = op.result(types) else {
+        return vec![floats(vec![F::of(0.0); lanes])];
+    };
+    let from = |k: usize| match types.get(k) {
+        Some(Type::Bool | Type::Int) => k as u32 + 1,
+        _ => 4 * k as u32 + 4,
+    };
+    let places = op.operands(types, 0, [from(0), from(1), from(2)]);
+    let kernel = ops::kernel::<F>(op, op.components(types));
+    let mut out = empty(result, lanes);
     for l in 0..lanes {
-        values.clear();
-        values.extend(types.iter().zip(args).map(|(ty, a)| gather(*ty, a, l)));
-        let result = ops::evaluate(op, &values);
-        if l == 0 {
-            out = empty(&result, lanes);
-        }
-        scatter(&result, &mut out);
-    }
-    out
-}
-
-fn gather<F: Real>(ty: Type, value: &Lanes<F>, l: usize) -> Value<F> {
-    match ty {
-        Type::Bool => Value::Bool(at(value[0].bools(), l)),
-        Type::Int => Value::Int(at(value[0].ints(), l)),
-        _ => {
-            let mut components = [F::of(0.0); 4];
-            for (c, column) in value.iter().enumerate() {
-                components[c] = at(column.floats(), l);
+        // The result, then the operands, in steps of the widest.
+        let (mut numbers, mut whole) = ([F::of(0.0); 16], [0; 4]);
+        for (k, arg) in args.iter().enumerate() {
+            for (c, column) in arg.iter().enumerate() {
+                match column {
+                    Column::Float(v) => numbers[4 * k + 4 + c] = at(v, l),
+                    Column::Int(v) => whole[k + 1] = at(v, l),
+                    Column::Bool(v) => whole[k + 1] = i32::from(at(v, l)),
+                }
             }
-            Value::floats(&components[..value.len()])
+        }
+        kernel(&mut numbers, &mut whole, &places);
+        match &mut out {
+            Out::Float(columns) => columns.iter_mut().zip(numbers).for_each(|(v, x)| v.push(x)),
+            Out::Int(v) => v.push(whole[0]),
+            Out::Bool(v) => v.push(whole[0] != 0),
         }
     }
-}
-
-fn empty<F: Real>(like: &Value<F>, lanes: usize) -> Lanes<F> {
-    match like {
-        Value::Bool(_) => vec![Column::Bool(Rc::new(Vec::with_capacity(lanes)))],
-        Value::Int(_) => vec![Column::Int(Rc::new(Vec::with_capacity(lanes)))],
-        value => vec![(); value.components().len()]
-            .iter()
-            .map(|()| floats(Vec::with_capacity(lanes)))
-            .collect(),
+    match out {
+        Out::Float(columns) => columns.into_iter().map(floats).collect(),
+        Out::Int(v) => vec![Column::Int(Rc::new(v))],
+        Out::Bool(v) => vec![Column::Bool(Rc::new(v))],
     }
 }
 
-fn scatter<F: Real>(value: &Value<F>, out: &mut Lanes<F>) {
-    for (c, column) in out.iter_mut().enumerate() {
-        match column {
-            Column::Float(v) => Rc::make_mut(v).push(value.components()[c]),
-            Column::Int(v) => Rc::make_mut(v).push(value.as_int()),
-            Column::Bool(v) => Rc::make_mut(v).push(value.as_bool()),
+/// The result of an op, as it comes about.
+enum Out<F> {
+    Float(Vec<Vec<F>>),
+    Int(Vec<i32>),
+    Bool(Vec<bool>),
+}
+
+fn empty<F>(ty: Type, lanes: usize) -> Out<F> {
+    match ty {
+        Type::Bool => Out::Bool(Vec::with_capacity(lanes)),
+        Type::Int => Out::Int(Vec::with_capacity(lanes)),
+        ty => {
+            let columns = 0..ty.width().unwrap_or(1);
+            Out::Float(columns.map(|_| Vec::with_capacity(lanes)).collect())
         }
     }
 }

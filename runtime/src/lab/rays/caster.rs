@@ -158,7 +158,6 @@ impl<'g> Caster<'g> {
         let flags = [("any_hit", any_hit), ("fetched", persistent)];
         text += &template!("../../kernels/rays.wgsl").wgsl(&flags);
         text += &self.shell(sizes.fetch_limit);
-        crate::gpu::shader::validate("rays", &text)?;
         let layout = self.layout();
         let buffers = own.iter().chain(&self.scene_buffers);
         let entries: Vec<_> = (0..)
@@ -179,7 +178,7 @@ impl<'g> Caster<'g> {
         let threads = if persistent { sizes.threads } else { count };
         let step = Step {
             name: "rays".into(),
-            pipeline: self.gpu.pipeline("rays", &text, &layout),
+            pipeline: self.gpu.pipeline("rays", &text, &layout)?,
             bind_group,
             size: Size::for_items(threads, sizes.workgroup, sizes.row_groups),
         };

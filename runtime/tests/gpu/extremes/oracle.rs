@@ -61,7 +61,11 @@ fn questions(count: usize) -> Vec<Words> {
 }
 
 /// The oracle's answer: value in three channels, and density.
-fn exact(program: &Program, rows: &[Words]) -> [f64; 4] {
+fn exact<'a>(
+    interpreter: &mut Interpreter<'a, f64>,
+    program: &'a Program,
+    rows: &[Words],
+) -> [f64; 4] {
     let wide = |row: Words, n: usize| {
         let values: Vec<f64> = floats(row).iter().map(|&x| f64::from(x)).collect();
         Value::<f64>::vector(&values[..n])
@@ -81,7 +85,6 @@ fn exact(program: &Program, rows: &[Words]) -> [f64; 4] {
         wide(rows[2], 3),
         Value::vector(&[0.5; 4]),
     ];
-    let mut interpreter = Interpreter::<f64>::new(program.ir(), u64::MAX);
     let answer = interpreter
         .run(&program.compiled()[0].evaluate, args)
         .expect("ends");
@@ -102,9 +105,13 @@ fn worst(program: &Program, asked: &[Words], near: f64) -> (f64, String, usize) 
     };
     let count = asked.len() / 3;
     let answers = run(&[&part], BODY, asked, count, count);
+    let mut interpreter = Interpreter::new(program.ir(), u64::MAX);
     let (mut worst, mut place, mut far) = (0.0, String::from("nowhere"), 0);
     for (rows, answer) in asked.chunks(3).zip(answers) {
-        let (exact, found) = (exact(program, rows), floats(answer).map(f64::from));
+        let (exact, found) = (
+            exact(&mut interpreter, program, rows),
+            floats(answer).map(f64::from),
+        );
         // Where next to nothing of what comes is reflected, relative errors say nothing of pictures.
         let least = 1e-3 * exact[3].max(1.0);
         let error = |k: usize| (found[k] - exact[k]).abs() / exact[k].abs().max(least);
