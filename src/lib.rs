@@ -30,6 +30,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use compiler::partition::PlanInputs;
+use runtime::film::outputs;
 
 pub use impasto_compiler as compiler;
 pub use impasto_runtime as runtime;
@@ -115,8 +116,18 @@ pub fn file_requests(file: &str, loader: &mut FileLoader) -> Vec<MaterialRequest
 
 /// Compiles every material of a scene. Warnings are dropped; [`compiler::compile`] gives them.
 pub fn compile(scene: &Scene) -> Result<Program, Error> {
+    compile_for(scene, &[])
+}
+
+/// The same for a film that records `outputs` beside the picture.
+pub fn compile_for(scene: &Scene, outputs: &[String]) -> Result<Program, Error> {
     let mut loader = FileLoader::new(&scene.base);
-    let compilation = compiler::compile(&requests(scene), &mut loader);
+    let requests = requests(scene);
+    let compilation = if outputs::ask_for_looks(outputs) {
+        compiler::compile_with_looks(&requests, &mut loader)
+    } else {
+        compiler::compile(&requests, &mut loader)
+    };
     let Compilation {
         sources,
         diagnostics,

@@ -1,7 +1,6 @@
 //! The buffers of a render and how kernels bind them.
 
 use crate::error::RuntimeError;
-use crate::film;
 use crate::gpu::Gpu;
 use crate::kernels::compose::{Access, OWN_BUFFERS, RUN_MEMBERS};
 use crate::kernels::layout::Layout;
@@ -260,7 +259,7 @@ fn own_bytes(name: &str, composer: &Composer<'_>) -> u64 {
         name if RAY_BUFFERS.iter().any(|(buffer, ..)| *buffer == name) => {
             pool * layout.ray_bytes(name)
         }
-        _ => 4 * pixels * film::PLANES as u64,
+        _ => 4 * pixels * composer.world.outputs.layers.planes() as u64,
     }
 }
 

@@ -11,6 +11,7 @@ use crate::fingerprint::Fingerprint;
 use crate::kernels::cones;
 use crate::kernels::modules::{Composer, Kernel, Recipe};
 use crate::kernels::order;
+use crate::kernels::outputs;
 use crate::kernels::profile;
 use crate::kernels::stages::{Part, StageId};
 use crate::kernels::state::{self, Storage};
@@ -155,7 +156,10 @@ impl Composer<'_> {
                 let lens = self.layout.needs.has(Need::Lens);
                 world.camera.wgsl(world.width, world.height, lens)
             }
-            Part::Film => include_str!("film.wgsl").to_string(),
+            Part::Film => {
+                let flags: Vec<Flag> = self.layout.needs.flags().collect();
+                template!("film.wgsl").wgsl(&flags)
+            }
             Part::Numbers => include_str!("numbers.wgsl").to_string(),
             Part::Geometry => parts.geometry.wgsl.clone(),
             Part::Surface => parts.surface.wgsl.clone(),
@@ -165,6 +169,10 @@ impl Composer<'_> {
             Part::Order => order::bins(self.technique.ray_order, world.parts.bounds),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
+            Part::Outputs => {
+                let layers = &world.outputs.layers;
+                text(parts.outputs.as_ref()) + &outputs::text(layers, self.layout.needs)
+            }
         }
     }
 

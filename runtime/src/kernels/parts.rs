@@ -32,6 +32,8 @@ fn is_missing(part: Part, parts: &KernelParts, needs: Needs) -> bool {
         Part::Materials => needs.has(Need::Textures) && parts.texture.is_none(),
         // The runtime's own.
         Part::Random | Part::Camera | Part::Film | Part::Numbers | Part::Mis | Part::Order => false,
+        // A world has outputs only with what they look up.
+        Part::Outputs => false,
     }
 }
 
@@ -55,6 +57,7 @@ mod tests {
             lights: part(),
             media: Some(part()),
             texture: Some(part()),
+            outputs: None,
         }
     }
 

@@ -14,6 +14,10 @@ const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
 const SCATTERING: When = when(&[Need::Scattering]);
+const FIRST_HIT_OUTPUTS: When = when(&[Need::FirstHitOutputs]);
+const MATERIAL_OUTPUTS: When = when(&[Need::MaterialOutputs]);
+const SAMPLE_OUTPUTS: When = when(&[Need::SampleOutputs]);
+const LIGHT_GROUPS: When = when(&[Need::LightGroups]);
 
 /// The stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,6 +65,8 @@ pub(crate) enum Part {
     Order,
     /// Generated material code with what it reads.
     Materials,
+    /// What records outputs of the film beside the picture.
+    Outputs,
 }
 
 impl Part {
@@ -114,6 +120,10 @@ pub(crate) const STAGES: [Stage; 7] = [
             (Part::Mis, MIS),
             (Part::Lights, ALWAYS),
             (Part::Media, ABSORPTION),
+            (Part::Camera, FIRST_HIT_OUTPUTS),
+            (Part::Outputs, FIRST_HIT_OUTPUTS),
+            (Part::Outputs, SAMPLE_OUTPUTS),
+            (Part::Outputs, LIGHT_GROUPS),
         ],
         need: ALWAYS,
     },
@@ -136,6 +146,8 @@ pub(crate) const STAGES: [Stage; 7] = [
             (Part::Mis, MIS),
             (Part::Media, MEDIA),
             (Part::Materials, ALWAYS),
+            (Part::Outputs, MATERIAL_OUTPUTS),
+            (Part::Outputs, LIGHT_GROUPS),
         ],
         need: ALWAYS,
     },

@@ -128,7 +128,7 @@ const CONE: &[(&str, Type)] = &[
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 10] = [
+pub(crate) const FIELDS: [Field; 11] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -314,6 +314,21 @@ pub(crate) const FIELDS: [Field; 10] = [
         ],
     },
     Field {
+        // The group of the light that was sampled, until what it brings is gathered.
+        uses: &[Use {
+            name: "light_group",
+            components: &[
+                ("group", U32),
+                ("unused0", U32),
+                ("unused1", U32),
+                ("unused2", U32),
+            ],
+            need: when(&[Need::LightGroups, Need::ShadowRays]),
+            readers: &[Logic],
+            writers: &[Logic],
+        }],
+    },
+    Field {
         // The media it is in; see `kernels/media.wgsl`.
         uses: &[Use {
             name: "media",
@@ -341,11 +356,14 @@ pub(crate) fn constants() -> String {
          const PATH_LIT: u32 = {}u;\n\
          const PATH_LIVE: u32 = {}u;\n\
          // No work is left for the slot.\n\
-         const PATH_RETIRED: u32 = {}u;\n",
+         const PATH_RETIRED: u32 = {}u;\n\
+         // The path has ended; its first hit is asked how it looks.\n\
+         const PATH_LOOKS: u32 = {}u;\n",
         bit(0) - 1,
         bit(0),
         bit(1),
         bit(2),
+        bit(3),
     )
 }
 
