@@ -105,7 +105,7 @@ pub struct Report {
     /// What the film records beside the picture, as `--aov` calls it; absent if nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<String>,
-    /// Samples cut to what the film holds.
+    /// Samples cut to what the film holds, and values of outputs that were no finite number.
     pub clamped_samples: u64,
     /// Samples whose id found no room in their pixel, of outputs that are Cryptomattes.
     pub lost_ids: u64,
