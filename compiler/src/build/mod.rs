@@ -95,10 +95,9 @@ impl ProgramBuilder {
             closure::cut_out(&mut material, transparent);
         }
         self.functions.take_over(&checker.ir);
-        Some(MaterialState {
-            has_looks: self.looks,
-            ..MaterialState::new(material, instances::agreed(settings))
-        })
+        let mut state = MaterialState::new(material, instances::agreed(settings));
+        state.has_looks = self.looks;
+        Some(state)
     }
 
     /// Takes a material through all passes.

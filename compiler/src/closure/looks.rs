@@ -4,7 +4,7 @@
 use super::view::View;
 use super::{Core, lobes};
 use crate::ir::{Function, Material, Module};
-use crate::ops::Op;
+use crate::ir::ops::Op;
 
 /// The functions of a material.
 #[derive(Clone, Debug)]

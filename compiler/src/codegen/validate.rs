@@ -1,8 +1,9 @@
 //! Checks text that was generated.
 
+use crate::closure::Looks;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{Function, walk};
-use crate::program::Program;
+use crate::program::{CompiledMaterial, Program};
 use crate::stages::{Progress, Stage};
 
 /// Checks a module's text with naga, as every kernel that includes it will be checked.

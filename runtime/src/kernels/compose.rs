@@ -16,7 +16,7 @@ use crate::kernels::profile;
 use crate::kernels::stages::{Part, StageId};
 use crate::kernels::state::{self, Storage};
 use crate::wgsl;
-use crate::wgsl::template::Flag;
+use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::needs::{Need, Needs};

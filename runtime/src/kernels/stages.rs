@@ -85,6 +85,7 @@ impl Part {
             Part::Traversal => "ray casts",
             Part::Order => "order of rays",
             Part::Materials => "texture lookups",
+            Part::Outputs => "outputs",
         }
     }
 }
