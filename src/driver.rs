@@ -6,6 +6,7 @@ use std::path::Path;
 use impasto_compiler::partition::{Plan, PlanError, PlanInputs, Strategy};
 use impasto_compiler::{Compilation, MaterialRequest, Parameters, Program};
 use impasto_runtime::error::SceneError;
+use impasto_runtime::film::outputs;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
@@ -53,8 +54,18 @@ pub fn file_requests(file: &str, loader: &mut FileLoader) -> Vec<MaterialRequest
 
 /// Compiles every material of a scene. Warnings are dropped; [`impasto_compiler::compile`] gives them.
 pub fn compile(scene: &Scene) -> Result<Program, Error> {
+    compile_for(scene, &[])
+}
+
+/// The same for a film that records `outputs` beside the picture.
+pub fn compile_for(scene: &Scene, outputs: &[String]) -> Result<Program, Error> {
     let mut loader = FileLoader::new(&scene.base);
-    let compilation = impasto_compiler::compile(&requests(scene), &mut loader);
+    let requests = requests(scene);
+    let compilation = if outputs::ask_for_looks(outputs) {
+        impasto_compiler::compile_with_looks(&requests, &mut loader)
+    } else {
+        impasto_compiler::compile(&requests, &mut loader)
+    };
     let Compilation {
         sources,
         diagnostics,

@@ -31,7 +31,7 @@ pub use impasto_runtime as runtime;
 
 pub use compiler::partition::{Plan, PlanError, Strategy};
 pub use compiler::{Compilation, MaterialRequest, Program};
-pub use driver::{compile, file_requests, load, plan, render, requests};
+pub use driver::{compile, compile_for, file_requests, load, plan, render, requests};
 pub use error::Error;
 pub use files::FileLoader;
 pub use ir_text::ir_text;

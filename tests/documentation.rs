@@ -18,6 +18,17 @@ fn examples_check() {
     }
 }
 
+#[test]
+fn the_page_on_outputs_has_the_table() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/outputs.md");
+    let text = std::fs::read_to_string(path).expect("docs/outputs.md");
+    let table = impasto::runtime::film::outputs::manual();
+    assert!(
+        text.contains(&table),
+        "docs/outputs.md should have\n{table}"
+    );
+}
+
 /// README.md and the pages of `docs/` and `docs/library/`.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -6,12 +6,14 @@
 //! `filter_width` needs are left out of modules that read none of them ([`InputSet::declares`]).
 //!
 //! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
-//! `evaluate_` or `emission_`; kernels must not define such names.
+//! `evaluate_`, `emission_`, `albedo_` or `normal_`; kernels must not define such names.
 //!
 //! ```wgsl
 //! // Printed by the compiler (support functions and structs first):
 //! fn evaluate_material(instance: u32, point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample
 //! fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // only if some emission varies
+//! fn material_albedo(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // only of programs
+//! fn material_normal(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32>   // compiled with looks
 //! fn material_of(instance: u32) -> u32   // apart from the others: `Program::lookup_wgsl`
 //! // Provided by the runtime when a material reads textures:
 //! fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32>
@@ -31,6 +33,10 @@
 pub const EVALUATE: &str = "evaluate_material";
 /// The WGSL function that gives the emission of any material of a module.
 pub const EMISSION: &str = "material_emission";
+/// The WGSL function that gives what any material of a module scatters in all.
+pub const ALBEDO: &str = "material_albedo";
+/// The WGSL function that gives the mean normal of the lobes of any material of a module.
+pub const NORMAL: &str = "material_normal";
 /// The WGSL function that gives the material of an instance.
 pub const MATERIAL_OF: &str = "material_of";
 /// The WGSL function the runtime provides: bilinear, wrapping lookup of texture `slot`.

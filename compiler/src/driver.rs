@@ -87,14 +87,28 @@ pub fn compile(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compila
     compile_with_progress(requests, loader, Progress::silent())
 }
 
+/// [`compile`] with functions that say how materials look, for outputs of a film.
+pub fn compile_with_looks(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compilation {
+    compile_as(requests, loader, Progress::silent(), true)
+}
+
 /// [`compile`], which says the stage it is at.
 pub fn compile_with_progress<'a>(
     requests: &[MaterialRequest],
     loader: &'a mut dyn Loader,
     progress: Progress<'a>,
 ) -> Compilation {
+    compile_as(requests, loader, progress, false)
+}
+
+fn compile_as<'a>(
+    requests: &[MaterialRequest],
+    loader: &'a mut dyn Loader,
+    progress: Progress<'a>,
+    looks: bool,
+) -> Compilation {
     let mut checker = Checker::with_progress(loader, progress);
-    let program = compile_all(&mut checker, requests);
+    let program = compile_all(&mut checker, requests, looks);
     let program = program.filter(|_| !diag::has_errors(&checker.diagnostics));
     drop_unsure(&mut checker.diagnostics);
     Compilation {
@@ -196,8 +210,12 @@ struct Requested {
     settings: Vec<(usize, Setting)>,
 }
 
-fn compile_all(checker: &mut Checker, requests: &[MaterialRequest]) -> Option<Program> {
-    let mut builder = ProgramBuilder::new(checker)?;
+fn compile_all(
+    checker: &mut Checker,
+    requests: &[MaterialRequest],
+    looks: bool,
+) -> Option<Program> {
+    let mut builder = ProgramBuilder::new(checker)?.with_looks(looks);
     let requested = requested(checker, requests);
     if diag::has_errors(&checker.diagnostics) {
         return None;

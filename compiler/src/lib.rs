@@ -47,7 +47,7 @@ pub mod stages;
 
 pub use driver::{
     Checked, Compilation, MaterialRequest, Parameters, after_pass, check, compile,
-    compile_with_progress,
+    compile_with_looks, compile_with_progress,
 };
 pub use loader::{Loader, MemoryLoader, library_text};
 pub use parameter_value::ParameterValue;

@@ -24,6 +24,8 @@ pub struct RenderOptions {
     pub technique: Technique,
     /// Whether a wavefront's logic kernel counts what paths hit, for the report's workload.
     pub count_hits: bool,
+    /// What the film records beside the picture, by the names of [`outputs`](crate::film::outputs).
+    pub outputs: Vec<String>,
     /// The pixels to render, ascending, each as row x width + column; all if `None`. The others have no
     /// samples, and those given have the bits that they have in the whole picture.
     pub pixels: Option<Arc<[u32]>>,
@@ -38,6 +40,7 @@ impl Default for RenderOptions {
             pool: None,
             technique: Technique::default(),
             count_hits: false,
+            outputs: Vec::new(),
             pixels: None,
         }
     }

@@ -61,6 +61,7 @@ pub fn scene(palette: &Palette, coherence: Coherence, side: u32) -> Scene {
         materials: palette.materials.iter().map(binding).collect(),
         lights: Vec::new(),
         environment: None,
+        labels: Default::default(),
         warnings: Vec::new(),
     };
     match coherence {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use impasto::runtime::film::file::{FilmFile, Range};
+use impasto::runtime::film::outputs::ID_SLOTS;
 
 use super::outputs::{Outputs, parse_exposure};
 use super::{Global, Outcome, count, runtime};
@@ -38,6 +39,12 @@ pub(super) fn run(args: &MergeArgs, global: &Global) -> Outcome {
         return Err("there is no film to merge".to_string().into());
     };
     outputs.write(&merged.sums.picture(), &merged, args.exposure)?;
+    let lost = merged.sums.lost_ids();
+    if lost > 0 {
+        global.note(&format!(
+            "warning: the ids of {lost} samples found no room in their pixels, which tell {ID_SLOTS} apart"
+        ));
+    }
     global.note(&format!(
         "wrote {} ({} of {}: {})",
         outputs.names(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use impasto::files;
 use impasto::runtime::film::Film;
 use impasto::runtime::film::file::FilmFile;
-use impasto::runtime::film::output;
+use impasto::runtime::film::{exr, output, outputs};
 
 use super::Failure;
 
@@ -41,11 +41,30 @@ impl Outputs {
     /// Writes everything; `exposure` brightens what is to be looked at by stops.
     pub(super) fn write(&self, film: &Film, sums: &FilmFile, exposure: f32) -> Result<(), Failure> {
         for path in &self.pictures {
-            output::write(film, path, exposure).map_err(super::runtime)?;
+            let written = match is_exr(path) && !sums.sums.layers().is_empty() {
+                true => exr::write(sums, path),
+                false => output::write(film, path, exposure),
+            };
+            written.map_err(super::runtime)?;
         }
         match &self.film {
             Some(path) => sums.write(path).map_err(super::runtime),
             None => Ok(()),
+        }
+    }
+
+    /// Fails if outputs beside the picture are asked for that do not exist, or that no file would hold.
+    pub(super) fn check_aov(&self, names: &[String]) -> Result<(), String> {
+        names
+            .iter()
+            .try_for_each(|name| outputs::check_name(name))?;
+        let is_held = self.is_film() || self.pictures.iter().any(|path| is_exr(path));
+        match is_held || names.is_empty() {
+            true => Ok(()),
+            false => Err(format!(
+                "`--aov {}` needs a file that holds more than a picture\n  hint: write an .exr or a .film file",
+                names.join(",")
+            )),
         }
     }
 
@@ -60,6 +79,20 @@ impl Outputs {
         let names: Vec<String> = files.map(|path| path.display().to_string()).collect();
         names.join(" and ")
     }
+}
+
+fn is_exr(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("exr")
+}
+
+/// What `--help` says of outputs.
+pub(super) fn aov_help() -> String {
+    let names: Vec<&str> = outputs::names().collect();
+    format!(
+        "Records outputs beside the picture, as layers of the EXR: {} (see docs/outputs.md)",
+        names.join(", ")
+    )
 }
 
 /// A number of stops for the option `--exposure`.

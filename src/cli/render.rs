@@ -12,6 +12,7 @@ use clap::Args;
 use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
 use impasto::runtime::options::Progress;
 use impasto::runtime::render::Replanning;
 use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
@@ -26,7 +27,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::checkpoint::CheckpointArgs;
 use super::dropped;
 use super::info::GpuArgs;
-use super::outputs::{Outputs, parse_exposure};
+use super::outputs::{Outputs, aov_help, parse_exposure};
 use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
 use super::technique::TechniqueArgs;
@@ -41,6 +42,8 @@ pub(super) struct RenderArgs {
     /// for a part that `impasto merge` takes
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', help = aov_help())]
+    aov: Vec<String>,
     /// Samples per pixel; 64 by default
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
@@ -98,6 +101,7 @@ const MAX_SIDE: u32 = 65_536;
 
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let outputs = Outputs::of(&args.out)?;
+    outputs.check_aov(&args.aov)?;
     if let Some(report) = &args.report {
         files::check_writable(report)?;
     }
@@ -106,7 +110,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     interrupt::install()?;
     let scene = Arc::new(load(args, global)?);
     let started = Instant::now();
-    let program = Arc::new(compile(&scene, global)?);
+    let program = Arc::new(compile(&scene, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
     let planned = args.planned(&scene, &program)?;
     let given = args.device_profile.as_deref().map(Profile::given);
@@ -210,6 +214,7 @@ impl RenderArgs {
             pool: self.pool,
             technique: self.technique.technique(),
             count_hits,
+            outputs: self.aov.clone(),
             pixels: None,
         }
     }
@@ -237,7 +242,7 @@ fn load(args: &RenderArgs, global: &Global) -> Result<Scene, Failure> {
 }
 
 /// The scene's materials. A file that is not there is an input error, not one of the language.
-fn compile(scene: &Scene, global: &Global) -> Result<Program, Failure> {
+fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program, Failure> {
     let mut loader = FileLoader::new(&scene.base);
     let requests = impasto::requests(scene);
     for request in &requests {
@@ -247,7 +252,10 @@ fn compile(scene: &Scene, global: &Global) -> Result<Program, Failure> {
             format!("cannot read `{file}`, which the scene names for the material `{name}`: {why}")
         })?;
     }
-    let compiled = compiler::compile(&requests, &mut loader);
+    let compiled = match ask_for_looks(&args.aov) {
+        true => compiler::compile_with_looks(&requests, &mut loader),
+        false => compiler::compile(&requests, &mut loader),
+    };
     if global.json() {
         let found = super::json(&compiled.sources, &compiled.diagnostics);
         print(&format!(
@@ -356,6 +364,12 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
         global.note(&format!(
             "warning: {times} times a path entered a medium inside of {MAX_NESTED} others, which is \
              more than it can follow"
+        ));
+    }
+    if report.lost_ids > 0 {
+        let lost = report.lost_ids;
+        global.note(&format!(
+            "warning: the ids of {lost} samples found no room in their pixels, which tell {ID_SLOTS} apart"
         ));
     }
     if report.lost_paths > 0 {

@@ -1,6 +1,7 @@
 //! The command as its users meet it: exit codes, streams, files, and input that is not what it
 //! should be. Every test runs the built program.
 
+mod aov;
 mod calibrate;
 mod common;
 mod converge;

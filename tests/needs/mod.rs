@@ -195,6 +195,7 @@ fn picture(gpu: &Gpu, text: &Text, features: Features) -> Vec<f32> {
             features,
             ..text.technique
         },
+        outputs: text.outputs(),
         ..RenderOptions::default()
     };
     let plan = impasto::plan(&program, Strategy::OWN)

@@ -63,6 +63,13 @@ fn under(environment: &'static str, text: Text) -> Text {
     }
 }
 
+fn recording(outputs: &'static [&'static str]) -> Text {
+    Text {
+        outputs,
+        ..Text::default()
+    }
+}
+
 fn with_uvs(text: Text) -> Text {
     Text {
         corners: Corners::Uvs,
@@ -176,6 +183,16 @@ pairs! {
          +enter_placement +is_mirrored +material_row +place_of +place_point +placed_triangle \
          +set_slabs +take_in_tree",
         Text { shared: Some(false), ..Text::default() } => Text { shared: Some(true), ..Text::default() };
+    "outputs of the first hit", also &[], "functions +add_carrying +facing +film_add_signed +film_add_values +hit_geometric_normal \
+         +record_first_hit",
+        Text::default() => recording(&["geometric_normal"]);
+    "outputs of materials", also &[], "functions +add_carrying +film_add_signed +film_add_values +material_albedo +record_material",
+        Text::default() => recording(&["albedo"]);
+    "outputs of samples", also &[], "functions +add_carrying +film_add_signed +film_add_values +record_sample",
+        Text::default() => recording(&["variance"]);
+    "light groups", also &[], "+16 bytes; bindings +light_groups; functions +add_carrying +film_add_signed +film_add_values \
+         +hit_group +light_group +load_light_group +record_light +store_light_group",
+        Text::default() => recording(&["lights"]);
     "rays in an order of their own", also &[], "kernels +bin_extension +bin_shadow +scan_extension +scan_shadow +scatter_extension \
          +scatter_shadow; bindings +bins; functions +bin_extension +bin_ray +bin_shadow \
          +ray_bin",

@@ -29,6 +29,8 @@ pub struct Text {
     /// Whether the geometry stands there twice, and is stored once.
     pub shared: Option<bool>,
     pub technique: Technique,
+    /// What `--aov` asks for.
+    pub outputs: &'static [&'static str],
 }
 
 pub const QUAD: &str = "kind = \"quad\"\ncorner = [-0.5, 1.9, -0.5]\nu = [1, 0, 0]\nv = [0, 0, 1]\n\
@@ -58,6 +60,7 @@ impl Default for Text {
             corners: Corners::Plain,
             shared: None,
             technique: Technique::default(),
+            outputs: &[],
         }
     }
 }
@@ -75,15 +78,20 @@ impl Text {
     pub fn load(&self, folder: &Path) -> Loaded {
         self.write(folder);
         let scene = impasto::load(&folder.join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
-        let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let outputs = self.outputs();
+        let program = impasto::compile_for(&scene, &outputs).unwrap_or_else(|e| panic!("{e}"));
         let technique = self.technique;
-        let world = World::of_program(&scene, &program, &technique);
+        let world = World::of_render(&scene, &program, &technique, &outputs);
         Loaded {
             world: world.unwrap_or_else(|e| panic!("{e}")),
             scene,
             program,
             technique,
         }
+    }
+
+    pub fn outputs(&self) -> Vec<String> {
+        self.outputs.iter().map(|name| (*name).to_owned()).collect()
     }
 
     fn write(&self, folder: &Path) {

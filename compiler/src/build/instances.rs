@@ -67,7 +67,7 @@ fn instance(
         values.extend(part.evaluate(module, &setting.values).map_err(too_long)?);
     }
     let medium = interior::medium(module, &state.material, &setting.values).map_err(too_long)?;
-    let emission = closure::emission_kind(module, state.functions.get(1), &values);
+    let emission = closure::emission_kind(module, state.emission(), &values);
     Ok(Instance {
         info: InstanceInfo {
             name: setting.name.clone(),

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::abi::{Lookups, TextureSpace};
+use crate::closure::Looks;
 use crate::ir::{Const, ExprKind, Function, Module, Type};
 use crate::program::{CompiledMaterial, Slot};
 
@@ -79,6 +80,7 @@ impl Reads {
 fn reached<'p>(module: &'p Module, material: &'p CompiledMaterial) -> Vec<&'p Function> {
     let mut found: Vec<&Function> = vec![&material.evaluate];
     found.extend(&material.emission);
+    found.extend(material.looks.iter().flat_map(Looks::functions));
     let mut known = BTreeSet::new();
     let mut next = 0;
     while let Some(&f) = found.get(next) {

@@ -30,6 +30,8 @@ pub(crate) struct ProgramBuilder {
     materials: Vec<CompiledMaterial>,
     instances: Vec<Instance>,
     names: BTreeMap<String, u32>,
+    /// Are there functions that say how materials look?
+    looks: bool,
 }
 
 impl ProgramBuilder {
@@ -50,7 +52,14 @@ impl ProgramBuilder {
             materials: Vec::new(),
             instances: Vec::new(),
             names: BTreeMap::from([("material".to_owned(), 1)]),
+            looks: false,
         })
+    }
+
+    /// Makes functions that say how materials look as well.
+    pub(crate) fn with_looks(mut self, looks: bool) -> Self {
+        self.looks = looks;
+        self
     }
 
     /// What lowered code uses of the library.
@@ -86,7 +95,9 @@ impl ProgramBuilder {
             closure::cut_out(&mut material, transparent);
         }
         self.functions.take_over(&checker.ir);
-        Some(MaterialState::new(material, instances::agreed(settings)))
+        let mut state = MaterialState::new(material, instances::agreed(settings));
+        state.has_looks = self.looks;
+        Some(state)
     }
 
     /// Takes a material through all passes.
@@ -170,12 +181,14 @@ impl ProgramBuilder {
             .any(|i| i.info.emission == Emission::Varying);
         let layout = TableLayout::new(&state.table());
         let name = unique(&mut self.names, &state.material.name);
+        let emits = state.emission().is_some();
         let mut functions = state.functions;
         for f in &mut functions {
             f.name.clone_from(&name);
         }
-        let read = functions.iter().take(if varying { 2 } else { 1 });
-        let read: Vec<&Function> = read.collect();
+        let unread = |at: usize| at == 1 && emits && !varying;
+        let read = functions.iter().enumerate().filter(|(at, _)| !unread(*at));
+        let read: Vec<&Function> = read.map(|(_, f)| f).collect();
         let lobes = closure::surface_lobes(&state.material);
         let crosses = closure::transmissive(module, &state.material, &lobes);
         let info = MaterialInfo {
@@ -193,7 +206,8 @@ impl ProgramBuilder {
             self.materials.push(CompiledMaterial {
                 info,
                 evaluate,
-                emission: functions.next(),
+                emission: if emits { functions.next() } else { None },
+                looks: closure::Looks::from_functions(functions),
                 layout,
             });
         }
@@ -232,6 +246,7 @@ impl ProgramBuilder {
             textures,
             sources: checker.sources.clone(),
             effort,
+            looks: self.looks,
         }
     }
 }

@@ -15,12 +15,14 @@ use crate::ir::{
 
 mod emission;
 mod evaluate;
+mod looks;
 mod opacity;
 mod probe;
 mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
+pub use looks::Looks;
 pub use opacity::cut_out;
 pub use probe::{Probe, ProbedLobe, probe};
 

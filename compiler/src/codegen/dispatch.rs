@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{emission_name, evaluate_name};
-use crate::abi::{EMISSION, EVALUATE, INSTANCES, MATERIAL_OF};
+use super::{albedo_name, emission_name, evaluate_name, normal_name};
+use crate::abi::{ALBEDO, EMISSION, EVALUATE, INSTANCES, MATERIAL_OF, NORMAL};
 use crate::program::Program;
 
 /// The functions that the kernels call.
@@ -34,6 +34,30 @@ pub fn dispatch(program: &Program, members: &[usize], out: &mut String) {
         };
         emission.print(&emitters, members.len() == 1, out);
     }
+    if program.has_looks() {
+        looks(program, members, (ALBEDO, albedo_name, "vec3f()"), out);
+        looks(program, members, (NORMAL, normal_name, "point.normal"), out);
+    }
+}
+
+/// A function that says how a material looks.
+fn looks(
+    program: &Program,
+    members: &[usize],
+    (function, name, otherwise): (&str, fn(&str) -> String, &'static str),
+    out: &mut String,
+) {
+    let _ = writeln!(
+        out,
+        "\nfn {function}(instance: u32, point: SurfacePoint, wo: vec3f) -> vec3f {{"
+    );
+    let dispatch = Dispatch {
+        program,
+        name,
+        args: "point, wo",
+        otherwise,
+    };
+    dispatch.print(members, members.len() == 1, out);
 }
 
 /// A call of one function of the material of an instance.

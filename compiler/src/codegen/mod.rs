@@ -122,6 +122,10 @@ fn roots<'p>(program: &'p Program, members: &[usize]) -> Vec<Root<'p>> {
         if let (Some(f), true) = (&material.emission, material.info.varying_emission) {
             add(f, emission_name(&material.info.name));
         }
+        if let Some(looks) = &material.looks {
+            add(&looks.albedo, albedo_name(&material.info.name));
+            add(&looks.normal, normal_name(&material.info.name));
+        }
     }
     roots
 }
@@ -148,6 +152,16 @@ fn evaluate_name(material: &str) -> String {
 /// The WGSL function of a material's emission.
 fn emission_name(material: &str) -> String {
     format!("emission_{material}")
+}
+
+/// The WGSL function of a material's albedo.
+fn albedo_name(material: &str) -> String {
+    format!("albedo_{material}")
+}
+
+/// The WGSL function of a material's normal.
+fn normal_name(material: &str) -> String {
+    format!("normal_{material}")
 }
 
 /// Functions that the roots call, directly or not, ascending (so callees come first).

@@ -1,8 +1,9 @@
 //! Checks text that was generated.
 
+use crate::closure::Looks;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::{Function, walk};
-use crate::program::Program;
+use crate::program::{CompiledMaterial, Program};
 use crate::stages::{Progress, Stage};
 
 /// Checks a module's text with naga, as every kernel that includes it will be checked.
@@ -31,9 +32,14 @@ pub(crate) fn validate_with_progress(
 
 /// The first function of some materials whose blocks lie deeper within each other than WGSL
 /// allows, as the error to report.
-pub(crate) fn nested_too_deep(program: &Program, members: &[usize]) -> Option<Diagnostic> {
+pub(crate) fn nested_too_deep<'p>(program: &'p Program, members: &[usize]) -> Option<Diagnostic> {
     let own = members.iter().map(|&m| &program.materials[m]);
-    let own = own.flat_map(|m| std::iter::once(&m.evaluate).chain(&m.emission));
+    let looks = |m: &'p CompiledMaterial| m.looks.iter().flat_map(Looks::functions);
+    let own = own.flat_map(|m| {
+        std::iter::once(&m.evaluate)
+            .chain(&m.emission)
+            .chain(looks(m))
+    });
     let deep = |f: &&Function| walk::nesting(&f.body) > walk::MAX_NESTING;
     let f = program.module.functions.iter().chain(own).find(deep)?;
     let message = format!("the blocks of `{}` nest too deeply", f.name);

@@ -2,7 +2,7 @@
 //! they change nothing.
 
 use super::{Hoisted, PIPELINE, Pass, Rules, Work, cse, function_passes, rewrite};
-use crate::closure::Core;
+use crate::closure::{Core, Looks};
 use crate::diag::Diagnostic;
 use crate::ir::{self, Const, ExprKind, Function, Material, Module, Type};
 
@@ -16,8 +16,11 @@ pub struct MaterialState {
     pub material: Material,
     /// The values of its parameters that are known for good.
     pub constants: Vec<Option<Const>>,
-    /// What it is lowered to, once it is: what it scatters, then what it emits if it does.
+    /// What it is lowered to, once it is: what it scatters, then what it emits if it does, then how it looks if that
+    /// is asked for.
     pub functions: Vec<Function>,
+    /// Is it asked how it looks?
+    pub has_looks: bool,
     /// What the host computes for these, once that is split off. The functions read the values of
     /// all of them, one after another, as one table.
     pub hoisted: Vec<Hoisted>,
@@ -32,9 +35,16 @@ impl MaterialState {
             material,
             constants,
             functions: Vec::new(),
+            has_looks: false,
             hoisted: Vec::new(),
             changed: false,
         }
+    }
+
+    /// Of its functions what it emits.
+    pub fn emission(&self) -> Option<&Function> {
+        let looks = if self.has_looks { Looks::FUNCTIONS } else { 0 };
+        self.functions[..self.functions.len().saturating_sub(looks)].get(1)
     }
 
     /// The types of the values that its functions read of the table.
@@ -65,7 +75,13 @@ pub fn apply(
         Work::Material(..) | Work::MaterialAgain(..) => {
             state.changed = first.run_on_material(module, &mut state.material, &state.constants)?;
         }
-        Work::Lowering(_, lower) => state.functions = lower(module, core, &state.material)?,
+        Work::Lowering(_, lower) => {
+            state.functions = lower(module, core, &state.material)?;
+            if state.has_looks {
+                let looks = Looks::of(module, core, &state.material);
+                state.functions.extend([looks.albedo, looks.normal]);
+            }
+        }
         Work::Split(split) => {
             for i in 0..state.functions.len() {
                 split_off(module, state, i, split);

@@ -28,6 +28,7 @@ pub struct Program {
     /// Line of each span that generated code mentions, by file.
     pub(crate) sources: SourceMap,
     pub(crate) effort: u64,
+    pub(crate) looks: bool,
 }
 
 /// A texture as it is read: its index in `module.textures`, in which space, and by which lookups.
@@ -42,7 +43,9 @@ pub struct CompiledMaterial {
     pub evaluate: Function,
     /// `(point, wo) -> radiance`, when it emits.
     pub emission: Option<Function>,
-    /// Where the values lie that both functions read of the rows of an instance.
+    /// How it looks, if the program was compiled with that.
+    pub looks: Option<closure::Looks>,
+    /// Where the values lie that its functions read of the rows of an instance.
     pub layout: TableLayout,
 }
 
@@ -81,6 +84,11 @@ impl Program {
     /// The IR of the functions that materials call.
     pub fn ir(&self) -> &Module {
         &self.module
+    }
+
+    /// Whether it was compiled with functions that say how materials look.
+    pub fn has_looks(&self) -> bool {
+        self.looks
     }
 
     /// Statements that the passes walked to make the program: what it took to compile, in a

@@ -2,21 +2,26 @@
 //! apart, on other days or other machines, and merged into the very bits of the whole.
 //!
 //! All numbers are little-endian. After the magic number and a version come the identity of the
-//! render, what was dropped, the ranges of samples, the planes of the film that are not all zero,
-//! and a fingerprint of everything before it.
+//! render, what was dropped, the ranges of samples, the scene's name, the outputs beside the picture with the names
+//! that their ids stand for, the planes of the film that are not all zero, and a fingerprint of everything
+//! before it. Version 1 had neither a name nor outputs.
 
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
 use crate::error::RuntimeError;
+use crate::film::Sums;
+use crate::film::layers::{Layer, Layers};
 use crate::film::output;
-use crate::film::{PLANES, Sums};
+use crate::film::outputs::Output;
 use crate::fingerprint;
 use crate::technique::{Choice, Sampler};
 
 const MAGIC: [u8; 8] = *b"IMPASTOF";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+/// The version without outputs, which is read as well.
+const BEFORE_OUTPUTS: u32 = 1;
 /// The most ranges that a file may list.
 const MAX_RANGES: u32 = 1 << 16;
 
@@ -76,6 +81,8 @@ impl Range {
 pub struct FilmFile {
     /// Of which render.
     pub identity: Identity,
+    /// The scene's name; empty if it is not known.
+    pub scene: String,
     /// Samples dropped because a value was no number.
     pub nonfinite: u64,
     /// Samples cut to what the film holds.
@@ -95,6 +102,9 @@ impl FilmFile {
     /// Adds the samples of another part of the same render. Fails, in words, if it is of
     /// another, or if a sample is in both.
     pub fn merge(&mut self, other: &FilmFile) -> Result<(), String> {
+        if let Some(difference) = self.sums.layers().difference(other.sums.layers()) {
+            return Err(format!("their outputs differ: {difference}"));
+        }
         if let Some(difference) = self.identity.difference(&other.identity) {
             return Err(format!("they are of different renders: {difference}"));
         }
@@ -125,8 +135,22 @@ impl FilmFile {
         Ok(())
     }
 
-    /// How many samples of a render are done, if these are the first ones of it. Fails, in
+    /// How many samples of a render with some outputs are done, if these are the first ones of it. Fails, in
     /// words, if they are not.
+    pub(crate) fn done_of_all(
+        &self,
+        identity: &Identity,
+        layers: &Layers,
+        first: u32,
+        samples: u32,
+    ) -> Result<u32, String> {
+        match layers.difference(self.sums.layers()) {
+            Some(difference) => Err(format!("its outputs are others: {difference}")),
+            None => self.done_of(identity, first, samples),
+        }
+    }
+
+    /// The same, whatever the outputs.
     pub fn done_of(&self, identity: &Identity, first: u32, samples: u32) -> Result<u32, String> {
         if let Some(difference) = identity.difference(&self.identity) {
             return Err(format!("it is of another render: {difference}"));
@@ -192,9 +216,24 @@ impl FilmFile {
             out.extend(range.first.to_le_bytes());
             out.extend(range.count.to_le_bytes());
         }
-        let planes = (0..PLANES).filter(|i| self.sums.plane(*i).iter().any(|w| *w != 0));
-        let present = planes.clone().fold(0u32, |bits, i| bits | 1 << i);
-        out.extend(present.to_le_bytes());
+        write_text(&mut out, &self.scene);
+        let layers = self.sums.layers();
+        write_count(&mut out, layers.iter().count());
+        for layer in layers.iter() {
+            write_text(&mut out, &layer.name);
+            write_count(&mut out, layer.names.len());
+            layer
+                .names
+                .iter()
+                .for_each(|name| write_text(&mut out, name));
+        }
+        let all = layers.planes();
+        let planes = (0..all).filter(|i| self.sums.plane(*i).iter().any(|w| *w != 0));
+        let mut present = vec![0u32; all.div_ceil(32)];
+        planes
+            .clone()
+            .for_each(|i| present[i / 32] |= 1 << (i % 32));
+        out.extend(present.iter().flat_map(|w| w.to_le_bytes()));
         for plane in planes {
             out.extend(self.sums.plane(plane).iter().flat_map(|w| w.to_le_bytes()));
         }
@@ -208,7 +247,7 @@ impl FilmFile {
         };
         let mut reader = Reader(rest);
         let version = reader.word()?;
-        if version != VERSION {
+        if ![BEFORE_OUTPUTS, VERSION].contains(&version) {
             return Err(format!(
                 "it is a film file of version {version}; this program reads version {VERSION}"
             ));
@@ -228,9 +267,14 @@ impl FilmFile {
             scene,
         };
         let ranges = reader.ranges()?;
-        let sums = reader.sums(width, height)?;
+        let (mut name, mut layers) = (String::new(), Layers::default());
+        if version == VERSION {
+            (name, layers) = (reader.text()?, reader.layers()?);
+        }
+        let sums = reader.sums(width, height, layers)?;
         Ok(Self {
             identity,
+            scene: name,
             nonfinite,
             clamped,
             ranges,
@@ -293,13 +337,44 @@ impl<'a> Reader<'a> {
         Ok(ranges)
     }
 
+    fn text(&mut self) -> Result<String, String> {
+        let length = self.word()? as usize;
+        let bytes = self.take(length)?.to_vec();
+        String::from_utf8(bytes).map_err(|_| damaged())
+    }
+
+    fn layers(&mut self) -> Result<Layers, String> {
+        let mut layers = Vec::new();
+        for _ in 0..self.word()? {
+            let name = self.text()?;
+            let output = Output::named(&name);
+            let output = output.ok_or_else(|| format!("its output `{name}` is unknown"))?;
+            let mut names = Vec::new();
+            for _ in 0..self.word()? {
+                names.push(self.text()?);
+            }
+            layers.push(Layer {
+                output,
+                name,
+                names,
+            });
+        }
+        Ok(Layers::new(layers))
+    }
+
     /// The planes, of which the file has exactly as many bytes as are left before its end.
-    fn sums(&mut self, width: u32, height: u32) -> Result<Sums, String> {
-        let present = self.word()?;
+    fn sums(&mut self, width: u32, height: u32, layers: Layers) -> Result<Sums, String> {
+        let all = layers.planes();
+        let mut present = Vec::new();
+        for _ in 0..all.div_ceil(32) {
+            present.push(self.word()?);
+        }
+        let is_present = |plane: usize| present[plane / 32] >> (plane % 32) & 1 == 1;
         let pixels = u64::from(width) * u64::from(height);
-        let planes = u128::from((present).count_ones());
+        let planes = u128::from(present.iter().map(|bits| bits.count_ones()).sum::<u32>());
         let expected = 4 * u128::from(pixels) * planes + 8;
-        if present >> PLANES != 0 || pixels == 0 || expected != self.0.len() as u128 {
+        let beyond = (all..32 * present.len()).any(is_present);
+        if beyond || pixels == 0 || expected != self.0.len() as u128 {
             return Err(damaged());
         }
         // One plane at least is there: every pixel has samples.
@@ -307,17 +382,27 @@ impl<'a> Reader<'a> {
             return Err(damaged());
         }
         let pixels = pixels as usize;
-        let mut words = Vec::with_capacity(pixels * PLANES);
-        for plane in 0..PLANES {
-            if present >> plane & 1 == 1 {
+        let mut words = Vec::with_capacity(pixels * all);
+        for plane in 0..all {
+            if is_present(plane) {
                 let (chunks, _) = self.take(4 * pixels)?.as_chunks::<4>();
                 words.extend(chunks.iter().map(|c| u32::from_le_bytes(*c)));
             } else {
                 words.resize(words.len() + pixels, 0);
             }
         }
-        Sums::new(width, height, words).ok_or_else(damaged)
+        Sums::new(width, height, layers, words).ok_or_else(damaged)
     }
+}
+
+fn write_count(out: &mut Vec<u8>, count: usize) {
+    out.extend((count as u32).to_le_bytes());
+}
+
+/// A length in bytes, and the bytes.
+fn write_text(out: &mut Vec<u8>, text: &str) {
+    write_count(out, text.len());
+    out.extend(text.as_bytes());
 }
 
 /// Makes a renamed file survive a power cut, where the system can; the file itself is safe already.
@@ -331,12 +416,24 @@ fn sync_folder(path: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PLANES;
 
     fn part(first: u64, count: u64, value: u32) -> FilmFile {
+        with_outputs(first, count, value, &[])
+    }
+
+    fn with_outputs(first: u64, count: u64, value: u32, names: &[&str]) -> FilmFile {
         let samples = vec![count as u32; 2];
         let mut words = vec![value; 2 * (PLANES - 1)];
         words[4..6].fill(0);
         words.extend(samples);
+        let layer = |name: &&str| Layer {
+            output: Output::named(name).expect("an output"),
+            name: (*name).into(),
+            names: vec!["metal".into(), "gras \u{df}".into()],
+        };
+        let layers = Layers::new(names.iter().map(layer).collect());
+        words.extend((2 * PLANES..2 * layers.planes()).map(|i| i as u32 % 7));
         FilmFile {
             identity: Identity {
                 width: 2,
@@ -345,10 +442,11 @@ mod tests {
                 sampler: Sampler::Owen,
                 scene: 0x1234_5678_9abc_def0,
             },
+            scene: "attic".into(),
             nonfinite: 1,
             clamped: 2,
             ranges: vec![Range { first, count }],
-            sums: Sums::new(2, 1, words).expect("two pixels' words"),
+            sums: Sums::new(2, 1, layers, words).expect("two pixels' words"),
         }
     }
 
@@ -359,8 +457,45 @@ mod tests {
     }
 
     #[test]
+    fn outputs_come_back_as_they_were() {
+        let film = with_outputs(0, 2, 3, &["material", "light_key", "position"]);
+        assert_eq!(FilmFile::from_bytes(&film.to_bytes()), Ok(film));
+    }
+
+    /// Version 1 had neither the scene's name nor outputs after the ranges.
+    #[test]
+    fn files_of_before_outputs_are_read() {
+        let film = part(3, 5, 9);
+        let mut bytes = film.to_bytes();
+        bytes.truncate(bytes.len() - 8);
+        bytes[8] = 1;
+        let name = 24 + SAMPLER_BYTES + 24 + 4 + 16;
+        bytes.drain(name..name + 4 + film.scene.len() + 4);
+        bytes.extend(fingerprint::of(&bytes).to_le_bytes());
+        let read = FilmFile::from_bytes(&bytes).expect("it is read");
+        assert_eq!((&read.sums, read.scene.as_str()), (&film.sums, ""));
+    }
+
+    #[test]
+    fn parts_with_other_outputs_do_not_merge() {
+        let film = with_outputs(0, 2, 3, &["albedo", "depth"]);
+        let mut other = with_outputs(2, 2, 3, &["albedo"]);
+        let error = other.merge(&film).expect_err("refused");
+        assert!(
+            error.contains("the outputs albedo, the other the outputs albedo, depth"),
+            "{error}"
+        );
+        let error = part(2, 2, 3).merge(&film).expect_err("refused");
+        assert!(error.contains("one has no outputs"), "{error}");
+    }
+
+    #[test]
     fn no_damage_goes_unseen() {
-        let bytes = part(3, 5, 9).to_bytes();
+        no_damage_of(&part(3, 5, 9).to_bytes());
+        no_damage_of(&with_outputs(3, 5, 9, &["material"]).to_bytes());
+    }
+
+    fn no_damage_of(bytes: &[u8]) {
         for length in 0..bytes.len() {
             assert!(
                 FilmFile::from_bytes(&bytes[..length]).is_err(),
@@ -368,11 +503,11 @@ mod tests {
             );
         }
         for at in 0..bytes.len() {
-            let mut other = bytes.clone();
+            let mut other = bytes.to_vec();
             other[at] ^= 4;
             assert!(FilmFile::from_bytes(&other).is_err(), "byte {at}");
         }
-        let mut longer = bytes.clone();
+        let mut longer = bytes.to_vec();
         longer.push(0);
         assert!(FilmFile::from_bytes(&longer).is_err());
     }
@@ -387,7 +522,7 @@ mod tests {
             content.extend(fingerprint::of(&content).to_le_bytes());
             FilmFile::from_bytes(&content).expect_err("refused")
         };
-        assert!(refused(8, &[2]).contains("version 2"));
+        assert!(refused(8, &[3]).contains("version 3"));
         for width in [0, 1, 3, u32::MAX] {
             assert!(
                 refused(12, &width.to_le_bytes()).contains("damaged"),

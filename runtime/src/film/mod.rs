@@ -1,14 +1,21 @@
-//! The film: sums of radiance as the kernels keep them, and the picture they amount to.
+//! The film: sums of radiance and of other outputs as the kernels keep them, and the picture they amount to.
 //!
 //! `kernels/film.wgsl` adds in 96-bit fixed point, in three words a channel. Sums of disjoint
-//! ranges of samples therefore add up to exactly the sums of one render of all of them.
+//! ranges of samples therefore add up to exactly the sums of one render of all of them. So do the other
+//! outputs ([`outputs`]), whose planes come after those of the picture.
 
+pub mod cryptomatte;
+pub mod exr;
 pub mod file;
+pub mod layers;
 pub mod output;
+pub mod outputs;
+mod values;
 
-/// Words of a sum, from the lowest.
-const SUM_WORDS: usize = 3;
-/// Words of the film buffer for one pixel: three sums and a count. They are planes, each of one
+use layers::Layers;
+use outputs::SUM_WORDS;
+
+/// Words of the film buffer for one pixel of the picture: three sums and a count. They are planes, each of one
 /// word a pixel.
 pub(crate) const PLANES: usize = 3 * SUM_WORDS + 1;
 /// The plane that counts a pixel's samples.
@@ -36,23 +43,39 @@ impl Film {
     }
 }
 
-/// Exact sums of radiance: the words of a film buffer.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Exact sums of radiance and of other outputs: the words of a film buffer.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     width: u32,
     height: u32,
+    layers: Layers,
     words: Vec<u32>,
 }
 
 impl Sums {
-    /// The sums in a film buffer of a picture's size; `None` if that is not how many words it has.
-    pub(crate) fn new(width: u32, height: u32, words: Vec<u32>) -> Option<Self> {
-        let expected = (width as usize) * (height as usize) * PLANES;
+    /// The sums in a film buffer of a picture's size and outputs; `None` if that is not how many words it has.
+    pub(crate) fn new(width: u32, height: u32, layers: Layers, words: Vec<u32>) -> Option<Self> {
+        let expected = (width as usize) * (height as usize) * layers.planes();
         (words.len() == expected).then_some(Self {
             width,
             height,
+            layers,
             words,
         })
+    }
+
+    /// The outputs beside the picture.
+    pub fn layers(&self) -> &Layers {
+        &self.layers
+    }
+
+    /// The picture's sums alone.
+    pub(crate) fn without_outputs(&self) -> Self {
+        Self {
+            layers: Layers::default(),
+            words: self.words[..PLANES * self.pixel_count()].to_vec(),
+            ..*self
+        }
     }
 
     /// Columns and rows.
@@ -85,7 +108,7 @@ impl Sums {
         }
     }
 
-    /// Adds the sums of other samples of a picture of the same size.
+    /// Adds the sums of other samples of a picture of the same size and outputs.
     pub(crate) fn add(&mut self, other: &Sums) {
         let count = self.pixel_count();
         for pixel in 0..count {
@@ -96,9 +119,10 @@ impl Sums {
             let at = COUNT_PLANE * count + pixel;
             self.words[at] = self.words[at].saturating_add(other.words[at]);
         }
+        self.add_outputs(other);
     }
 
-    /// Takes the sums of some of these samples away.
+    /// Takes the sums of some of these samples away, but for outputs beside the picture.
     pub(crate) fn subtract(&mut self, part: &Sums) {
         let count = self.pixel_count();
         for pixel in 0..count {
@@ -124,9 +148,14 @@ impl Sums {
     }
 
     fn set(&mut self, channel: usize, pixel: usize, sum: u128) {
+        self.set_words(SUM_WORDS * channel, pixel, sum);
+    }
+
+    /// Writes the words of a sum, the lowest of which is in `plane`.
+    fn set_words(&mut self, plane: usize, pixel: usize, sum: u128) {
         let count = self.pixel_count();
         for word in 0..SUM_WORDS {
-            let at = (SUM_WORDS * channel + word) * count + pixel;
+            let at = (plane + word) * count + pixel;
             self.words[at] = (sum >> (32 * word)) as u32;
         }
     }
@@ -137,7 +166,12 @@ impl Sums {
 
     /// The sum of one pixel in units.
     fn sum(&self, channel: usize, pixel: usize) -> u128 {
-        let word = |k: usize| u128::from(self.plane(SUM_WORDS * channel + k)[pixel]);
+        self.sum_words(SUM_WORDS * channel, pixel)
+    }
+
+    /// The words of a sum, the lowest of which is in `plane`.
+    fn sum_words(&self, plane: usize, pixel: usize) -> u128 {
+        let word = |k: usize| u128::from(self.plane(plane + k)[pixel]);
         word(0) | word(1) << 32 | word(2) << 64
     }
 }
@@ -159,7 +193,7 @@ mod tests {
             .iter()
             .flat_map(|s| [0, 32, 64].map(|at| (s >> at) as u32));
         let words = words.chain([samples]).collect();
-        Sums::new(1, 1, words).expect("a pixel's words")
+        Sums::new(1, 1, Layers::default(), words).expect("a pixel's words")
     }
 
     #[test]
@@ -212,6 +246,6 @@ mod tests {
 
     #[test]
     fn a_film_of_another_size_is_none() {
-        assert_eq!(Sums::new(2, 1, vec![0; PLANES]), None);
+        assert_eq!(Sums::new(2, 1, Layers::default(), vec![0; PLANES]), None);
     }
 }

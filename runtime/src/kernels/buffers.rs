@@ -1,7 +1,6 @@
 //! The one table of the runtime's own buffers. How kernels declare and bind them, how large they are and
 //! when they are emptied follows from it; a buffer more is a row more.
 
-use crate::film;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Composer;
 use crate::kernels::{order, run};
@@ -112,7 +111,7 @@ buffers! {
         InAll(|of| 4 * of.layout.counters.len() as u64);
     /// The sums of the picture.
     Film, "film", "array<atomic<u32>>", ReadWrite, Host, World, ByRender,
-        InAll(|of| 4 * of.pixels() * film::PLANES as u64);
+        InAll(|of| 4 * of.pixels() * of.world.outputs.layers.planes() as u64);
     /// How many workgroups the kernel of each queue gets.
     Arguments, "arguments", "array<u32>", ReadWrite, Dispatches, Plan, Never,
         InAll(|of| ARGUMENT_BYTES * of.layout.counters.queues as u64);

@@ -12,12 +12,13 @@ use crate::kernels::buffers::{Access, BUFFERS};
 use crate::kernels::cones;
 use crate::kernels::modules::{Composer, Kernel, KernelDesc};
 use crate::kernels::order;
+use crate::kernels::outputs;
 use crate::kernels::profile;
 use crate::kernels::run;
 use crate::kernels::stages::{Part, Stage};
 use crate::kernels::state::{self, Storage};
 use crate::wgsl;
-use crate::wgsl::template::Flag;
+use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::needs::{Need, Needs};
@@ -122,7 +123,10 @@ impl Composer<'_> {
                 let lens = self.layout.needs.has(Need::Lens);
                 world.camera.wgsl(world.width, world.height, lens)
             }
-            Part::Film => include_str!("film.wgsl").to_string(),
+            Part::Film => {
+                let flags: Vec<Flag> = self.layout.needs.flags().collect();
+                template!("film.wgsl").wgsl(&flags)
+            }
             Part::Numbers => include_str!("numbers.wgsl").to_string(),
             Part::Geometry => parts.geometry.wgsl.clone(),
             Part::Surface => parts.surface.wgsl.clone(),
@@ -133,6 +137,10 @@ impl Composer<'_> {
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
             Part::Fates => self.fates(),
+            Part::Outputs => {
+                let layers = &world.outputs.layers;
+                text(parts.outputs.as_ref()) + &outputs::text(layers, self.layout.needs)
+            }
         }
     }
 

@@ -21,6 +21,9 @@ fn film_add(place: vec3<u32>, radiance: vec3<f32>) {
     film_add_channel(0u, pixel, sample.x);
     film_add_channel(1u, pixel, sample.y);
     film_add_channel(2u, pixel, sample.z);
+#if sample_outputs
+    record_sample(pixel, sample);
+#endif
     atomicAdd(&film[FILM_COUNT_PLANE * PIXELS + pixel], 1u);
 }
 

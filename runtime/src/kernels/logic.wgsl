@@ -24,6 +24,9 @@ fn logic(slot: u32) {
 #if shadow_rays
     if (path.flags & PATH_LIT) != 0u {
         path.radiance += light_contribution(slot);
+#if light_groups
+        record_light(pixel, load_light_group(slot).group, light_contribution(slot));
+#endif
     }
 #endif
     // A throughput of zero says that scattering failed and no ray was cast.
@@ -48,15 +51,30 @@ fn logic(slot: u32) {
 #if hit_lights
             path.radiance += carried.throughput
                 * light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
+#if light_groups
+            let met = light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
+            record_light(pixel, hit_group(hit.primitive), carried.throughput * met);
+#endif
 #endif
             instance = primitive_instance(hit.primitive);
         }
 #if escape_lights
         if hit.primitive == NOTHING {
             path.radiance += carried.throughput * light_escape(ray.direction, carried.bsdf_pdf);
+#if light_groups
+            record_escape(pixel, carried.throughput, ray.direction, carried.bsdf_pdf);
+#endif
         }
 #endif
     }
+#if first_hit_outputs
+    if vertex == 1u && hit.primitive != NOTHING {
+        record_first_hit(pixel, hit, ray.direction, instance);
+    }
+#endif
+#if material_outputs
+    let seen = instance;
+#endif
 #if varying_emission
     if instance != NOTHING && vertex >= MAX_DEPTH && !needs_last_evaluation(instance) {
 #else
@@ -87,6 +105,18 @@ fn logic(slot: u32) {
         }
     }
 #endif
+#if material_outputs
+    // How the first hit looks is asked of its material even if the path ends there.
+    if instance == NOTHING && vertex == 1u && seen != NOTHING {
+        path.flags = ((path.flags & ~PATH_LIT) | PATH_LOOKS) + 1u;
+#if shadow_rays
+        store_carried(slot, PathCarried(vec3<f32>(0.0), 0.0));
+#endif
+        store_radiance(slot, path);
+        request_material(seen);
+        return;
+    }
+#endif
     if instance == NOTHING {
         film_add(vec3<u32>(pixel, ray.sample, vertex), path.radiance);
         request_new_path();
@@ -114,6 +144,9 @@ fn logic(slot: u32) {
             light_pdf = light.pdf;
             store_light(slot, PathLight(light.radiance, light.distance));
             store_light_direction(slot, PathLightDirection(light.wi, pixel));
+#if light_groups
+            store_light_group(slot, PathLightGroup(light_group(pick_light(bits).light), 0u, 0u, 0u));
+#endif
         }
     }
     store_carried(slot, PathCarried(carried.throughput, light_pdf));

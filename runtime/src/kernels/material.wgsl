@@ -35,9 +35,25 @@ fn material(slot: u32, instance: u32) {
     let vertex = (path.flags & DEPTH_MASK) - 1u;
     let place = vec3<u32>(pixel, arrived.sample, vertex);
 
+#if material_outputs
+    if vertex == 1u {
+        record_material(pixel, instance, point, wo);
+        if (path.flags & PATH_LOOKS) != 0u {
+            store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));
+            return;
+        }
+    }
+#endif
 #if varying_emission
+#if light_groups
+    let emitted = carried.throughput
+        * checked_emission(material_emission(instance, point, wo), instance, place);
+    path.radiance += emitted;
+    record_light(pixel, instance_group(instance), emitted);
+#else
     path.radiance += carried.throughput
         * checked_emission(material_emission(instance, point, wo), instance, place);
+#endif
     store_radiance(slot, path);
     if vertex >= MAX_DEPTH {
         store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));

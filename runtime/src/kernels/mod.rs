@@ -8,6 +8,7 @@ pub mod dropped;
 pub(crate) mod layout;
 pub(crate) mod modules;
 pub(crate) mod order;
+pub(crate) mod outputs;
 pub(crate) mod parts;
 pub(crate) mod profile;
 pub(crate) mod queues;

@@ -38,6 +38,8 @@ fn is_missing(part: Part, parts: &KernelParts, needs: Needs) -> bool {
         | Part::Mis
         | Part::Order
         | Part::Fates => false,
+        // A world has outputs only with what they look up.
+        Part::Outputs => false,
     }
 }
 
@@ -61,6 +63,7 @@ mod tests {
             lights: part(),
             media: Some(part()),
             texture: Some(part()),
+            outputs: None,
         }
     }
 

@@ -65,8 +65,10 @@ impl<'g> Renderer<'g> {
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
-        let world = World::of_program(scene, program, &options.technique)?;
-        Self::from_world(gpu, &world, program, plan, options)
+        let world = World::of_render(scene, program, &options.technique, &options.outputs)?;
+        let mut renderer = Self::from_world(gpu, &world, program, plan, options)?;
+        renderer.facts.name.clone_from(&scene.name);
+        Ok(renderer)
     }
 
     /// Composes and builds the kernels of `plan` and uploads the world's buffers.
@@ -173,7 +175,7 @@ impl<'a> CompositionInputs<'a> {
         technique: Technique,
         decision: Decision,
     ) -> Result<Self, RuntimeError> {
-        let parts = world.parts.written(decision.needs);
+        let parts = world.written(decision.needs);
         parts::check(&parts, decision.needs)?;
         // What is forced gets no dimension, which would change the others'.
         let demand = Demand::of(world, decision.natural);
@@ -252,6 +254,8 @@ impl ReportInputs {
                 scene: options.fingerprint(scene),
             },
             scene,
+            name: String::new(),
+            layers: world.outputs.layers.clone(),
             materials: MaterialReport::of(composer.materials, composer.instances),
             workload: workload::before_rendering(
                 world,

@@ -23,12 +23,13 @@ pub use replan::{Planner, Replanning};
 pub use selection::Samples;
 
 use std::ops::ControlFlow;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use impasto_compiler::partition::Workload;
 
 use crate::error::RuntimeError;
 use crate::film::file::{FilmFile, Identity, Range};
+use crate::film::layers::Layers;
 use crate::film::{Film, Sums};
 use crate::gpu::{Gpu, Timing};
 use crate::kernels::dropped::Dropped;
@@ -78,6 +79,10 @@ struct ReportInputs {
     identity: Identity,
     /// The fingerprint of all pixels.
     scene: u64,
+    /// The scene's name.
+    name: String,
+    /// What the film records beside the picture.
+    layers: Layers,
     materials: Vec<MaterialReport>,
     /// What is known of the workload before rendering.
     workload: Workload,
@@ -160,7 +165,7 @@ impl<'g> Renderer<'g> {
             (keeping.keep)(&sums)?;
         }
         let film = sums.sums.picture();
-        let report = self.report(&status, &film, resumed, begin.elapsed().as_secs_f64());
+        let report = self.report(&status, (&film, &sums.sums), resumed, begin.elapsed());
         Ok(Rendering { film, sums, report })
     }
 
@@ -171,7 +176,8 @@ impl<'g> Renderer<'g> {
             return Ok(Resumed::default());
         };
         let (identity, options) = (self.identity(), &self.options);
-        let done = start.done_of(identity, options.first_sample, options.samples);
+        let (first, samples) = (options.first_sample, options.samples);
+        let done = start.done_of_all(identity, &self.facts.layers, first, samples);
         let samples = done.map_err(RuntimeError::OtherRender)?;
         self.built
             .resources
@@ -192,12 +198,15 @@ impl<'g> Renderer<'g> {
     ) -> Result<FilmFile, RuntimeError> {
         let (width, height) = (self.facts.width, self.facts.height);
         let words = self.built.resources.read_film(self.gpu)?;
-        let sums = Sums::new(width, height, words);
-        let sums = sums.ok_or_else(|| RuntimeError::Validation("the film lost its size".into()))?;
+        let sums = Sums::new(width, height, self.facts.layers.clone(), words);
+        let lost = || RuntimeError::Validation("the film lost its size".into());
+        let mut sums = sums.ok_or_else(lost)?;
+        sums.sort_all_ids();
         let (counters, read) = (self.built.layout.counters, &status.counters);
         let before: u64 = status.before.dropped.iter().map(Dropped::samples).sum();
         Ok(FilmFile {
             identity: self.facts.identity,
+            scene: self.facts.name.clone(),
             nonfinite: resumed.nonfinite + before + counters.all_dropped(read),
             clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
             ranges: vec![Range {
@@ -223,7 +232,13 @@ impl<'g> Renderer<'g> {
         })
     }
 
-    fn report(&self, status: &Status, film: &Film, resumed: Resumed, wall_seconds: f64) -> Report {
+    fn report(
+        &self,
+        status: &Status,
+        (film, sums): (&Film, &Sums),
+        resumed: Resumed,
+        wall: Duration,
+    ) -> Report {
         crate::render::report::Inputs {
             resumed,
             gpu: self.gpu.info(),
@@ -239,8 +254,8 @@ impl<'g> Renderer<'g> {
             materials: &self.facts.materials,
             workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,
-            wall_seconds,
+            wall_seconds: wall.as_secs_f64(),
         }
-        .report(status, film)
+        .report(status, film, sums)
     }
 }

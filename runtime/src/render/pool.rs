@@ -3,7 +3,6 @@
 use std::time::{Duration, Instant};
 
 use crate::error::RuntimeError;
-use crate::film;
 use crate::gpu::Gpu;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
@@ -48,7 +47,7 @@ pub(crate) fn sizes(
 ) -> Result<Sizes, RuntimeError> {
     let limits = gpu.device.limits();
     let pixels = u64::from(world.width) * u64::from(world.height);
-    let film = pixels * film::PLANES as u64 * 4;
+    let film = pixels * world.outputs.layers.planes() as u64 * 4;
     gpu.check_binding_size("the film", film)?;
     // State and queues are one buffer each.
     let state_bytes = layout.path_bytes();

@@ -6,7 +6,7 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
 
-use crate::film::Film;
+use crate::film::{Film, Sums};
 use crate::gpu::GpuInfo;
 use crate::kernels::dropped::Dropped;
 use crate::kernels::layout::PlanLayout;
@@ -101,8 +101,13 @@ pub struct Report {
     /// Why such a render ended: `relmse`, `rmse`, `time`, `samples` or `interrupt`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ended_by: Option<Ending>,
-    /// Samples cut to what the film holds.
+    /// What the film records beside the picture, as `--aov` calls it; absent if nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<String>,
+    /// Samples cut to what the film holds, and values of outputs that were no finite number.
     pub clamped_samples: u64,
+    /// Samples whose id found no room in their pixel, of outputs that are Cryptomattes.
+    pub lost_ids: u64,
     /// Requests lost because a queue was full; anything but 0 is a defect.
     pub queue_overflow: u64,
     /// Media that paths entered while in as many as they can follow, and then ignored.
@@ -266,7 +271,7 @@ pub(crate) struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    pub(crate) fn report(self, status: &Status, film: &Film) -> Report {
+    pub(crate) fn report(self, status: &Status, film: &Film, sums: &Sums) -> Report {
         let pixels = self.options.pixel_count(film.width, film.height);
         let all_paths = film.total_samples();
         let paths = all_paths.saturating_sub(pixels * u64::from(self.resumed.samples));
@@ -327,6 +332,8 @@ impl Inputs<'_> {
             dropped,
             convergence: Vec::new(),
             ended_by: None,
+            outputs: sums.layers().names(),
+            lost_ids: sums.lost_ids(),
             clamped_samples: self.resumed.clamped + scalar(Scalar::FilmClamped),
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),

@@ -15,7 +15,7 @@ use super::load::Source;
 use super::mesh::{MAX_COORDINATE, Repairs};
 use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
-use super::{Light, MaterialBinding, Mesh, Object, Placement, Transform};
+use super::{Labels, Light, MaterialBinding, Mesh, Object, Placement, Transform, labels};
 use crate::error::SceneError;
 
 /// Copies of a geometry file are shared if that saves so many triangles. Below, one level of
@@ -32,6 +32,7 @@ pub(super) struct Assembled {
     pub(super) materials: Vec<MaterialBinding>,
     pub(super) camera_media: Vec<u32>,
     pub(super) lights: Vec<Light>,
+    pub(super) labels: Labels,
 }
 
 /// Puts together what `description` of the scene at `path` says of `sources`, by the names that
@@ -68,6 +69,8 @@ pub(super) fn assemble(
         mesh: Mesh::default(),
         objects: Vec::new(),
         placements: Vec::new(),
+        labels: Labels::default(),
+        seen: BTreeMap::new(),
         warnings,
     };
     for entry in &entries {
@@ -77,7 +80,10 @@ pub(super) fn assemble(
     let lights: Vec<Light> = lights.map(|l| l.seen_from(assembly.origin)).collect();
     for (index, light) in lights.iter().enumerate() {
         if let Light::Quad(quad) = light {
-            assembly.mesh.push_quad(quad, index as u32);
+            let object = assembly.labels.objects.len() as u32;
+            let name = format!("lights/{}", index + 1);
+            assembly.labels.objects.push(name);
+            assembly.mesh.push_quad(quad, index as u32, object);
         }
     }
     assembly.finish(description, lights)
@@ -147,6 +153,9 @@ struct Assembly<'d, 'w> {
     mesh: Mesh,
     objects: Vec<Object>,
     placements: Vec<Placement>,
+    labels: Labels,
+    /// How often each geometry file was placed so far.
+    seen: BTreeMap<&'d str, u32>,
     warnings: &'w mut Vec<String>,
 }
 
@@ -202,7 +211,7 @@ impl<'d> Assembly<'d, '_> {
     }
 
     /// Adds the triangles of every place to those in the world.
-    fn copy(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Repairs, SceneError> {
+    fn copy(&mut self, entry: &Entry<'d>, materials: &[Arc<[u32]>]) -> Result<Repairs, SceneError> {
         let Source { path, geometry, .. } = entry.source;
         let copies = entry.places.list.len();
         let total = (copies as u64).saturating_mul(geometry.triangles.len() as u64);
@@ -210,17 +219,33 @@ impl<'d> Assembly<'d, '_> {
             return Err(self.too_many_triangles());
         }
         let mut repairs = Repairs::default();
+        let (names, of_triangle) = labels::parts(geometry);
         for (place, materials) in entry.places.list.iter().zip(materials) {
             let transform = self.transform(entry, &place.transform)?;
-            repairs +=
-                self.mesh
-                    .push_geometry(path, geometry, &transform, self.origin, materials)?;
+            let copy = self.next_copy(entry);
+            let first = self.labels.objects.len() as u32;
+            let named = |part: &String| labels::name(&entry.spec.file, part, copy);
+            self.labels.objects.extend(names.iter().map(named));
+            let object = |triangle: usize| first + of_triangle[triangle];
+            let (mesh, origin) = (&mut self.mesh, self.origin);
+            repairs += mesh.push_geometry(path, geometry, &transform, origin, materials, object)?;
         }
         Ok(repairs)
     }
 
+    /// Which copy of its geometry file is the next of an entry.
+    fn next_copy(&mut self, entry: &Entry<'d>) -> u32 {
+        let seen = self.seen.entry(entry.spec.file.as_str()).or_default();
+        *seen += 1;
+        *seen - 1
+    }
+
     /// Places the entry's object.
-    fn place(&mut self, entry: &Entry, materials: &[Arc<[u32]>]) -> Result<Repairs, SceneError> {
+    fn place(
+        &mut self,
+        entry: &Entry<'d>,
+        materials: &[Arc<[u32]>],
+    ) -> Result<Repairs, SceneError> {
         let (object, repairs) = self.object(entry)?;
         if self.placements.len() + materials.len() > placements::MAX_PLACEMENTS {
             return Err(placements::too_many(self.path));
@@ -247,6 +272,8 @@ impl<'d> Assembly<'d, '_> {
                 transform: transform.moved(-self.origin),
                 materials: Arc::clone(materials),
             });
+            let copy = self.next_copy(entry);
+            self.labels.copies.push(copy);
         }
         Ok(repairs)
     }
@@ -261,11 +288,15 @@ impl<'d> Assembly<'d, '_> {
         let slots: Vec<u32> = (0..geometry.materials.len() as u32).collect();
         let mut mesh = Mesh::default();
         let at = origin::of(&Extent::of(geometry));
-        let repairs = mesh.push_geometry(path, geometry, &Transform::default(), at, &slots)?;
+        let (names, of_triangle) = labels::parts(geometry);
+        let part = |triangle: usize| of_triangle[triangle];
+        let home = Transform::default();
+        let repairs = mesh.push_geometry(path, geometry, &home, at, &slots, part)?;
         mesh.simplify();
         let name = name.clone();
         self.objects.push(Object { name, mesh });
         self.object_origins.push(at);
+        self.labels.parts.push(names);
         Ok((self.objects.len() as u32 - 1, repairs))
     }
 
@@ -312,6 +343,10 @@ impl<'d> Assembly<'d, '_> {
         }
         self.mesh.simplify();
         let camera_media = self.bindings.of_camera(&description.camera_media)?;
+        self.labels.lights = description.lights.iter().map(|l| l.group.clone()).collect();
+        let environment = description.environment.as_ref();
+        self.labels.environment = environment.and_then(|e| e.group.clone());
+        self.labels.materials = self.bindings.groups();
         Ok(Assembled {
             origin: self.origin,
             mesh: self.mesh,
@@ -320,6 +355,7 @@ impl<'d> Assembly<'d, '_> {
             materials: self.bindings.finish(self.warnings),
             camera_media,
             lights,
+            labels: self.labels,
         })
     }
     fn too_many_triangles(&self) -> SceneError {

@@ -21,11 +21,19 @@ pub(super) struct Bindings<'d> {
     specs: &'d [MaterialSpec],
     used: Vec<bool>,
     resolved: Vec<MaterialBinding>,
+    groups: Vec<Option<String>>,
     by_content: HashMap<Content, u32>,
 }
 
-/// What makes two bindings the same material: file, item, parameters as text and how they are compiled.
-type Content = (String, Option<String>, Vec<(String, String)>, bool);
+/// What makes two bindings the same material: file, item, parameters as text, how they are compiled, and the group
+/// of their light.
+type Content = (
+    String,
+    Option<String>,
+    Vec<(String, String)>,
+    bool,
+    Option<String>,
+);
 
 impl<'d> Bindings<'d> {
     pub(super) fn new(specs: &'d [MaterialSpec]) -> Self {
@@ -33,6 +41,7 @@ impl<'d> Bindings<'d> {
             specs,
             used: vec![false; specs.len()],
             resolved: Vec::new(),
+            groups: Vec::new(),
             by_content: HashMap::new(),
         }
     }
@@ -73,6 +82,11 @@ impl<'d> Bindings<'d> {
             }
         };
         media.iter().map(index).collect()
+    }
+
+    /// The groups that the light of each material is in.
+    pub(super) fn groups(&self) -> Vec<Option<String>> {
+        self.groups.clone()
     }
 
     /// The materials in order of first use.
@@ -145,12 +159,15 @@ impl<'d> Bindings<'d> {
         let params = spec.values(material);
         let texts = params.iter().map(|(key, v)| (key.clone(), v.to_string()));
         let (file, item) = (spec.file.clone(), spec.material.clone());
-        let content = (file.clone(), item.clone(), texts.collect(), spec.bake);
+        let group = spec.group.clone();
+        let (own_file, own_item) = (file.clone(), item.clone());
+        let content = (own_file, own_item, texts.collect(), spec.bake, group);
         if let Some(&known) = self.by_content.get(&content) {
             return known;
         }
         let index = self.resolved.len() as u32;
         self.by_content.insert(content, index);
+        self.groups.push(spec.group.clone());
         self.resolved.push(MaterialBinding {
             name: self.unique_name(spec, name),
             file,

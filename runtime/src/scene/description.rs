@@ -53,6 +53,8 @@ impl CameraSpec {
 pub(super) struct LightSpec {
     light: Light,
     pub(super) corner: Option<DVec3>,
+    /// The group that it is in.
+    pub(super) group: Option<String>,
 }
 
 impl LightSpec {
@@ -107,6 +109,8 @@ pub(super) struct MaterialSpec {
     pub(super) material: Option<String>,
     pub(super) params: Vec<(String, ParamSpec)>,
     pub(super) bake: bool,
+    /// The group that its light is in, if it emits.
+    pub(super) group: Option<String>,
 }
 
 /// Where a parameter's value comes from.
@@ -123,6 +127,8 @@ pub(super) struct EnvironmentSpec {
     pub(super) scale: f32,
     pub(super) rotate: f32,
     pub(super) sample: bool,
+    /// The group that it is in.
+    pub(super) group: Option<String>,
 }
 
 pub(super) enum EnvironmentSpecSource {
@@ -321,6 +327,7 @@ fn material(name: &str, value: &Value, formats: &[Format]) -> Result<MaterialSpe
     let file = table.require("file")?.string()?.to_owned();
     let item = table.get("material").map(|v| v.string().map(str::to_owned));
     let bake = optional(&mut table, "bake", Value::boolean, false)?;
+    let group = group(&mut table)?;
     let mut params = Vec::new();
     if let Some(value) = table.get("params") {
         let entries = value.table(format!("{title} params"))?.named();
@@ -335,7 +342,22 @@ fn material(name: &str, value: &Value, formats: &[Format]) -> Result<MaterialSpe
         material: item.transpose()?,
         params,
         bake,
+        group,
     })
+}
+
+/// The name of a group of lights, which is part of a channel's name.
+fn group(table: &mut Table) -> Result<Option<String>, SceneError> {
+    let name = |value: &Value| {
+        let name = value.string()?;
+        let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if !name.is_empty() && name.chars().all(fits) {
+            Ok(Some(name.to_owned()))
+        } else {
+            Err(value.mismatch("a name of letters, digits, `_` and `-`"))
+        }
+    };
+    optional(table, "group", name, None)
 }
 
 /// A parameter's value, or where it comes from.
@@ -393,16 +415,18 @@ fn lights(root: &mut Table) -> Result<Vec<LightSpec>, SceneError> {
     };
     let light = |mut table: Table| {
         let kind = table.require("kind")?;
+        let group = group(&mut table)?;
         let light = match kind.string()? {
             "quad" => quad(&mut table)?,
             "distant" => LightSpec {
                 light: Light::Distant(distant(&mut table)?),
                 corner: None,
+                group: None,
             },
             _ => return Err(kind.mismatch("\"quad\" or \"distant\"")),
         };
         table.finish()?;
-        Ok(light)
+        Ok(LightSpec { group, ..light })
     };
     value.tables("lights")?.into_iter().map(light).collect()
 }
@@ -430,6 +454,7 @@ fn quad(table: &mut Table) -> Result<LightSpec, SceneError> {
     Ok(LightSpec {
         light: Light::Quad(quad),
         corner: Some(corner),
+        group: None,
     })
 }
 
@@ -473,6 +498,7 @@ fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> 
         scale: optional(&mut table, "scale", scale, 1.0)?,
         rotate: optional(&mut table, "rotate", Value::float, 0.0)?,
         sample: optional(&mut table, "sample", Value::boolean, is_map)?,
+        group: group(&mut table)?,
     };
     table.finish()?;
     Ok(Some(spec))

@@ -60,6 +60,7 @@ pub fn load_with(path: &Path, formats: &[Format]) -> Result<Scene, SceneError> {
         materials: assembled.materials,
         lights: assembled.lights,
         environment,
+        labels: assembled.labels,
         warnings,
     })
 }

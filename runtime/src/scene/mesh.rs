@@ -34,6 +34,9 @@ pub struct Mesh {
     pub materials: Vec<u32>,
     /// Index into [`super::Scene::lights`] of the quad light it belongs to.
     pub lights: Vec<Option<u32>>,
+    /// Which object it is of: an index into the names of [`super::Labels`]; of an object's mesh one into the parts of
+    /// the object. Empty if nobody knows.
+    pub objects: Vec<u32>,
 }
 
 impl Mesh {
@@ -67,22 +70,22 @@ impl Mesh {
 
     /// Adds the two triangles of the quad light numbered `index`: corner, end of u, opposite
     /// corner, and corner, opposite corner, end of v.
-    pub(super) fn push_quad(&mut self, quad: &QuadLight, index: u32) {
+    pub(super) fn push_quad(&mut self, quad: &QuadLight, index: u32, object: u32) {
         let QuadLight { corner, u, v, .. } = *quad;
         let opposite = corner + u + v;
         for positions in [
             [corner, corner + u, opposite],
             [corner, opposite, corner + v],
         ] {
-            self.push(positions, None, [Vec2::ZERO; 3], NO_MATERIAL);
+            self.push(positions, None, [Vec2::ZERO; 3], [NO_MATERIAL, object]);
             if let Some(light) = self.lights.last_mut() {
                 *light = Some(index);
             }
         }
     }
 
-    /// Adds the triangles of the geometry file at `path`, whose materials have the indices `materials`, where
-    /// `transform` puts them, in coordinates that count from `origin`.
+    /// Adds the triangles of the geometry file at `path`, whose materials have the indices `materials` and which are
+    /// of the `objects`, where `transform` puts them, in coordinates that count from `origin`.
     pub(super) fn push_geometry(
         &mut self,
         path: &Path,
@@ -90,10 +93,11 @@ impl Mesh {
         transform: &Transform,
         origin: DVec3,
         materials: &[u32],
+        objects: impl Fn(usize) -> u32,
     ) -> Result<Repairs, SceneError> {
         let mut repairs = Repairs::default();
         let mirrored = transform.is_mirrored();
-        for triangle in &geometry.triangles {
+        for (index, triangle) in geometry.triangles.iter().enumerate() {
             let places = triangle.positions.map(|p| transform.place(p));
             check_range(path, &places)?;
             let positions = places.map(|p| (p - origin).as_vec3());
@@ -103,7 +107,8 @@ impl Mesh {
             }
             let normals = vertex_normals(triangle, transform);
             let uvs = triangle.uvs.unwrap_or_default();
-            self.push(positions, normals, uvs, materials[triangle.material]);
+            let named = [materials[triangle.material], objects(index)];
+            self.push(positions, normals, uvs, named);
             if mirrored {
                 self.flip_last();
             }
@@ -116,13 +121,14 @@ impl Mesh {
     }
 
     /// Adds a copy of the triangles of `object` that `keep` keeps, with its materials looked up
-    /// in `materials`.
+    /// in `materials` and its parts from `first_object` on.
     pub(crate) fn push_copy(
         &mut self,
         object: &Mesh,
         keep: impl Fn(usize) -> bool,
         transform: &Transform,
         materials: &[u32],
+        first_object: u32,
     ) {
         let mirrored = transform.is_mirrored();
         for triangle in (0..object.len()).filter(|t| keep(*t)) {
@@ -134,7 +140,8 @@ impl Mesh {
             let normals = normals.map(|n| n.map(|n| transform.normal(n)));
             let uvs = object.uvs.get(triangle).copied().unwrap_or_default();
             let material = materials[object.materials[triangle] as usize];
-            self.push(positions, normals, uvs, material);
+            let part = object.objects.get(triangle).copied().unwrap_or(0);
+            self.push(positions, normals, uvs, [material, first_object + part]);
             if mirrored {
                 self.flip_last();
             }
@@ -146,13 +153,14 @@ impl Mesh {
         positions: [Vec3; 3],
         normals: Option<[Vec3; 3]>,
         uvs: [Vec2; 3],
-        material: u32,
+        [material, object]: [u32; 2],
     ) {
         self.positions.push(positions);
         self.normals.push(normals);
         self.uvs.push(uvs);
         self.materials.push(material);
         self.lights.push(None);
+        self.objects.push(object);
     }
 
     /// Makes the other side of the last triangle the outside.
@@ -188,6 +196,7 @@ impl Mesh {
             uvs: pick(&self.uvs, &kept),
             materials: pick(&self.materials, &kept),
             lights: pick(&self.lights, &kept),
+            objects: pick(&self.objects, &kept),
         };
         mesh.simplify();
         mesh
@@ -197,6 +206,7 @@ impl Mesh {
     pub(crate) fn spell_out(&mut self) {
         self.normals.resize(self.len(), None);
         self.uvs.resize(self.len(), [Vec2::ZERO; 3]);
+        self.objects.resize(self.len(), 0);
     }
 }
 

@@ -15,12 +15,14 @@ mod bound;
 mod description;
 mod document;
 pub mod formats;
+mod labels;
 mod load;
 mod mesh;
 mod origin;
 mod placements;
 mod transform;
 
+pub use labels::Labels;
 pub use load::{load, load_with};
 pub(crate) use mesh::MAX_TRIANGLES;
 pub use mesh::{Mesh, NO_MATERIAL};
@@ -61,6 +63,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// What surrounds everything.
     pub environment: Option<Environment>,
+    /// What outputs of a film tell objects and lights apart by.
+    pub labels: Labels,
     /// Oddities that do not keep it from being rendered, for people to read.
     pub warnings: Vec<String>,
 }

@@ -18,6 +18,7 @@ use super::path::Path;
 use super::record::{self, Names, Recorder};
 use super::textures::Textures;
 use super::{LIMIT, lower};
+use crate::film::layers::Layers;
 use crate::film::{self, Sums};
 use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
@@ -304,7 +305,7 @@ impl<F: Float> Session<'_, F> {
         let planes = film.into_iter();
         let planes = planes.flat_map(|(_, words)| words.chunks_exact(pixels));
         let words = planes.map(|plane| plane[pixel]).collect();
-        let sums = Sums::new(1, 1, words);
+        let sums = Sums::new(1, 1, Layers::default(), words);
         sums.map_or([0.0; 3], |sums| sums.picture().pixels[0])
     }
 }

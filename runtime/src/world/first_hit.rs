@@ -250,6 +250,7 @@ mod tests {
             materials: Vec::new(),
             lights: Vec::new(),
             environment: None,
+            labels: Default::default(),
             warnings: Vec::new(),
         }
     }

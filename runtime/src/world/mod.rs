@@ -10,6 +10,7 @@ pub mod first_hit;
 pub mod lights;
 pub mod media;
 pub(crate) mod needs;
+pub mod outputs;
 mod parts;
 mod placed;
 mod split;
@@ -25,10 +26,12 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Table, TextureRef};
 use impasto_compiler::partition::Plan;
 
 use crate::error::SceneError;
+use crate::film::layers::Layers;
 use crate::scene::Scene;
 use crate::technique::Technique;
 use crate::world::camera::CameraFrame;
-use crate::world::needs::{Decision, NeedInputs, Needs};
+use crate::world::needs::{Decision, NeedInputs, Needs, OutputTraits};
+use crate::world::outputs::Recorded;
 
 /// A scene as the kernels see it.
 #[derive(Clone, Debug)]
@@ -45,6 +48,8 @@ pub struct World {
     pub roulette_start: u32,
     /// What kernels ask geometry, lights and textures through.
     pub parts: SceneParts,
+    /// What the film records beside the picture.
+    pub outputs: Recorded,
 }
 
 impl World {
@@ -57,13 +62,23 @@ impl World {
         program: &Program,
         technique: &Technique,
     ) -> Result<Self, SceneError> {
-        Self::new(
-            scene,
-            &program.infos(),
-            &MaterialSource::instances(program),
-            &program.textures(),
-            technique,
-        )
+        Self::of_render(scene, program, technique, &[])
+    }
+
+    /// The same for a film that records `outputs` beside the picture.
+    ///
+    /// # Errors
+    /// If the scene has what cannot be rendered, or an output cannot be had of it.
+    pub fn of_render(
+        scene: &Scene,
+        program: &Program,
+        technique: &Technique,
+        outputs: &[String],
+    ) -> Result<Self, SceneError> {
+        let instances = MaterialSource::instances(program);
+        let layers = outputs::layers(outputs, scene, &instances, program.has_looks())?;
+        let (infos, textures) = (program.infos(), program.textures());
+        Self::recording(scene, &infos, &instances, &textures, technique, layers)
     }
 
     /// The plan that gives a kernel to each of `materials` that is on some surface.
@@ -81,7 +96,21 @@ impl World {
         textures: &[TextureRef],
         technique: &Technique,
     ) -> Result<Self, SceneError> {
+        let none = Layers::default();
+        Self::recording(scene, materials, instances, textures, technique, none)
+    }
+
+    fn recording(
+        scene: &Scene,
+        materials: &[MaterialInfo],
+        instances: &[InstanceInfo],
+        textures: &[TextureRef],
+        technique: &Technique,
+        layers: Layers,
+    ) -> Result<Self, SceneError> {
         lights::check(scene, instances)?;
+        let inputs = (materials, instances, textures);
+        let (parts, outputs) = SceneParts::recording(scene, inputs, technique, layers)?;
         let (width, height) = (scene.film.width, scene.film.height);
         Ok(Self {
             width,
@@ -89,7 +118,8 @@ impl World {
             camera: CameraFrame::new(&scene.camera, width as f32 / height as f32),
             max_depth: scene.integrator.max_depth,
             roulette_start: scene.integrator.roulette_start,
-            parts: SceneParts::build(scene, materials, instances, textures, technique)?,
+            parts,
+            outputs,
         })
     }
 }
@@ -111,6 +141,7 @@ impl World {
             materials,
             ray_order: technique.ray_order,
             ray_data: technique.ray_data,
+            outputs: OutputTraits::of(&self.outputs.layers),
         }
     }
 
@@ -124,13 +155,22 @@ impl World {
 
     /// The parts that its kernels are composed of with these materials.
     pub fn kernel_parts(&self, materials: &[MaterialInfo], technique: &Technique) -> KernelParts {
-        self.parts.written(self.decide(materials, technique).needs)
+        self.written(self.decide(materials, technique).needs)
+    }
+
+    /// The parts with the texts that `needs` ask for.
+    pub(crate) fn written(&self, needs: Needs) -> KernelParts {
+        KernelParts {
+            outputs: self.outputs.written(needs),
+            ..self.parts.written(needs)
+        }
     }
 
     /// The same without the contents of buffers, for composing kernels that read what is uploaded already.
     pub(crate) fn without_contents(&self) -> World {
         World {
             parts: self.parts.without_contents(),
+            outputs: self.outputs.without_contents(),
             ..*self
         }
     }

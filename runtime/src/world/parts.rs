@@ -16,6 +16,8 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
 use super::surface::{Corners, Surface, geometry_part};
 use super::{GeometryCounts, Placed, Split};
 use crate::error::SceneError;
+use crate::film::layers::Layers;
+use crate::film::outputs::Ask;
 use crate::scene::Scene;
 use crate::technique::{Stack, Technique};
 use crate::wgsl::{BufferData, ShaderPart};
@@ -23,6 +25,7 @@ use crate::world::bvh::Bvh;
 use crate::world::lights::{Kinds, Lights};
 use crate::world::media::{self, Media};
 use crate::world::needs::{Need, Needs};
+use crate::world::outputs::{Recorded, objects_part};
 use crate::world::texture;
 
 /// Everything that kernels may read of a scene. What depends on needs is no text yet.
@@ -65,6 +68,8 @@ pub struct KernelParts {
     pub media: Option<ShaderPart>,
     /// Texture lookups; absent if no material reads a texture.
     pub texture: Option<ShaderPart>,
+    /// What outputs of the film look up; absent if they look up nothing.
+    pub outputs: Option<ShaderPart>,
 }
 
 impl SceneParts {
@@ -77,18 +82,31 @@ impl SceneParts {
         textures: &[TextureRef],
         technique: &Technique,
     ) -> Result<SceneParts, SceneError> {
+        let inputs = (materials, instances, textures);
+        let (parts, _) = Self::recording(scene, inputs, technique, Layers::default())?;
+        Ok(parts)
+    }
+
+    /// The same for a film with some outputs, and what these look up.
+    pub(crate) fn recording(
+        scene: &Scene,
+        (materials, instances, textures): (&[MaterialInfo], &[InstanceInfo], &[TextureRef]),
+        technique: &Technique,
+        layers: Layers,
+    ) -> Result<(SceneParts, Recorded), SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
         let reads_uv = |m: &MaterialInfo| {
             let inputs = &m.inputs;
             inputs.uv || inputs.tangent || inputs.footprint_uv
         };
-        let reads_uv = materials.iter().any(reads_uv);
+        let reads_uv = materials.iter().any(reads_uv) || layers.ask(Ask::Uvs);
+        let tells_objects = layers.ask(Ask::Objects);
         let split = Split::new(scene, instances, technique.copies)?;
         let lights = |order: &[u32]| {
             Kinds::build(scene, &split.world, split.bounds, order, instances, &media)
         };
-        let (geometry, bvh, corners, lights) = if split.placements.is_empty() {
+        let (geometry, bvh, corners, lights, objects) = if split.placements.is_empty() {
             let mesh = &*split.world;
             let bvh = Bvh::build(mesh, technique.traversal);
             let lights = lights(bvh.order());
@@ -98,6 +116,7 @@ impl SceneParts {
                 bvh.part(technique),
                 Corners::of_mesh(mesh, bvh.order(), reads_uv),
                 lights,
+                tells_objects.then(|| objects_part(mesh, bvh.order())),
             )
         } else {
             check_stack(technique.stack)?;
@@ -109,9 +128,15 @@ impl SceneParts {
                 placed.levels().part(technique),
                 placed.corners(reads_uv),
                 lights,
+                tells_objects.then(|| placed.objects_part(&split.first_objects)),
             )
         };
-        Ok(SceneParts {
+        let recorded = Recorded {
+            groups: lights.groups(scene, &layers),
+            objects,
+            layers,
+        };
+        let parts = SceneParts {
             geometry,
             bvh,
             surface: Surface::OfScene(Corners {
@@ -125,7 +150,8 @@ impl SceneParts {
             unbound: scene.unbound(materials.len(), instances),
             media,
             texture,
-        })
+        };
+        Ok((parts, recorded))
     }
 
     /// The texts that `needs` ask for. What they ask for without its being there comes with black lights,
@@ -144,6 +170,7 @@ impl SceneParts {
             lights: self.lights.written(needs),
             media: needs.has(Need::Media).then(media),
             texture: self.texture.clone(),
+            outputs: None,
         }
     }
 
@@ -166,7 +193,8 @@ impl KernelParts {
     /// Every part that there is, in the order of their buffers.
     pub(crate) fn all(&self) -> impl Iterator<Item = &ShaderPart> {
         let always = [&self.geometry, &self.bvh, &self.surface, &self.lights];
-        always.into_iter().chain(&self.media).chain(&self.texture)
+        let others = self.media.iter().chain(&self.texture);
+        always.into_iter().chain(others).chain(&self.outputs)
     }
 }
 

@@ -127,6 +127,26 @@ impl<'s> Placed<'s> {
         }
     }
 
+    /// Which object a primitive is of; the parts of the placements that are no world begin with
+    /// `first_objects`.
+    pub fn objects_part(&self, first_objects: &[u32]) -> ShaderPart {
+        let triangles = self.gather(|mesh, t| mesh.objects.get(t).copied().unwrap_or(0));
+        let triangles: Vec<u32> = triangles.collect();
+        let others = usize::from(self.has_world);
+        let first = |index: u32| match (index as usize).checked_sub(others) {
+            Some(index) => first_objects.get(index).copied().unwrap_or(0),
+            None => 0,
+        };
+        let placements: Vec<u32> = self.levels.order().iter().map(|&i| first(i)).collect();
+        ShaderPart {
+            wgsl: include_str!("objects_placed.wgsl").to_owned(),
+            buffers: vec![
+                BufferData::new("triangle_objects", "array<u32>", &triangles),
+                BufferData::new("placement_objects", "array<u32>", &placements),
+            ],
+        }
+    }
+
     /// Something of every triangle, in the order of all.
     fn gather<T>(&self, of: impl Fn(&Mesh, usize) -> T) -> impl Iterator<Item = T> {
         let objects = self.meshes.iter().zip(self.levels.objects());

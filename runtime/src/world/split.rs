@@ -22,6 +22,8 @@ pub struct Split<'s> {
     pub objects: Vec<Cow<'s, Mesh>>,
     /// Where; `object` is an index into [`Split::objects`].
     pub placements: Vec<Placement>,
+    /// The first name of each of them among those of [`Scene`]'s objects.
+    pub first_objects: Vec<u32>,
     /// The box around everything: least and greatest coordinates.
     pub bounds: [Vec3; 2],
 }
@@ -62,25 +64,28 @@ impl<'s> Split<'s> {
             world: Cow::Borrowed(&scene.mesh),
             objects: Vec::new(),
             placements: Vec::new(),
+            first_objects: Vec::new(),
             bounds: [Vec3::ZERO; 2],
         };
+        let first_objects = scene.first_objects();
         for (index, object) in scene.objects.iter().enumerate() {
             let mesh = &object.mesh;
-            let placed = scene.placements.iter().filter(|p| p.object == index as u32);
+            let placed = scene.placements.iter().zip(first_objects.iter().copied());
+            let placed = placed.filter(|(p, _)| p.object == index as u32);
             if is_whole(index) {
                 split.push(Cow::Borrowed(mesh), placed);
                 continue;
             }
             let world = split.world.to_mut();
             world.spell_out();
-            for placement in placed.clone() {
+            for (placement, first) in placed.clone() {
                 let emits = |t: usize| flat(index, mesh.materials[t]);
                 let Placement {
                     transform,
                     materials,
                     ..
                 } = placement;
-                world.push_copy(mesh, emits, transform, materials);
+                world.push_copy(mesh, emits, transform, materials, first);
             }
             split.push(
                 Cow::Owned(mesh.filtered(|t| !flat(index, mesh.materials[t]))),
@@ -94,13 +99,21 @@ impl<'s> Split<'s> {
         Ok(split)
     }
 
-    fn push<'a>(&mut self, mesh: Cow<'s, Mesh>, placed: impl Iterator<Item = &'a Placement>) {
+    fn push<'a>(
+        &mut self,
+        mesh: Cow<'s, Mesh>,
+        placed: impl Iterator<Item = (&'a Placement, u32)>,
+    ) {
         let object = self.objects.len() as u32;
         let before = self.placements.len();
         if !mesh.is_empty() {
-            let placed = placed.cloned();
-            self.placements
-                .extend(placed.map(|p| Placement { object, ..p }));
+            for (placement, first) in placed {
+                self.placements.push(Placement {
+                    object,
+                    ..placement.clone()
+                });
+                self.first_objects.push(first);
+            }
         }
         if self.placements.len() > before {
             self.objects.push(mesh);
@@ -172,7 +185,7 @@ impl Scene {
                     materials,
                 } = placement;
                 let object = &self.objects[*object as usize].mesh;
-                mesh.push_copy(object, |_| true, transform, materials);
+                mesh.push_copy(object, |_| true, transform, materials, 0);
             }
         }
         if let Cow::Owned(mesh) = &mut mesh {

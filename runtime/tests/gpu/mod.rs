@@ -17,6 +17,7 @@ mod lost;
 mod many_lights;
 mod media;
 mod ops;
+mod outputs;
 mod passes;
 mod pixels;
 mod placed;

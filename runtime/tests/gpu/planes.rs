@@ -284,6 +284,7 @@ impl Planes {
             camera: CameraFrame::new(&camera, 1.0),
             max_depth: self.max_depth,
             roulette_start: 1000,
+            outputs: Default::default(),
             parts: SceneParts {
                 bounds: [Vec3::NEG_ONE, Vec3::ONE],
                 geometry: ShaderPart {

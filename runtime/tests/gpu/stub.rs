@@ -402,6 +402,7 @@ impl Room {
             camera: CameraFrame::new(&camera, self.width as f32 / self.height as f32),
             max_depth: self.max_depth,
             roulette_start: self.roulette_start,
+            outputs: Default::default(),
             parts: SceneParts {
                 geometry: ShaderPart {
                     wgsl: GEOMETRY.to_string(),

@@ -42,6 +42,7 @@ pub(crate) fn dark_scene() -> Scene {
         materials: Vec::new(),
         lights: Vec::new(),
         environment: None,
+        labels: Default::default(),
         warnings: Vec::new(),
     };
     let corner = Vec3::new(0.0, -30.0, 0.0);

@@ -43,6 +43,8 @@ pub(crate) enum Part {
     Materials,
     /// What is known of materials without evaluating them.
     Fates,
+    /// What records outputs of the film beside the picture.
+    Outputs,
 }
 
 impl Part {
@@ -62,6 +64,7 @@ impl Part {
             Part::Order => "order of rays",
             Part::Materials => "texture lookups",
             Part::Fates => "knowledge of materials",
+            Part::Outputs => "outputs",
         }
     }
 }

@@ -9,6 +9,10 @@ const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
 const SCATTERING: When = when(&[Need::Scattering]);
+const FIRST_HIT_OUTPUTS: When = when(&[Need::FirstHitOutputs]);
+const MATERIAL_OUTPUTS: When = when(&[Need::MaterialOutputs]);
+const SAMPLE_OUTPUTS: When = when(&[Need::SampleOutputs]);
+const LIGHT_GROUPS: When = when(&[Need::LightGroups]);
 
 /// Every stage, in the order of an iteration.
 pub(crate) static STAGES: [Stage; 7] = [
@@ -32,6 +36,10 @@ pub(crate) static STAGES: [Stage; 7] = [
             (Part::Lights, ALWAYS),
             (Part::Media, ABSORPTION),
             (Part::Fates, ALWAYS),
+            (Part::Camera, FIRST_HIT_OUTPUTS),
+            (Part::Outputs, FIRST_HIT_OUTPUTS),
+            (Part::Outputs, SAMPLE_OUTPUTS),
+            (Part::Outputs, LIGHT_GROUPS),
         ],
         loads: &[(
             ALWAYS,
@@ -43,6 +51,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "radiance",
                 "contribution",
                 "requests",
+                "light_group",
                 "media",
             ],
         )],
@@ -55,6 +64,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "carried",
                 "radiance",
                 "light",
+                "light_group",
             ],
         )],
     },
@@ -102,6 +112,8 @@ pub(crate) static STAGES: [Stage; 7] = [
             (Part::Mis, MIS),
             (Part::Media, MEDIA),
             (Part::Materials, ALWAYS),
+            (Part::Outputs, MATERIAL_OUTPUTS),
+            (Part::Outputs, LIGHT_GROUPS),
         ],
         loads: &[(
             ALWAYS,

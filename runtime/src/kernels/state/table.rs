@@ -24,7 +24,7 @@ const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 10] = [
+pub(crate) const FIELDS: [Field; 11] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -150,6 +150,19 @@ pub(crate) const FIELDS: [Field; 10] = [
                 ("unused1", U32),
             ],
             need: when(&[Need::RayCones]),
+        }],
+    },
+    Field {
+        // The group of the light that was sampled, until what it brings is gathered.
+        uses: &[Use {
+            name: "light_group",
+            components: &[
+                ("group", U32),
+                ("unused0", U32),
+                ("unused1", U32),
+                ("unused2", U32),
+            ],
+            need: when(&[Need::LightGroups, Need::ShadowRays]),
         }],
     },
     Field {

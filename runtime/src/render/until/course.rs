@@ -73,7 +73,7 @@ impl Renderer<'_> {
         let seeds = [self.options.seed, second_seed(self.options.seed)];
         let status = Status::new(self.built.schedule.steps.len());
         let mut course = Course {
-            halves: Halves::new(self.sums(&status, &resumed, 0)?.sums),
+            halves: Halves::new(&self.sums(&status, &resumed, 0)?.sums),
             pass: Pass::new(begin, 0),
             status,
             taken: [0; 2],
@@ -164,7 +164,8 @@ impl Renderer<'_> {
         let mut sums = self.sums(status, &resumed, pass.done)?;
         mark(&mut sums);
         let film = sums.sums.picture();
-        let mut report = self.report(status, &film, resumed, pass.begin.elapsed().as_secs_f64());
+        let wall = pass.begin.elapsed();
+        let mut report = self.report(status, (&film, &sums.sums), resumed, wall);
         for dropped in &mut report.dropped {
             let seed = example_of(dropped).and_then(|key| course.seeds.get(&key));
             if let (Some(example), Some(seed)) = (&mut dropped.example, seed) {

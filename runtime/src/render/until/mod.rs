@@ -107,7 +107,8 @@ pub(crate) struct Halves {
 
 impl Halves {
     /// Of pictures like `empty`, which has no samples.
-    pub(crate) fn new(empty: Sums) -> Self {
+    pub(crate) fn new(empty: &Sums) -> Self {
+        let empty = empty.without_outputs();
         Self {
             first: empty.clone(),
             all: empty,
@@ -116,12 +117,13 @@ impl Halves {
 
     /// Takes note of the film after samples were added by one of the halves.
     pub(crate) fn update(&mut self, half: usize, film: &Sums) {
+        let film = film.without_outputs();
         if half == 0 {
             // What the film has gained is the first half's.
-            self.first.add(film);
+            self.first.add(&film);
             self.first.subtract(&self.all);
         }
-        self.all = film.clone();
+        self.all = film;
     }
 
     /// The estimated mean squared error of the mean of all samples, and the relative one. `None` while a

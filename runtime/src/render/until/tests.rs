@@ -1,6 +1,7 @@
 //! Estimates against errors that are known, and plans against courses that are.
 
 use super::*;
+use crate::film::layers::Layers;
 use crate::film::{COUNT_PLANE, PLANES};
 
 /// A film of square pictures or of one row, of sums in units of 2^-24, the same in all channels, and a
@@ -21,7 +22,7 @@ fn film(sums: &[u64], samples: u32) -> Sums {
     } else {
         (count as u32, 1)
     };
-    Sums::new(size.0, size.1, words).expect("a film")
+    Sums::new(size.0, size.1, Layers::default(), words).expect("a film")
 }
 
 /// Uniform in 0..1, another for each index.
@@ -66,7 +67,7 @@ fn estimated_by_true(sample: fn(u64) -> f64, first: u64, second: u64) -> [f64; 2
         let (a, b) = (sums(0..first), sums(first..first + second));
         let a_units: Vec<u64> = a.iter().map(units).collect();
         let all_units: Vec<u64> = a_units.iter().zip(&b).map(|(a, b)| a + units(b)).collect();
-        let mut halves = Halves::new(film(&[0; PIXELS], 0));
+        let mut halves = Halves::new(&film(&[0; PIXELS], 0));
         halves.update(0, &film(&a_units, first as u32));
         assert_eq!(halves.errors(), None, "half a picture has no estimate");
         halves.update(1, &film(&all_units, (first + second) as u32));
@@ -110,7 +111,7 @@ fn fireflies_do_not_hide_themselves() {
 /// The film grows by one half after the other, in any order.
 #[test]
 fn halves_are_kept_apart() {
-    let mut halves = Halves::new(film(&[0, 0], 0));
+    let mut halves = Halves::new(&film(&[0, 0], 0));
     halves.update(0, &film(&[10 << 24, 0], 1));
     halves.update(1, &film(&[14 << 24, 0], 2));
     halves.update(1, &film(&[14 << 24, 0], 3));

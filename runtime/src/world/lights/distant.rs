@@ -4,19 +4,23 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use super::{Context, Kind, Piece, Sampled, luminance};
+use super::{Context, Kind, Piece, Sampled, Source, luminance};
 use crate::scene::{DistantLight, Light};
 use crate::wgsl;
 use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
-pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
-    let lights = context.scene.lights.iter().filter_map(|light| match light {
-        Light::Distant(distant) if luminance(distant.irradiance) > 0.0 => Some(distant),
+pub(super) fn kind<'a>(context: &Context<'a>, first: u32) -> Option<Kind> {
+    let shining = |(index, light): (usize, &'a Light)| match light {
+        Light::Distant(distant) if luminance(distant.irradiance) > 0.0 => {
+            Some((Source::Light(index as u32), distant))
+        }
         _ => None,
-    });
-    let lights: Vec<&DistantLight> = lights.collect();
-    let sampled = lights.iter().map(|light| Sampled {
+    };
+    let lights = context.scene.lights.iter().enumerate().filter_map(shining);
+    let (sources, lights): (Vec<Source>, Vec<&DistantLight>) = lights.unzip();
+    let sampled = lights.iter().zip(sources).map(|(light, source)| Sampled {
+        source,
         power: luminance(light.irradiance) * context.cross_section(),
         by_chance: !light.sample,
         is_discrete: light.angle <= 0.0,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use impasto_compiler::abi::Emission;
 
-use super::{Context, Kind, Piece, Sampled, area, luminance};
+use super::{Context, Kind, Piece, Sampled, Source, area, luminance};
 use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
@@ -24,6 +24,7 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
                 by_chance,
                 radiance,
                 primitive: context.primitives[triangle],
+                source: Source::Material(mesh.materials[triangle]),
                 triangles: vec![triangle as u32],
                 ..Sampled::default()
             })

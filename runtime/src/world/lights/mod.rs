@@ -18,6 +18,7 @@ use crate::world::needs::{LightTraits, Need, Needs};
 mod alias;
 mod distant;
 mod environment;
+pub(crate) mod groups;
 mod mesh;
 mod quad;
 
@@ -187,6 +188,18 @@ impl Piece {
     }
 }
 
+/// What a light is in the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Source {
+    /// The environment.
+    #[default]
+    Environment,
+    /// One of [`Scene::lights`].
+    Light(u32),
+    /// A triangle of one of [`Scene::materials`].
+    Material(u32),
+}
+
 /// A row of the light table.
 #[derive(Clone, Debug, Default)]
 struct Sampled {
@@ -200,6 +213,8 @@ struct Sampled {
     by_chance: bool,
     /// Is it seen in a single direction, where scattering cannot find it?
     is_discrete: bool,
+    /// What it is, for groups of lights.
+    source: Source,
     /// The kind's own use.
     flag: u32,
     /// Triangles of the mesh that belong to it.

@@ -1,6 +1,6 @@
 //! Parallelograms that emit and reflect nothing.
 
-use super::{Context, Kind, Piece, Sampled, luminance};
+use super::{Context, Kind, Piece, Sampled, Source, luminance};
 use crate::scene::{Light, QuadLight};
 use crate::wgsl::template::template;
 use crate::world::needs::Need;
@@ -57,6 +57,7 @@ fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
         power,
         radiance: quad.radiance,
         primitive: context.primitives[first],
+        source: Source::Light(index),
         flag: u32::from(quad.two_sided),
         is_discrete: false,
         triangles: vec![first as u32, first as u32 + 1],

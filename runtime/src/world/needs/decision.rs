@@ -113,6 +113,7 @@ mod tests {
             materials,
             ray_order: RayOrder::Coarse,
             ray_data: RayData::Slots,
+            outputs: Default::default(),
         }
     }
 

@@ -3,6 +3,8 @@
 use impasto_compiler::abi::{InputSet, MaterialInfo};
 
 use super::Need;
+use crate::film::layers::Layers;
+use crate::film::outputs::{Ask, At, OUTPUTS, Output};
 use crate::technique::{RayData, RayOrder};
 
 /// What a world's parts, its materials and the technique say.
@@ -20,6 +22,28 @@ pub(crate) struct NeedInputs<'a> {
     pub materials: &'a [MaterialInfo],
     pub ray_order: RayOrder,
     pub ray_data: RayData,
+    pub outputs: OutputTraits,
+}
+
+/// What the film records beside the picture: of the table of outputs a bit a row.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct OutputTraits(u64);
+
+impl OutputTraits {
+    /// Of the layers of a film.
+    pub(crate) fn of(layers: &Layers) -> Self {
+        let rows = OUTPUTS.iter().enumerate();
+        let recorded = rows.filter(|(_, row)| layers.iter().any(|l| std::ptr::eq(l.output, *row)));
+        Self(recorded.fold(0, |bits, (at, _)| bits | 1 << at))
+    }
+
+    /// The first output for which a condition holds, in words.
+    fn find(self, holds: impl Fn(&Output) -> bool) -> Option<String> {
+        let rows = OUTPUTS.iter().enumerate();
+        let mut recorded = rows.filter(|(at, _)| self.0 >> at & 1 == 1);
+        let found = recorded.find(|(_, row)| holds(row));
+        found.map(|(_, row)| format!("`--aov` asks for `{}`", row.name))
+    }
 }
 
 /// What lights there are.
@@ -73,6 +97,8 @@ impl NeedInputs<'_> {
         NeedInputs {
             materials,
             lights: self.lights.clone(),
+            // What the logic stage records is nothing that materials must be given.
+            outputs: OutputTraits::default(),
             ..*self
         }
     }
@@ -81,6 +107,16 @@ impl NeedInputs<'_> {
     pub(super) fn light(&self, need: Need) -> Option<String> {
         let found = self.lights.rows.iter().find(|(row, _)| *row == need);
         found.map(|(_, what)| what.clone())
+    }
+
+    /// Says which output is recorded at a point of a path.
+    pub(super) fn records(&self, at: At) -> Option<String> {
+        self.outputs.find(|output| output.is_recorded_at(at))
+    }
+
+    /// Says which output asks for something.
+    pub(super) fn asks(&self, ask: Ask) -> Option<String> {
+        self.outputs.find(|output| output.asks.contains(&ask))
     }
 
     /// Says of the first material for which a condition holds what is so.

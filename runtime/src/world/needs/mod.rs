@@ -14,7 +14,7 @@ mod inputs;
 mod table;
 
 pub(crate) use decision::Decision;
-pub(crate) use inputs::{LightTraits, MediaTraits, NeedInputs, SurfaceTraits};
+pub(crate) use inputs::{LightTraits, MediaTraits, NeedInputs, OutputTraits, SurfaceTraits};
 pub(crate) use table::{Forcing, Need, OF_MATERIALS, OF_WAVEFRONTS, ROWS, Row};
 
 /// The rows that are on.

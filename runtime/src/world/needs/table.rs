@@ -1,6 +1,7 @@
 //! The table of needs: a row for everything that a scene may do without.
 
 use super::{NeedInputs, Needs};
+use crate::film::outputs::{Ask, At};
 use crate::technique::{RayData, RayOrder};
 
 /// One row.
@@ -82,6 +83,7 @@ use Forcing::{Never, Unless, Whole, WholeUnless};
 use Need::*;
 
 const ASKED: Forcing = Never("it is a technique that is asked for");
+const AOV: Forcing = Never("it is recorded if it is asked for");
 
 rows! {
     // ---- Lights ----
@@ -194,25 +196,30 @@ rows! {
             f.material("emits what varies", |m| m.varying_emission)
         };
     Position, "positions", "reads_position",
-        "a material reads `position`",
-        on &[], draws "", Whole, |f, _| f.reads("`position`", |i| i.position);
+        "a material reads `position`, or the film records it",
+        on &[], draws "", Whole, |f, _| {
+            let read = f.reads("`position`", |i| i.position);
+            read.or_else(|| f.asks(Ask::Position))
+        };
     Moved, "an origin of the scene's own", "moved",
-        "coordinates are counted from nearby, and a material reads `position`",
+        "coordinates are counted from nearby, and a material or the film reads `position`",
         on &[Position], draws "", Never("the scene lies where it lies"), |f, n| {
             let moved = f.surface.moved && n.has(Position);
             moved.then(|| "coordinates are counted from nearby".into())
         };
     Normals, "vertex normals", "normals",
-        "corners have normals, and a material reads `normal`",
+        "corners have normals, and a material or the film reads `normal`",
         on &[], draws "", Whole, |f, _| {
             let any = f.surface.normals;
-            any.then(|| f.reads("`normal`, and corners have some", |i| i.normal))?
+            let read = || f.reads("`normal`, and corners have some", |i| i.normal);
+            any.then(|| read().or_else(|| f.asks(Ask::Normals)))?
         };
     Uvs, "texture coordinates", "uvs",
-        "corners have texture coordinates, and a material reads `uv`",
+        "corners have texture coordinates, and a material or the film reads `uv`",
         on &[], draws "", Whole, |f, _| {
             let any = f.surface.uvs;
-            any.then(|| f.reads("`uv`, and corners have some", |i| i.uv))?
+            let read = || f.reads("`uv`, and corners have some", |i| i.uv);
+            any.then(|| read().or_else(|| f.asks(Ask::Uvs)))?
         };
     Tangents, "tangents", "tangents",
         "corners have texture coordinates, and a material reads `tangent`",
@@ -260,6 +267,19 @@ rows! {
         on &[], draws "", Never("the scene's objects are repeated or not"), |f, _| {
             f.surface.placed.then(|| "objects are placed more than once".into())
         };
+    // ---- Outputs of the film ----
+    FirstHitOutputs, "outputs of the first hit", "first_hit_outputs",
+        "`--aov` asks for what a camera ray meets",
+        on &[], draws "", AOV, |f, _| f.records(At::FirstHit);
+    MaterialOutputs, "outputs of materials", "material_outputs",
+        "`--aov` asks for how the material there looks",
+        on &[], draws "", AOV, |f, _| f.records(At::Material);
+    SampleOutputs, "outputs of samples", "sample_outputs",
+        "`--aov` asks for what samples come to",
+        on &[], draws "", AOV, |f, _| f.records(At::Sample);
+    LightGroups, "light groups", "light_groups",
+        "`--aov` asks for the share of a group of lights",
+        on &[], draws "", AOV, |f, _| f.records(At::Light);
     // ---- Techniques ----
     SomePixels, "some pixels only", "some_pixels",
         "only some pixels are asked for",
