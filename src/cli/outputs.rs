@@ -41,9 +41,10 @@ impl Outputs {
     /// Writes everything; `exposure` brightens what is to be looked at by stops.
     pub(super) fn write(&self, film: &Film, sums: &FilmFile, exposure: f32) -> Result<(), Failure> {
         for path in &self.pictures {
-            let written = match is_exr(path) && !sums.sums.layers().is_empty() {
-                true => exr::write(sums, path),
-                false => output::write(film, path, exposure),
+            let written = if is_exr(path) && !sums.sums.layers().is_empty() {
+                exr::write(sums, path)
+            } else {
+                output::write(film, path, exposure)
             };
             written.map_err(super::runtime)?;
         }
@@ -59,13 +60,13 @@ impl Outputs {
             .iter()
             .try_for_each(|name| outputs::check_name(name))?;
         let is_held = self.is_film() || self.pictures.iter().any(|path| is_exr(path));
-        match is_held || names.is_empty() {
-            true => Ok(()),
-            false => Err(format!(
-                "`--aov {}` needs a file that holds more than a picture\n  hint: write an .exr or a .film file",
-                names.join(",")
-            )),
+        if is_held || names.is_empty() {
+            return Ok(());
         }
+        Err(format!(
+            "`--aov {}` needs a file that holds more than a picture\n  hint: write an .exr or a .film file",
+            names.join(",")
+        ))
     }
 
     /// Is it a part of a render?

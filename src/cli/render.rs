@@ -252,9 +252,10 @@ fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program,
             format!("cannot read `{file}`, which the scene names for the material `{name}`: {why}")
         })?;
     }
-    let compiled = match ask_for_looks(&args.aov) {
-        true => compiler::compile_with_looks(&requests, &mut loader),
-        false => compiler::compile(&requests, &mut loader),
+    let compiled = if ask_for_looks(&args.aov) {
+        compiler::compile_with_looks(&requests, &mut loader)
+    } else {
+        compiler::compile(&requests, &mut loader)
     };
     if global.json() {
         let found = super::json(&compiled.sources, &compiled.diagnostics);

@@ -42,6 +42,7 @@ pub(crate) fn world(
         max_depth: 2,
         roulette_start: 2,
         parts: SceneParts::build(scene, materials, instances, &[], technique)?,
+        outputs: Default::default(),
     })
 }
 
