@@ -18,11 +18,11 @@ use impasto_compiler::Program;
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Sampler, Technique};
-use impasto_runtime::trace::{Float, Parting, Path, Replayer, parting, with_room};
 use impasto_runtime::world::World;
+use impasto_trace::{Float, Parting, Path, Replayer, parting, with_room};
 use serde::Serialize;
 
-pub use impasto_runtime::trace::{self as path, MaterialCode, TraceError};
+pub use impasto_trace::{self as path, MaterialCode, TraceError};
 
 /// Which path, and how it is replayed.
 #[derive(Clone, Copy, Debug)]

@@ -10,7 +10,7 @@
 //! | `kernels` | the text of every kernel that a plan needs |
 //! | [`gpu`] | device, pipelines, buffers, dispatches |
 //! | [`render`] | a [`render::Renderer`] dispatches kernels until every path is done, and gives a [`film::Film`] and a [`render::report::Report`] |
-//! | [`lab`], [`audit`], [`trace`] | experiments on top of all |
+//! | [`lab`], [`audit`] | experiments on top of all |
 
 pub mod audit;
 pub mod error;
@@ -25,6 +25,5 @@ mod parallel;
 pub mod render;
 pub mod scene;
 pub mod technique;
-pub mod trace;
 pub mod wgsl;
 pub mod world;

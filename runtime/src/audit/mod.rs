@@ -1,6 +1,10 @@
 //! What a scene needs and why, and what it saves by going without the rest: measured by writing its kernels
 //! again with one row more. Needs no GPU.
 
+mod path_kernel;
+
+pub use path_kernel::{PathKernel, dropped_value};
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use impasto_compiler::abi::MaterialInfo;

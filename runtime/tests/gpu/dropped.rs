@@ -7,8 +7,8 @@ use impasto_runtime::kernels::dropped::Dropped;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{Sampler, Technique};
-use impasto_runtime::trace::{End, MaterialCode, Replayer};
 use impasto_runtime::world::lights::Lights;
+use impasto_trace::{End, MaterialCode, Replayer};
 
 /// One wall of each kind of wrong material, and what is wrong with it: the value, and whether that is
 /// below zero.

@@ -61,7 +61,19 @@ const CRATES: &[Crate] = &[
             &["kernels"],
             &["gpu"],
             &["render"],
-            &["lab", "audit", "trace"],
+            &["lab", "audit"],
+        ],
+    },
+    Crate {
+        name: "impasto-trace",
+        folder: "trace/src",
+        layers: &[
+            &["error", "float", "path", "shape", "textures"],
+            &["compare", "ops", "signature"],
+            &["code", "materials"],
+            &["geometry", "lower", "machine"],
+            &["expressions", "record"],
+            &["replay"],
         ],
     },
     Crate {

@@ -42,6 +42,3 @@ pub use float::Float;
 pub use materials::MaterialCode;
 pub use path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
 pub use replay::{KernelCode, Replayer, Session, with_room};
-
-/// Steps that a path may take, and expressions that one evaluation of a material may.
-const LIMIT: u64 = 1 << 30;

@@ -4,7 +4,6 @@
 //! same scalars lie at the offsets of the WGSL specification, which naga computes.
 
 use naga::{ArraySize, Module, ScalarKind, TypeInner, VectorSize};
-use wgpu::naga;
 
 /// Where a part of a value begins within the whole.
 pub(super) struct Part {

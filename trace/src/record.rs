@@ -3,13 +3,13 @@
 //! The kernel knows nothing of this: functions are recognised by their names, and what they take and
 //! give by the names of arguments and members. `tests/trace.rs` notices when a name is no more.
 
-use super::error::TraceError;
-use super::float::Float;
-use super::machine::Host;
-use super::materials::Materials;
-use super::path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
-use super::signature::Signature;
-use crate::kernels::dropped;
+use crate::error::TraceError;
+use crate::float::Float;
+use crate::machine::Host;
+use crate::materials::Materials;
+use crate::path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
+use crate::signature::Signature;
+use impasto_runtime::audit::dropped_value;
 
 /// The functions whose calls are looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -357,7 +357,7 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
             }
             Hook::CountDropped if self.is_within(Hook::FilmAdd) => self.path.left_out = true,
             Hook::CountDropped => {
-                let value = dropped::value_name(of.arguments.word("value", arguments));
+                let value = dropped_value(of.arguments.word("value", arguments));
                 if let Some(vertex) = self.last() {
                     vertex.dropped = Some(value);
                 }

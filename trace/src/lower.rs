@@ -6,14 +6,13 @@ use naga::{
     AddressSpace, Arena, AtomicFunction, Expression, Handle, Literal, Module, ScalarKind,
     Statement, SwitchValue, TypeInner,
 };
-use wgpu::naga;
 
-use super::code::{Block, Case, Code, Function, Ins, Node, Pointer, Slot};
-use super::error::TraceError;
-use super::float::{Float, signed};
-use super::ops::{self, Fn2};
-use super::shape::{Place, Shapes, kind};
-use super::signature::Signature;
+use crate::code::{Block, Case, Code, Function, Ins, Node, Pointer, Slot};
+use crate::error::TraceError;
+use crate::float::{Float, signed};
+use crate::ops::{self, Fn2};
+use crate::shape::{Place, Shapes, kind};
+use crate::signature::Signature;
 
 /// What the functions of a kernel share.
 pub(super) struct Shared<'m> {

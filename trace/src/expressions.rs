@@ -3,14 +3,13 @@
 use naga::{
     BinaryOperator, Expression, Handle, MathFunction, RelationalFunction, TypeInner, VectorSize,
 };
-use wgpu::naga;
 
-use super::code::{Block, First, Ins, Node, Pointer, Slot};
-use super::error::TraceError;
-use super::float::Float;
-use super::lower::{Lowering, word};
-use super::shape::{Length, count};
-use super::{geometry, ops};
+use crate::code::{Block, First, Ins, Node, Pointer, Slot};
+use crate::error::TraceError;
+use crate::float::Float;
+use crate::lower::{Lowering, word};
+use crate::shape::{Length, count};
+use crate::{geometry, ops};
 
 impl<F: Float> Lowering<'_, '_, F> {
     /// Evaluates an expression where it is emitted.

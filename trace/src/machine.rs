@@ -2,10 +2,10 @@
 
 use std::marker::PhantomData;
 
-use super::code::{Block, Case, Code, First, Function, Ins, Node, Pointer, Slot};
-use super::error::TraceError;
-use super::float::Float;
-use super::shape::Scalar;
+use crate::code::{Block, Case, Code, First, Function, Ins, Node, Pointer, Slot};
+use crate::error::TraceError;
+use crate::float::Float;
+use crate::shape::Scalar;
 
 /// Who looks at some calls, and answers others.
 pub(super) trait Host {

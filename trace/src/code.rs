@@ -4,9 +4,9 @@
 //! have a place in it that is known beforehand, so an instruction names cells and nothing has to be
 //! looked up.
 
-use super::ops::{Fn1, Fn2, Fn3};
-use super::shape;
-use super::signature::Signature;
+use crate::ops::{Fn1, Fn2, Fn3};
+use crate::shape;
+use crate::signature::Signature;
 
 /// A cell, from the beginning of the frame.
 pub(super) type Slot = u32;

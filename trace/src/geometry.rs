@@ -1,10 +1,9 @@
 //! Functions of WGSL that take several components at once: of vectors, matrices and packed words.
 
 use naga::{MathFunction as Math, ScalarKind as Kind};
-use wgpu::naga;
 
-use super::code::{Geometry, Slot};
-use super::float::{Float, signed};
+use crate::code::{Geometry, Slot};
+use crate::float::{Float, signed};
 
 fn at<F: Float>(cells: &[u64], slot: Slot, component: u32) -> F {
     F::of_cell(cells[(slot + component) as usize])

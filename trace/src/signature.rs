@@ -2,11 +2,10 @@
 //! need not know how structs lie in cells.
 
 use naga::{ScalarKind, TypeInner};
-use wgpu::naga;
 
-use super::float::Float;
-use super::path::Triple;
-use super::shape::{Shapes, kind};
+use crate::float::Float;
+use crate::path::Triple;
+use crate::shape::{Shapes, kind};
 
 /// What a function takes and gives.
 #[derive(Clone, Debug, Default)]

@@ -5,9 +5,8 @@
 //! the WGSL specification says.
 
 use naga::{BinaryOperator as Bin, MathFunction as Math, ScalarKind as Kind, UnaryOperator as Un};
-use wgpu::naga;
 
-use super::float::{Float, as_signed, signed};
+use crate::float::{Float, as_signed, signed};
 
 /// Functions of one to three components.
 pub(super) type Fn1 = fn(u64) -> u64;

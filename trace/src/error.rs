@@ -1,6 +1,9 @@
 //! Why a path could not be replayed.
 
-use crate::error::RuntimeError;
+use impasto_runtime::error::RuntimeError;
+
+/// Steps that a path may take, and expressions that one evaluation of a material may.
+pub(crate) const LIMIT: u64 = 1 << 30;
 
 /// An error of a replay.
 #[derive(Debug, thiserror::Error)]

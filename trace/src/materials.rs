@@ -6,10 +6,10 @@ use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Type};
 use impasto_compiler::program::{CompiledMaterial, Program};
 
-use super::LIMIT;
-use super::error::TraceError;
-use super::float::Float;
-use super::signature::Signature;
+use crate::error::LIMIT;
+use crate::error::TraceError;
+use crate::float::Float;
+use crate::signature::Signature;
 
 /// Which code of materials is run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

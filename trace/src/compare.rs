@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::path::{Path, Vertex};
+use crate::path::{Path, Vertex};
 
 /// Relative differences above this are no mere rounding.
 const TOLERANCE: f64 = 1e-3;
