@@ -22,7 +22,7 @@ use impasto::compiler::{self, Loader, MaterialRequest, Program, parser};
 use crate::probe;
 
 /// Files of which every stage is kept in full.
-const IN_FULL: [&str; 16] = [
+const IN_FULL: [&str; 17] = [
     "materials/car_paint",
     "materials/glass",
     "materials/leaf",
@@ -36,6 +36,7 @@ const IN_FULL: [&str; 16] = [
     "stdlib/edf/generalized_schlick",
     "stdlib/noise/gabor_2d",
     "stdlib/noise/simplex",
+    "stdlib/noise/turbulence",
     "stdlib/pattern/band",
     "stdlib/pattern/triplanar",
     "stdlib/surface/gltf_pbr",

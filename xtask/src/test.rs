@@ -1,6 +1,8 @@
 //! `cargo xtask test`: every test there is, documentation examples included. With `--quick` those that
 //! say within a minute whether a change is worth the rest.
 
+use std::process::Command;
+
 use clap::Args;
 
 use crate::adapter;
@@ -15,49 +17,90 @@ pub(crate) struct TestArgs {
     quick: bool,
 }
 
-/// Names of tests that `--quick` leaves out, and what those are. No test is less thorough for it: it is
-/// run as it always is, or not at all.
-const LEFT_OUT: &[(&str, &str)] = &[];
+/// A crate, and which of its tests `--quick` leaves out: whole groups, by what their names contain.
+/// None is less thorough for it; it is run as it always is, or not at all.
+const LEFT_OUT: &[(&str, &[(&str, &str)])] = &[
+    (
+        "impasto-compiler",
+        &[(
+            "stdlib::",
+            "what the library promises, by sampling and search",
+        )],
+    ),
+    (
+        "impasto-runtime",
+        &[("gpu::", "pictures of small worlds, and numbers of kernels")],
+    ),
+    (
+        "impasto",
+        &[
+            ("needs::", "the pairs of scenes of the table of needs"),
+            ("filtering::", "ray cones"),
+            ("instances::", "pictures of instances"),
+            ("render::", "pictures of scenes"),
+            ("textures::", "textures far away"),
+            ("trace::", "replays of paths"),
+            ("until::", "estimates of errors"),
+            ("cli::calibrate::", "the command, rendering"),
+            ("cli::converge::", "the command, rendering"),
+            ("cli::film::", "the command, rendering"),
+            ("cli::limits::", "the command, rendering"),
+            ("cli::plans::", "the command, rendering"),
+            ("cli::rays::", "the command, rendering"),
+        ],
+    ),
+];
 
-/// Runs `cargo test --workspace` on a machine that is made ready for it.
+/// Runs the tests on a machine that is made ready for them.
 ///
 /// Snapshots are compared and never written: accepting one is `cargo xtask bless`.
 pub(crate) fn run(args: &TestArgs) -> Result {
     adapter::prepare()?;
     shell::section("Building the tests");
-    // Examples of documentation are programs of their own, which are built each time.
-    let targets: &[&str] = if args.quick {
-        &["--lib", "--bins", "--tests"]
-    } else {
-        &[]
-    };
-    shell::run(
-        cargo()
-            .args(["test", "--workspace", "--no-run"])
-            .args(targets),
-    )?;
+    shell::run(cargo().args(["test", "--workspace", "--no-run"]))?;
     adapter::require(&shell::impasto("debug")?)?;
-
+    if args.quick {
+        return quick(args);
+    }
     shell::section("Running the tests");
+    let mut test = testing(args);
+    shell::run(test.arg("--workspace").args(&args.filter))
+}
+
+/// `cargo test`, going on after failures, which compares snapshots.
+fn testing(args: &TestArgs) -> Command {
     let mut test = cargo();
-    test.args(["test", "--workspace", "--no-fail-fast"])
-        .args(targets)
-        .args(&args.filter)
+    test.args(["test", "--no-fail-fast"])
         .env("CI", "true")
         .env("INSTA_UPDATE", "no");
     if args.quick {
-        test.arg("--");
-        for (name, _) in LEFT_OUT {
-            test.args(["--skip", name]);
+        test.arg("--quiet");
+    }
+    test
+}
+
+/// Runs all unit tests, and of the others what is not left out. Fails at the end, if anything did.
+fn quick(args: &TestArgs) -> Result {
+    shell::section("Running unit tests");
+    let mut units = testing(args);
+    units.args(["--workspace", "--lib", "--bins"]);
+    let mut result = shell::run(units.args(&args.filter));
+    for (package, groups) in LEFT_OUT {
+        shell::section(&format!("Running the quick tests of {package}"));
+        let mut tests = testing(args);
+        tests.args(["--package", package, "--test", "*"]);
+        tests.args(&args.filter).arg("--");
+        for (group, _) in *groups {
+            tests.args(["--skip", group]);
+        }
+        result = result.and(shell::run(&mut tests));
+    }
+    shell::section("Left out by --quick");
+    for (package, groups) in LEFT_OUT {
+        for (group, what) in *groups {
+            eprintln!("{package:<17} {group:<18} {what}");
         }
     }
-    let result = shell::run(&mut test);
-    if args.quick {
-        shell::section("Left out by --quick");
-        for (name, what) in LEFT_OUT {
-            eprintln!("{name:<46} {what}");
-        }
-        eprintln!("examples of documentation");
-    }
+    eprintln!("examples of documentation");
     result
 }

@@ -151,7 +151,7 @@ pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> La
 }
 
 /// Lanes that are run together.
-const BLOCK: usize = 512;
+const BLOCK: usize = 2048;
 
 /// Runs a function that need not be in the module.
 pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {
