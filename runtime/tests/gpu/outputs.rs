@@ -514,10 +514,15 @@ fn hidden_boundaries_are_no_first_hit() {
 fn every_row_of_the_table_is_an_output() {
     let outputs = everything();
     // Of one material, whose kernels are built sooner.
-    let plain = ["coated", "bumpy", "glow"].iter().fold(STUDIO.to_owned(), |toml, name| {
-        toml.replace(&format!("material = '{name}'\n"), "material = 'plain'\n")
-    });
-    let studio = load(&plain.replace("material = 'plain'\n[materials.left]", "[materials.left]"), &outputs);
+    let plain = ["coated", "bumpy", "glow"]
+        .iter()
+        .fold(STUDIO.to_owned(), |toml, name| {
+            toml.replace(&format!("material = '{name}'\n"), "material = 'plain'\n")
+        });
+    let studio = load(
+        &plain.replace("material = 'plain'\n[materials.left]", "[materials.left]"),
+        &outputs,
+    );
     let none = render(&studio, "own", &asking(&[], 2));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
