@@ -21,7 +21,7 @@ use pairs::{HELD_ELSEWHERE, PAIRS, Pair};
 use scenes::{Loaded, Text};
 
 /// Names that the compiler gives to functions of materials, which differ where materials do.
-const GENERATED: [&str; 9] = [
+const GENERATED: [&str; 11] = [
     "core_",
     "bsdf_",
     "edf_",
@@ -31,6 +31,8 @@ const GENERATED: [&str; 9] = [
     "op_",
     "evaluate_",
     "emission_",
+    "albedo_",
+    "normal_",
 ];
 
 #[test]

@@ -183,8 +183,7 @@ pairs! {
          +enter_placement +is_mirrored +material_row +place_of +place_point +placed_triangle \
          +set_slabs +take_in_tree",
         Text { shared: Some(false), ..Text::default() } => Text { shared: Some(true), ..Text::default() };
-    "outputs of the first hit", also &[], "functions +add_carrying +facing +film_add_signed +film_add_values +hit_geometric_normal \
-         +record_first_hit",
+    "outputs of the first hit", also &[], "functions +add_carrying +facing +film_add_signed +film_add_values +record_first_hit",
         Text::default() => recording(&["geometric_normal"]);
     "outputs of materials", also &[], "functions +add_carrying +film_add_signed +film_add_values +material_albedo +record_material",
         Text::default() => recording(&["albedo"]);

@@ -86,9 +86,10 @@ pub(crate) fn layers(
             check(name, *ask, scene, has_looks)?;
         }
         if output.kind == Kind::Ids {
-            layer.names = match output.asks.contains(&Ask::Objects) {
-                true => scene.object_names(),
-                false => instances.iter().map(|i| i.name.clone()).collect(),
+            layer.names = if output.asks.contains(&Ask::Objects) {
+                scene.object_names()
+            } else {
+                instances.iter().map(|i| i.name.clone()).collect()
             };
         }
         layers.push(layer);
