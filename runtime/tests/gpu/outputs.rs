@@ -75,7 +75,8 @@ fn load(toml: &str, outputs: &[&str]) -> (Scene, Program) {
     ] {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let scene = impasto_runtime::world::load(&folder.path().join("scene.toml"))
+        .unwrap_or_else(|e| panic!("{e}"));
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
         material: binding.material.clone(),
         params: binding.params.clone(),
@@ -514,10 +515,15 @@ fn hidden_boundaries_are_no_first_hit() {
 fn every_row_of_the_table_is_an_output() {
     let outputs = everything();
     // Of one material, whose kernels are built sooner.
-    let plain = ["coated", "bumpy", "glow"].iter().fold(STUDIO.to_owned(), |toml, name| {
-        toml.replace(&format!("material = '{name}'\n"), "material = 'plain'\n")
-    });
-    let studio = load(&plain.replace("material = 'plain'\n[materials.left]", "[materials.left]"), &outputs);
+    let plain = ["coated", "bumpy", "glow"]
+        .iter()
+        .fold(STUDIO.to_owned(), |toml, name| {
+            toml.replace(&format!("material = '{name}'\n"), "material = 'plain'\n")
+        });
+    let studio = load(
+        &plain.replace("material = 'plain'\n[materials.left]", "[materials.left]"),
+        &outputs,
+    );
     let none = render(&studio, "own", &asking(&[], 2));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
