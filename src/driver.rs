@@ -17,7 +17,7 @@ use crate::files::FileLoader;
 
 /// Reads a scene file and the geometry, lights and environment that it names.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    impasto_runtime::scene::load(path)
+    impasto_runtime::world::load(path)
 }
 
 /// The materials that a scene binds, as the compiler is asked for them.

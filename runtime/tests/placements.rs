@@ -5,10 +5,11 @@ use std::fmt::Write;
 use crate::support::worlds::kernel_parts;
 use glam::{Vec2, Vec3};
 use impasto_runtime::error::SceneError;
-use impasto_runtime::scene::{Scene, load};
+use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::{Copies, Stack, Technique};
 use impasto_runtime::world::KernelParts;
 use impasto_runtime::world::Split;
+use impasto_runtime::world::load;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n\
                         usemtl leaf\nf 1//1 2//1 3//1\nusemtl wood\nf 1 2 3\n";

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
 use impasto_runtime::error::SceneError;
-use impasto_runtime::scene::{EnvironmentSource, Integrator, Light, NO_MATERIAL, Scene, load};
+use impasto_runtime::scene::{EnvironmentSource, Integrator, NO_MATERIAL, Scene};
+use impasto_runtime::world::lights::distant::DistantLight;
+use impasto_runtime::world::lights::quad::QuadLight;
+use impasto_runtime::world::load;
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -71,9 +74,11 @@ fn a_scene_has_what_its_file_says() {
         EnvironmentSource::Uniform(Vec3::new(0.5, 1.0, 1.5))
     );
     assert!(!environment.sample);
-    let [Light::Quad(quad), Light::Distant(sun)] = &room.lights[..] else {
+    let [quad, sun] = &room.lights[..] else {
         panic!("{:?}", room.lights);
     };
+    let quad: &QuadLight = quad.get().expect("it is a quad");
+    let sun: &DistantLight = sun.get().expect("it is far away");
     assert_eq!(
         (quad.radiance, quad.two_sided),
         (Vec3::new(1.0, 2.0, 3.0), false)

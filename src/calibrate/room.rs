@@ -5,8 +5,9 @@ use glam::Vec3;
 use impasto_compiler::cost::Inputs;
 use impasto_runtime::scene::{
     Camera, Environment, EnvironmentSource, FilmSettings, Integrator, Light, MaterialBinding, Mesh,
-    NO_MATERIAL, QuadLight, Scene,
+    NO_MATERIAL, Scene,
 };
+use impasto_runtime::world::lights::quad::QuadLight;
 
 use super::sources::Palette;
 
@@ -163,7 +164,7 @@ fn lamp(scene: &mut Scene) {
     let corners = [corner, corner + u, corner + u + v, corner + v];
     quad(&mut scene.mesh, corners, NO_MATERIAL, Some(0));
     // The front is where u x v points: down.
-    scene.lights.push(Light::Quad(QuadLight {
+    scene.lights.push(Light::new(QuadLight {
         corner,
         u,
         v,

@@ -10,6 +10,7 @@ use crate::materials::Materials;
 use crate::path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
 use crate::signature::Signature;
 use impasto_runtime::audit::dropped_value;
+use impasto_runtime::world::lights::sample_functions;
 
 /// The functions whose calls are looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,10 +24,6 @@ pub(super) enum Hook {
     LightShare,
     LightContribution,
     SampleLight,
-    SampleQuad,
-    SampleMesh,
-    SampleDistant,
-    SampleEnvironment,
     Survival,
     Transmittance,
     TraceClosest,
@@ -42,10 +39,12 @@ pub(super) enum Hook {
     FilmAdd,
     MaterialEmission,
     EvaluateMaterial,
+    /// The sample of a light of this kind.
+    SampleKind(&'static str),
 }
 
-/// Each by its name.
-const HOOKS: [(Hook, &str); 28] = [
+/// Each by its name, but for those of kinds of light.
+const HOOKS: [(Hook, &str); 24] = [
     (Hook::CameraRay, "camera_ray"),
     (Hook::Logic, "logic"),
     (Hook::Material, "material"),
@@ -55,10 +54,6 @@ const HOOKS: [(Hook, &str); 28] = [
     (Hook::LightShare, "light_share"),
     (Hook::LightContribution, "light_contribution"),
     (Hook::SampleLight, "sample_light"),
-    (Hook::SampleQuad, "sample_quad_light"),
-    (Hook::SampleMesh, "sample_mesh_light"),
-    (Hook::SampleDistant, "sample_distant_light"),
-    (Hook::SampleEnvironment, "sample_environment"),
     (Hook::Survival, "survival_probability"),
     (Hook::Transmittance, "transmittance"),
     (Hook::TraceClosest, "trace_closest"),
@@ -77,17 +72,23 @@ const HOOKS: [(Hook, &str); 28] = [
     (Hook::EvaluateMaterial, "evaluate_material"),
 ];
 
+/// All hooks, each by its name.
+fn hooks() -> impl Iterator<Item = (Hook, &'static str)> {
+    let kinds = sample_functions().map(|(kind, function)| (Hook::SampleKind(kind), function));
+    HOOKS.into_iter().chain(kinds)
+}
+
 /// The names, in the order of hooks.
 pub(super) fn names() -> Vec<&'static str> {
-    HOOKS.iter().map(|(_, name)| *name).collect()
+    hooks().map(|(_, name)| name).collect()
 }
 
 /// The hooks that materials answer.
 pub(super) fn answered() -> Vec<usize> {
-    vec![
-        Hook::MaterialEmission as usize,
-        Hook::EvaluateMaterial as usize,
-    ]
+    let is_answered = |hook| matches!(hook, Hook::MaterialEmission | Hook::EvaluateMaterial);
+    let hooks = hooks().enumerate();
+    let answered = hooks.filter(|(_, (hook, _))| is_answered(*hook));
+    answered.map(|(index, _)| index).collect()
 }
 
 /// Names of a scene.
@@ -99,6 +100,7 @@ pub(super) struct Names {
 
 /// The writer of one path.
 pub(super) struct Recorder<'r, 'p, F> {
+    hooks: Vec<Hook>,
     signatures: &'r [Option<Signature>],
     names: &'r Names,
     materials: &'r mut Materials<'p, F>,
@@ -128,6 +130,7 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
         max_depth: u32,
     ) -> Self {
         Self {
+            hooks: hooks().map(|(hook, _)| hook).collect(),
             signatures,
             names,
             materials,
@@ -370,20 +373,13 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
     /// What concerns light samples.
     fn left_light(&mut self, hook: Hook, of: &Signature, arguments: &[u64], result: &[u64]) {
         let got = |name: &str| of.result.triple::<F>(name, result);
-        let kind = match hook {
-            Hook::SampleQuad => "quad",
-            Hook::SampleMesh => "mesh",
-            Hook::SampleDistant => "distant",
-            Hook::SampleEnvironment => "environment",
-            _ => "",
-        };
         let blocked = of.result.word("", result) != 0;
         let weight = of.result.number::<F>("", result);
         let Some(vertex) = self.last() else {
             return;
         };
         match hook {
-            _ if !kind.is_empty() => vertex.light.get_or_insert_with(Light::default).kind = kind,
+            Hook::SampleKind(kind) => vertex.light.get_or_insert_with(Light::default).kind = kind,
             Hook::SampleLight => {
                 let light = vertex.light.get_or_insert_with(Light::default);
                 (light.wi, light.radiance) = (got("wi"), got("radiance"));
@@ -430,12 +426,12 @@ impl<F: Float> Host for Recorder<'_, '_, F> {
         result: &mut Vec<u64>,
     ) -> Result<(), TraceError> {
         let signatures = self.signatures;
-        let (Some((hook, _)), Some(Some(signature))) = (HOOKS.get(hook), signatures.get(hook))
+        let (Some(&hook), Some(Some(signature))) = (self.hooks.get(hook), signatures.get(hook))
         else {
             return Ok(());
         };
-        self.calls.push(*hook);
-        self.entered(*hook);
+        self.calls.push(hook);
+        self.entered(hook);
         match hook {
             Hook::EvaluateMaterial => self.materials.evaluate(signature, arguments, result),
             Hook::MaterialEmission => self.materials.emission(signature, arguments, result),
@@ -445,21 +441,9 @@ impl<F: Float> Host for Recorder<'_, '_, F> {
 
     fn leave(&mut self, hook: usize, arguments: &[u64], result: &[u64]) {
         let signatures = self.signatures;
-        if let (Some((hook, _)), Some(Some(signature))) = (HOOKS.get(hook), signatures.get(hook)) {
+        if let (Some(&hook), Some(Some(signature))) = (self.hooks.get(hook), signatures.get(hook)) {
             self.calls.pop();
-            self.left(*hook, signature, arguments, result);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hooks_stand_in_their_order() {
-        for (at, (hook, _)) in HOOKS.iter().enumerate() {
-            assert_eq!(*hook as usize, at, "{hook:?}");
+            self.left(hook, signature, arguments, result);
         }
     }
 }

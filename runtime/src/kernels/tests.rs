@@ -99,7 +99,7 @@ struct Room {
 impl Room {
     fn new(technique: &Technique) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cornell/scene.toml");
-        let scene = crate::scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
+        let scene = crate::world::load(&path).unwrap_or_else(|e| panic!("{e}"));
         let requests = scene.materials.iter().cloned().map(|b| MaterialRequest {
             name: b.name,
             file: b.file,

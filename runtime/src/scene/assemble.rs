@@ -79,11 +79,10 @@ pub(super) fn assemble(
     let lights = description.lights.iter();
     let lights: Vec<Light> = lights.map(|l| l.seen_from(assembly.origin)).collect();
     for (index, light) in lights.iter().enumerate() {
-        if let Light::Quad(quad) = light {
-            let object = assembly.labels.objects.len() as u32;
+        let object = assembly.labels.objects.len() as u32;
+        if assembly.mesh.push_light(light, index as u32, object) {
             let name = format!("lights/{}", index + 1);
             assembly.labels.objects.push(name);
-            assembly.mesh.push_quad(quad, index as u32, object);
         }
     }
     assembly.finish(description, lights)
@@ -106,8 +105,8 @@ fn origin(entries: &[Entry], description: &Description) -> DVec3 {
             all.add_placed(of_file, &spec.transform.then(&place.transform));
         }
     }
-    let corners = description.lights.iter().filter_map(|l| l.corners());
-    corners.flatten().for_each(|corner| all.add(corner));
+    let corners = description.lights.iter().flat_map(|l| l.corners());
+    corners.for_each(|corner| all.add(corner));
     origin::of(&all)
 }
 

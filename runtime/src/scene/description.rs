@@ -8,9 +8,7 @@ use toml::de::DeValue;
 use super::document::{Document, Table, Value, number, numbers};
 use super::formats::{self, FileValue, Format};
 use super::placements::{self, PlacesSpec};
-use super::{
-    Camera, DistantLight, FilmSettings, Integrator, Light, MAX_NESTED, QuadLight, Transform,
-};
+use super::{Camera, FilmSettings, Integrator, Light, LightReader, MAX_NESTED, Transform};
 use crate::error::SceneError;
 
 /// Pixels a side of the largest film.
@@ -49,10 +47,10 @@ impl CameraSpec {
     }
 }
 
-/// A light, and where in the world its corner is if it has one.
+/// A light, and where in the world it is if it has a place.
 pub(super) struct LightSpec {
     light: Light,
-    pub(super) corner: Option<DVec3>,
+    place: Option<DVec3>,
     /// The group that it is in.
     pub(super) group: Option<String>,
 }
@@ -60,24 +58,16 @@ pub(super) struct LightSpec {
 impl LightSpec {
     /// The light in coordinates that count from `origin`.
     pub(super) fn seen_from(&self, origin: DVec3) -> Light {
-        match (&self.light, self.corner) {
-            (Light::Quad(quad), Some(corner)) => Light::Quad(QuadLight {
-                corner: (corner - origin).as_vec3(),
-                ..quad.clone()
-            }),
-            (light, _) => light.clone(),
+        match self.place {
+            Some(place) => self.light.put_at((place - origin).as_vec3()),
+            None => self.light.clone(),
         }
     }
 
     /// The corners of a light with a surface.
-    pub(super) fn corners(&self) -> Option<[DVec3; 4]> {
-        match (&self.light, self.corner) {
-            (Light::Quad(quad), Some(corner)) => {
-                let [u, v] = [quad.u, quad.v].map(|edge| edge.as_dvec3());
-                Some([corner, corner + u, corner + v, corner + u + v])
-            }
-            _ => None,
-        }
+    pub(super) fn corners(&self) -> Vec<DVec3> {
+        self.place
+            .map_or_else(Vec::new, |place| self.light.corners(place))
     }
 }
 
@@ -137,10 +127,11 @@ pub(super) enum EnvironmentSpecSource {
 }
 
 impl<'f> Description<'f> {
-    /// Reads a scene whose geometry is of some of the given formats.
+    /// Reads a scene whose geometry is of some of the given formats, with `readers` for its lights.
     pub(super) fn read(
         document: &Document,
         formats: &'f [Format],
+        readers: &[LightReader],
     ) -> Result<Description<'f>, SceneError> {
         let parsed = document.parse()?;
         let mut root = Table::new(document, "the scene", &parsed);
@@ -154,7 +145,7 @@ impl<'f> Description<'f> {
             integrator: integrator(&mut root)?,
             geometry: geometry(&mut root, formats)?,
             materials: materials(&mut root, formats)?,
-            lights: lights(&mut root)?,
+            lights: lights(&mut root, readers)?,
             environment: environment(&mut root)?,
         };
         root.finish()?;
@@ -409,76 +400,29 @@ fn file_value(
     })
 }
 
-fn lights(root: &mut Table) -> Result<Vec<LightSpec>, SceneError> {
+fn lights(root: &mut Table, readers: &[LightReader]) -> Result<Vec<LightSpec>, SceneError> {
     let Some(value) = root.get("lights") else {
         return Ok(Vec::new());
     };
     let light = |mut table: Table| {
         let kind = table.require("kind")?;
         let group = group(&mut table)?;
-        let light = match kind.string()? {
-            "quad" => quad(&mut table)?,
-            "distant" => LightSpec {
-                light: Light::Distant(distant(&mut table)?),
-                corner: None,
-                group: None,
-            },
-            _ => return Err(kind.mismatch("\"quad\" or \"distant\"")),
+        let name = kind.string()?;
+        let Some(reader) = readers.iter().find(|reader| reader.kind == name) else {
+            let kinds = readers.iter().map(|reader| format!("{:?}", reader.kind));
+            let kinds: Vec<String> = kinds.collect();
+            return Err(kind.mismatch(&kinds.join(" or ")));
         };
+        let (light, place) = (reader.read)(&mut table)?;
         table.finish()?;
-        Ok(LightSpec { group, ..light })
+        let spec = LightSpec {
+            light,
+            place,
+            group,
+        };
+        Ok(spec)
     };
     value.tables("lights")?.into_iter().map(light).collect()
-}
-
-fn quad(table: &mut Table) -> Result<LightSpec, SceneError> {
-    let corner = table.require("corner")?.place()?;
-    let quad = QuadLight {
-        corner: Vec3::ZERO,
-        u: table.require("u")?.vector()?,
-        v: table.require("v")?.vector()?,
-        radiance: table.require("radiance")?.rgb()?,
-        two_sided: optional(table, "two_sided", Value::boolean, false)?,
-        sample: optional(table, "sample", Value::boolean, true)?,
-    };
-    let corners = [
-        quad.corner,
-        quad.corner + quad.u,
-        quad.corner + quad.u + quad.v,
-    ];
-    if !super::mesh::has_area(&corners) {
-        return Err(table
-            .error("the quad light has no area")
-            .hint("its edges `u` and `v` must not be zero or parallel"));
-    }
-    Ok(LightSpec {
-        light: Light::Quad(quad),
-        corner: Some(corner),
-        group: None,
-    })
-}
-
-fn distant(table: &mut Table) -> Result<DistantLight, SceneError> {
-    let hint = "the direction from the scene towards the light";
-    let direction = table.require("to_light").map_err(|e| e.or_hint(hint))?;
-    let to_light = direction.vector()?.as_dvec3().normalize_or_zero().as_vec3();
-    if to_light == Vec3::ZERO {
-        return Err(direction.mismatch("a direction that is not zero"));
-    }
-    let angle =
-        |v: &Value| v.float_where("degrees from 0 to below 180", |v| (0.0..180.0).contains(&v));
-    let light = DistantLight {
-        to_light,
-        irradiance: table.require("irradiance")?.rgb()?,
-        angle: optional(table, "angle", angle, 0.0)?,
-        sample: optional(table, "sample", Value::boolean, true)?,
-    };
-    if light.angle == 0.0 && !light.sample {
-        return Err(table
-            .error("a distant light of a single direction is not sampled, so nothing would find it")
-            .hint("give it an `angle`, or leave `sample = false` out"));
-    }
-    Ok(light)
 }
 
 fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> {
@@ -505,7 +449,7 @@ fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> 
 }
 
 /// The value of an optional key as `read` reads it, or `default`.
-pub(super) fn optional<'d, T>(
+pub(crate) fn optional<'d, T>(
     table: &mut Table<'d>,
     key: &'static str,
     read: impl Fn(&Value<'d>) -> Result<T, SceneError>,

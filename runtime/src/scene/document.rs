@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 use crate::error::SceneError;
 
 /// The text of a TOML file.
-pub(super) struct Document<'d> {
+pub(crate) struct Document<'d> {
     path: &'d Path,
     text: &'d str,
 }
@@ -42,7 +42,7 @@ impl<'d> Document<'d> {
 }
 
 /// A table whose keys are taken one by one; [`Table::finish`] refuses the rest.
-pub(super) struct Table<'d> {
+pub(crate) struct Table<'d> {
     document: &'d Document<'d>,
     /// The table in words, such as `[camera]`.
     name: String,
@@ -76,19 +76,19 @@ impl<'d> Table<'d> {
     }
 
     /// An error about the table as a whole.
-    pub(super) fn error(&self, message: impl Into<String>) -> SceneError {
+    pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.place.clone(), message)
     }
 
     /// The value of an optional key.
-    pub(super) fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
+    pub(crate) fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
         self.asked.push(key);
         let item = self.entries.get(key)?;
         Some(self.value(key, item))
     }
 
     /// The value of a key that must be there.
-    pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'d>, SceneError> {
+    pub(crate) fn require(&mut self, key: &'static str) -> Result<Value<'d>, SceneError> {
         if let Some(value) = self.get(key) {
             return Ok(value);
         }
@@ -142,7 +142,7 @@ impl<'d> Table<'d> {
 }
 
 /// One value with its place.
-pub(super) struct Value<'d> {
+pub(crate) struct Value<'d> {
     document: &'d Document<'d>,
     /// The value in words, such as `` `fov` of [camera] ``.
     name: String,
@@ -151,12 +151,12 @@ pub(super) struct Value<'d> {
 
 impl<'d> Value<'d> {
     /// An error at the value.
-    pub(super) fn error(&self, message: impl Into<String>) -> SceneError {
+    pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.item.span(), message)
     }
 
     /// `` `fov` of [camera] must be ..., but it is ... ``
-    pub(super) fn mismatch(&self, expected: &str) -> SceneError {
+    pub(crate) fn mismatch(&self, expected: &str) -> SceneError {
         let found = &self.document.text[self.item.span()];
         let shown: String = found.chars().take(40).take_while(|c| *c != '\n').collect();
         let more = if shown.len() < found.len() { "..." } else { "" };
@@ -170,18 +170,18 @@ impl<'d> Value<'d> {
         self.item.get_ref()
     }
 
-    pub(super) fn string(&self) -> Result<&'d str, SceneError> {
+    pub(crate) fn string(&self) -> Result<&'d str, SceneError> {
         let text = self.item().as_str();
         text.ok_or_else(|| self.mismatch("a string in quotes"))
     }
 
-    pub(super) fn boolean(&self) -> Result<bool, SceneError> {
+    pub(crate) fn boolean(&self) -> Result<bool, SceneError> {
         let value = self.item().as_bool();
         value.ok_or_else(|| self.mismatch("true or false"))
     }
 
     /// An integer in `range`.
-    pub(super) fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
+    pub(crate) fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
         let (low, high) = (range.start(), range.end());
         let value = self.item().as_integer().and_then(|i| {
             let value = u32::from_str_radix(i.as_str(), i.radix()).ok()?;
@@ -191,13 +191,13 @@ impl<'d> Value<'d> {
     }
 
     /// A finite number.
-    pub(super) fn float(&self) -> Result<f32, SceneError> {
+    pub(crate) fn float(&self) -> Result<f32, SceneError> {
         let value = number(self.item()).map(|v| v as f32);
         value.ok_or_else(|| self.mismatch("a finite number"))
     }
 
     /// A finite number for which `holds`.
-    pub(super) fn float_where(
+    pub(crate) fn float_where(
         &self,
         expected: &str,
         holds: impl Fn(f32) -> bool,
@@ -209,19 +209,19 @@ impl<'d> Value<'d> {
     }
 
     /// Three finite numbers.
-    pub(super) fn vector(&self) -> Result<Vec3, SceneError> {
+    pub(crate) fn vector(&self) -> Result<Vec3, SceneError> {
         Ok(self.place()?.as_vec3())
     }
 
     /// Three finite numbers that say where something is. Single precision would lose what is small
     /// against its distance from the origin.
-    pub(super) fn place(&self) -> Result<DVec3, SceneError> {
+    pub(crate) fn place(&self) -> Result<DVec3, SceneError> {
         let place: [f64; 3] = self.array("three finite numbers, as [x, y, z]")?;
         Ok(place.into())
     }
 
     /// Linear RGB, not negative: three numbers, or one for a grey.
-    pub(super) fn rgb(&self) -> Result<Vec3, SceneError> {
+    pub(crate) fn rgb(&self) -> Result<Vec3, SceneError> {
         let rgb = match number(self.item()) {
             Some(grey) => Some([grey; 3]),
             None => numbers(self.item()).and_then(|v| v.try_into().ok()),

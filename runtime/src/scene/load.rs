@@ -9,34 +9,31 @@ use rayon::prelude::*;
 use super::assemble::assemble;
 use super::description::{Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec};
 use super::document::Document;
-use super::formats::{FORMATS, Format, Geometry};
-use super::{Environment, EnvironmentMap, EnvironmentSource, Scene};
+use super::formats::{Format, Geometry};
+use super::{Environment, EnvironmentMap, EnvironmentSource, LightReader, Scene};
 use crate::error::SceneError;
 use crate::image_file;
 
 /// Texels of the largest environment map.
 const MAX_ENVIRONMENT: usize = 8192 * 4096;
 
-/// Reads a scene file and the geometry and environment that it names.
+/// Reads a scene file and the geometry and environment that it names. Its geometry is of some of the
+/// `formats`, and the kinds of its lights are those that `lights` read.
 ///
 /// Materials and their textures are only named: compiling the former tells the latter.
 ///
 /// # Errors
 /// The first thing that is wrong, with its place.
-pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_with(path, FORMATS)
-}
-
-/// [`load`] for scenes whose geometry is of other formats than [`FORMATS`].
-///
-/// # Errors
-/// As those of [`load`].
-pub fn load_with(path: &Path, formats: &[Format]) -> Result<Scene, SceneError> {
+pub fn load_with(
+    path: &Path,
+    formats: &[Format],
+    lights: &[LightReader],
+) -> Result<Scene, SceneError> {
     let text = std::fs::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
     let text = String::from_utf8(text)
         .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
-    let description = Description::read(&Document::new(path, &text), formats)?;
+    let description = Description::read(&Document::new(path, &text), formats, lights)?;
     let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let mut warnings = Vec::new();
     let sources = load_sources(&base, &description.geometry)?;

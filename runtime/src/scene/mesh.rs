@@ -5,13 +5,13 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::formats::{Geometry, Triangle};
-use super::{QuadLight, Transform};
+use super::{Light, Transform};
 use crate::error::SceneError;
 
 /// Most triangles that are stored: what a binding of 4 GiB holds.
 pub(crate) const MAX_TRIANGLES: usize = (u32::MAX / 48) as usize;
 
-/// Material of a triangle that has none: the geometry of a quad light.
+/// Material of a triangle that has none: the geometry of a light.
 pub const NO_MATERIAL: u32 = u32::MAX;
 
 /// Largest coordinate in metres: products of three still fit a float.
@@ -32,7 +32,7 @@ pub struct Mesh {
     /// Index into [`super::Scene::materials`], or [`NO_MATERIAL`]; of an object, an index into
     /// [`super::Placement::materials`].
     pub materials: Vec<u32>,
-    /// Index into [`super::Scene::lights`] of the quad light it belongs to.
+    /// Index into [`super::Scene::lights`] of the light it belongs to.
     pub lights: Vec<Option<u32>>,
     /// Which object it is of: an index into the names of [`super::Labels`]; of an object's mesh one into the parts of
     /// the object. Empty if nobody knows.
@@ -68,20 +68,17 @@ impl Mesh {
         }
     }
 
-    /// Adds the two triangles of the quad light numbered `index`: corner, end of u, opposite
-    /// corner, and corner, opposite corner, end of v.
-    pub(super) fn push_quad(&mut self, quad: &QuadLight, index: u32, object: u32) {
-        let QuadLight { corner, u, v, .. } = *quad;
-        let opposite = corner + u + v;
-        for positions in [
-            [corner, corner + u, opposite],
-            [corner, opposite, corner + v],
-        ] {
+    /// Adds the triangles of the light numbered `index`, which are those of `object`. Whether it has any.
+    pub(super) fn push_light(&mut self, light: &Light, index: u32, object: u32) -> bool {
+        let triangles = light.triangles();
+        let has_any = !triangles.is_empty();
+        for positions in triangles {
             self.push(positions, None, [Vec2::ZERO; 3], [NO_MATERIAL, object]);
             if let Some(light) = self.lights.last_mut() {
                 *light = Some(index);
             }
         }
+        has_any
     }
 
     /// Adds the triangles of the geometry file at `path`, whose materials have the indices `materials` and which are
@@ -242,7 +239,7 @@ impl std::ops::AddAssign for Repairs {
 }
 
 /// Does the triangle have an area that single precision can tell from none, and so a normal?
-pub(super) fn has_area([a, b, c]: &[Vec3; 3]) -> bool {
+pub(crate) fn has_area([a, b, c]: &[Vec3; 3]) -> bool {
     let (e1, e2) = ((*b - *a).as_dvec3(), (*c - *a).as_dvec3());
     let longest = e1.abs().max_element().max(e2.abs().max_element());
     longest > f64::from(f32::MIN_POSITIVE) && (e1 / longest).cross(e2 / longest).length() > 1e-7

@@ -16,15 +16,20 @@ mod description;
 mod document;
 pub mod formats;
 mod labels;
+mod lights;
 mod load;
 mod mesh;
 mod origin;
 mod placements;
 mod transform;
 
+pub(crate) use description::optional;
+pub(crate) use document::{Table, Value};
 pub use labels::Labels;
-pub use load::{load, load_with};
-pub(crate) use mesh::MAX_TRIANGLES;
+pub(crate) use lights::ReadLight;
+pub use lights::{Light, LightReader, SceneLight};
+pub use load::load_with;
+pub(crate) use mesh::{MAX_TRIANGLES, has_area};
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use transform::Transform;
 
@@ -51,7 +56,7 @@ pub struct Scene {
     pub film: FilmSettings,
     /// How long paths get.
     pub integrator: Integrator,
-    /// The triangles that are not part of an object, those of quad lights included.
+    /// The triangles that are not part of an object, those of lights included.
     pub mesh: Mesh,
     /// Meshes that are stored once and placed any number of times.
     pub objects: Vec<Object>,
@@ -59,7 +64,7 @@ pub struct Scene {
     pub placements: Vec<Placement>,
     /// The materials that triangles use, in order of first use.
     pub materials: Vec<MaterialBinding>,
-    /// Quad and distant lights in the order of the file.
+    /// The lights of `[[lights]]` in the order of the file.
     pub lights: Vec<Light>,
     /// What surrounds everything.
     pub environment: Option<Environment>,
@@ -146,48 +151,6 @@ pub struct MaterialBinding {
     pub params: Vec<(String, ParameterValue)>,
     /// Is it compiled to code of its own, with its parameters as constants?
     pub bake: bool,
-}
-
-/// A light that is neither a surface with an emissive material nor the environment.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Light {
-    /// A parallelogram that emits and reflects nothing.
-    Quad(QuadLight),
-    /// A light so far away that it shines from one direction.
-    Distant(DistantLight),
-}
-
-/// A parallelogram that emits the same radiance in all directions of its front side.
-///
-/// Its two triangles are in the mesh with [`NO_MATERIAL`]; paths end on it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct QuadLight {
-    /// One corner, in metres.
-    pub corner: Vec3,
-    /// Edge from the corner.
-    pub u: Vec3,
-    /// The other edge from the corner; the front side is where `u x v` points.
-    pub v: Vec3,
-    /// Emitted radiance, linear RGB, W/(m^2 sr).
-    pub radiance: Vec3,
-    /// Does the back emit as well?
-    pub two_sided: bool,
-    /// Do light samples pick points on it, or is it only found by chance?
-    pub sample: bool,
-}
-
-/// A light at infinity, of uniform radiance over a disc of directions.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DistantLight {
-    /// Unit direction towards the light.
-    pub to_light: Vec3,
-    /// Irradiance on a surface that faces it, linear RGB, W/m^2.
-    pub irradiance: Vec3,
-    /// Angular diameter in degrees, below 180; 0 is a single direction.
-    pub angle: f32,
-    /// Do light samples pick directions in it, or is it only found by chance? A single direction
-    /// is always sampled.
-    pub sample: bool,
 }
 
 /// Radiance that comes from infinitely far away in all directions.

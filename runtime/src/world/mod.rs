@@ -8,6 +8,7 @@ pub mod bvh;
 pub mod camera;
 pub mod first_hit;
 pub mod lights;
+mod load;
 pub mod media;
 pub(crate) mod needs;
 pub mod outputs;
@@ -17,6 +18,7 @@ mod split;
 pub mod surface;
 pub mod texture;
 
+pub use load::load;
 pub use parts::{KernelParts, SceneParts};
 pub use placed::Placed;
 pub use split::{GeometryCounts, Split};

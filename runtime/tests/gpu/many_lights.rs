@@ -65,7 +65,8 @@ fn render(side: usize) -> Rendering {
     ] {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let scene = impasto_runtime::world::load(&folder.path().join("scene.toml"))
+        .unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(scene.mesh.len(), 2 * side * side + 2);
     let mut files = MemoryLoader::default();
     files.add("m.impasto", MATERIALS);

@@ -75,7 +75,8 @@ fn load(toml: &str, outputs: &[&str]) -> (Scene, Program) {
     ] {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let scene = impasto_runtime::world::load(&folder.path().join("scene.toml"))
+        .unwrap_or_else(|e| panic!("{e}"));
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
         material: binding.material.clone(),
         params: binding.params.clone(),

@@ -104,7 +104,8 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     for (name, text) in files.iter().chain(more) {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let scene = scene::load(&folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let scene = impasto_runtime::world::load(&folder.path().join("scene.toml"))
+        .unwrap_or_else(|e| panic!("{e}"));
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
         name: binding.name.clone(),
         file: binding.file.clone(),

@@ -4,11 +4,13 @@
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::{
-    Camera, DistantLight, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator,
-    Light, Mesh, NO_MATERIAL, QuadLight, Scene,
+    Camera, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator, Light, Mesh,
+    NO_MATERIAL, Scene,
 };
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::KernelParts;
+use impasto_runtime::world::lights::distant::DistantLight;
+use impasto_runtime::world::lights::quad::QuadLight;
 
 use super::worlds::kernel_parts;
 use super::{Random, Row, floats, row, run};
@@ -71,7 +73,7 @@ pub(crate) fn push_quad(scene: &mut Scene, quad: QuadLight) {
         scene.mesh.lights.pop();
         scene.mesh.lights.push(Some(index));
     }
-    scene.lights.push(Light::Quad(quad));
+    scene.lights.push(Light::new(quad));
 }
 
 pub(crate) fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3], radiance: f32) -> QuadLight {
@@ -112,7 +114,7 @@ pub(crate) fn map_scene(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec
 }
 
 pub(crate) fn distant(to_light: [f32; 3], irradiance: f32, angle: f32) -> Light {
-    Light::Distant(DistantLight {
+    Light::new(DistantLight {
         to_light: Vec3::from(to_light).normalize(),
         irradiance: Vec3::splat(irradiance),
         angle,

@@ -78,7 +78,7 @@ fn scene(text: &str, files: &[(&str, &str)], formats: &[Format]) -> Result<Scene
         std::fs::write(folder.path().join(name), text).expect("it is written");
     }
     let path: PathBuf = folder.path().join("scene.toml");
-    load_with(&path, formats)
+    load_with(&path, formats, &[])
 }
 
 const OBJ: &str = "v 0 0 0\nv 2 0 0\nv 0 2 0\nusemtl red\nf 1 2 3\n";

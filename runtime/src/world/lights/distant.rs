@@ -2,20 +2,78 @@
 
 use std::f64::consts::PI;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use super::{Context, Kind, Piece, Sampled, Source, luminance};
-use crate::scene::{DistantLight, Light};
+use super::table::Share;
+use super::{Context, Kind, LightKind, Piece, Sampled, Source, luminance};
+use crate::error::SceneError;
+use crate::scene::{Light, SceneLight, Table, Value, optional};
 use crate::wgsl;
 use crate::wgsl::template::template;
-use crate::world::needs::Need;
+use crate::world::needs::{Need, Needs};
 
-pub(super) fn kind<'a>(context: &Context<'a>, first: u32) -> Option<Kind> {
-    let shining = |(index, light): (usize, &'a Light)| match light {
-        Light::Distant(distant) if luminance(distant.irradiance) > 0.0 => {
-            Some((Source::Light(index as u32), distant))
-        }
-        _ => None,
+/// The kind.
+pub(super) const KIND: LightKind = LightKind {
+    name: "distant",
+    needs: &[],
+    read: Some(read),
+    sample: "sample_distant_light",
+    hit: None,
+    escape: Some("distant_light_escape"),
+    share: Some(Share {
+        function: "distant_light_share",
+        wgsl: template!("distant_groups.wgsl"),
+        first: "FIRST_DISTANT_LIGHT",
+        count: "DISTANT_LIGHTS",
+    }),
+    present,
+    absent,
+};
+
+/// A light at infinity, of uniform radiance over a disc of directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistantLight {
+    /// Unit direction towards the light.
+    pub to_light: Vec3,
+    /// Irradiance on a surface that faces it, linear RGB, W/m^2.
+    pub irradiance: Vec3,
+    /// Angular diameter in degrees, below 180; 0 is a single direction.
+    pub angle: f32,
+    /// Do light samples pick directions in it, or is it only found by chance? A single direction
+    /// is always sampled.
+    pub sample: bool,
+}
+
+impl SceneLight for DistantLight {}
+
+fn read(table: &mut Table) -> Result<(Light, Option<DVec3>), SceneError> {
+    let hint = "the direction from the scene towards the light";
+    let direction = table.require("to_light").map_err(|e| e.or_hint(hint))?;
+    let to_light = direction.vector()?.as_dvec3().normalize_or_zero().as_vec3();
+    if to_light == Vec3::ZERO {
+        return Err(direction.mismatch("a direction that is not zero"));
+    }
+    let angle =
+        |v: &Value| v.float_where("degrees from 0 to below 180", |v| (0.0..180.0).contains(&v));
+    let light = DistantLight {
+        to_light,
+        irradiance: table.require("irradiance")?.rgb()?,
+        angle: optional(table, "angle", angle, 0.0)?,
+        sample: optional(table, "sample", Value::boolean, true)?,
+    };
+    if light.angle == 0.0 && !light.sample {
+        return Err(table
+            .error("a distant light of a single direction is not sampled, so nothing would find it")
+            .hint("give it an `angle`, or leave `sample = false` out"));
+    }
+    Ok((Light::new(light), None))
+}
+
+fn present(context: &Context, first: u32) -> Option<Kind> {
+    let shining = |(index, light)| {
+        let light: &DistantLight = Light::get(light)?;
+        let shines = luminance(light.irradiance) > 0.0;
+        shines.then_some((Source::Light(index as u32), light))
     };
     let lights = context.scene.lights.iter().enumerate().filter_map(shining);
     let (sources, lights): (Vec<Source>, Vec<&DistantLight>) = lights.unzip();
@@ -40,31 +98,27 @@ pub(super) fn kind<'a>(context: &Context<'a>, first: u32) -> Option<Kind> {
     (!lights.is_empty()).then(|| Kind {
         rows: rows.into_iter().flatten().collect(),
         lights: sampled.collect(),
-        wgsl: text(&lights, first),
-        ..empty(is_disc)
+        ..kind(is_disc, &lights, first)
     })
 }
 
-/// The kind without a light; its code has one that is black, and not in the table. What is no disc, but a single
-/// direction, is never met by chance.
-pub(super) fn empty(is_disc: bool) -> Kind {
+/// The code has a light that is black, and not in the table.
+fn absent(needs: Needs) -> Kind {
     let black = DistantLight {
         to_light: Vec3::Y,
         irradiance: Vec3::ZERO,
         angle: 1.0,
         sample: true,
     };
+    kind(needs.has(Need::DiscLights), &[&black], 0)
+}
+
+/// The kind with code for `lights`. What is no disc, but a single direction, is never met by chance.
+fn kind(is_disc: bool, lights: &[&DistantLight], first: u32) -> Kind {
     Kind {
-        serves: &[Need::DirectionalLights, Need::DiscLights],
-        idle: false,
-        rows: Vec::new(),
-        lights: Vec::new(),
-        wgsl: text(&[&black], 0),
-        buffers: Vec::new(),
-        sample: "sample_distant_light",
-        hit: None,
-        escape: is_disc.then_some("distant_light_escape"),
-        chooses: false,
+        wgsl: text(lights, first),
+        escape: KIND.escape.filter(|_| is_disc),
+        ..Kind::of(&KIND)
     }
 }
 

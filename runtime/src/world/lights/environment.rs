@@ -7,14 +7,27 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::alias::PackedAlias;
-use super::{Context, Kind, Piece, Sampled, luminance};
+use super::{Context, Kind, LightKind, Piece, Sampled, luminance};
 use crate::scene::{Environment, EnvironmentMap, EnvironmentSource};
 use crate::wgsl;
 use crate::wgsl::BufferData;
 use crate::wgsl::template::template;
-use crate::world::needs::Need;
+use crate::world::needs::{Need, Needs};
 
-pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
+/// The kind.
+pub(super) const KIND: LightKind = LightKind {
+    name: "environment",
+    needs: &[],
+    read: None,
+    sample: "sample_environment",
+    hit: None,
+    escape: Some("environment_escape"),
+    share: None,
+    present,
+    absent,
+};
+
+fn present(context: &Context, first: u32) -> Option<Kind> {
     let environment = context.scene.environment.as_ref()?;
     match &environment.source {
         EnvironmentSource::Uniform(radiance) => uniform(context, environment, *radiance, first),
@@ -22,26 +35,10 @@ pub(super) fn kind(context: &Context, first: u32) -> Option<Kind> {
     }
 }
 
-/// A kind without lights.
-fn without_lights(serves: &'static [Need], wgsl: Vec<Piece>) -> Kind {
-    Kind {
-        serves,
-        idle: false,
-        rows: Vec::new(),
-        lights: Vec::new(),
-        wgsl,
-        buffers: Vec::new(),
-        sample: "sample_environment",
-        hit: None,
-        escape: Some("environment_escape"),
-        chooses: false,
-    }
-}
-
 /// The kind with its one light, if sampled, of `irradiance` W/m^2 summed over all directions.
 fn environment_kind(
     context: &Context,
-    (need, what): (&'static [Need; 1], &str),
+    (need, what): (Need, &str),
     irradiance: Option<f64>,
     wgsl: Vec<Piece>,
 ) -> Kind {
@@ -50,35 +47,37 @@ fn environment_kind(
         ..Sampled::default()
     });
     Kind {
-        rows: vec![(need[0], what.to_owned())],
+        rows: vec![(need, what.to_owned())],
         lights: sampled.into_iter().collect(),
-        ..without_lights(need, wgsl)
+        wgsl,
+        ..Kind::of(&KIND)
     }
 }
 
-const UNIFORM: (&[Need; 1], &str) = (
-    &[Need::UniformEnvironment],
+const UNIFORM: (Need, &str) = (
+    Need::UniformEnvironment,
     "`[environment]` has the same color everywhere",
 );
-const MAP: (&[Need; 1], &str) = (&[Need::EnvironmentMap], "`[environment]` names a picture");
+const MAP: (Need, &str) = (Need::EnvironmentMap, "`[environment]` names a picture");
 
-/// The kind of a black environment that is not in the table of lights.
-pub(super) fn empty_uniform() -> Kind {
-    without_lights(UNIFORM.0, uniform_text(Vec3::ZERO, 0))
-}
-
-/// The same with a picture of one texel.
-pub(super) fn empty_map() -> Kind {
+/// A black environment that is not in the table of lights: a picture of one texel, or one of one color.
+fn absent(needs: Needs) -> Kind {
+    if !needs.has(Need::EnvironmentMap) {
+        return Kind {
+            wgsl: uniform_text(Vec3::ZERO, 0),
+            ..Kind::of(&KIND)
+        };
+    }
     let map = EnvironmentMap {
         width: 1,
         height: 1,
         texels: vec![Vec3::ZERO],
     };
     let table = Importance::new(&map);
-    let text = sampled_map_text(&map, 0.0, 0);
     Kind {
+        wgsl: sampled_map_text(&map, 0.0, 0),
         buffers: map_buffers(&map, &table),
-        ..without_lights(MAP.0, text)
+        ..Kind::of(&KIND)
     }
 }
 

@@ -1,16 +1,15 @@
 //! Groups of lights: tables that say which output of the film records the light of what.
 
+use super::table::Share;
 use super::{Kinds, Source};
 use crate::film::layers::Layers;
 use crate::film::outputs::{At, DEFAULT_GROUP, group_of};
 use crate::scene::Scene;
 use crate::wgsl;
-use crate::wgsl::template::{Flag, template};
+use crate::wgsl::template::{Flag, Template};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::needs::Needs;
 
-/// What adds up the light of discs, which have groups each.
-const DISCS: &str = "distant_light_escape";
 /// Light of which no output is asked for.
 const NOWHERE: u32 = u32::MAX;
 
@@ -36,8 +35,8 @@ pub(crate) fn names(scene: &Scene, emits: impl Fn(usize) -> bool) -> Vec<String>
 pub(crate) struct Groups {
     pub(crate) buffers: Vec<BufferData>,
     constants: String,
-    /// Are there discs in the sky?
-    discs: bool,
+    /// What tells lights at infinity apart.
+    shares: Vec<Template>,
     escape: String,
 }
 
@@ -45,10 +44,8 @@ impl Groups {
     /// The functions, for kernels with some needs.
     pub(crate) fn written(&self, needs: Needs) -> ShaderPart {
         let mut wgsl = self.constants.clone() + include_str!("groups.wgsl");
-        if self.discs {
-            let flags: Vec<Flag> = needs.flags().collect();
-            wgsl += &template!("distant_groups.wgsl").wgsl(&flags);
-        }
+        let flags: Vec<Flag> = needs.flags().collect();
+        wgsl.extend(self.shares.iter().map(|share| share.wgsl(&flags)));
         ShaderPart {
             wgsl: wgsl + &self.escape,
             buffers: self.buffers.clone(),
@@ -83,7 +80,7 @@ impl Kinds {
         let instances: Vec<u32> = instances.collect();
         Some(Groups {
             constants: wgsl::constant_u32("GROUPED_LIGHTS", lights.len() as u32),
-            discs: self.0.iter().any(|kind| kind.escape == Some(DISCS)),
+            shares: self.escaping().filter_map(|(_, s)| Some(s?.wgsl)).collect(),
             escape: self.escape(environment),
             buffers: vec![
                 BufferData::new("light_groups", "array<u32>", &never_empty(lights)),
@@ -92,14 +89,28 @@ impl Kinds {
         })
     }
 
+    /// The functions of kinds at infinity, with what tells their lights apart.
+    fn escaping(&self) -> impl Iterator<Item = (&'static str, Option<Share>)> {
+        let kinds = self.0.iter();
+        kinds.filter_map(|kind| Some((kind.escape?, kind.share)))
+    }
+
     /// Records what arrives from infinity, the environment and every disc for itself.
     fn escape(&self, environment: u32) -> String {
         let mut body = String::new();
-        for escape in self.0.iter().filter_map(|kind| kind.escape) {
-            if escape == DISCS {
-                body += "    for (var i = 0u; i < DISTANT_LIGHTS; i += 1u) {\n        \
-                         let light = distant_light_share(i, direction, bsdf_pdf);\n        \
-                         record_light(pixel, light_group(FIRST_DISTANT_LIGHT + i), throughput * light);\n    }\n";
+        for (escape, share) in self.escaping() {
+            if let Some(Share {
+                function,
+                first,
+                count,
+                ..
+            }) = share
+            {
+                body += &format!(
+                    "    for (var i = 0u; i < {count}; i += 1u) {{\n        \
+                     let light = {function}(i, direction, bsdf_pdf);\n        \
+                     record_light(pixel, light_group({first} + i), throughput * light);\n    }}\n"
+                );
             } else {
                 body += &format!(
                     "    record_light(pixel, {environment}u, throughput * {escape}(direction, bsdf_pdf));\n"

@@ -3,11 +3,24 @@
 use glam::Vec3;
 use impasto_compiler::abi::Emission;
 
-use super::{Context, Kind, Piece, Sampled, Source, area, luminance};
+use super::{Context, Kind, LightKind, Piece, Sampled, Source, area, luminance};
 use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
-pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
+/// The kind.
+pub(super) const KIND: LightKind = LightKind {
+    name: "mesh",
+    needs: &[],
+    read: None,
+    sample: "sample_mesh_light",
+    hit: Some("mesh_light_hit"),
+    escape: None,
+    share: None,
+    present,
+    absent: |_| without_lights(),
+};
+
+fn present(context: &Context, _first: u32) -> Option<Kind> {
     let mesh = context.mesh;
     let lights: Vec<Sampled> = (0..mesh.len())
         .filter_map(|triangle| {
@@ -39,22 +52,13 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
     (!lights.is_empty()).then(|| Kind {
         rows: rows.into_iter().collect(),
         lights,
-        ..empty()
+        ..without_lights()
     })
 }
 
-/// The kind without a light.
-pub(super) fn empty() -> Kind {
+fn without_lights() -> Kind {
     Kind {
-        serves: &[Need::MeshLights],
-        idle: false,
-        rows: Vec::new(),
-        lights: Vec::new(),
         wgsl: vec![Piece::File(template!("mesh.wgsl"))],
-        buffers: Vec::new(),
-        sample: "sample_mesh_light",
-        hit: Some("mesh_light_hit"),
-        escape: None,
-        chooses: false,
+        ..Kind::of(&KIND)
     }
 }

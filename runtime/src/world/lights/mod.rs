@@ -1,7 +1,7 @@
 //! Every kind of light as one shader part: a table to choose a light from, and what each kind
 //! contributes to a light sample, a hit and an escaping ray.
 //!
-//! A kind is a file here, a file in `kernels/lights` and a row in `KINDS`. Kinds that a scene
+//! A kind is a file here, its WGSL beside it and a row of the table in `table.rs`. Kinds that a scene
 //! lacks leave no trace in its WGSL.
 
 use glam::Vec3;
@@ -16,20 +16,21 @@ use crate::world::media::Media;
 use crate::world::needs::{LightTraits, Need, Needs};
 
 mod alias;
-mod distant;
+pub mod distant;
 mod environment;
 pub(crate) mod groups;
 mod mesh;
-mod quad;
+pub mod quad;
+pub(crate) mod table;
+#[cfg(test)]
+mod tests;
+
+pub use table::{LIGHT_KINDS, LightKind, readers, sample_functions};
 
 use alias::WordAlias;
 
 /// Index in the light table of triangles that are no sampled light: beyond any table.
 pub const NO_LIGHT: u32 = u32::MAX;
-
-/// Every kind of light, in the order of the light table.
-const KINDS: [fn(&Context, u32) -> Option<Kind>; 4] =
-    [mesh::kind, quad::kind, distant::kind, environment::kind];
 
 /// What lights a scene, of which text is written once it is known what of it is needed.
 #[derive(Clone, Debug)]
@@ -51,7 +52,7 @@ impl Lights {
     /// The part with the functions that `needs` asks for; needs the surface part and [`mis`].
     pub(super) fn written(&self, needs: Needs) -> ShaderPart {
         match self {
-            Lights::OfScene(kinds) => kinds.written(needs),
+            Lights::OfScene(kinds) => kinds.written(LIGHT_KINDS, needs),
             Lights::ByHand { part, .. } => part.clone(),
         }
     }
@@ -148,8 +149,6 @@ impl<'a> Context<'a> {
 /// One kind of light as a scene has it.
 #[derive(Clone, Debug)]
 struct Kind {
-    /// The rows of the table of needs that its code is for.
-    serves: &'static [Need],
     /// Is its code there in vain?
     idle: bool,
     /// The rows that its lights are, and which of them they are.
@@ -159,15 +158,31 @@ struct Kind {
     /// The kind's functions and constants.
     wgsl: Vec<Piece>,
     buffers: Vec<BufferData>,
-    /// `fn NAME(pick: LightPick, position: vec3<f32>) -> LightSample`
+    /// The functions, as [`LightKind`] names them.
     sample: &'static str,
-    /// `fn NAME(light: u32, primitive: u32, t: f32, direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`,
-    /// for lights with a surface.
     hit: Option<&'static str>,
-    /// `fn NAME(direction: vec3<f32>, bsdf_pdf: f32) -> vec3<f32>`, for lights at infinity.
     escape: Option<&'static str>,
+    share: Option<table::Share>,
     /// Is there more to choose in one of its lights?
     chooses: bool,
+}
+
+impl Kind {
+    /// A kind without lights and text.
+    fn of(kind: &LightKind) -> Kind {
+        Kind {
+            idle: false,
+            rows: Vec::new(),
+            lights: Vec::new(),
+            wgsl: Vec::new(),
+            buffers: Vec::new(),
+            sample: kind.sample,
+            hit: kind.hit,
+            escape: kind.escape,
+            share: kind.share,
+            chooses: false,
+        }
+    }
 }
 
 /// A piece of a kind's text.
@@ -238,9 +253,14 @@ impl Kinds {
         media: &Media,
     ) -> Kinds {
         let context = Context::new(scene, mesh, bounds, order, instances, media);
+        Kinds::of(LIGHT_KINDS, &context)
+    }
+
+    /// Those of the kinds in `table` that there are lights of.
+    fn of(table: &[LightKind], context: &Context) -> Kinds {
         let mut kinds = Kinds::default();
-        for kind in KINDS {
-            kinds.0.extend(kind(&context, kinds.count()));
+        for kind in table {
+            kinds.0.extend((kind.present)(context, kinds.count()));
         }
         kinds
     }
@@ -283,27 +303,18 @@ impl Kinds {
         }
     }
 
-    /// The part with the functions that `needs` asks for. Kinds that it asks for in vain have their code and
-    /// no light.
-    fn written(&self, needs: Needs) -> ShaderPart {
-        let has = |kind: &Kind| self.0.iter().any(|k| k.sample == kind.sample);
-        let idle = empty_kinds(needs).into_iter();
-        let idle = idle.filter(|k| needs.any(k.serves) && !has(k));
-        let idle = idle.map(|kind| Kind { idle: true, ..kind });
+    /// The part with the functions that `needs` asks for. Kinds in `table` that it asks for in vain have their
+    /// code and no light.
+    fn written(&self, table: &[LightKind], needs: Needs) -> ShaderPart {
+        let has = |kind: &LightKind| self.0.iter().any(|k| k.sample == kind.sample);
+        let idle = table.iter().filter(|k| needs.any(k.needs) && !has(k));
+        let idle = idle.map(|kind| Kind {
+            idle: true,
+            ..(kind.absent)(needs)
+        });
         let kinds: Vec<Kind> = self.0.iter().cloned().chain(idle).collect();
         part(&kinds, self.count(), needs)
     }
-}
-
-/// Every kind without a light, as `needs` asks for it.
-fn empty_kinds(needs: Needs) -> [Kind; 5] {
-    [
-        mesh::empty(),
-        quad::empty(),
-        distant::empty(needs.has(Need::DiscLights)),
-        environment::empty_map(),
-        environment::empty_uniform(),
-    ]
 }
 
 /// The part of some kinds, which have `count` lights.
@@ -334,7 +345,7 @@ fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
     part
 }
 
-/// Two rows of words a light; see `kernels/lights/select.wgsl`.
+/// Two rows of words a light; see `select.wgsl`.
 fn light_table(kinds: &[Kind]) -> BufferData {
     let weights = selection_weights(kinds);
     let alias = WordAlias::new(&weights);
@@ -414,9 +425,10 @@ fn hit_function(kinds: &[Kind]) -> String {
         end += kind.lights.len();
         if let Some(name) = kind.hit {
             let call = format!("{name}(light, primitive, t, direction, bsdf_pdf)");
-            let bound = match kind.idle {
-                true => NONE.to_owned(),
-                false => format!("{end}u"),
+            let bound = if kind.idle {
+                NONE.to_owned()
+            } else {
+                format!("{end}u")
             };
             text += &format!("    if light < {bound} {{ return {call}; }}\n");
         }

@@ -1,17 +1,88 @@
 //! Parallelograms that emit and reflect nothing.
 
-use super::{Context, Kind, Piece, Sampled, Source, luminance};
-use crate::scene::{Light, QuadLight};
+use glam::{DVec3, Vec3};
+
+use super::{Context, Kind, LightKind, Piece, Sampled, Source, luminance};
+use crate::error::SceneError;
+use crate::scene::{Light, SceneLight, Table, Value, has_area, optional};
 use crate::wgsl::template::template;
 use crate::world::needs::Need;
 
-pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
+/// The kind.
+pub(super) const KIND: LightKind = LightKind {
+    name: "quad",
+    needs: &[],
+    read: Some(read),
+    sample: "sample_quad_light",
+    hit: Some("quad_light_hit"),
+    escape: None,
+    share: None,
+    present,
+    absent: |_| without_lights(),
+};
+
+/// A parallelogram that emits the same radiance in all directions of its front side.
+///
+/// Its two triangles are in the mesh of the scene with [`crate::scene::NO_MATERIAL`]; paths end on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuadLight {
+    /// One corner, in metres.
+    pub corner: Vec3,
+    /// Edge from the corner.
+    pub u: Vec3,
+    /// The other edge from the corner; the front side is where `u x v` points.
+    pub v: Vec3,
+    /// Emitted radiance, linear RGB, W/(m^2 sr).
+    pub radiance: Vec3,
+    /// Does the back emit as well?
+    pub two_sided: bool,
+    /// Do light samples pick points on it, or is it only found by chance?
+    pub sample: bool,
+}
+
+impl SceneLight for QuadLight {
+    fn put_at(&mut self, place: Vec3) {
+        self.corner = place;
+    }
+
+    fn corners(&self, corner: DVec3) -> Vec<DVec3> {
+        let [u, v] = [self.u, self.v].map(|edge| edge.as_dvec3());
+        vec![corner, corner + u, corner + v, corner + u + v]
+    }
+
+    /// Corner, end of u, opposite corner, and corner, opposite corner, end of v.
+    fn triangles(&self) -> Vec<[Vec3; 3]> {
+        let QuadLight { corner, u, v, .. } = *self;
+        let opposite = corner + u + v;
+        vec![
+            [corner, corner + u, opposite],
+            [corner, opposite, corner + v],
+        ]
+    }
+}
+
+fn read(table: &mut Table) -> Result<(Light, Option<DVec3>), SceneError> {
+    let corner = table.require("corner")?.place()?;
+    let quad = QuadLight {
+        corner: Vec3::ZERO,
+        u: table.require("u")?.vector()?,
+        v: table.require("v")?.vector()?,
+        radiance: table.require("radiance")?.rgb()?,
+        two_sided: optional(table, "two_sided", Value::boolean, false)?,
+        sample: optional(table, "sample", Value::boolean, true)?,
+    };
+    if !has_area(&quad.triangles()[0]) {
+        return Err(table
+            .error("the quad light has no area")
+            .hint("its edges `u` and `v` must not be zero or parallel"));
+    }
+    Ok((Light::new(quad), Some(corner)))
+}
+
+fn present(context: &Context, _first: u32) -> Option<Kind> {
     let lights = context.scene.lights.iter().enumerate();
     let lights: Vec<Sampled> = lights
-        .filter_map(|(index, light)| match light {
-            Light::Quad(quad) => sampled(context, index as u32, quad),
-            _ => None,
-        })
+        .filter_map(|(index, light)| sampled(context, index as u32, light.get()?))
         .collect();
     let count = lights.len();
     let mut rows = vec![(
@@ -25,23 +96,14 @@ pub(super) fn kind(context: &Context, _first: u32) -> Option<Kind> {
     (!lights.is_empty()).then(|| Kind {
         rows,
         lights,
-        ..empty()
+        ..without_lights()
     })
 }
 
-/// The kind without a light.
-pub(super) fn empty() -> Kind {
+fn without_lights() -> Kind {
     Kind {
-        serves: &[Need::QuadLights, Need::TwoSidedLights],
-        idle: false,
-        rows: Vec::new(),
-        lights: Vec::new(),
         wgsl: vec![Piece::File(template!("quad.wgsl"))],
-        buffers: Vec::new(),
-        sample: "sample_quad_light",
-        hit: Some("quad_light_hit"),
-        escape: None,
-        chooses: false,
+        ..Kind::of(&KIND)
     }
 }
 

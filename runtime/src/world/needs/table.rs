@@ -3,6 +3,7 @@
 use super::{NeedInputs, Needs};
 use crate::film::outputs::{Ask, At};
 use crate::technique::{RayData, RayOrder};
+use crate::world::lights::table::light_kinds;
 
 /// One row.
 #[derive(Debug)]
@@ -54,8 +55,20 @@ impl Row {
     }
 }
 
-/// Declares the rows in their order, and the names that other tables have for them.
+/// Declares the rows in their order, and the names that other tables have for them. Those of `lights` come from the
+/// table of kinds of light.
 macro_rules! rows {
+    (lights; $($rest:tt)+) => {
+        light_kinds! { rows $($rest)+ }
+    };
+    ([$($kind:ident { $($need:ident, $name:literal, $flag:literal, $when:literal,
+        on $foundations:expr, $forcing:expr;)+ })+] $($rest:tt)+) => {
+        rows! {
+            $($($need, $name, $flag, $when, on $foundations, draws "", $forcing,
+                |f, _| f.light($need);)+)+
+            $($rest)+
+        }
+    };
     ($($need:ident, $name:literal, $flag:literal, $when:literal,
        on $foundations:expr, draws $draws:literal, $forcing:expr, $reason:expr;)+) => {
         /// The rows.
@@ -87,27 +100,7 @@ const AOV: Forcing = Never("it is recorded if it is asked for");
 
 rows! {
     // ---- Lights ----
-    MeshLights, "mesh lights", "mesh_lights",
-        "a material on a surface emits the same light everywhere on its front",
-        on &[HitLights], draws "", Whole, |f, _| f.light(MeshLights);
-    QuadLights, "quad lights", "quad_lights",
-        "`[[lights]]` has a quad that shines",
-        on &[HitLights], draws "", Whole, |f, _| f.light(QuadLights);
-    TwoSidedLights, "two-sided quads", "two_sided_lights",
-        "a quad shines on both sides",
-        on &[QuadLights], draws "", Whole, |f, _| f.light(TwoSidedLights);
-    DirectionalLights, "distant lights in one direction", "directional_lights",
-        "a distant light has no angle",
-        on &[], draws "", Whole, |f, _| f.light(DirectionalLights);
-    DiscLights, "distant lights with an angle", "disc_lights",
-        "a distant light is a disc in the sky",
-        on &[EscapeLights], draws "", Whole, |f, _| f.light(DiscLights);
-    UniformEnvironment, "uniform environment", "uniform_environment",
-        "the environment is of one color",
-        on &[EscapeLights], draws "", Unless(EnvironmentMap), |f, _| f.light(UniformEnvironment);
-    EnvironmentMap, "environment map", "environment_map",
-        "the environment is a picture",
-        on &[EscapeLights], draws "", WholeUnless(UniformEnvironment), |f, _| f.light(EnvironmentMap);
+    lights;
     HitLights, "lights that paths run into", "hit_lights",
         "a light has a surface",
         on &[], draws "", Whole, |f, _| {
