@@ -47,9 +47,6 @@ fn what_no_output_is_called_is_refused_with_the_nearest() {
         .exits(2)
         .says("no light of the scene is in the group `kee`")
         .says("light_default");
-    render(at, "--spp 1 --aov uv --out {}/a.exr")
-        .exits(2)
-        .says("no triangle of the scene has texture coordinates");
     render(at, "--spp 1 --aov albedo --out {}/a.png")
         .exits(2)
         .says("`--aov albedo` needs a file that holds more");
