@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn ids_of_parts_are_put_together_in_any_order_to_the_same() {
         let ids = |pairs: &[[u32; 2]], lost| {
-            let mut planes = vec![[0; 2]; ID_SLOTS];
+            let mut planes = [[0; 2]; ID_SLOTS];
             planes[..pairs.len()].copy_from_slice(pairs);
             let mut planes = planes.concat();
             planes.push(lost);

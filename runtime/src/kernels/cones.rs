@@ -2,7 +2,7 @@
 //!
 //! A cone is a width and a spread, carried by the path (`cone` in the state) only where some material
 //! asks. It begins as a pixel (`kernels/new_path.wgsl`), widens where light is scattered into more than one direction
-//! (`kernels/material.wgsl`), and meets surfaces as an ellipse (`kernels/footprint.wgsl`).
+//! (`kernels/material.wgsl`), and meets surfaces as an ellipse (`world/footprint.wgsl`).
 //! docs/filtering.md has the formulas.
 
 use impasto_compiler::abi::InputSet;

@@ -3,8 +3,8 @@
 //!
 //! A path carries a stack of the media it is in. Where objects overlap, the medium with the
 //! highest priority counts: Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced
-//! Images". `kernels/media.wgsl` and, where light is scattered,
-//! `kernels/volume.wgsl` are the other half of this file.
+//! Images". `media.wgsl` and, where light is scattered,
+//! `volume.wgsl` are the other half of this file.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ pub struct Media {
     /// `active_medium` and the other functions of a stack; needs the geometry part. Absent if
     /// paths need not follow media.
     pub part: Option<ShaderPart>,
-    /// For each instance the word of its medium (see `kernels/media.wgsl`), 0 without one.
+    /// For each instance the word of its medium (see `media.wgsl`), 0 without one.
     pub of_instance: Vec<u32>,
     /// The stack of a path that starts at the camera, innermost first.
     pub camera: [u32; MAX_NESTED],

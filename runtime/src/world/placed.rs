@@ -206,7 +206,7 @@ impl<'s> Placed<'s> {
     }
 }
 
-/// The words of a placement; see `kernels/geometry_placed.wgsl`.
+/// The words of a placement; see `geometry_placed.wgsl`.
 fn row(
     placement: &Placement,
     tree: &ObjectTree,

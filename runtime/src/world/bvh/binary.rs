@@ -1,4 +1,4 @@
-//! The binary layout, for `kernels/bvh_binary.wgsl`.
+//! The binary layout, for `binary.wgsl`.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;

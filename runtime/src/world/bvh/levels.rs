@@ -1,7 +1,7 @@
 //! Two levels of acceleration structures: one over placements, and below it one an object.
 //!
 //! The nodes of all lie in one buffer, and the triangles of all objects in one list, so that
-//! `kernels/bvh_placed.wgsl` goes from one tree to the other by a reference to its root.
+//! `placed.wgsl` goes from one tree to the other by a reference to its root.
 
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::aabb::Aabb;

@@ -1,4 +1,4 @@
-//! The eight-wide compressed layout, for `kernels/bvh_wide.wgsl`.
+//! The eight-wide compressed layout, for `wide.wgsl`.
 
 use obvhs::bvh2::Bvh2;
 use obvhs::cwbvh::CwBvh;
