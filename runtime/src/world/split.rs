@@ -171,7 +171,7 @@ impl Scene {
         let mut mesh = Cow::Borrowed(&self.mesh);
         let mut seen = BTreeSet::new();
         let (mut passed, mut taken) = (0, 0);
-        for placement in &self.placements {
+        for (placement, first) in self.placements.iter().zip(self.first_objects()) {
             passed += size(placement);
             let is_new = seen.insert((placement.object, &placement.materials));
             let due = passed as f64 * (limit as f64 / total as f64).min(1.0);
@@ -185,7 +185,7 @@ impl Scene {
                     materials,
                 } = placement;
                 let object = &self.objects[*object as usize].mesh;
-                mesh.push_copy(object, |_| true, transform, materials, 0);
+                mesh.push_copy(object, |_| true, transform, materials, first);
             }
         }
         if let Cow::Owned(mesh) = &mut mesh {
