@@ -101,7 +101,7 @@ fn the_code_of_a_call_is_that_of_the_material() {
     let called = user("material m { material = model(coat: 0.5); }").program;
     let set = model(&[("coat", "0.5")]).program;
     let count = |p: &Program| p.compiled()[0].evaluate.exprs.len();
-    assert_eq!(count(&called), count(&set));
+    assert_eq!(count(called), count(set));
 }
 
 #[test]

@@ -33,7 +33,7 @@ struct Course {
 }
 
 impl Renderer<'_> {
-    /// Renders until one of the goals is reached, at most [`samples`](super::RenderOptions::samples) a pixel,
+    /// Renders until one of the goals is reached, at most [`samples`](crate::options::RenderOptions::samples) a pixel,
     /// half of them by the seed and half by another that is made of it. `look` is called with every estimate
     /// of the error, `progress` after each submission; if that breaks, the samples that were begun by then
     /// make the picture. The report tells the estimates and why the render ended.
