@@ -1,5 +1,5 @@
 //! A compiled program: materials as code, instances as values, and what the renderer must know of
-//! both. [`crate::build`] makes it, [`crate::codegen`] writes its text.
+//! both. `build` makes it, [`crate::codegen`] writes its text.
 //!
 //! Instances of one material share its code. A parameter on which all of them agree is a constant
 //! in it; what depends on nothing but the others is computed on the host, once an instance, and read
