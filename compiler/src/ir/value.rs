@@ -20,6 +20,7 @@ pub trait Real:
     /// Widens to f64, exactly.
     fn f64(self) -> f64;
     /// Applies a function of f64; the f32 type rounds its result once.
+    #[inline]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self::of(f(self.f64()))
     }
@@ -28,24 +29,30 @@ pub trait Real:
 }
 
 impl Real for f32 {
+    #[inline]
     fn of(x: f64) -> Self {
         x as f32
     }
+    #[inline]
     fn f64(self) -> f64 {
         f64::from(self)
     }
+    #[inline]
     fn sqrt(self) -> Self {
         f32::sqrt(self)
     }
 }
 
 impl Real for f64 {
+    #[inline]
     fn of(x: f64) -> Self {
         x
     }
+    #[inline]
     fn f64(self) -> f64 {
         self
     }
+    #[inline]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
     }

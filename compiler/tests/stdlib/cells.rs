@@ -309,7 +309,7 @@ pub fn integrate(
 /// The four-by-four rule over each cell.
 fn rule(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<Measures> {
     let mut sums = Vec::with_capacity(cells.len());
-    for chunk in cells.chunks(256) {
+    for chunk in cells.chunks(1024) {
         let points: Vec<[f64; 3]> = chunk.iter().flat_map(Cell::points).collect();
         let values = measure(&points);
         for (cell, values) in chunk.iter().zip(values.chunks(16)) {

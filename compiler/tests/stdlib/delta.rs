@@ -5,7 +5,7 @@ use super::sampling::{BATCH, VIEWS, distribution, view};
 use super::statistics::Numbers;
 
 /// Directions drawn for each case and view.
-const SAMPLES: usize = 8 * BATCH;
+const SAMPLES: usize = 1 << 15;
 
 /// One of the directions that a view scatters into.
 struct Found {

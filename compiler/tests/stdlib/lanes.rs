@@ -4,8 +4,8 @@
 //! Values are columns, one number a lane; a column of length one is the same in every lane. All
 //! lanes follow both sides of a branch and stores are masked. What is not written here as a loop
 //! goes through the op table; `lanes_and_interpreter_agree` holds both to the same bits. Lanes are run
-//! in blocks, and values are dropped where they were read last, so that what is worked on stays in
-//! the cache of a processor.
+//! in blocks, and a value that is read for the last time becomes the result, so that what is worked
+//! on stays in the cache of a processor.
 
 mod ops;
 mod uses;
@@ -36,6 +36,13 @@ impl<F: Real> Column<F> {
         match self {
             Column::Float(v) => v,
             _ => panic!("not a float column: {self:?}"),
+        }
+    }
+
+    fn into_floats(self) -> Rc<Vec<F>> {
+        match self {
+            Column::Float(v) => v,
+            other => panic!("not a float column: {other:?}"),
         }
     }
 
@@ -150,8 +157,9 @@ pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> La
     run(module, &module.functions[id.index()], args)
 }
 
-/// Lanes that are run together.
-const BLOCK: usize = 2048;
+/// Lanes that are run together: enough that what is the same in all lanes, and is computed for each
+/// block anew, is a small part of the work.
+const BLOCK: usize = 1 << 14;
 
 /// Runs a function that need not be in the module.
 pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {
@@ -237,13 +245,13 @@ impl<F: Real> Frame<'_, F> {
                 self.values[id.index()] = Some(value);
             }
             Stmt::Store(local, part, value) => {
-                let value = self.take(*value);
+                let mut value = self.take(*value);
                 let place = &mut self.locals[local.index()];
                 match part {
-                    Some(part) => store(&mut place[usize::from(*part)], &value[0], mask),
+                    Some(part) => store(&mut place[usize::from(*part)], value.swap_remove(0), mask),
                     None => place
                         .iter_mut()
-                        .zip(&value)
+                        .zip(value)
                         .for_each(|(p, v)| store(p, v, mask)),
                 }
             }
@@ -310,7 +318,9 @@ impl<F: Real> Frame<'_, F> {
         for (wanted, block) in [(true, then), (false, otherwise)] {
             let mask = both(wanted);
             if mask.contains(&true) {
-                let flow = self.block(block, Some(&mask));
+                // Where all lanes go the same way, nothing is masked.
+                let mask = mask.contains(&false).then_some(&mask[..]);
+                let flow = self.block(block, mask);
                 assert!(
                     flow == Flow::Next,
                     "{}: lanes leave a loop apart",
@@ -351,7 +361,7 @@ impl<F: Real> Frame<'_, F> {
         match &e.kind {
             ExprKind::Op(op, operands) => {
                 let types: Vec<Type> = operands.iter().map(|&a| self.f.ty(a)).collect();
-                ops::fast(*op, &args).unwrap_or_else(|| ops::by_table(*op, &types, &args))
+                ops::fast(*op, args).unwrap_or_else(|args| ops::by_table(*op, &types, &args))
             }
             ExprKind::Load(local) => self.locals[local.index()].clone(),
             ExprKind::Compose(_) => match args.concat() {
@@ -381,24 +391,35 @@ impl<F: Real> Frame<'_, F> {
     }
 }
 
-fn store<F: Real>(place: &mut Column<F>, value: &Column<F>, mask: Option<&[bool]>) {
+fn store<F: Real>(place: &mut Column<F>, value: Column<F>, mask: Option<&[bool]>) {
     let Some(mask) = mask else {
-        *place = value.clone();
+        *place = value;
         return;
     };
-    *place = match (&*place, value) {
-        (Column::Float(old), Column::Float(new)) => floats(masked(mask, new, old)),
-        (Column::Int(old), Column::Int(new)) => Column::Int(Rc::new(masked(mask, new, old))),
-        (Column::Bool(old), Column::Bool(new)) => Column::Bool(Rc::new(masked(mask, new, old))),
+    match (place, &value) {
+        (Column::Float(old), Column::Float(new)) => masked(old, new, mask),
+        (Column::Int(old), Column::Int(new)) => masked(old, new, mask),
+        (Column::Bool(old), Column::Bool(new)) => masked(old, new, mask),
         (old, new) => panic!("{new:?} does not fit {old:?}"),
-    };
+    }
 }
 
-fn masked<T: Copy>(mask: &[bool], new: &[T], old: &[T]) -> Vec<T> {
-    let lanes = mask.iter().enumerate();
-    lanes
-        .map(|(l, &m)| if m { at(new, l) } else { at(old, l) })
-        .collect()
+fn masked<T: Copy>(old: &mut Rc<Vec<T>>, new: &[T], mask: &[bool]) {
+    if old.len() == 1 {
+        *old = Rc::new(vec![old[0]; mask.len()]);
+    }
+    replace(&mut Rc::make_mut(old)[..], new, mask, true);
+}
+
+/// Puts `new` where the mask is `wanted`.
+fn replace<T: Copy>(old: &mut [T], new: &[T], mask: &[bool], wanted: bool) {
+    let places = old.iter_mut().zip(mask);
+    match new {
+        [new] => places.for_each(|(x, &m)| *x = if m == wanted { *new } else { *x }),
+        new => places
+            .zip(new)
+            .for_each(|((x, &m), &new)| *x = if m == wanted { new } else { *x }),
+    }
 }
 
 #[test]

@@ -23,7 +23,7 @@ const SIGNIFICANCE: f64 = 0.01;
 pub const VIEWS: [f64; 7] = [0.0, 30.0, 60.0, 80.0, 89.0, 130.0, 175.0];
 
 /// Lanes evaluated together.
-pub const BATCH: usize = 4096;
+pub const BATCH: usize = 1 << 14;
 
 /// The unit direction at `degrees` from the normal.
 pub fn view(degrees: f64) -> [f64; 3] {

@@ -9,88 +9,131 @@ use impasto_compiler::ir::value::Real;
 
 use super::{Column, Lanes, at, floats};
 
-/// The ops that BSDFs spend their time in, as loops over floats.
-pub fn fast<F: Real>(op: Op, args: &[Lanes<F>]) -> Option<Lanes<F>> {
-    let all_floats = args.iter().flatten().all(|c| matches!(c, Column::Float(_)));
-    let (zero, one) = (F::of(0.0), F::of(1.0));
-    let zero_safe = |x: F, y: F| if y == zero { zero } else { x / y };
+/// The ops that BSDFs spend their time in, as loops over floats; the arguments of others come back.
+/// A column that nothing else reads becomes the result, so that columns are seldom allocated.
+pub fn fast<F: Real>(op: Op, args: Vec<Lanes<F>>) -> Result<Lanes<F>, Vec<Lanes<F>>> {
+    if let (Op::And | Op::Or, [a, b]) = (op, &args[..]) {
+        return Ok(vec![logic(op, &a[0], &b[0])]);
+    }
+    let is_float = |c: &Column<F>| matches!(c, Column::Float(_));
+    if op == Op::Select && args[1..].iter().flatten().all(is_float) {
+        let [cond, a, b] = taken(args);
+        let picked = |(a, b)| choose(cond[0].bools(), a, b);
+        return Ok(a.into_iter().zip(b).map(picked).collect());
+    }
+    if !args.iter().flatten().all(is_float) {
+        return Err(args);
+    }
+    let (zero, one, tiny) = (F::of(0.0), F::of(1.0), F::of(ops::TINY));
     let low = |x: F, y: F| if y < x { y } else { x };
     let high = |x: F, y: F| if x < y { y } else { x };
-    if let (Op::Select, [cond, a, b]) = (op, args)
-        && matches!(a[0], Column::Float(_))
-    {
-        let picked =
-            |(a, b): (&Column<F>, &Column<F>)| choose(cond[0].bools(), a.floats(), b.floats());
-        return Some(a.iter().zip(b).map(picked).collect());
-    }
-    if let Op::And | Op::Or = op {
-        return Some(vec![logic(op, &args[0][0], &args[1][0])]);
-    }
-    if !all_floats {
-        return None;
-    }
-    Some(match op {
+    Ok(match op {
         Op::Neg => map1(args, |x| -x),
         Op::Add => map2(args, |x, y| x + y),
         Op::Sub => map2(args, |x, y| x - y),
         Op::Mul => map2(args, |x, y| x * y),
-        Op::Div => map2(args, zero_safe),
+        Op::Div => map2(args, |x, y| if y == zero { zero } else { x / y }),
         Op::Min => map2(args, low),
         Op::Max => map2(args, high),
-        Op::Clamp => map2(&[map2(&args[..2], high), args[2].clone()], low),
+        Op::Clamp => {
+            let [x, least, most] = taken(args);
+            map2(vec![map2(vec![x, least], high), most], low)
+        }
         Op::Saturate => map1(args, |x| low(high(x, zero), one)),
         Op::Mix => {
-            let kept = map2(&[args[0].clone(), map1(&args[2..], |t| one - t)], |x, t| {
-                x * t
-            });
-            map2(&[kept, map2(&args[1..], |y, t| y * t)], |x, y| x + y)
+            let [x, y, t] = taken(args);
+            let rest = map1(vec![t.clone()], |t| one - t);
+            let kept = map2(vec![x, rest], |x, t| x * t);
+            let added = map2(vec![y, t], |y, t| y * t);
+            map2(vec![kept, added], |x, y| x + y)
         }
         Op::Abs => map1(args, |x| x.map(f64::abs)),
         Op::Exp => map1(args, |x| x.map(|x| x.min(88.0).exp())),
         Op::Log => map1(args, |x| x.map(|x| x.max(ops::TINY).ln())),
         Op::InverseSqrt => map1(args, |x| {
             if x > zero {
-                one / high(x, F::of(ops::TINY)).sqrt()
+                one / high(x, tiny).sqrt()
             } else {
                 zero
             }
         }),
         Op::Normalize => {
-            let inverse = |d: F| {
-                if d > F::of(ops::TINY) {
-                    one / d.sqrt()
-                } else {
-                    zero
-                }
-            };
-            let scale = map1(&[vec![dot(&args[0], &args[0])]], inverse);
-            map2(&[args[0].clone(), scale], |x, s| {
-                if s == zero { zero } else { x * s }
-            })
+            let [v] = taken(args);
+            let inverse = |d: F| if d > tiny { one / d.sqrt() } else { zero };
+            let scale = map1(vec![vec![dot(&v, &v)]], inverse);
+            map2(
+                vec![v, scale],
+                |x, s| if s == zero { zero } else { x * s },
+            )
         }
         Op::Sqrt => map1(args, |x| high(x, zero).sqrt()),
         Op::Sin => map1(args, |x| x.map(f64::sin)),
         Op::Cos => map1(args, |x| x.map(f64::cos)),
         Op::Dot => vec![dot(&args[0], &args[1])],
-        Op::Less => vec![compare(args, |x, y| x < y)],
-        Op::LessEqual => vec![compare(args, |x, y| x <= y)],
-        Op::Greater => vec![compare(args, |x, y| x > y)],
-        Op::GreaterEqual => vec![compare(args, |x, y| x >= y)],
-        _ => return None,
+        Op::Less => vec![compare(&args, |x, y| x < y)],
+        Op::LessEqual => vec![compare(&args, |x, y| x <= y)],
+        Op::Greater => vec![compare(&args, |x, y| x > y)],
+        Op::GreaterEqual => vec![compare(&args, |x, y| x >= y)],
+        _ => return Err(args),
     })
 }
 
-fn map1<F: Real>(args: &[Lanes<F>], f: impl Fn(F) -> F) -> Lanes<F> {
-    let column = |c: &Column<F>| floats(c.floats().iter().map(|&x| f(x)).collect());
-    args[0].iter().map(column).collect()
+fn taken<F: Real, const N: usize>(args: Vec<Lanes<F>>) -> [Lanes<F>; N] {
+    let args: Result<[Lanes<F>; N], _> = args.try_into();
+    args.unwrap_or_else(|args| panic!("{} arguments, not {N}", args.len()))
 }
 
-fn map2<F: Real>(args: &[Lanes<F>], f: impl Fn(F, F) -> F) -> Lanes<F> {
-    let width = args[0].len().max(args[1].len());
-    let part = |k: usize, c: usize| args[k][if args[k].len() == 1 { 0 } else { c }].floats();
-    (0..width)
-        .map(|c| floats(zip(part(0, c), part(1, c), &f)))
+fn map1<F: Real>(mut args: Vec<Lanes<F>>, f: impl Fn(F) -> F) -> Lanes<F> {
+    let column = |c: Column<F>| {
+        let mut v = c.into_floats();
+        match Rc::get_mut(&mut v) {
+            Some(own) => own.iter_mut().for_each(|x| *x = f(*x)),
+            None => v = Rc::new(v.iter().map(|&x| f(x)).collect()),
+        }
+        Column::Float(v)
+    };
+    args.swap_remove(0).into_iter().map(column).collect()
+}
+
+/// Component by component; what has one component serves all of the other.
+fn map2<F: Real>(args: Vec<Lanes<F>>, f: impl Fn(F, F) -> F) -> Lanes<F> {
+    let [a, b] = taken(args);
+    let width = a.len().max(b.len());
+    spread(a, width)
+        .zip(spread(b, width))
+        .map(|(a, b)| Column::Float(merged(a, b, &f)))
         .collect()
+}
+
+/// The columns of a value of `width` components, or the only one as often.
+fn spread<F: Real>(value: Lanes<F>, width: usize) -> impl Iterator<Item = Rc<Vec<F>>> {
+    let copies = if value.len() == 1 { width } else { 1 };
+    let columns = value.into_iter().map(Column::into_floats);
+    // The last copy is the column itself, which may then be written over.
+    columns.flat_map(move |c| std::iter::repeat_n(c, copies))
+}
+
+fn merged<F: Real>(mut a: Rc<Vec<F>>, mut b: Rc<Vec<F>>, f: impl Fn(F, F) -> F) -> Rc<Vec<F>> {
+    let (a_lanes, b_lanes) = (a.len(), b.len());
+    if a_lanes >= b_lanes
+        && let Some(own) = Rc::get_mut(&mut a)
+    {
+        match &b[..] {
+            [y] => own.iter_mut().for_each(|x| *x = f(*x, *y)),
+            b => own.iter_mut().zip(b).for_each(|(x, &y)| *x = f(*x, y)),
+        }
+        return a;
+    }
+    if b_lanes >= a_lanes
+        && let Some(own) = Rc::get_mut(&mut b)
+    {
+        match &a[..] {
+            [x] => own.iter_mut().for_each(|y| *y = f(*x, *y)),
+            a => own.iter_mut().zip(a).for_each(|(y, &x)| *y = f(x, *y)),
+        }
+        return b;
+    }
+    Rc::new(zip(&a, &b, f))
 }
 
 fn zip<F: Real, T>(a: &[F], b: &[F], f: impl Fn(F, F) -> T) -> Vec<T> {
@@ -102,11 +145,20 @@ fn zip<F: Real, T>(a: &[F], b: &[F], f: impl Fn(F, F) -> T) -> Vec<T> {
 }
 
 fn dot<F: Real>(a: &Lanes<F>, b: &Lanes<F>) -> Column<F> {
-    let products = a
-        .iter()
-        .zip(b)
-        .map(|(x, y)| zip(x.floats(), y.floats(), |x, y| x * y));
-    floats(products.fold(vec![F::of(0.0)], |sum, p| zip(&sum, &p, |s, x| s + x)))
+    let lanes = a.iter().chain(b).map(Column::len).max().unwrap_or(1);
+    let mut sums = vec![F::of(0.0); lanes];
+    for (x, y) in a.iter().zip(b) {
+        let sums = sums.iter_mut();
+        match (x.floats(), y.floats()) {
+            ([x], [y]) => sums.for_each(|s| *s = *s + *x * *y),
+            ([x], y) => sums.zip(y).for_each(|(s, &y)| *s = *s + *x * y),
+            (x, [y]) => sums.zip(x).for_each(|(s, &x)| *s = *s + x * *y),
+            (x, y) => sums
+                .zip(x.iter().zip(y))
+                .for_each(|(s, (&x, &y))| *s = *s + x * y),
+        }
+    }
+    floats(sums)
 }
 
 fn compare<F: Real>(args: &[Lanes<F>], f: impl Fn(F, F) -> bool) -> Column<F> {
@@ -122,11 +174,19 @@ fn logic<F: Real>(op: Op, a: &Column<F>, b: &Column<F>) -> Column<F> {
     Column::Bool(Rc::new((0..a.len().max(b.len())).map(one).collect()))
 }
 
-fn choose<F: Real>(cond: &[bool], a: &[F], b: &[F]) -> Column<F> {
-    let lanes = cond.len().max(a.len()).max(b.len());
+fn choose<F: Real>(cond: &[bool], a: Column<F>, b: Column<F>) -> Column<F> {
+    if let [cond] = cond {
+        return if *cond { a } else { b };
+    }
+    let (mut a, b) = (a.into_floats(), b.into_floats());
+    if let (true, Some(own)) = (a.len() == cond.len(), Rc::get_mut(&mut a)) {
+        super::replace(own, &b, cond, false);
+        return Column::Float(a);
+    }
+    let picked = cond.iter().enumerate();
     floats(
-        (0..lanes)
-            .map(|l| if at(cond, l) { at(a, l) } else { at(b, l) })
+        picked
+            .map(|(l, &c)| if c { at(&a, l) } else { at(&b, l) })
             .collect(),
     )
 }
