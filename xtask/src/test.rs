@@ -1,5 +1,6 @@
-//! `cargo xtask test`: every test there is, documentation examples included. With `--quick` those that
-//! say within a minute whether a change is worth the rest.
+//! `cargo xtask test`: every test there is, documentation examples included. The longest takes a share of
+//! its cases, and with `--all` takes them all. `--quick` has those that say within a minute whether a
+//! change is worth the rest.
 
 use std::process::Command;
 
@@ -13,8 +14,11 @@ pub(crate) struct TestArgs {
     /// Only tests whose name contains this
     filter: Option<String>,
     /// Leave out what takes long: statistics, pictures and examples of documentation
-    #[arg(long)]
+    #[arg(long, conflicts_with = "all")]
     quick: bool,
+    /// Hold every setting of a BSDF to its density from every view, as CI does, and not from a third
+    #[arg(long)]
+    all: bool,
 }
 
 /// A crate, and which of its tests `--quick` leaves out: whole groups, by what their names contain.
@@ -64,7 +68,19 @@ pub(crate) fn run(args: &TestArgs) -> Result {
     }
     shell::section("Running the tests");
     let mut test = testing(args);
-    shell::run(test.arg("--workspace").args(&args.filter))
+    let result = shell::run(test.arg("--workspace").args(&args.filter));
+    if !args.takes_all() {
+        shell::section("Left to `cargo xtask test --all`");
+        eprintln!("impasto-compiler  stdlib::sampling   two of three views of each setting of a BSDF");
+    }
+    result
+}
+
+impl TestArgs {
+    /// Whoever asks for tests by name wants all of them.
+    fn takes_all(&self) -> bool {
+        self.all || self.filter.is_some()
+    }
 }
 
 /// `cargo test`, going on after failures, which compares snapshots.
@@ -73,6 +89,9 @@ fn testing(args: &TestArgs) -> Command {
     test.args(["test", "--no-fail-fast"])
         .env("CI", "true")
         .env("INSTA_UPDATE", "no");
+    if !args.takes_all() {
+        test.env("IMPASTO_EFFORT", "share");
+    }
     if args.quick {
         test.arg("--quiet");
     }

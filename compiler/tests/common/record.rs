@@ -1,8 +1,9 @@
 //! What tests of numerical stability measured, kept for `cargo experiments stress`, and how hard they
 //! are to try.
 //!
-//! `IMPASTO_EFFORT=full` has the same tests look at more directions, samples and restarts; there is
-//! no second list of cases. `IMPASTO_STRESS_ROWS` names a folder: each `Row` noted becomes a line
+//! `IMPASTO_EFFORT=full` has the same tests look at more directions, samples and restarts;
+//! `IMPASTO_EFFORT=share`, as `cargo xtask test` has it without `--all`, has the longest of them take a
+//! share of their cases, each as thoroughly as ever. There is no second list of cases. `IMPASTO_STRESS_ROWS` names a folder: each `Row` noted becomes a line
 //! of a file there, written at once, so that a test which fails later does not lose it. A test
 //! notes what it measured before it asserts. Tests of other crates include this file by `#[path]`.
 
@@ -93,6 +94,11 @@ fn keep(folder: PathBuf, line: &str) {
 /// Is everything to be tried that time allows?
 pub fn full() -> bool {
     std::env::var(EFFORT).is_ok_and(|e| e == "full")
+}
+
+/// Is a share of the cases of the longest tests enough?
+pub fn share() -> bool {
+    std::env::var(EFFORT).is_ok_and(|e| e == "share")
 }
 
 /// `fast` as the suite has it, or `full` where all is to be tried.
