@@ -3,7 +3,7 @@
 
 mod path_kernel;
 
-pub use path_kernel::{PathKernel, dropped_value};
+pub use path_kernel::{PathKernel, PathSample, dropped_value};
 
 use std::collections::{BTreeMap, BTreeSet};
 
