@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
+use crate::lab::statistics::median;
 use crate::render::report::AdapterReport;
 use crate::scene::Scene;
 use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
@@ -169,9 +170,8 @@ fn rate(
     set: &RaySet,
     repetitions: u32,
 ) -> Result<RayRate, RuntimeError> {
-    let mut cast = caster.cast(&set.rays, set.kind.any_hit(), repetitions)?;
-    cast.seconds.sort_by(f64::total_cmp);
-    let seconds = cast.seconds[cast.seconds.len() / 2];
+    let cast = caster.cast(&set.rays, set.kind.any_hit(), repetitions)?;
+    let seconds = median(cast.seconds).unwrap_or_default();
     let pairs = set.hits.iter().zip(&cast.hits);
     let count = set.rays.len();
     Ok(RayRate {
