@@ -57,7 +57,7 @@ pub(super) struct ConvergeArgs {
     /// The first seed
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// Removes results that are in the folder
+    /// Remove earlier results from the folder
     #[arg(long)]
     fresh: bool,
     /// Paths in flight; by default chosen by the size of the picture

@@ -27,7 +27,7 @@ pub(super) struct EvalArgs {
     /// keys that are left out have defaults
     #[arg(long, value_name = "POINT", default_value = "")]
     at: At,
-    /// In which precision; `both` also says where they differ most
+    /// Precision of the evaluation; `both` also says where the two differ most
     #[arg(long, default_value = "f64")]
     precision: Precisions,
 }

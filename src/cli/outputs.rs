@@ -91,7 +91,7 @@ fn is_exr(path: &Path) -> bool {
 pub(super) fn aov_help() -> String {
     let names: Vec<&str> = outputs::names().collect();
     format!(
-        "Records outputs beside the picture, as layers of the EXR: {} (see docs/outputs.md)",
+        "Record outputs beside the picture, as layers of the EXR: {} (see docs/outputs.md)",
         names.join(", ")
     )
 }

@@ -69,7 +69,7 @@ pub(super) struct RenderArgs {
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Brightens the PNG by this many stops; the EXR stays as it is
+    /// Brighten the PNG by this many stops; the EXR stays as it is
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
     /// Paths in flight; by default chosen by the size of the picture

@@ -268,7 +268,7 @@ rows! {
         "`--aov` asks for how the material there looks",
         on &[], draws "", AOV, |f, _| f.records(At::Material);
     SampleOutputs, "outputs of samples", "sample_outputs",
-        "`--aov` asks for what samples come to",
+        "`--aov` asks for an output that is recorded once per sample",
         on &[], draws "", AOV, |f, _| f.records(At::Sample);
     LightGroups, "light groups", "light_groups",
         "`--aov` asks for the share of a group of lights",
