@@ -41,7 +41,7 @@ impl Outputs {
     /// Writes everything; `exposure` brightens what is to be looked at by stops.
     pub(super) fn write(&self, film: &Film, sums: &FilmFile, exposure: f32) -> Result<(), Failure> {
         for path in &self.pictures {
-            let written = if is_exr(path) && !sums.sums.layers().is_empty() {
+            let written = if is_exr(path) {
                 exr::write(sums, path)
             } else {
                 output::write(film, path, exposure)
