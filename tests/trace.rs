@@ -303,9 +303,10 @@ fn examples_in_single_precision_follow_double() {
     assert!(examples.len() >= 3, "{examples:?}");
     for (name, is_generated) in examples {
         let folder = tempfile::tempdir().expect("a folder");
-        let scene = match is_generated {
-            true => generated::generated(&name, folder.path()),
-            false => format!("examples/{name}/scene.toml"),
+        let scene = if is_generated {
+            generated::generated(&name, folder.path())
+        } else {
+            format!("examples/{name}/scene.toml")
         };
         let subject = subject(&scene);
         let samples = record::effort(1, 16) as u32;

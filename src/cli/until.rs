@@ -143,12 +143,13 @@ pub(super) fn ending(report: &Report, goals: &Goals) -> Option<String> {
         Some(format!("the {name} is {is}, not {:.3e}", goal?))
     });
     let missed: Vec<String> = missed.collect();
-    Some(match missed.is_empty() {
-        true => format!("{why} after {samples} samples"),
-        false => format!(
+    Some(if missed.is_empty() {
+        format!("{why} after {samples} samples")
+    } else {
+        format!(
             "warning: {why} after {samples} samples: {}",
             missed.join(", and ")
-        ),
+        )
     })
 }
 

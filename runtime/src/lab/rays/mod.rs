@@ -133,9 +133,10 @@ pub fn measure(
     let mut rates = Vec::new();
     for technique in &options.techniques {
         progress(technique);
-        let bvh = match technique.traversal == default.traversal {
-            true => reference.clone(),
-            false => Bvh::build(&scene.mesh, technique.traversal),
+        let bvh = if technique.traversal == default.traversal {
+            reference.clone()
+        } else {
+            Bvh::build(&scene.mesh, technique.traversal)
         };
         let caster = Caster::new(gpu, scene, &bvh, technique)?;
         for set in &sets {

@@ -75,9 +75,10 @@ pub(super) fn load(toml: &str, outputs: &[&str]) -> (Scene, Program) {
         ..MaterialRequest::new(binding.name.clone(), binding.file.clone())
     };
     let requests: Vec<_> = scene.materials.iter().map(request).collect();
-    let compiled = match ask_for_looks(&strings(outputs)) {
-        true => compile_with_looks(&requests, &mut Folder(folder.path())),
-        false => compile(&requests, &mut Folder(folder.path())),
+    let compiled = if ask_for_looks(&strings(outputs)) {
+        compile_with_looks(&requests, &mut Folder(folder.path()))
+    } else {
+        compile(&requests, &mut Folder(folder.path()))
     };
     let program = compiled.program;
     (
