@@ -117,9 +117,10 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
 /// Writes a whole file or none: a temporary one beside it takes its name once it is complete.
 /// Devices and pipes are written to as they are.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let written = match is_device(path) {
-        true => std::fs::write(path, bytes),
-        false => replace(path, bytes),
+    let written = if is_device(path) {
+        std::fs::write(path, bytes)
+    } else {
+        replace(path, bytes)
     };
     written.map_err(|error| format!("cannot write `{}`: {}", path.display(), reason(&error)))
 }

@@ -41,9 +41,10 @@ fn scenes() -> Vec<String> {
 fn scene_file(name: &str, out: &Path) -> PathBuf {
     let scene = root().join(format!("examples/{name}/scene.toml"));
     let text = std::fs::read_to_string(&scene).expect("the scene");
-    match text.contains("generated/") {
-        true => generated::generated(name, out).into(),
-        false => scene,
+    if text.contains("generated/") {
+        generated::generated(name, out).into()
+    } else {
+        scene
     }
 }
 

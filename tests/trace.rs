@@ -101,6 +101,26 @@ impl Subject {
     }
 }
 
+/// A setting that no render can have is named before the size that only replays cannot have.
+#[test]
+fn settings_are_checked_before_the_size_of_replays() {
+    let subject = subject("examples/cornell/scene.toml");
+    let mut world = subject.world(Sampler::Owen);
+    (world.width, world.height) = (1 << 14, 1 << 13);
+    let error = |world: &World| {
+        let replayer = Replayer::new(world, &subject.program, Sampler::Owen);
+        replayer.err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let size = error(&world);
+    assert!(
+        size.contains("134217728 pixels cannot be replayed"),
+        "{size}"
+    );
+    world.max_depth = 0;
+    let depth = error(&world);
+    assert!(depth.contains("max_depth"), "{depth}");
+}
+
 /// Whether two samples are the same but for rounding: of the film's unit, and of functions that
 /// drivers compute to within some units in the last place.
 fn same(a: [f32; 3], b: [f32; 3], relative: f32) -> bool {
@@ -283,9 +303,10 @@ fn examples_in_single_precision_follow_double() {
     assert!(examples.len() >= 3, "{examples:?}");
     for (name, is_generated) in examples {
         let folder = tempfile::tempdir().expect("a folder");
-        let scene = match is_generated {
-            true => generated::generated(&name, folder.path()),
-            false => format!("examples/{name}/scene.toml"),
+        let scene = if is_generated {
+            generated::generated(&name, folder.path())
+        } else {
+            format!("examples/{name}/scene.toml")
         };
         let subject = subject(&scene);
         let samples = record::effort(1, 16) as u32;

@@ -35,9 +35,10 @@ fn comments(text: &str) -> Vec<String> {
     let mut rest = rest.as_str();
     while let Some(start) = rest.find("//").into_iter().chain(rest.find("/*")).min() {
         rest = &rest[start..];
-        let end = match rest.starts_with("//") {
-            true => rest.find('\n').unwrap_or(rest.len()),
-            false => rest.find("*/").map_or(rest.len(), |at| at + 2),
+        let end = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else {
+            rest.find("*/").map_or(rest.len(), |at| at + 2)
         };
         found.push(rest[..end].trim_end().to_owned());
         rest = &rest[end..];

@@ -102,9 +102,10 @@ fn rows(program: &Program, name: &str, first: usize, walks: u32) -> Result<Strin
     let grey = |e: &Estimate| {
         let m = e.mean;
         let same = (m[0] - m[1]).abs().max((m[0] - m[2]).abs()) < 1e-9;
-        match same {
-            true => format!(" {:.3} |", m[0]),
-            false => format!(" {:.3} {:.3} {:.3} |", m[0], m[1], m[2]),
+        if same {
+            format!(" {:.3} |", m[0])
+        } else {
+            format!(" {:.3} {:.3} {:.3} |", m[0], m[1], m[2])
         }
     };
     let line = |label: &str, estimates: &[Estimate]| {

@@ -79,9 +79,10 @@ fn open<'a>(
     }
     let rgbe = start.starts_with(b"#?RGBE");
     // What the contents do not tell, the name may.
-    let told = match rgbe {
-        true => Some(ImageFormat::Hdr),
-        false => image::guess_format(&start).ok(),
+    let told = if rgbe {
+        Some(ImageFormat::Hdr)
+    } else {
+        image::guess_format(&start).ok()
     };
     let named = ImageFormat::from_path(path).ok();
     let Some(format) = told.or(named) else {
@@ -182,9 +183,10 @@ fn unknown_format(path: &Path, what: &str, format: Option<ImageFormat>) -> Scene
 
 /// What to do about a file that begins with `start`, which no picture does.
 fn whole_file(start: &[u8]) -> &'static str {
-    match start.starts_with(b"version https://git-lfs") {
-        true => "this is what Git LFS keeps in its place: `git lfs pull` gets the file",
-        false => "export it again",
+    if start.starts_with(b"version https://git-lfs") {
+        "this is what Git LFS keeps in its place: `git lfs pull` gets the file"
+    } else {
+        "export it again"
     }
 }
 
@@ -235,11 +237,12 @@ fn integer_texels<const LEVELS: usize>(
 ) -> Vec<[f32; 4]> {
     let value = |level: usize| level as f64 / (LEVELS - 1) as f64;
     let data: Vec<f32> = (0..LEVELS).map(|l| value(l) as f32).collect();
-    let color: Vec<f32> = match is_color {
-        true => (0..LEVELS)
+    let color: Vec<f32> = if is_color {
+        (0..LEVELS)
             .map(|l| srgb_to_linear(value(l)) as f32)
-            .collect(),
-        false => data.clone(),
+            .collect()
+    } else {
+        data.clone()
     };
     texels
         .map(|[r, g, b, a]| [color[r], color[g], color[b], data[a]])

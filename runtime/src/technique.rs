@@ -68,7 +68,7 @@ macro_rules! choices {
 choices! {
     /// Where random numbers come from.
     Sampler {
-        /// Sobol points with a random mask a pixel for 32 dimensions, then independent (Laine et al. 2013)
+        /// Sobol points with a random mask per pixel for 32 dimensions, then hashes (Laine et al. 2013)
         Sobol = "sobol",
         /// Sobol points, Owen-scrambled and shuffled anew for every pixel and draw (Burley 2020)
         Owen = "owen",
@@ -78,11 +78,11 @@ choices! {
 
     /// How kernels append to queues (Laine et al. 2013, section 4.4).
     Append {
-        /// One atomic operation a workgroup and queue
+        /// One atomic operation per workgroup and queue
         Workgroup = "workgroup",
-        /// One atomic operation a subgroup and queue
+        /// One atomic operation per subgroup and queue
         Subgroup = "subgroup",
-        /// One atomic operation a thread
+        /// One atomic operation per thread
         Thread = "thread",
     }
 
@@ -121,13 +121,13 @@ choices! {
         Private = "private",
         /// The first entries in workgroup memory (Ylitie et al. 2017)
         Workgroup = "workgroup",
-        /// Some bits a level in registers, and a way back up the tree (Laine 2010)
+        /// Some bits per level in registers, and pointers to parents (Laine 2010)
         Trail = "trail",
     }
 
     /// When threads that fetch rays test triangles.
     Leaves {
-        /// When enough threads of a subgroup have some (Ylitie et al. 2017)
+        /// When enough threads of a subgroup have one to test (Ylitie et al. 2017)
         Together = "together",
         /// Right after the node that they are in
         AtOnce = "at-once",
@@ -137,7 +137,7 @@ choices! {
     RayFetch {
         /// Threads stay and take new rays when many of a subgroup have none (Aila and Laine 2009)
         Persistent = "persistent",
-        /// One ray a thread
+        /// One ray per thread
         Thread = "thread",
     }
 
@@ -161,7 +161,7 @@ choices! {
     Features {
         /// What the scene needs, and nothing else
         Scene = "scene",
-        /// Everything that can be on without need: the same picture, to measure what leaving out saves
+        /// Every feature that can be on: the same picture, to measure what leaving features out saves
         All = "all",
     }
 
@@ -169,7 +169,7 @@ choices! {
     RayOrder {
         /// As they were asked for
         Queue = "queue",
-        /// By the cell of the scene where they begin, of 512, and the octant of their direction
+        /// Sorted by origin (512 cells of the scene) and by the octant of the direction
         Coarse = "coarse",
         /// The same with 32,768 cells
         Fine = "fine",

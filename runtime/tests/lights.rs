@@ -105,11 +105,14 @@ fn densities_integrate_to_one() {
         let directions: Vec<Vec3> = (0..100_000).map(|_| random.direction()).collect();
         let full = met(&parts, position, &directions, 0.0);
         let weighted = met(&parts, position, &directions, 1.0);
-        let density = |(full, weighted): (&Vec3, &Vec3)| match full.max_element() > 0.0 {
-            true => (f64::from(full.max_element() / weighted.max_element()) - 1.0)
-                .max(0.0)
-                .sqrt(),
-            false => 0.0,
+        let density = |(full, weighted): (&Vec3, &Vec3)| {
+            if full.max_element() > 0.0 {
+                (f64::from(full.max_element() / weighted.max_element()) - 1.0)
+                    .max(0.0)
+                    .sqrt()
+            } else {
+                0.0
+            }
         };
         let (mean, error) = statistics(full.iter().zip(&weighted).map(density));
         let (integral, error) = (4.0 * PI * mean, 4.0 * PI * error);

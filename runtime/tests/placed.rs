@@ -433,9 +433,10 @@ fn rays_that_leave_a_placed_object_do_not_hit_it_again() {
                 let along = (tilt - tilt.dot(side) * side).normalize();
                 let direction = along + 2.0 * random.uniform().powi(3) * side;
                 let ray = Ray::new(origin, direction);
-                match skips {
-                    true => Ray { skip: at[0], ..ray },
-                    false => Ray::new(origin, -side),
+                if skips {
+                    Ray { skip: at[0], ..ray }
+                } else {
+                    Ray::new(origin, -side)
                 }
             };
             input.iter().zip(starts.chunks(2)).map(ray).collect()

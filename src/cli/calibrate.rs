@@ -62,18 +62,20 @@ pub(super) fn run(args: &CalibrateArgs, global: &Global) -> Outcome {
     let start = calibrate::start(&sets)?;
     let fitted = calibrate::fit(&sets, &start);
     write(args, &fitted)?;
-    match global.json() {
-        true => print(&format!("{:#}\n", serde_json::json!(fitted))),
-        false => print(&calibrate::text(&fitted, global.verbose > 0)),
+    if global.json() {
+        print(&format!("{:#}\n", serde_json::json!(fitted)))
+    } else {
+        print(&calibrate::text(&fitted, global.verbose > 0))
     }
 }
 
 /// Says what a profile predicts of measurements.
 fn score(sets: &[Measurement], profile: &Profile, global: &Global) -> Outcome {
     let scored = calibrate::score(sets, (&profile.name, &profile.profile))?;
-    match global.json() {
-        true => print(&format!("{:#}\n", serde_json::json!(scored))),
-        false => print(&calibrate::scores_text(&scored)),
+    if global.json() {
+        print(&format!("{:#}\n", serde_json::json!(scored)))
+    } else {
+        print(&calibrate::scores_text(&scored))
     }
 }
 

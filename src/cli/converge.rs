@@ -57,7 +57,7 @@ pub(super) struct ConvergeArgs {
     /// The first seed
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// Removes results that are in the folder
+    /// Remove earlier results from the folder
     #[arg(long)]
     fresh: bool,
     /// Paths in flight; by default chosen by the size of the picture
@@ -172,9 +172,10 @@ impl ConvergeArgs {
                 global.detail(&progress.what);
                 bar.set_message(progress.what.clone());
             }
-            match interrupt::requested() {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+            if interrupt::requested() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         };
         let found = study(gpu, &subject, &self.out, settings, &mut progress);
@@ -261,9 +262,12 @@ fn make_folder(folder: &Path) -> Result<(), String> {
 /// What was typed, with the program's name alone in the place of its path.
 fn command() -> String {
     let words = std::env::args().skip(1);
-    let quoted = words.map(|word| match word.contains(char::is_whitespace) {
-        true => format!("'{word}'"),
-        false => word,
+    let quoted = words.map(|word| {
+        if word.contains(char::is_whitespace) {
+            format!("'{word}'")
+        } else {
+            word
+        }
     });
     let words: Vec<String> = std::iter::once("impasto".to_owned())
         .chain(quoted)

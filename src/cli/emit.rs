@@ -92,9 +92,10 @@ pub(super) fn run(args: &EmitArgs, global: &Global) -> Outcome {
         files::check_writable(Path::new(&args.out))?;
     }
     let text = emitted(args, global)?;
-    match to_stdout {
-        true => print(&text),
-        false => Ok(files::write_whole(Path::new(&args.out), text.as_bytes())?),
+    if to_stdout {
+        print(&text)
+    } else {
+        Ok(files::write_whole(Path::new(&args.out), text.as_bytes())?)
     }
 }
 
@@ -140,9 +141,10 @@ fn syntax(args: &EmitArgs, bytes: &[u8], global: &Global) -> Result<String, Fail
         }
     };
     global.report(&sources, &diagnostics);
-    match diag::has_errors(&diagnostics) {
-        true => Err(Failure::Diagnostics),
-        false => Ok(shown),
+    if diag::has_errors(&diagnostics) {
+        Err(Failure::Diagnostics)
+    } else {
+        Ok(shown)
     }
 }
 
@@ -156,9 +158,10 @@ fn ir(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result<Strin
     if only.is_none() {
         global.report(&checked.sources, &checked.diagnostics);
     }
-    match diag::has_errors(&checked.diagnostics) {
-        true => Err(Failure::Diagnostics),
-        false => Ok(impasto::ir_text(&checked, &args.file, only)),
+    if diag::has_errors(&checked.diagnostics) {
+        Err(Failure::Diagnostics)
+    } else {
+        Ok(impasto::ir_text(&checked, &args.file, only))
     }
 }
 
@@ -232,9 +235,10 @@ fn compiled(args: &EmitArgs, loader: &mut FileLoader, global: &Global) -> Result
 /// A request for each material to print. A file without any is asked for its material all the
 /// same: the compiler knows what to say.
 fn requests(args: &EmitArgs, loader: &mut FileLoader) -> Vec<MaterialRequest> {
-    let parameters = match args.table {
-        true => Parameters::Table,
-        false => Parameters::Agreed,
+    let parameters = if args.table {
+        Parameters::Table
+    } else {
+        Parameters::Agreed
     };
     let request = |name: &str, material| MaterialRequest {
         material,
@@ -245,8 +249,9 @@ fn requests(args: &EmitArgs, loader: &mut FileLoader) -> Vec<MaterialRequest> {
         return vec![request(name, Some(name.clone()))];
     }
     let names = compiler::check(&args.file, loader).materials;
-    match names.is_empty() {
-        true => vec![request("material", None)],
-        false => names.iter().map(|n| request(n, Some(n.clone()))).collect(),
+    if names.is_empty() {
+        vec![request("material", None)]
+    } else {
+        names.iter().map(|n| request(n, Some(n.clone()))).collect()
     }
 }

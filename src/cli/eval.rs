@@ -27,7 +27,7 @@ pub(super) struct EvalArgs {
     /// keys that are left out have defaults
     #[arg(long, value_name = "POINT", default_value = "")]
     at: At,
-    /// In which precision; `both` also says where they differ most
+    /// Precision of the evaluation; `both` also says where the two differ most
     #[arg(long, default_value = "f64")]
     precision: Precisions,
 }
@@ -76,9 +76,10 @@ pub(super) fn run(args: &EvalArgs, global: &Global) -> Outcome {
             global.note(&format!("`{file}` defines nothing that can be evaluated"));
         }
     }
-    match diag::has_errors(&found.diagnostics) {
-        true => Err(Failure::Diagnostics),
-        false => Ok(()),
+    if diag::has_errors(&found.diagnostics) {
+        Err(Failure::Diagnostics)
+    } else {
+        Ok(())
     }
 }
 
@@ -191,9 +192,10 @@ fn scattering(out: &mut String, indent: &str, surface: &Surface) {
         format!("pdf         {}", surface.toward.pdf),
     ];
     section(out, indent, "toward wi", &toward);
-    let crosses = match surface.sampled.transmitted {
-        true => ", on the other side",
-        false => "",
+    let crosses = if surface.sampled.transmitted {
+        ", on the other side"
+    } else {
+        ""
     };
     let sampled = [
         format!("wi          {}{crosses}", surface.sampled.wi),

@@ -146,9 +146,10 @@ fn summary(args: &FmtArgs, global: &Global, done: &Done) -> Outcome {
         return print(&format!("{result:#}\n"));
     }
     for name in &done.changed {
-        match reads_only {
-            true => global.note(&format!("not formatted: {name}")),
-            false => global.detail(&format!("formatted {name}")),
+        if reads_only {
+            global.note(&format!("not formatted: {name}"));
+        } else {
+            global.detail(&format!("formatted {name}"));
         }
     }
     let changed = done.changed.len();

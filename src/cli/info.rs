@@ -33,8 +33,9 @@ impl GpuArgs {
 
 pub(super) fn run(args: &GpuArgs, global: &Global) -> Outcome {
     let info = args.open()?.info();
-    match global.json() {
-        true => print(&format!("{:#}\n", serde_json::json!(info))),
-        false => print(&info.to_string()),
+    if global.json() {
+        print(&format!("{:#}\n", serde_json::json!(info)))
+    } else {
+        print(&info.to_string())
     }
 }

@@ -89,8 +89,9 @@ fn brings(row: &NeedReport) -> String {
         (!row.draws.is_empty()).then(|| format!("random numbers for {}", row.draws)),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
-    match parts.is_empty() {
-        true => String::new(),
-        false => format!(" ({})", parts.join("; ")),
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", parts.join("; "))
     }
 }

@@ -41,7 +41,7 @@ impl Outputs {
     /// Writes everything; `exposure` brightens what is to be looked at by stops.
     pub(super) fn write(&self, film: &Film, sums: &FilmFile, exposure: f32) -> Result<(), Failure> {
         for path in &self.pictures {
-            let written = if is_exr(path) && !sums.sums.layers().is_empty() {
+            let written = if is_exr(path) {
                 exr::write(sums, path)
             } else {
                 output::write(film, path, exposure)
@@ -91,7 +91,7 @@ fn is_exr(path: &Path) -> bool {
 pub(super) fn aov_help() -> String {
     let names: Vec<&str> = outputs::names().collect();
     format!(
-        "Records outputs beside the picture, as layers of the EXR: {} (see docs/outputs.md)",
+        "Record outputs beside the picture, as layers of the EXR: {} (see docs/outputs.md)",
         names.join(", ")
     )
 }

@@ -99,9 +99,10 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     };
     let explanation = explain(&subject).map_err(|e| e.to_string())?;
     args.save(&plan, &materials.names, &workload)?;
-    match global.json() {
-        true => args.print_json(&explanation, &workload),
-        false => print(&explanation.to_string()),
+    if global.json() {
+        args.print_json(&explanation, &workload)
+    } else {
+        print(&explanation.to_string())
     }
 }
 
@@ -135,9 +136,10 @@ impl PlanCommandArgs {
         let best = text::parse(&answer.best, &materials.names, &materials.unused);
         let best = best.map_err(|e| e.to_string())?;
         self.save(&best, &materials.names, &answer.measurement.workload)?;
-        match global.json() {
-            true => print(&format!("{:#}\n", serde_json::json!(answer))),
-            false => print(&answer.to_string()),
+        if global.json() {
+            print(&format!("{:#}\n", serde_json::json!(answer)))
+        } else {
+            print(&answer.to_string())
         }
     }
 

@@ -69,7 +69,7 @@ pub(super) struct RenderArgs {
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Brightens the PNG by this many stops; the EXR stays as it is
+    /// Brighten the PNG by this many stops; the EXR stays as it is
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
     /// Paths in flight; by default chosen by the size of the picture
@@ -142,9 +142,10 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     summarise(&rendering, args, &outputs, global);
     let ending = goals.and_then(|goals| until::ending(&rendering.report, &goals));
     ending.iter().for_each(|ending| global.note(ending));
-    match is_complete(&rendering) {
-        true => Ok(()),
-        false => Err(Failure::Interrupted),
+    if is_complete(&rendering) {
+        Ok(())
+    } else {
+        Err(Failure::Interrupted)
     }
 }
 
@@ -304,9 +305,10 @@ fn sample_until(
 fn tick(bar: &ProgressBar, progress: &Progress) -> ControlFlow<()> {
     bar.set_length(progress.total);
     bar.set_position(progress.paths);
-    match interrupt::requested() {
-        true => ControlFlow::Break(()),
-        false => ControlFlow::Continue(()),
+    if interrupt::requested() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
     }
 }
 
@@ -411,9 +413,10 @@ const LISTED: usize = 12;
 
 /// A progress bar on standard error; invisible where that is no terminal.
 pub(super) fn progress_bar(global: &Global) -> ProgressBar {
-    let bar = match global.quiet {
-        true => ProgressBar::hidden(),
-        false => ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()),
+    let bar = if global.quiet {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
     };
     let template = "{wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {

@@ -17,13 +17,13 @@ pub(super) struct TechniqueArgs {
     /// How kernels append to queues
     #[arg(long, value_name = "NAME", default_value = default_name::<Append>(), value_parser = named::<Append>())]
     append: Append,
-    /// How path state lies in memory
+    /// Memory layout of path state
     #[arg(long, value_name = "NAME", default_value = default_name::<StateLayout>(), value_parser = named::<StateLayout>())]
     state: StateLayout,
     /// When threads of a megakernel begin another path
     #[arg(long, value_name = "NAME", default_value = default_name::<Regeneration>(), value_parser = named::<Regeneration>())]
     regeneration: Regeneration,
-    /// What rays are cast through
+    /// The acceleration structure
     #[arg(long, value_name = "NAME", default_value = default_name::<Traversal>(), value_parser = named::<Traversal>())]
     traversal: Traversal,
     /// Where ray casts keep the nodes they have yet to visit
@@ -35,16 +35,16 @@ pub(super) struct TechniqueArgs {
     /// How threads get the rays of a queue
     #[arg(long, value_name = "NAME", default_value = default_name::<RayFetch>(), value_parser = named::<RayFetch>())]
     ray_fetch: RayFetch,
-    /// How geometry is stored that is repeated often enough to share it
+    /// How repeated geometry is stored
     #[arg(long, value_name = "NAME", default_value = default_name::<Copies>(), value_parser = named::<Copies>())]
     copies: Copies,
-    /// Where ray casts find rays, and leave what they hit
+    /// Where ray casts read rays and write hits
     #[arg(long, value_name = "NAME", default_value = default_name::<RayData>(), value_parser = named::<RayData>())]
     ray_data: RayData,
     /// In which order rays are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<RayOrder>(), value_parser = named::<RayOrder>())]
     ray_order: RayOrder,
-    /// What kernels can do that the scene may not ask for
+    /// Whether kernels contain only the features that the scene uses
     #[arg(long, value_name = "NAME", default_value = default_name::<Features>(), value_parser = named::<Features>())]
     features: Features,
     /// Threads of a workgroup; by default chosen by the kind of plan and GPU
@@ -53,7 +53,7 @@ pub(super) struct TechniqueArgs {
     /// Threads of kernels that fetch one item after another; by default as many as fill the GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     threads: Option<u32>,
-    /// Count the lanes at work in every kernel (`utilisation` in the report; much slower)
+    /// Count the active lanes in every kernel (`utilisation` in the report; much slower)
     #[arg(long)]
     profile: bool,
 }

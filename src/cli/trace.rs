@@ -30,10 +30,10 @@ pub(super) struct TraceArgs {
     /// Width and height of the render in pixels, as in 640x480; the scene's own by default
     #[arg(long, value_name = "WxH", value_parser = super::render::parse_size)]
     size: Option<(u32, u32)>,
-    /// In which precision; `both` also says where the two part
+    /// Precision of the replay; `both` also says where the two paths diverge
     #[arg(long, value_name = "BITS", default_value = "64")]
     precision: Precisions,
-    /// Which code of materials: what the compiler's interpreter runs, or the WGSL that GPUs get
+    /// The code of materials: the IR that the compiler's interpreter runs, or the WGSL that GPUs run
     #[arg(long, value_name = "CODE", default_value = "ir")]
     code: CodeArg,
 }

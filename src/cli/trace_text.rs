@@ -231,14 +231,16 @@ fn light_rows(sample: &Light, out: &mut Vec<Row>) {
     }
     out.push(row("light", sample.kind.to_owned()));
     out.push(plain("  wi", &sample.wi));
-    out.push(match sample.distance < 1e30 {
-        true => plain("  distance", &[sample.distance]),
-        false => row("  distance", "infinite".into()),
+    out.push(if sample.distance < 1e30 {
+        plain("  distance", &[sample.distance])
+    } else {
+        row("  distance", "infinite".into())
     });
     out.push(light("  radiance / pdf", &sample.radiance));
-    out.push(match sample.pdf > 0.0 {
-        true => light("  pdf", &[sample.pdf]),
-        false => row("  pdf", "discrete".into()),
+    out.push(if sample.pdf > 0.0 {
+        light("  pdf", &[sample.pdf])
+    } else {
+        row("  pdf", "discrete".into())
     });
     out.push(light("  reflected", &sample.throughput));
     out.push(light("  bsdf pdf", &[sample.bsdf_pdf]));
@@ -274,9 +276,10 @@ fn number(x: f64) -> String {
     let before = size.log10().floor() as i32;
     let digits = (5 - before).clamp(0, 9) as usize;
     let text = format!("{x:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
     }
 }
 

@@ -16,7 +16,7 @@ const LONGEST: f64 = 30.0 * 86_400.0;
 
 #[derive(Args)]
 pub(super) struct UntilArgs {
-    /// Renders until an error is small enough or a time is over: `relmse=1e-3`, `rmse=0.01`, `time=60s`
+    /// Render until the error is small enough or the time is up: `relmse=1e-3`, `rmse=0.01`, `time=60s`
     /// (ms, s, min, h). May be given several times: what is reached first ends the render. Errors are
     /// estimated while rendering, by two halves of the samples (see docs/until.md); --spp is the limit,
     /// otherwise 1048576 samples
@@ -143,12 +143,13 @@ pub(super) fn ending(report: &Report, goals: &Goals) -> Option<String> {
         Some(format!("the {name} is {is}, not {:.3e}", goal?))
     });
     let missed: Vec<String> = missed.collect();
-    Some(match missed.is_empty() {
-        true => format!("{why} after {samples} samples"),
-        false => format!(
+    Some(if missed.is_empty() {
+        format!("{why} after {samples} samples")
+    } else {
+        format!(
             "warning: {why} after {samples} samples: {}",
             missed.join(", and ")
-        ),
+        )
     })
 }
 

@@ -105,18 +105,20 @@ pub(super) struct Sum {
 impl Sum {
     pub(super) fn add(&mut self, value: f64) {
         let sum = self.sum + value;
-        self.lost += match self.sum.abs() >= value.abs() {
-            true => (self.sum - sum) + value,
-            false => (value - sum) + self.sum,
+        self.lost += if self.sum.abs() >= value.abs() {
+            (self.sum - sum) + value
+        } else {
+            (value - sum) + self.sum
         };
         self.sum = sum;
     }
 
     pub(super) fn value(self) -> f64 {
         // The squares of the largest floats may overflow a sum of many, where nothing is lost.
-        match self.sum.is_finite() {
-            true => self.sum + self.lost,
-            false => self.sum,
+        if self.sum.is_finite() {
+            self.sum + self.lost
+        } else {
+            self.sum
         }
     }
 }

@@ -57,10 +57,12 @@ const RAMP: [[f32; 3]; 6] = [
 /// The color of a relative squared error, linear; what is no number is the end of the ramp.
 pub fn error_color(error: f64) -> [f32; 3] {
     let [low, high] = ERROR_DECADES;
-    let place = match error > 0.0 {
-        true => ((error.log10() - low) / (high - low)).clamp(0.0, 1.0),
-        false if error <= 0.0 => 0.0,
-        false => 1.0,
+    let place = if error > 0.0 {
+        ((error.log10() - low) / (high - low)).clamp(0.0, 1.0)
+    } else if error <= 0.0 {
+        0.0
+    } else {
+        1.0
     };
     let last = RAMP.len() - 1;
     let along = place * last as f64;

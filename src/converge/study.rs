@@ -351,9 +351,10 @@ fn relative(reference: &Reference, series: &[Series]) -> Option<f64> {
         .iter()
         .flat_map(|s| fit::means(&s.points, Metric::Rmse));
     let smallest = points.map(|mean| mean.error).min_by(f64::total_cmp)?;
-    match own > 0.0 {
-        false => Some(0.0),
-        true => (smallest > 0.0).then(|| own / smallest),
+    if own > 0.0 {
+        (smallest > 0.0).then(|| own / smallest)
+    } else {
+        Some(0.0)
     }
 }
 

@@ -95,9 +95,10 @@ impl<'a> Watch<'a> {
             (self.show)(&self.now)
         })?;
         self.now.done = before + weight;
-        match is_whole(&rendering, samples) {
-            true => Ok(rendering),
-            false => Err(StudyError::Interrupted),
+        if is_whole(&rendering, samples) {
+            Ok(rendering)
+        } else {
+            Err(StudyError::Interrupted)
         }
     }
 }

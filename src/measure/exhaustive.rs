@@ -104,9 +104,10 @@ pub fn exhaustive(
     let times = tabulate(&mut measurement, &model);
     plans.extend(found(&inputs, &times, &on_surface));
     let late = deadline.is_some_and(|end| Instant::now() >= end);
-    let whole = match late {
-        true => vec![None; plans.len()],
-        false => iterations(&mut lab, &plans)?,
+    let whole = if late {
+        vec![None; plans.len()]
+    } else {
+        iterations(&mut lab, &plans)?
     };
     let plans = plans.iter().zip(whole);
     let plans: Vec<PlanTime> = plans

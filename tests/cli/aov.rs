@@ -31,6 +31,22 @@ fn channels(folder: &Path, name: &str) -> BTreeMap<String, Vec<u32>> {
     .collect()
 }
 
+/// Metadata is not an output: pictures have it without.
+#[test]
+fn a_picture_without_outputs_says_what_it_is_of() {
+    let folder = folder();
+    let at = folder.path();
+    render(at, "--spp 3 --seed 5 --out {}/a.exr").exits(0);
+    let image = read_first_flat_layer_from_file(at.join("a.exr")).expect("an EXR");
+    let texts = image.layer_data.attributes.other.iter();
+    let texts = texts.map(|(key, value)| (key.to_string(), format!("{value:?}")));
+    let texts: BTreeMap<String, String> = texts.collect();
+    for (key, expected) in [("impasto/samples", "3"), ("impasto/seed", "5")] {
+        assert!(texts[key].contains(expected), "{texts:?}");
+    }
+    assert_eq!(channels(at, "a.exr").len(), 3);
+}
+
 #[test]
 fn what_no_output_is_called_is_refused_with_the_nearest() {
     let folder = folder();

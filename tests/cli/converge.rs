@@ -445,12 +445,15 @@ fn ctrl_c_keeps_what_is_finished() {
         .expect("it starts");
     let runs = at.join("out/smooth/runs/own-sobol");
     let began = Instant::now();
-    let kept = || match runs.is_dir() {
-        true => names(&runs)
-            .iter()
-            .filter(|name| name.ends_with(".json"))
-            .count(),
-        false => 0,
+    let kept = || {
+        if runs.is_dir() {
+            names(&runs)
+                .iter()
+                .filter(|name| name.ends_with(".json"))
+                .count()
+        } else {
+            0
+        }
     };
     while kept() < 3 {
         assert!(began.elapsed() < Duration::from_secs(300), "no renders");

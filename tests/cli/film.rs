@@ -160,11 +160,12 @@ fn a_killed_render_goes_on_to_the_same_bits() {
         let began = std::time::Instant::now();
         loop {
             // However often it is read, the file is whole: it is never written in place.
-            let done = match checkpoint.exists() {
-                true => FilmFile::read(&checkpoint)
+            let done = if checkpoint.exists() {
+                FilmFile::read(&checkpoint)
                     .expect("a whole checkpoint")
-                    .samples(),
-                false => 0,
+                    .samples()
+            } else {
+                0
             };
             if done > seen {
                 seen = done;

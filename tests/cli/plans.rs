@@ -135,9 +135,10 @@ fn the_automatic_plan_takes_over_while_rendering() {
     assert!(change["at_iteration"].as_u64() < report["iterations"].as_u64());
     let shares = report["workload"]["materials"].as_array().expect("hits");
     assert_eq!(shares.len(), 5);
-    let summary = match change["to"] == change["from"] {
-        true => "best plan",
-        false => "planned after",
+    let summary = if change["to"] == change["from"] {
+        "best plan"
+    } else {
+        "planned after"
     };
     run.says(summary);
 }

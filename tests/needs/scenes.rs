@@ -207,9 +207,10 @@ fn material(name: &str, body: &str) -> String {
     if body.contains("uniform(") {
         text += "use std::edf::uniform;\n";
     }
-    let (params, body) = match body.contains("picture") {
-        true => ("param picture: texture = \"stone.png\"; ", body),
-        false => ("", body),
+    let (params, body) = if body.contains("picture") {
+        ("param picture: texture = \"stone.png\"; ", body)
+    } else {
+        ("", body)
     };
     format!("{text}material {name} {{ {params}{body} }}\n")
 }

@@ -106,9 +106,10 @@ fn relative(a: &[f64], b: &[f64]) -> f64 {
     }
     let largest = a.iter().chain(b).fold(0f64, |m, x| m.max(x.abs()));
     let difference = a.iter().zip(b).fold(0f64, |m, (x, y)| m.max((x - y).abs()));
-    match largest > 1e-30 {
-        true => difference / largest,
-        false => 0.0,
+    if largest > 1e-30 {
+        difference / largest
+    } else {
+        0.0
     }
 }
 

@@ -69,9 +69,10 @@ impl Float for f64 {
     }
     fn word(self) -> u64 {
         let nearest = self as f32;
-        let rest = match nearest.is_finite() {
-            true => (self - f64::from(nearest)) as f32,
-            false => 0.0,
+        let rest = if nearest.is_finite() {
+            (self - f64::from(nearest)) as f32
+        } else {
+            0.0
         };
         u64::from(nearest.to_bits()) | u64::from(rest.to_bits()) << 32
     }

@@ -116,9 +116,10 @@ fn refract<F: Float>(cells: &mut [u64], [v, normal, eta]: [Slot; 3], width: u32,
     let cosine = dot::<F>(cells, normal, v, width);
     let k = one - eta * eta * (one - cosine * cosine);
     for i in 0..width {
-        let refracted = match k < zero() {
-            true => zero(),
-            false => eta * at::<F>(cells, v, i) - (eta * cosine + k.sqrt()) * at(cells, normal, i),
+        let refracted = if k < zero() {
+            zero()
+        } else {
+            eta * at::<F>(cells, v, i) - (eta * cosine + k.sqrt()) * at(cells, normal, i)
         };
         put(cells, to, i, refracted);
     }

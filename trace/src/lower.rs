@@ -59,13 +59,13 @@ pub(super) fn lower<F: Float>(
         if let Some(hook) = hook_of(function, hooks).filter(|_| reached[handle.index()]) {
             signatures[hook] = Some(Signature::of(function, shapes));
         }
-        functions.push(match reached[handle.index()] {
-            true => {
-                let lowering = Lowering::<F>::new(&mut shared, function, &info[handle])?;
-                Some(lowering.function(is_answered(function))?)
-            }
-            false => None,
-        });
+        let lowered = if reached[handle.index()] {
+            let lowering = Lowering::<F>::new(&mut shared, function, &info[handle])?;
+            Some(lowering.function(is_answered(function))?)
+        } else {
+            None
+        };
+        functions.push(lowered);
     }
     let main = Lowering::<F>::new(&mut shared, &entry.function, info.get_entry_point(0))?;
     let main = main.function(false)?;
@@ -242,12 +242,11 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         let result = self.source.result.as_ref();
         let result = result.map(|result| self.cells(self.shapes.inner(result.ty)));
         let result = result.transpose()?.unwrap_or(0);
-        let body = match answered {
-            true => Vec::new(),
-            false => {
-                self.place_locals()?;
-                self.block(&self.source.body)?
-            }
+        let body = if answered {
+            Vec::new()
+        } else {
+            self.place_locals()?;
+            self.block(&self.source.body)?
         };
         // There must be room for a result even if the function does not end by a return.
         let least = self.image.len().max(result as usize);
@@ -501,18 +500,18 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         for argument in arguments {
             let ty = self.ty(*argument);
             let is_pointer = ty.pointer_space().is_some();
-            given.push(match is_pointer {
-                true => {
-                    let pointer = self.pointer(*argument)?;
-                    if matches!(pointer, Pointer::Buffer { .. }) {
-                        return Err(self.unsupported("pointer into a buffer as an argument"));
-                    }
-                    let to = self.room(1);
-                    out.push(Node::Ins(Ins::Address { pointer, to }));
-                    (to, 1)
+            let place = if is_pointer {
+                let pointer = self.pointer(*argument)?;
+                if matches!(pointer, Pointer::Buffer { .. }) {
+                    return Err(self.unsupported("pointer into a buffer as an argument"));
                 }
-                false => (self.slot(*argument)?, self.cells(ty)?),
-            });
+                let to = self.room(1);
+                out.push(Node::Ins(Ins::Address { pointer, to }));
+                (to, 1)
+            } else {
+                (self.slot(*argument)?, self.cells(ty)?)
+            };
+            given.push(place);
         }
         let to = match result {
             Some(result) => {

@@ -91,9 +91,10 @@ impl<'p, F: Float> Oracle<'p, F> {
                 let structs = &self.program.ir().structs;
                 let fields = structs[id.index()].fields.iter().map(|(name, ty)| {
                     let value = vector(&format!("point.{name}"));
-                    match value.components().is_empty() {
-                        true => Value::zero(*ty, structs),
-                        false => value,
+                    if value.components().is_empty() {
+                        Value::zero(*ty, structs)
+                    } else {
+                        value
                     }
                 });
                 Value::Struct(fields.collect())

@@ -88,6 +88,8 @@ impl<'p> Replayer<'p> {
         source: &dyn MaterialSource,
         sampler: Sampler,
     ) -> Result<Self, TraceError> {
+        // This checks the settings: what no render can have is named before what only replays cannot.
+        let kernel = PathKernel::new(world, source, sampler)?;
         let pixels = u64::from(world.width) * u64::from(world.height);
         if pixels > MAX_PIXELS {
             return Err(TraceError::TooLarge {
@@ -95,7 +97,6 @@ impl<'p> Replayer<'p> {
                 most: MAX_PIXELS,
             });
         }
-        let kernel = PathKernel::new(world, source, sampler)?;
         Ok(Self {
             names: Names {
                 instances: kernel.instances.clone(),
@@ -184,8 +185,9 @@ impl<F: Float> Session<'_, F> {
             });
         }
         let pixel = (y * width + x) as usize;
+        let prepared = kernel.sample(pixel, sample, seed)?;
         for (name, words) in self.code.buffers.iter().zip(&mut self.machine.buffers) {
-            kernel.prepare((name, words), pixel, sample, seed)?;
+            prepared.prepare(name, words);
         }
         let names = &self.replayer.names;
         let mut recorder = Recorder::new(

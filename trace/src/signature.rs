@@ -88,9 +88,12 @@ impl Record {
         let Some((field, cells)) = self.get(name, cells) else {
             return Vec::new();
         };
-        let of = |cell: &u64| match field.float {
-            true => F::of_cell(*cell).f64(),
-            false => f64::from(*cell as u32),
+        let of = |cell: &u64| {
+            if field.float {
+                F::of_cell(*cell).f64()
+            } else {
+                f64::from(*cell as u32)
+            }
         };
         cells.iter().map(of).collect()
     }

@@ -71,9 +71,10 @@ impl Textures {
             uv[axis] += (f64::from(i) + 0.5 - 0.5 * taps) * of.width[axis] / taps;
             let fine = self.filter(self.level(slot, detail as u32)?, uv, of.mode)?;
             let weight = detail.fract();
-            let coarse = match weight > 0.0 {
-                true => self.filter(self.level(slot, detail as u32 + 1)?, uv, of.mode)?,
-                false => fine,
+            let coarse = if weight > 0.0 {
+                self.filter(self.level(slot, detail as u32 + 1)?, uv, of.mode)?
+            } else {
+                fine
             };
             (0..4).for_each(|c| sum[c] += fine[c] + (coarse[c] - fine[c]) * weight);
         }

@@ -132,10 +132,14 @@ fn listed_drivers() -> Option<(&'static str, Vec<PathBuf>)> {
 fn manifests_of_variable(value: &std::ffi::OsStr) -> Vec<PathBuf> {
     let listed = std::env::split_paths(value);
     listed
-        .flat_map(|path| match path.is_dir() {
-            true => manifests_in(&path),
-            false if path.is_file() => vec![path],
-            false => Vec::new(),
+        .flat_map(|path| {
+            if path.is_dir() {
+                manifests_in(&path)
+            } else if path.is_file() {
+                vec![path]
+            } else {
+                Vec::new()
+            }
         })
         .collect()
 }

@@ -106,9 +106,10 @@ type Times = BTreeMap<Stage, f64>;
 
 impl Case {
     fn request(&self) -> MaterialRequest {
-        let file = match self.file.starts_with("std::") {
-            true => self.file.to_owned(),
-            false => format!("{}/{}", env!("CARGO_MANIFEST_DIR"), self.file),
+        let file = if self.file.starts_with("std::") {
+            self.file.to_owned()
+        } else {
+            format!("{}/{}", env!("CARGO_MANIFEST_DIR"), self.file)
         };
         let mut request = MaterialRequest::new("m", file);
         let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).into());

@@ -112,9 +112,10 @@ fn textures(program: &Program, body: &str, first: usize, out: &mut String) {
             TextureSpace::Color => "decoded to linear color, as the -srgb formats are",
             TextureSpace::Data => "numbers as they are",
         };
-        let levels = match texture.lookups.levels {
-            true => ", all mip levels",
-            false => "",
+        let levels = if texture.lookups.levels {
+            ", all mip levels"
+        } else {
+            ""
         };
         let path = texture.path.replace(|c: char| c.is_control(), "?");
         let _ = writeln!(out, "// {path}: {kind}{levels}.");

@@ -273,9 +273,10 @@ fn chosen(query: &Query, items: Vec<Item>) -> Result<Vec<Item>, Diagnostic> {
         return Ok(vec![item]);
     }
     let is_material = |i: &Item| i.kind == Kind::Material;
-    match items.iter().any(is_material) {
-        true => Ok(items.into_iter().filter(is_material).collect()),
-        false => Ok(items),
+    if items.iter().any(is_material) {
+        Ok(items.into_iter().filter(is_material).collect())
+    } else {
+        Ok(items)
     }
 }
 
@@ -434,9 +435,10 @@ fn material(
     let Some(probed) = run::probed(&request, source) else {
         return Ok(());
     };
-    match own {
-        true => answer.parameters.clone_from(&probed.parameters),
-        false => answer.arguments = texts(&call.arguments),
+    if own {
+        answer.parameters.clone_from(&probed.parameters);
+    } else {
+        answer.arguments = texts(&call.arguments);
     }
     let results = in_each(
         query,

@@ -104,9 +104,10 @@ pub fn number(x: f64) -> String {
             (6 - size.log10().floor() as i32).clamp(0, 10)
         };
         let text = format!("{x:.*}", digits as usize);
-        match text.contains('.') {
-            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-            false => text,
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
         }
     } else {
         format!("{x:.6e}")

@@ -79,12 +79,13 @@ impl Plan {
         }
         let missing = names.iter().zip(&places).filter(|(_, of)| of.is_empty());
         let missing: Vec<&str> = missing.map(|(name, _)| name.as_str()).collect();
-        match missing.is_empty() {
-            true => Ok(()),
-            false => Err(PlanError::new(format!(
+        if missing.is_empty() {
+            Ok(())
+        } else {
+            Err(PlanError::new(format!(
                 "it has no kernel for {}",
                 list(missing)
-            ))),
+            )))
         }
     }
 }

@@ -220,9 +220,10 @@ impl Calibrated<'_> {
         };
         let all = density(members);
         let one = |m: &Member<'_>| {
-            let density = match form.diverges() {
-                true => all,
-                false => density(std::slice::from_ref(m)),
+            let density = if form.diverges() {
+                all
+            } else {
+                density(std::slice::from_ref(m))
             };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);

@@ -78,9 +78,11 @@ impl Table {
         let mut operands = std::mem::take(&mut self.operands[at]);
         operands.clear();
         for &operand in f.expr(id).kind.operands() {
-            operands.push(match f.expr(operand).kind.is_free() {
-                true => self.leaf(f, operand),
-                false => operand,
+            let is_free = f.expr(operand).kind.is_free();
+            operands.push(if is_free {
+                self.leaf(f, operand)
+            } else {
+                operand
             });
         }
         order(&f.expr(id).kind, &mut operands);

@@ -24,9 +24,10 @@ impl Body<'_, '_> {
         }
         let values = self.positional(&callee.node, args)?;
         let [(id, ty, at)] = values[..] else {
-            let (code, message) = match values.is_empty() {
-                true => (Code::MissingArgument, "`filter_width` needs a value"),
-                false => (Code::TooManyArguments, "`filter_width` takes one value"),
+            let (code, message) = if values.is_empty() {
+                (Code::MissingArgument, "`filter_width` needs a value")
+            } else {
+                (Code::TooManyArguments, "`filter_width` takes one value")
             };
             let wrong = Diagnostic::new(code, span, message).expected("`filter_width(8.0 * uv)`");
             return self.report(wrong);

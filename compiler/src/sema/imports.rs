@@ -97,10 +97,12 @@ impl Checker<'_> {
         let private = Diagnostic::new(Code::PrivateItem, wanted.span, message)
             .expected("a definition without the mark `private`")
             .label(name, "defined here");
-        self.report(match is_std {
-            true => private.hint("import what the library makes of it, or copy it"),
-            false => private.hint("remove `private` there, or import what the module makes of it"),
-        });
+        let hint = if is_std {
+            "import what the library makes of it, or copy it"
+        } else {
+            "remove `private` there, or import what the module makes of it"
+        };
+        self.report(private.hint(hint));
         None
     }
 

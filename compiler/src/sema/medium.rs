@@ -113,9 +113,12 @@ impl Body<'_, '_> {
 
     fn clamped(&mut self, id: ExprId, (low, high): (f64, f64), span: Span) -> ExprId {
         let int = self.builder.ty(id) == Type::Int;
-        let mut limit = |x: f64| match int {
-            true => self.constant(Const::Int(x as i32), span),
-            false => self.builder.float(x, span),
+        let mut limit = |x: f64| {
+            if int {
+                self.constant(Const::Int(x as i32), span)
+            } else {
+                self.builder.float(x, span)
+            }
         };
         let least = limit(low);
         if high.is_finite() {
@@ -179,9 +182,10 @@ impl Checker<'_> {
                 Cause::Texture(span) => (*span, "a texture".into()),
             };
             // Of a material that is called, the caller may keep the surface alone.
-            let hint = match interior.span.file == body.span.file {
-                true => BETWEEN_SURFACES,
-                false => OWN_INTERIOR,
+            let hint = if interior.span.file == body.span.file {
+                BETWEEN_SURFACES
+            } else {
+                OWN_INTERIOR
             };
             let message = format!("{name} depends on {what}");
             let varies = Diagnostic::new(Code::VaryingMedium, span, message)

@@ -220,12 +220,12 @@ impl Checker<'_> {
                 let duplicate = Diagnostic::new(Code::Duplicate, name.span, message)
                     .expected("one definition a name")
                     .label(first_span, "first defined here");
-                self.report(match functions {
-                    true => duplicate.hint(
-                        "functions are not overloaded: give each a name of its own, or one of them defaults",
-                    ),
-                    false => duplicate.hint("rename one of them, or import it with `as`"),
-                });
+                let hint = if functions {
+                    "functions are not overloaded: give each a name of its own, or one of them defaults"
+                } else {
+                    "rename one of them, or import it with `as`"
+                };
+                self.report(duplicate.hint(hint));
             }
             _ => drop(names.insert(name.node.clone(), item)),
         }

@@ -27,9 +27,12 @@ impl Body<'_, '_> {
         let &[texture, uv, width, wrap, wrap_u, wrap_v, filter] = values.as_slice() else {
             return None;
         };
-        let own = |i: usize, value| match is_given(args, &params, i) {
-            true => (value, params[i].name.as_str()),
-            false => (wrap, "wrap"),
+        let own = |i: usize, value| {
+            if is_given(args, &params, i) {
+                (value, params[i].name.as_str())
+            } else {
+                (wrap, "wrap")
+            }
         };
         let (wrap_u, u_name) = own(WRAP_U, wrap_u);
         let (wrap_v, v_name) = own(WRAP_V, wrap_v);

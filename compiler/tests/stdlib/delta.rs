@@ -46,10 +46,12 @@ fn directions(bsdf: &Bsdf, case: &Case, wo: [f64; 3], seed: u64) -> (Vec<Found>,
 
 /// The mirror direction, or the one that Snell's law gives for the index `ior`.
 fn is_specular(wo: [f64; 3], wi: [f64; 3], ior: f64) -> bool {
-    let n = match wo[2] * wi[2] > 0.0 {
-        true => 1.0,
-        false if wo[2] > 0.0 => ior,
-        false => 1.0 / ior,
+    let n = if wo[2] * wi[2] > 0.0 {
+        1.0
+    } else if wo[2] > 0.0 {
+        ior
+    } else {
+        1.0 / ior
     };
     let length = wi.iter().map(|x| x * x).sum::<f64>();
     (0..2).all(|c| (wi[c] * n + wo[c]).abs() < 1e-9) && (length - 1.0).abs() < 1e-9

@@ -62,9 +62,10 @@ fn score(goal: Goal, bsdf: &Bsdf, case: &Case, wo: [f64; 3], energy: [f64; 3]) -
 
 /// How near the documentation says that `albedo` is.
 fn promised(bsdf: &Bsdf, case: &Case, wo: [f64; 3]) -> f64 {
-    match (wo[2] > 0.0) == (case.ior >= 1.0) {
-        true => bsdf.albedo_within,
-        false => bsdf.albedo_within_inside,
+    if (wo[2] > 0.0) == (case.ior >= 1.0) {
+        bsdf.albedo_within
+    } else {
+        bsdf.albedo_within_inside
     }
 }
 

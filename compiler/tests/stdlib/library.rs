@@ -347,10 +347,13 @@ impl Bsdf {
     /// What the power that goes from `wi` to `wo` is over the radiance: undoes the scaling of
     /// what passes.
     pub fn power_over_radiance(&self, case: &Case, wo_z: f64, wi_z: f64) -> f64 {
-        match self.scales_radiance && wo_z * wi_z < 0.0 {
-            true if wo_z > 0.0 => case.ior * case.ior,
-            true => 1.0 / (case.ior * case.ior),
-            false => 1.0,
+        let scaled = self.scales_radiance && wo_z * wi_z < 0.0;
+        if !scaled {
+            1.0
+        } else if wo_z > 0.0 {
+            case.ior * case.ior
+        } else {
+            1.0 / (case.ior * case.ior)
         }
     }
 }

@@ -75,9 +75,10 @@ fn rough_diffuse_is_the_published_formula() {
             let [wo, wi] = p.directions(n.between(0.0, 6.0), k % 2 == 0);
             let single = rho * fujii(&p, r);
             let lost = [p.o, p.i].map(|a| 1.0 - fujii_albedo(a, r));
-            let rest = match r > 0.0 {
-                true => multiple / PI * lost[0] * lost[1] / (1.0 - mean) * p.i.cos(),
-                false => 0.0,
+            let rest = if r > 0.0 {
+                multiple / PI * lost[0] * lost[1] / (1.0 - mean) * p.i.cos()
+            } else {
+                0.0
             };
             assert_near(plain.eval(wo, wi), single, 1e-6, "single");
             assert_near(full.eval(wo, wi), single + rest, 1e-6, "compensated");

@@ -165,9 +165,12 @@ pub fn climb<T: Clone>(
 
 /// A point at most `step` away in each coordinate, of which a third change.
 fn near(x: &[f64], step: f64, n: &mut Numbers) -> Vec<f64> {
-    let moved = |x: &f64| match n.unit() < 0.35 {
-        true => (x + step * n.between(-1.0, 1.0)).clamp(0.0, 1.0),
-        false => *x,
+    let moved = |x: &f64| {
+        if n.unit() < 0.35 {
+            (x + step * n.between(-1.0, 1.0)).clamp(0.0, 1.0)
+        } else {
+            *x
+        }
     };
     x.iter().map(moved).collect()
 }

@@ -115,6 +115,7 @@ enum Stage {
     Queues,
 }
 
+/// The stage of a kernel by its name: the records of docs/paper.json are older than `KernelReport::stage`.
 fn stage_of(kernel: &KernelReport) -> Stage {
     match kernel.name.as_str() {
         "logic" => Stage::Logic,

@@ -3,7 +3,7 @@
 
 mod path_kernel;
 
-pub use path_kernel::{PathKernel, dropped_value};
+pub use path_kernel::{PathKernel, PathSample, dropped_value};
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -176,9 +176,10 @@ impl<'a> Scale<'a> {
         extent: Extent,
     ) -> Result<NeedReport, RuntimeError> {
         let because = (row.reason)(&self.inputs(), natural);
-        let saved = match because.is_none() && row.is_forceable_with(natural) {
-            true => Some(self.weigh(Needs::of_rows(&[row.need]))?.beyond(extent)),
-            false => None,
+        let saved = if because.is_none() && row.is_forceable_with(natural) {
+            Some(self.weigh(Needs::of_rows(&[row.need]))?.beyond(extent))
+        } else {
+            None
         };
         let unmeasured = match row.forcing {
             _ if because.is_some() || saved.is_some() => None,

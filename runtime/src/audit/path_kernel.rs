@@ -45,6 +45,14 @@ pub struct PathKernel {
     counters: Counters,
 }
 
+/// A sample of a pixel that exists.
+#[derive(Debug)]
+pub struct PathSample<'k> {
+    kernel: &'k PathKernel,
+    options: RenderOptions,
+    pixel: usize,
+}
+
 impl PathKernel {
     /// Of a world with any materials.
     ///
@@ -101,18 +109,16 @@ impl PathKernel {
         }
     }
 
-    /// Changes the words of the buffer `name` so that the next run takes a sample of a pixel (row x width +
-    /// column) that it adds to an empty film.
+    /// A sample of a pixel (row x width + column), as runs take it.
     ///
     /// # Errors
     /// If there is no such sample.
-    pub fn prepare(
+    pub fn sample(
         &self,
-        (name, words): (&str, &mut [u32]),
         pixel: usize,
         sample: u32,
         seed: u32,
-    ) -> Result<(), RuntimeError> {
+    ) -> Result<PathSample<'_>, RuntimeError> {
         let options = RenderOptions {
             samples: 1,
             first_sample: sample,
@@ -120,19 +126,11 @@ impl PathKernel {
             ..RenderOptions::default()
         };
         settings::check_samples(&options)?;
-        match name {
-            "run" => words.copy_from_slice(&run::words(&options)),
-            "counters" => {
-                words.fill(0);
-                words[self.counters.index(Scalar::WorkPixel)] = pixel as u32;
-            }
-            "film" => {
-                let planes = words.chunks_exact_mut(self.pixels());
-                planes.for_each(|plane| plane[pixel] = 0);
-            }
-            _ => {}
-        }
-        Ok(())
+        Ok(PathSample {
+            kernel: self,
+            options,
+            pixel,
+        })
     }
 
     /// The mean radiance of a pixel in the words of the buffer `film`.
@@ -145,6 +143,25 @@ impl PathKernel {
 
     fn pixels(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize
+    }
+}
+
+impl PathSample<'_> {
+    /// Changes the words of the buffer `name` so that the next run takes the sample and adds it to an empty
+    /// film.
+    pub fn prepare(&self, name: &str, words: &mut [u32]) {
+        match name {
+            "run" => words.copy_from_slice(&run::words(&self.options)),
+            "counters" => {
+                words.fill(0);
+                words[self.kernel.counters.index(Scalar::WorkPixel)] = self.pixel as u32;
+            }
+            "film" => {
+                let planes = words.chunks_exact_mut(self.kernel.pixels());
+                planes.for_each(|plane| plane[self.pixel] = 0);
+            }
+            _ => {}
+        }
     }
 }
 

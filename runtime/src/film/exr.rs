@@ -1,5 +1,5 @@
-//! OpenEXR files with a layer for each output: the picture as `R`, `G`, `B`, the outputs beside it under their
-//! usual names, and what they are of as metadata.
+//! OpenEXR files of films: the picture as `R`, `G`, `B`, a layer for each output beside it under its usual names,
+//! and what all that is of as metadata.
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -65,7 +65,40 @@ fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
     let mut bytes = Cursor::new(Vec::new());
     let written = image.write().to_buffered(&mut bytes);
     written.map_err(|e| e.to_string())?;
-    Ok(bytes.into_inner())
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes).ok_or("what was encoded has no whole header")?;
+    Ok(bytes)
+}
+
+/// Bytes before the first attribute: the magic number and the version.
+const BEFORE_ATTRIBUTES: usize = 8;
+
+/// Puts the attributes of a file with one header in the order of their names, so that equal films give equal
+/// files: the encoder takes our own attributes from a hash map. `None` if the header is not whole.
+fn sort_attributes(file: &mut [u8]) -> Option<()> {
+    let mut rest = file.get(BEFORE_ATTRIBUTES..)?;
+    let mut attributes = Vec::new();
+    // A 0 in place of a name ends the header.
+    while *rest.first()? != 0 {
+        let (attribute, after) = rest.split_at_checked(attribute_length(rest)?)?;
+        attributes.push(attribute);
+        rest = after;
+    }
+    attributes.sort_unstable();
+    let sorted = attributes.concat();
+    let place = file.get_mut(BEFORE_ATTRIBUTES..)?;
+    place.get_mut(..sorted.len())?.copy_from_slice(&sorted);
+    Some(())
+}
+
+/// How long the first attribute is: its name and its type, each with a 0 behind it, and its value after four bytes
+/// for the value's length.
+fn attribute_length(bytes: &[u8]) -> Option<usize> {
+    let mut zeros = bytes.iter().enumerate().filter(|(_, byte)| **byte == 0);
+    let (after_type, _) = zeros.nth(1)?;
+    let value = bytes.get(after_type + 1..)?.first_chunk::<4>()?;
+    let value = usize::try_from(i32::from_le_bytes(*value)).ok()?;
+    value.checked_add(after_type + 1 + 4)
 }
 
 /// Every channel with its values.
@@ -121,4 +154,59 @@ fn metadata(film: &FilmFile) -> Vec<(String, AttributeValue)> {
 /// UTF-8, which the format takes as bytes.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use exr::prelude::read_first_flat_layer_from_file;
+
+    use super::*;
+    use crate::film::file::tests::{part, with_outputs};
+
+    #[test]
+    fn equal_films_are_equal_files() {
+        let film = with_outputs(0, 2, 3, &["albedo", "material", "object"]);
+        let first = encode(&film).expect("encoded");
+        for _ in 0..8 {
+            assert!(encode(&film).expect("encoded") == first);
+        }
+        let [seed, version] = ["impasto/seed", "impasto/version"].map(|name| {
+            let found = first.windows(name.len()).position(|w| w == name.as_bytes());
+            found.unwrap_or_else(|| panic!("{name}"))
+        });
+        assert!(seed < version);
+    }
+
+    /// A film without outputs has the picture that other files of it have, and says what it is of.
+    #[test]
+    fn a_picture_alone_keeps_its_bits_and_has_metadata() {
+        let film = part(0, 5, 123_456_789);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr");
+        write(&film, &path).expect("written");
+        let read = output::read(&path, "picture").expect("read");
+        let bits = |pixels: Vec<[f32; 3]>| pixels.concat().into_iter().map(f32::to_bits);
+        assert!(bits(read.pixels).eq(bits(film.sums.picture().pixels)));
+
+        let image = read_first_flat_layer_from_file(&path).expect("an EXR");
+        assert_eq!(image.layer_data.channel_data.list.len(), 3);
+        assert!(image.attributes.chromaticities.is_some());
+        let attributes = image.attributes.other.iter();
+        let attributes = attributes.chain(&image.layer_data.attributes.other);
+        let texts = attributes.filter_map(|(key, value)| match value {
+            AttributeValue::Text(text) => Some((key.to_string(), text.to_string())),
+            _ => None,
+        });
+        let mut texts: Vec<_> = texts.collect();
+        texts.sort();
+        let expected = [
+            ("impasto/colorSpace", "linear Rec. 709"),
+            ("impasto/sampler", "owen"),
+            ("impasto/samples", "5"),
+            ("impasto/scene", "attic"),
+            ("impasto/seed", "7"),
+            ("impasto/version", env!("CARGO_PKG_VERSION")),
+        ];
+        assert_eq!(texts, expected.map(|(k, v)| (k.to_owned(), v.to_owned())));
+    }
 }

@@ -1,5 +1,5 @@
-//! Film files (`.film`): the exact sums of some samples, so that parts of a render can be taken
-//! apart, on other days or other machines, and merged into the very bits of the whole.
+//! Film files (`.film`): the exact sums of some samples, which outlive the program that took them. Parts of a
+//! render can so be taken apart, on other days or other machines (`merge`).
 //!
 //! All numbers are little-endian. After the magic number and a version come the identity of the
 //! render, what was dropped, the ranges of samples, the scene's name, the outputs beside the picture with the names
@@ -40,27 +40,6 @@ pub struct Identity {
     pub scene: u64,
 }
 
-impl Identity {
-    /// In what `other` differs, said for people.
-    fn difference(&self, other: &Self) -> Option<String> {
-        let size = |i: &Self| format!("{}x{}", i.width, i.height);
-        if size(self) != size(other) {
-            return Some(format!("one is {}, the other {}", size(self), size(other)));
-        }
-        if self.seed != other.seed {
-            let (a, b) = (self.seed, other.seed);
-            return Some(format!("one has the seed {a}, the other {b}"));
-        }
-        if self.sampler != other.sampler {
-            let (a, b) = (self.sampler.name(), other.sampler.name());
-            return Some(format!("one has the sampler {a}, the other {b}"));
-        }
-        (self.scene != other.scene).then(|| {
-            "the scene differs, or its materials, or how rays are cast through it".to_string()
-        })
-    }
-}
-
 /// Samples of every pixel from `first` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Range {
@@ -71,7 +50,7 @@ pub struct Range {
 }
 
 impl Range {
-    fn end(self) -> u64 {
+    pub(super) fn end(self) -> u64 {
         self.first + self.count
     }
 }
@@ -97,80 +76,6 @@ impl FilmFile {
     /// Samples of each pixel.
     pub fn samples(&self) -> u64 {
         self.ranges.iter().map(|r| r.count).sum()
-    }
-
-    /// Adds the samples of another part of the same render. Fails, in words, if it is of
-    /// another, or if a sample is in both.
-    pub fn merge(&mut self, other: &FilmFile) -> Result<(), String> {
-        if let Some(difference) = self.sums.layers().difference(other.sums.layers()) {
-            return Err(format!("their outputs differ: {difference}"));
-        }
-        if let Some(difference) = self.identity.difference(&other.identity) {
-            return Err(format!("they are of different renders: {difference}"));
-        }
-        for a in &self.ranges {
-            for b in &other.ranges {
-                let (first, end) = (a.first.max(b.first), a.end().min(b.end()));
-                if first < end {
-                    let last = end - 1;
-                    return Err(format!("both hold the samples {first} to {last}"));
-                }
-            }
-        }
-        if self.samples() + other.samples() > u64::from(u32::MAX) {
-            return Err("together they hold more than 2^32 - 1 samples a pixel".into());
-        }
-        self.sums.add(&other.sums);
-        self.nonfinite += other.nonfinite;
-        self.clamped += other.clamped;
-        self.ranges.extend(&other.ranges);
-        self.ranges.sort_unstable();
-        self.ranges.dedup_by(|next, before| {
-            let adjoins = before.end() == next.first;
-            if adjoins {
-                before.count += next.count;
-            }
-            adjoins
-        });
-        Ok(())
-    }
-
-    /// How many samples of a render with some outputs are done, if these are the first ones of it. Fails, in
-    /// words, if they are not.
-    pub(crate) fn done_of_all(
-        &self,
-        identity: &Identity,
-        layers: &Layers,
-        first: u32,
-        samples: u32,
-    ) -> Result<u32, String> {
-        match layers.difference(self.sums.layers()) {
-            Some(difference) => Err(format!("its outputs are others: {difference}")),
-            None => self.done_of(identity, first, samples),
-        }
-    }
-
-    /// The same, whatever the outputs.
-    pub fn done_of(&self, identity: &Identity, first: u32, samples: u32) -> Result<u32, String> {
-        if let Some(difference) = identity.difference(&self.identity) {
-            return Err(format!("it is of another render: {difference}"));
-        }
-        let [range] = self.ranges[..] else {
-            return Err("its samples have gaps".into());
-        };
-        let (from, last) = (range.first, range.end() - 1);
-        if from != u64::from(first) {
-            return Err(format!(
-                "it holds the samples {from} to {last}, but this render starts at {first}"
-            ));
-        }
-        match u32::try_from(range.count) {
-            Ok(count) if count <= samples => Ok(count),
-            _ => Err(format!(
-                "it holds {} samples a pixel, more than the {samples} asked for",
-                range.count
-            )),
-        }
     }
 
     /// Reads a file. Whatever its bytes are, the answer is a film or an error that names the file.
@@ -414,15 +319,22 @@ fn sync_folder(path: &Path) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::film::PLANES;
 
-    fn part(first: u64, count: u64, value: u32) -> FilmFile {
+    /// A part of two pixels' samples, whose sums have words of `value`.
+    pub(in crate::film) fn part(first: u64, count: u64, value: u32) -> FilmFile {
         with_outputs(first, count, value, &[])
     }
 
-    fn with_outputs(first: u64, count: u64, value: u32, names: &[&str]) -> FilmFile {
+    /// The same with outputs beside the picture.
+    pub(in crate::film) fn with_outputs(
+        first: u64,
+        count: u64,
+        value: u32,
+        names: &[&str],
+    ) -> FilmFile {
         let samples = vec![count as u32; 2];
         let mut words = vec![value; 2 * (PLANES - 1)];
         words[4..6].fill(0);
@@ -452,7 +364,10 @@ mod tests {
 
     #[test]
     fn a_file_comes_back_as_it_was() {
-        let film = part(3, 5, u32::MAX);
+        let mut film = part(3, 5, u32::MAX);
+        assert_eq!(FilmFile::from_bytes(&film.to_bytes()), Ok(film.clone()));
+        film.merge(&part(9, 1, 30)).expect("they merge");
+        assert_eq!(film.ranges.len(), 2);
         assert_eq!(FilmFile::from_bytes(&film.to_bytes()), Ok(film));
     }
 
@@ -474,19 +389,6 @@ mod tests {
         bytes.extend(fingerprint::of(&bytes).to_le_bytes());
         let read = FilmFile::from_bytes(&bytes).expect("it is read");
         assert_eq!((&read.sums, read.scene.as_str()), (&film.sums, ""));
-    }
-
-    #[test]
-    fn parts_with_other_outputs_do_not_merge() {
-        let film = with_outputs(0, 2, 3, &["albedo", "depth"]);
-        let mut other = with_outputs(2, 2, 3, &["albedo"]);
-        let error = other.merge(&film).expect_err("refused");
-        assert!(
-            error.contains("the outputs albedo, the other the outputs albedo, depth"),
-            "{error}"
-        );
-        let error = part(2, 2, 3).merge(&film).expect_err("refused");
-        assert!(error.contains("one has no outputs"), "{error}");
     }
 
     #[test]
@@ -538,61 +440,5 @@ mod tests {
         refused(ranges + 12, &0u64.to_le_bytes());
         refused(ranges + 12, &(1u64 << 32).to_le_bytes());
         refused(ranges + 20, &u32::MAX.to_le_bytes());
-    }
-
-    #[test]
-    fn parts_merge_in_any_order_to_the_same() {
-        let parts = [part(0, 4, 10), part(4, 2, u32::MAX), part(9, 1, 30)];
-        let merged = |order: [usize; 3]| {
-            let mut sum = parts[order[0]].clone();
-            for i in &order[1..] {
-                sum.merge(&parts[*i]).expect("they merge");
-            }
-            sum
-        };
-        let all = merged([0, 1, 2]);
-        assert_eq!(all, merged([2, 0, 1]));
-        assert_eq!(all, merged([1, 2, 0]));
-        let ranges = [(0, 6), (9, 1)].map(|(first, count)| Range { first, count });
-        assert_eq!(all.ranges, ranges);
-        assert_eq!((all.samples(), all.nonfinite, all.clamped), (7, 3, 6));
-        assert_eq!(all.sums.picture().samples, [7, 7]);
-        assert_eq!(FilmFile::from_bytes(&all.to_bytes()), Ok(all));
-    }
-
-    #[test]
-    fn what_does_not_belong_together_is_not_merged() {
-        let refused = |change: &dyn Fn(&mut FilmFile)| {
-            let mut other = part(4, 4, 1);
-            change(&mut other);
-            let mut film = part(0, 4, 1);
-            film.merge(&other).expect_err("refused")
-        };
-        let overlap = refused(&|f| f.ranges[0].first = 3);
-        assert!(overlap.contains("samples 3 to 3"), "{overlap}");
-        assert!(refused(&|f| f.identity.seed = 8).contains("the seed 7, the other 8"));
-        assert!(refused(&|f| f.identity.width = 3).contains("2x1, the other 3x1"));
-        assert!(refused(&|f| f.identity.sampler = Sampler::Sobol).contains("sobol"));
-        assert!(refused(&|f| f.identity.scene = 0).contains("scene"));
-        let many = refused(&|f| f.ranges[0].count = (1 << 32) - 4);
-        assert!(many.contains("2^32"), "{many}");
-    }
-
-    #[test]
-    fn a_checkpoint_fits_its_render_and_no_other() {
-        let film = part(4, 6, 1);
-        let done = |first, samples| film.done_of(&film.identity, first, samples);
-        assert_eq!(done(4, 6), Ok(6));
-        assert_eq!(done(4, 100), Ok(6));
-        assert!(done(4, 5).is_err_and(|e| e.contains("holds 6 samples")));
-        assert!(done(0, 6).is_err_and(|e| e.contains("samples 4 to 9")));
-        let other = Identity {
-            seed: 1,
-            ..film.identity
-        };
-        assert!(
-            film.done_of(&other, 4, 6)
-                .is_err_and(|e| e.contains("another render"))
-        );
     }
 }

@@ -8,6 +8,7 @@ pub mod cryptomatte;
 pub mod exr;
 pub mod file;
 pub mod layers;
+mod merge;
 pub mod output;
 pub mod outputs;
 mod values;

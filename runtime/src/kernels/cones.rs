@@ -41,20 +41,23 @@ pub(crate) fn footprint(needs: Needs, inputs: InputSet) -> (&'static str, String
     let uvs = cones && needs.has(Need::UvWidths);
     let mut arguments = String::new();
     if inputs.footprint {
-        arguments += match cones {
-            true => ", seen.x, seen.y",
-            false => ", vec3<f32>(0.0), vec3<f32>(0.0)",
+        arguments += if cones {
+            ", seen.x, seen.y"
+        } else {
+            ", vec3<f32>(0.0), vec3<f32>(0.0)"
         };
     }
     if inputs.footprint_uv {
-        arguments += match uvs {
-            true => ", hit_uv_change(hit.primitive, seen.x), hit_uv_change(hit.primitive, seen.y)",
-            false => ", vec2<f32>(0.0), vec2<f32>(0.0)",
+        arguments += if uvs {
+            ", hit_uv_change(hit.primitive, seen.x), hit_uv_change(hit.primitive, seen.y)"
+        } else {
+            ", vec2<f32>(0.0), vec2<f32>(0.0)"
         };
     }
-    let statements = match arguments.contains("seen") {
-        true => "let seen = footprint(hit_geometric_normal(hit.primitive), wo, width);\n    ",
-        false => "",
+    let statements = if arguments.contains("seen") {
+        "let seen = footprint(hit_geometric_normal(hit.primitive), wo, width);\n    "
+    } else {
+        ""
     };
     (statements, arguments)
 }

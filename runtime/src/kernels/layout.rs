@@ -75,18 +75,20 @@ impl PlanLayout {
 
     /// The technique as this layout has it: not every scene allows for each.
     pub(crate) fn technique(&self, asked: Technique) -> Technique {
-        let ray_data = match self.needs.has(Need::Requests) {
-            true => RayData::Requests,
-            false => RayData::Slots,
+        let ray_data = if self.needs.has(Need::Requests) {
+            RayData::Requests
+        } else {
+            RayData::Slots
         };
         Technique { ray_data, ..asked }
     }
 
     /// Words that the queues take for each slot of the pool.
     pub(crate) fn queue_words(&self) -> u64 {
-        match self.wavefront {
-            true => self.queues.regions() as u64,
-            false => 0,
+        if self.wavefront {
+            self.queues.regions() as u64
+        } else {
+            0
         }
     }
 

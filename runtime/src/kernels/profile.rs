@@ -61,10 +61,7 @@ impl Instrumented {
         let header = self.text[self.statement..].trim_start();
         let plain = ["struct", "switch", "continuing"];
         let other = plain.iter().any(|word| header.starts_with(word));
-        let inside = match other {
-            true => Brace::Other,
-            false => Brace::Block,
-        };
+        let inside = if other { Brace::Other } else { Brace::Block };
         // What decides about a branch is a statement of its own.
         if !header.starts_with("else") && !header.starts_with("continuing") {
             self.statements += 1;

@@ -95,9 +95,10 @@ impl Job {
         let composer = inputs.composer(plan, layout, sizes);
         // Without other queues nothing differs but the logic kernel, which counted hits.
         let same = does_the_same(plan, &present.plan);
-        let resources = match same {
-            true => present.resources.clone(),
-            false => present.resources.for_plan(gpu, &composer),
+        let resources = if same {
+            present.resources.clone()
+        } else {
+            present.resources.for_plan(gpu, &composer)
         };
         let build = |kernel: &Kernel| {
             let built = self.built(kernel).filter(|_| same);
@@ -133,9 +134,10 @@ impl Job {
     }
 
     fn check_cancelled(&self) -> Result<(), RuntimeError> {
-        match self.cancelled.load(Ordering::Relaxed) {
-            true => Err(RuntimeError::Validation("the render has ended".into())),
-            false => Ok(()),
+        if self.cancelled.load(Ordering::Relaxed) {
+            Err(RuntimeError::Validation("the render has ended".into()))
+        } else {
+            Ok(())
         }
     }
 }

@@ -279,9 +279,10 @@ fn counted_materials(gpu: &Gpu, composer: &Composer<'_>) -> usize {
     let room = gpu.device.limits().max_compute_workgroup_storage_size;
     let possible =
         composer.layout.wavefront && workgroup % BLOCK == 0 && 4 * words <= u64::from(room);
-    match possible {
-        true => composer.materials.len(),
-        false => 0,
+    if possible {
+        composer.materials.len()
+    } else {
+        0
     }
 }
 

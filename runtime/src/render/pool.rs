@@ -82,9 +82,10 @@ pub(crate) fn dispatch_sizes(
     technique: &Technique,
 ) -> Result<Sizes, RuntimeError> {
     let limits = gpu.device.limits();
-    let fetch_limit = match gpu.is_software() {
-        true => SOFTWARE_FETCH_LIMIT,
-        false => FETCH_LIMIT,
+    let fetch_limit = if gpu.is_software() {
+        SOFTWARE_FETCH_LIMIT
+    } else {
+        FETCH_LIMIT
     };
     Ok(Sizes {
         pool: items,

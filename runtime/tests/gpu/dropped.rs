@@ -72,9 +72,10 @@ fn what_a_material_gets_wrong_is_counted_for_it_in_every_kind_of_plan() {
         assert_eq!(of(&rendering, "m1").kernel, kernel);
         for (index, (_, value, negative)) in WRONG.iter().enumerate() {
             let entry = of(&rendering, &format!("m{}", index + 1));
-            let [some, none] = match negative {
-                true => [entry.negative, entry.nonfinite],
-                false => [entry.nonfinite, entry.negative],
+            let [some, none] = if *negative {
+                [entry.negative, entry.nonfinite]
+            } else {
+                [entry.nonfinite, entry.negative]
             };
             assert!(some > 0 && none == 0, "{entry:?}");
             let example = entry.example.as_ref().expect("an example");

@@ -217,9 +217,10 @@ fn a_stopped_render_is_one_of_fewer_samples() {
         let stop = &mut |progress: &Progress| {
             assert!(progress.paths < progress.total);
             after -= 1;
-            match after > 0 {
-                true => ControlFlow::Continue(()),
-                false => ControlFlow::Break(()),
+            if after > 0 {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
             }
         };
         let stopped = renderer(strategy, &room(), &options).render(stop);

@@ -46,15 +46,12 @@ fn rendering(renderer: &mut Renderer<'_>) -> Rendering {
 fn check(some: &Rendering, chosen: &[u32], whole: &Rendering, samples: u32) {
     for (pixel, count) in (0..).zip(&some.film.samples) {
         let at = pixel as usize;
-        match chosen.contains(&pixel) {
-            true => {
-                assert_eq!(*count, samples, "pixel {pixel}");
-                assert_eq!(some.film.pixels[at], whole.film.pixels[at], "pixel {pixel}");
-            }
-            false => {
-                assert_eq!(*count, 0, "pixel {pixel}");
-                assert_eq!(some.film.pixels[at], [0.0; 3], "pixel {pixel}");
-            }
+        if chosen.contains(&pixel) {
+            assert_eq!(*count, samples, "pixel {pixel}");
+            assert_eq!(some.film.pixels[at], whole.film.pixels[at], "pixel {pixel}");
+        } else {
+            assert_eq!(*count, 0, "pixel {pixel}");
+            assert_eq!(some.film.pixels[at], [0.0; 3], "pixel {pixel}");
         }
     }
     let paths = chosen.len() as u64 * u64::from(samples);

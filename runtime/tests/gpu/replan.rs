@@ -359,9 +359,10 @@ fn a_stopped_render_that_was_replanned_is_one_of_fewer_samples() {
     let mut left = 20;
     let stop = &mut |_: &Progress| {
         left -= 1;
-        match left > 0 {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
+        if left > 0 {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
         }
     };
     let rendering = stopped.render(stop).unwrap_or_else(|e| panic!("{e}"));

@@ -111,9 +111,10 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
         file: binding.file.clone(),
         material: binding.material.clone(),
         params: binding.params.clone(),
-        parameters: match binding.bake {
-            true => Parameters::Baked,
-            false => Parameters::Agreed,
+        parameters: if binding.bake {
+            Parameters::Baked
+        } else {
+            Parameters::Agreed
         },
     };
     let requests: Vec<_> = scene.materials.iter().map(request).collect();
@@ -395,14 +396,15 @@ fn lights_give_as_much_whether_they_are_sampled_or_not() {
                 u = [1.6, 0, 0]\nv = [0, 0, 1.6]\nradiance = [2, 2, 2]\n";
     let sun = "[[lights]]\nkind = 'distant'\nto_light = [0, 0, 1]\nirradiance = 1\nangle = 120\n";
     for light in [quad, sun] {
-        let toml = room(1.0, 0.0, 4).replace("glowing", "dull");
+        let room = room(1.0, 0.0, 4).replace("glowing", "dull");
         // The sun shines on a block without a room around it.
-        let toml = match light == sun {
-            true => toml
-                .replace("room.obj", "block.obj")
-                .replace("materials.wall", "materials.block"),
-            false => toml,
-        } + light;
+        let objects = if light == sun {
+            room.replace("room.obj", "block.obj")
+                .replace("materials.wall", "materials.block")
+        } else {
+            room
+        };
+        let toml = objects + light;
         let (scene, program) = load(&toml);
         let sampled = render(&scene, &program, "wavefront", &samples(64));
         let (scene, program) = load(&(toml + "sample = false\n"));

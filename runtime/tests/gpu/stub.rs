@@ -81,9 +81,10 @@ pub fn each_once(materials: &[MaterialInfo]) -> Vec<InstanceInfo> {
     let instance = |(material, info): (usize, &MaterialInfo)| InstanceInfo {
         name: info.name.clone(),
         material,
-        emission: match info.varying_emission {
-            true => Emission::Varying,
-            false => Emission::None,
+        emission: if info.varying_emission {
+            Emission::Varying
+        } else {
+            Emission::None
         },
         medium: None,
     };

@@ -59,12 +59,11 @@ fn photons(medium: &Medium, channel: usize, thickness: f64, count: u32) -> [f64;
                 break;
             }
             // The usual inverse of Henyey and Greenstein's function, and the law of cosines.
-            let turn = match g.abs() < 1e-6 {
-                true => 2.0 * uniform() - 1.0,
-                false => {
-                    let s = (1.0 - g * g) / (1.0 - g + 2.0 * g * uniform());
-                    (1.0 + g * g - s * s) / (2.0 * g)
-                }
+            let turn = if g.abs() < 1e-6 {
+                2.0 * uniform() - 1.0
+            } else {
+                let s = (1.0 - g * g) / (1.0 - g + 2.0 * g * uniform());
+                (1.0 + g * g - s * s) / (2.0 * g)
             };
             let azimuth = (std::f64::consts::TAU * uniform()).cos();
             let sines = ((1.0 - turn * turn) * (1.0 - cosine * cosine))

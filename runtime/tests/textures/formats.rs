@@ -30,9 +30,10 @@ fn one(name: &str, bytes: Vec<u8>, space: TextureSpace) -> Vec<[f32; 4]> {
 
 /// IEC 61966-2-1.
 fn decoded(x: f64) -> f64 {
-    match x <= 0.04045 {
-        true => x / 12.92,
-        false => ((x + 0.055) / 1.055).powf(2.4),
+    if x <= 0.04045 {
+        x / 12.92
+    } else {
+        ((x + 0.055) / 1.055).powf(2.4)
     }
 }
 

@@ -127,12 +127,11 @@ fn tint(place: &str) -> String {
 
 /// Where a material is, as a scene names it.
 fn file(material: &str) -> String {
-    match generated_materials()
-        .iter()
-        .any(|(name, _)| name == material)
-    {
-        true => format!("{material}.impasto"),
-        false => format!("../../../materials/{material}.impasto"),
+    let generated = generated_materials();
+    if generated.iter().any(|(name, _)| name == material) {
+        format!("{material}.impasto")
+    } else {
+        format!("../../../materials/{material}.impasto")
     }
 }
 

@@ -26,9 +26,10 @@ pub fn run(args: &CostArgs, global: &Global) -> Outcome {
     if found.materials.is_empty() {
         return Err(Failure::Error(nothing_in_common(old, &before, new, &after)));
     }
-    match global.json() {
-        true => print(&format!("{:#}\n", json(args, &found))),
-        false => print(&text(args, old, new, &found)),
+    if global.json() {
+        print(&format!("{:#}\n", json(args, &found)))
+    } else {
+        print(&text(args, old, new, &found))
     }
 }
 
@@ -149,9 +150,10 @@ fn shows(old: f64, new: f64) -> bool {
 fn row(out: &mut String, what: &str, old: f64, new: f64) {
     let change = new - old;
     let _ = write!(out, "  {what:20} {old:>9.0} {new:>9.0} {change:>+9.1}");
-    let _ = match old > 0.0 {
-        true => writeln!(out, "  {:>+6.1} %", 100.0 * change / old),
-        false => writeln!(out),
+    let _ = if old > 0.0 {
+        writeln!(out, "  {:>+6.1} %", 100.0 * change / old)
+    } else {
+        writeln!(out)
     };
 }
 

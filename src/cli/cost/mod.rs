@@ -61,17 +61,19 @@ pub(super) fn run(args: &CostArgs, global: &Global) -> Outcome {
         },
     };
     let noise = noise(samples)?;
-    match global.json() {
-        true => print(&format!("{:#}\n", json(args, &materials, &noise))),
-        false => print(&table::text(args, &materials, &noise)),
+    if global.json() {
+        print(&format!("{:#}\n", json(args, &materials, &noise)))
+    } else {
+        print(&table::text(args, &materials, &noise))
     }
 }
 
 /// The materials of a scene or of a file.
 fn one_source(path: &str, samples: usize, global: &Global) -> Result<Vec<MaterialCost>, Failure> {
-    match is_scene(path) {
-        true => scene_materials(path, samples, global),
-        false => file_materials(&[path.to_owned()], samples, global),
+    if is_scene(path) {
+        scene_materials(path, samples, global)
+    } else {
+        file_materials(&[path.to_owned()], samples, global)
     }
 }
 

@@ -73,9 +73,10 @@ impl Space {
 /// The cube root of L*a*b*, with its linear part near zero.
 fn compressed(t: f32) -> f32 {
     const DELTA: f32 = 6.0 / 29.0;
-    match t > DELTA * DELTA * DELTA {
-        true => t.cbrt(),
-        false => t / (3.0 * DELTA * DELTA) + 4.0 / 29.0,
+    if t > DELTA * DELTA * DELTA {
+        t.cbrt()
+    } else {
+        t / (3.0 * DELTA * DELTA) + 4.0 / 29.0
     }
 }
 

@@ -71,11 +71,15 @@ pub(super) fn normalised(taps: &[f64]) -> Vec<f32> {
 pub(super) fn balanced(taps: &[f64]) -> Vec<f32> {
     let positive: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
     let negative: f64 = taps.iter().filter(|tap| **tap < 0.0).sum();
-    let scale = |tap: &f64| match *tap > 0.0 {
-        true => tap / positive,
-        // The sum is zero only where no tap is negative.
-        false if negative < 0.0 => -tap / negative,
-        false => 0.0,
+    let scale = |tap: &f64| {
+        if *tap > 0.0 {
+            tap / positive
+        } else if negative < 0.0 {
+            // The sum is zero only where no tap is negative.
+            -tap / negative
+        } else {
+            0.0
+        }
     };
     taps.iter().map(|tap| scale(tap) as f32).collect()
 }

@@ -47,9 +47,10 @@ fn row(out: &mut String, scene: &SceneConvergence, series: &Series, samples: u32
 
 /// A text in quotes where it must be (RFC 4180).
 fn cell(text: &str) -> String {
-    match text.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_string(),
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_string()
     }
 }
 

@@ -29,9 +29,10 @@ pub(super) fn time(seconds: f64) -> String {
 
 /// A share in percent.
 pub(super) fn percent(share: f64) -> String {
-    match share.is_finite() {
-        true => format!("{:.1} %", 100.0 * share),
-        false => "-".into(),
+    if share.is_finite() {
+        format!("{:.1} %", 100.0 * share)
+    } else {
+        "-".into()
     }
 }
 
@@ -56,9 +57,12 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
 
 /// A name as a part of names of files: letters, digits and hyphens.
 pub(super) fn file_name(name: &str) -> String {
-    let kept = |c: char| match c.is_ascii_alphanumeric() {
-        true => c.to_ascii_lowercase(),
-        false => '-',
+    let kept = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '-'
+        }
     };
     let name: String = name.chars().take(60).map(kept).collect();
     match name.trim_matches('-') {
@@ -70,9 +74,12 @@ pub(super) fn file_name(name: &str) -> String {
 /// A relative path as a part of an address.
 pub(super) fn address(path: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
-    let part = |b: u8| match plain(b) {
-        true => char::from(b).to_string(),
-        false => format!("%{b:02X}"),
+    let part = |b: u8| {
+        if plain(b) {
+            char::from(b).to_string()
+        } else {
+            format!("%{b:02X}")
+        }
     };
     path.bytes().map(part).collect()
 }

@@ -43,9 +43,12 @@ struct Curve {
 
 impl Curve {
     fn of(series: &Series, color: RGBColor, metric: Metric, against_time: bool) -> Self {
-        let x = |seconds: f64, samples: u32| match against_time {
-            true => seconds,
-            false => f64::from(samples),
+        let x = |seconds: f64, samples: u32| {
+            if against_time {
+                seconds
+            } else {
+                f64::from(samples)
+            }
         };
         let mut all = Vec::new();
         for point in &series.points {
@@ -159,9 +162,12 @@ impl Plot {
                 (y[0]..y[1]).log_scale().with_key_points(ticks(y)),
             )
             .map_err(failed)?;
-        let x_label = |v: &f64| match self.against_time {
-            true => time(*v).replace(".00 ", " ").replace(".0 ", " "),
-            false => format!("{v:.0}"),
+        let x_label = |v: &f64| {
+            if self.against_time {
+                time(*v).replace(".00 ", " ").replace(".0 ", " ")
+            } else {
+                format!("{v:.0}")
+            }
         };
         chart
             .configure_mesh()
@@ -211,9 +217,10 @@ impl Plot {
         let mut samples: Vec<f64> = points.map(|p| p.0).collect();
         samples.sort_by(f64::total_cmp);
         samples.dedup();
-        match self.against_time || samples.len() > 10 {
-            true => ticks(range),
-            false => samples,
+        if self.against_time || samples.len() > 10 {
+            ticks(range)
+        } else {
+            samples
         }
     }
 

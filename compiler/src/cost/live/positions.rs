@@ -77,9 +77,10 @@ impl Positions {
 
     /// The uses by an expression that stands at `at`.
     fn operands(&mut self, f: &Function, id: ExprId, at: usize, inlined: &[bool]) {
-        let at = match inlined[id.index()] {
-            true => self.named[id.index()],
-            false => at,
+        let at = if inlined[id.index()] {
+            self.named[id.index()]
+        } else {
+            at
         };
         self.evaluated[id.index()] = at;
         let kind = &f.expr(id).kind;

@@ -228,9 +228,10 @@ impl<'p> Body<'p> {
     fn eval(&mut self, number: u32) -> Result<Stmt> {
         let start = self.p.here();
         self.p.next();
-        let name = match self.p.is(":") {
-            true => None,
-            false => Some(self.p.name("`:` or a name")?),
+        let name = if self.p.is(":") {
+            None
+        } else {
+            Some(self.p.name("`:` or a name")?)
         };
         self.p.expect(":")?;
         let ty = self.p.ty()?;
@@ -248,16 +249,15 @@ impl<'p> Body<'p> {
     /// `@0.name.x = operand`
     fn store(&mut self) -> Result<Stmt> {
         let local = self.variable()?;
-        let part = match self.p.eat(".") {
-            true => {
-                let at = self.p.here();
-                let letters = self.p.name("x, y, z or w")?;
-                match components(&letters).as_deref() {
-                    Some([one]) => Some(*one),
-                    _ => return Err(Wrong::new(at, "no component").expected("x, y, z or w")),
-                }
+        let part = if self.p.eat(".") {
+            let at = self.p.here();
+            let letters = self.p.name("x, y, z or w")?;
+            match components(&letters).as_deref() {
+                Some([one]) => Some(*one),
+                _ => return Err(Wrong::new(at, "no component").expected("x, y, z or w")),
             }
-            false => None,
+        } else {
+            None
         };
         self.p.expect("=")?;
         Ok(Stmt::Store(local, part, self.operand()?))
@@ -267,9 +267,10 @@ impl<'p> Body<'p> {
         self.p.next();
         let cond = self.operand()?;
         let then = self.braces()?;
-        let otherwise = match self.p.eat_word("else") {
-            true => self.braces()?,
-            false => Block::new(),
+        let otherwise = if self.p.eat_word("else") {
+            self.braces()?
+        } else {
+            Block::new()
         };
         Ok(Stmt::If(cond, then, otherwise))
     }

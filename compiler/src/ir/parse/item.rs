@@ -87,9 +87,10 @@ impl Parser {
         let params = self.params()?;
         self.expect("->")?;
         let result = self.ty()?;
-        let turns = match self.eat_word("turns") {
-            true => self.count(u64::MAX, "a number of turns")?.max(1),
-            false => 1,
+        let turns = if self.eat_word("turns") {
+            self.count(u64::MAX, "a number of turns")?.max(1)
+        } else {
+            1
         };
         let mut body = Body::new(self, params);
         body.open()?;

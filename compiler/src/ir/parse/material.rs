@@ -87,12 +87,13 @@ impl Body<'_> {
         let surface_type = self.surface_type(local.ty)?;
         self.p.expect("=")?;
         let default = self.p.constant()?;
-        let range = match self.p.eat_word("in") {
-            true => Some((
+        let range = if self.p.eat_word("in") {
+            Some((
                 self.limit()?,
                 self.p.expect("..").and_then(|()| self.limit())?,
-            )),
-            false => None,
+            ))
+        } else {
+            None
         };
         Ok(MaterialParam {
             name: local.name,
@@ -108,9 +109,10 @@ impl Body<'_> {
     /// `as color`, or the machine type's own name.
     fn surface_type(&mut self, ty: Type) -> Result<&'static str> {
         let at = self.p.here();
-        let written = match self.p.eat_word("as") {
-            true => self.p.name("a type of the language")?,
-            false => format!("{ty:?}").to_lowercase(),
+        let written = if self.p.eat_word("as") {
+            self.p.name("a type of the language")?
+        } else {
+            format!("{ty:?}").to_lowercase()
         };
         surface::surface_type(&written, ty).ok_or_else(|| {
             Wrong::new(at, format!("`{written}` is not a type of such uniforms"))
@@ -152,9 +154,10 @@ impl Body<'_> {
                 return Err(unknown.expected("`surface`, `emission`, `interior` or `opacity`"));
             }
         };
-        match again {
-            true => Err(Wrong::new(at, format!("`{name}` is there twice"))),
-            false => Ok(()),
+        if again {
+            Err(Wrong::new(at, format!("`{name}` is there twice")))
+        } else {
+            Ok(())
         }
     }
 
@@ -168,9 +171,10 @@ impl Body<'_> {
             *part = self.operand()?;
         }
         self.p.expect(")")?;
-        let when = match self.p.eat_word("when") {
-            true => Some(self.operand()?),
-            false => None,
+        let when = if self.p.eat_word("when") {
+            Some(self.operand()?)
+        } else {
+            None
         };
         Ok(Interior {
             when,
@@ -227,9 +231,12 @@ impl Body<'_> {
             args.push(self.operand()?);
         }
         self.p.expect(")")?;
-        let mut framed = |word| match self.p.eat_word(word) {
-            true => self.operand().map(Some),
-            false => Ok(None),
+        let mut framed = |word| {
+            if self.p.eat_word(word) {
+                self.operand().map(Some)
+            } else {
+                Ok(None)
+            }
         };
         let (normal, tangent) = (framed("normal")?, framed("tangent")?);
         Ok(Lobe {

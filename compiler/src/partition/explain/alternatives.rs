@@ -153,9 +153,10 @@ fn without(
             Form::Inline => format!("`{name}` inline"),
             _ => format!("`{name}` in `{}`", subject.plan.kernels[j].name),
         };
-        let forms: Vec<Form> = match with.takes_several() {
-            true => vec![*with],
-            false => Form::queued_of_members(all.len()).collect(),
+        let forms: Vec<Form> = if with.takes_several() {
+            vec![*with]
+        } else {
+            Form::queued_of_members(all.len()).collect()
         };
         for form in forms {
             offer(

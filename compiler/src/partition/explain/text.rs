@@ -45,9 +45,10 @@ impl Explanation {
         };
         writeln!(f, "plan `{}`: {kernels}", self.strategy)?;
         writeln!(f, "partition: {}", self.partition)?;
-        let profile = match self.exact {
-            true => "",
-            false => " (scaled from another device's)",
+        let profile = if self.exact {
+            ""
+        } else {
+            " (scaled from another device's)"
         };
         writeln!(f, "profile: {}{profile}", self.device)?;
         let paths = grouped(self.pool.into());
@@ -56,13 +57,14 @@ impl Explanation {
             "predicted: {} an iteration of {paths} paths",
             time(self.seconds)
         )?;
-        match self.other_seconds > 0.0 {
-            true => writeln!(
+        if self.other_seconds > 0.0 {
+            writeln!(
                 f,
                 ", beside {} for all else where hits were counted",
                 time(self.other_seconds)
-            ),
-            false => writeln!(f),
+            )
+        } else {
+            writeln!(f)
         }
     }
 
@@ -85,9 +87,10 @@ impl Explanation {
             times,
             ..
         } = other;
-        let same = match other.partition == self.partition {
-            true => ", the same",
-            false => "",
+        let same = if other.partition == self.partition {
+            ", the same"
+        } else {
+            ""
         };
         write!(f, "  {strategy:<10} {:>10}", time(*seconds))?;
         match times {
@@ -180,18 +183,20 @@ fn write_alternative(f: &mut fmt::Formatter<'_>, other: &Alternative) -> fmt::Re
         why,
         ..
     } = other;
-    let verdict = match *more < 0.0 {
-        true => "would be faster",
-        false => "best other way",
+    let verdict = if *more < 0.0 {
+        "would be faster"
+    } else {
+        "best other way"
     };
     writeln!(f, "  {verdict}: {what}: {}", signed(*more))?;
     writeln!(f, "    {part} {}: {why}", signed(*part_more))
 }
 
 fn signed(seconds: f64) -> String {
-    match seconds < 0.0 {
-        true => format!("-{}", time(-seconds)),
-        false => format!("+{}", time(seconds)),
+    if seconds < 0.0 {
+        format!("-{}", time(-seconds))
+    } else {
+        format!("+{}", time(seconds))
     }
 }
 

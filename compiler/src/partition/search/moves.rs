@@ -94,9 +94,10 @@ impl Moves<'_> {
         if items.is_empty() {
             return Block::nothing();
         }
-        let seconds = match self.problem.allows(form) {
-            true => self.model.seconds(form, &self.members(&items)),
-            false => f64::INFINITY,
+        let seconds = if self.problem.allows(form) {
+            self.model.seconds(form, &self.members(&items))
+        } else {
+            f64::INFINITY
         };
         Block {
             form,
@@ -207,9 +208,10 @@ impl Moves<'_> {
     fn merged(&self, state: &State, i: usize, j: usize) -> Option<Block> {
         let items = with(&state[i].items, &state[j].items);
         let some_inline = [i, j].iter().any(|b| state[*b].form == Form::Inline);
-        let block = match some_inline {
-            true => self.formed(Form::Inline, items),
-            false => self.queued(items),
+        let block = if some_inline {
+            self.formed(Form::Inline, items)
+        } else {
+            self.queued(items)
         };
         block.seconds.is_finite().then_some(block)
     }
@@ -272,9 +274,10 @@ impl Moves<'_> {
         let together = [Form::Binned, Form::Inline].map(|form| self.model.seconds(form, &all));
         let keys = |i: &usize| {
             let rest = self.members(&without(items, &[*i]));
-            let [binned, woven] = match rest.is_empty() {
-                true => together,
-                false => [Form::Binned, Form::Inline].map(|form| self.model.seconds(form, &rest)),
+            let [binned, woven] = if rest.is_empty() {
+                together
+            } else {
+                [Form::Binned, Form::Inline].map(|form| self.model.seconds(form, &rest))
             };
             let more = [together[0] - binned, together[1] - woven];
             let (alone, inline) = (alone(*i), inline(*i));

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
+use crate::lab::statistics::median;
 use crate::render::report::AdapterReport;
 use crate::scene::Scene;
 use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
@@ -132,9 +133,10 @@ pub fn measure(
     let mut rates = Vec::new();
     for technique in &options.techniques {
         progress(technique);
-        let bvh = match technique.traversal == default.traversal {
-            true => reference.clone(),
-            false => Bvh::build(&scene.mesh, technique.traversal),
+        let bvh = if technique.traversal == default.traversal {
+            reference.clone()
+        } else {
+            Bvh::build(&scene.mesh, technique.traversal)
         };
         let caster = Caster::new(gpu, scene, &bvh, technique)?;
         for set in &sets {
@@ -169,9 +171,8 @@ fn rate(
     set: &RaySet,
     repetitions: u32,
 ) -> Result<RayRate, RuntimeError> {
-    let mut cast = caster.cast(&set.rays, set.kind.any_hit(), repetitions)?;
-    cast.seconds.sort_by(f64::total_cmp);
-    let seconds = cast.seconds[cast.seconds.len() / 2];
+    let cast = caster.cast(&set.rays, set.kind.any_hit(), repetitions)?;
+    let seconds = median(cast.seconds).unwrap_or_default();
     let pairs = set.hits.iter().zip(&cast.hits);
     let count = set.rays.len();
     Ok(RayRate {

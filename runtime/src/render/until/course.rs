@@ -84,9 +84,10 @@ impl Renderer<'_> {
         let over = || goals.time.is_some_and(|time| begin.elapsed() >= time);
         let mut tick = |now: &Progress| {
             interrupted |= progress(now).is_break();
-            match interrupted || over() {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+            if interrupted || over() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         };
         let ending = loop {

@@ -195,9 +195,10 @@ impl Means {
                 }
             }
         }
-        match count > 0.0 {
-            true => sum.map(|s| s / count),
-            false => self.pixels[pixel].unwrap_or_default(),
+        if count > 0.0 {
+            sum.map(|s| s / count)
+        } else {
+            self.pixels[pixel].unwrap_or_default()
         }
     }
 }

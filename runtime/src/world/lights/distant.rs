@@ -130,9 +130,10 @@ fn text(lights: &[&DistantLight], first: u32) -> Vec<Piece> {
     let mut text =
         "\nfn distant_light(index: u32) -> DistantLight {\n    switch index {\n".to_owned();
     for (index, light) in lights.iter().enumerate() {
-        let case = match index + 1 == lights.len() {
-            true => "default".to_owned(),
-            false => format!("case {index}u"),
+        let case = if index + 1 == lights.len() {
+            "default".to_owned()
+        } else {
+            format!("case {index}u")
         };
         text += &format!("        {case}: {{ return {}; }}\n", literal(light));
     }

@@ -133,9 +133,12 @@ impl Needs {
     /// The same with what its rows are built on.
     fn with_foundations(self) -> Self {
         let rows = ROWS.iter().rev();
-        rows.fold(self, |needs, row| match needs.has(row.need) {
-            true => needs.or(Self::of_rows(row.foundations)),
-            false => needs,
+        rows.fold(self, |needs, row| {
+            if needs.has(row.need) {
+                needs.or(Self::of_rows(row.foundations))
+            } else {
+                needs
+            }
         })
     }
 }

@@ -138,15 +138,15 @@ rows! {
         };
     UnlitMaterials, "hits without a light sample", "unlit_materials",
         "lights are sampled, and some material scatters into discrete directions only",
-        on &[ShadowRays], draws "", Whole, |f, n| match n.has(ShadowRays) {
-            true => f.material("scatters into discrete directions only", |m| m.delta_only),
-            false => None,
+        on &[ShadowRays], draws "", Whole, |f, n| {
+            n.has(ShadowRays)
+                .then(|| f.material("scatters into discrete directions only", |m| m.delta_only))?
         };
     CrossingShadows, "shadow origins", "crossing_shadows",
         "lights are sampled at a surface that light can cross",
-        on &[ShadowRays], draws "", Whole, |f, n| match n.has(ShadowRays) {
-            true => f.material("lets light cross", |m| m.crosses && !m.delta_only),
-            false => None,
+        on &[ShadowRays], draws "", Whole, |f, n| {
+            n.has(ShadowRays)
+                .then(|| f.material("lets light cross", |m| m.crosses && !m.delta_only))?
         };
     // ---- Media ----
     Media, "media", "media",
@@ -172,15 +172,13 @@ rows! {
         };
     MediumChanges, "paths that change their medium", "changes_medium",
         "paths follow media, and a material with an interior lets them cross",
-        on &[Media], draws "", Whole, |f, n| match n.has(Media) {
-            true => f.material("is crossed into its interior", |m| m.transmissive),
-            false => None,
+        on &[Media], draws "", Whole, |f, n| {
+            n.has(Media).then(|| f.material("is crossed into its interior", |m| m.transmissive))?
         };
     ExteriorIor, "index outside of surfaces", "exterior_ior",
         "paths follow media, and a material reads `exterior_ior`",
-        on &[Media], draws "", Whole, |f, n| match n.has(Media) {
-            true => f.reads("`exterior_ior`", |i| i.exterior_ior),
-            false => None,
+        on &[Media], draws "", Whole, |f, n| {
+            n.has(Media).then(|| f.reads("`exterior_ior`", |i| i.exterior_ior))?
         };
     // ---- Materials ----
     VaryingEmission, "emission that varies", "varying_emission",
@@ -268,7 +266,7 @@ rows! {
         "`--aov` asks for how the material there looks",
         on &[], draws "", AOV, |f, _| f.records(At::Material);
     SampleOutputs, "outputs of samples", "sample_outputs",
-        "`--aov` asks for what samples come to",
+        "`--aov` asks for an output that is recorded once per sample",
         on &[], draws "", AOV, |f, _| f.records(At::Sample);
     LightGroups, "light groups", "light_groups",
         "`--aov` asks for the share of a group of lights",

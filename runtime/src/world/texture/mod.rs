@@ -126,9 +126,10 @@ fn load(texture: &TextureRef, base: &Path) -> Result<Packed, SceneError> {
     check_range(&picture, &path)?;
     let coverage = is_color && texture.lookups.alpha;
     let holes = |picture: &Picture| picture.texels.iter().any(|texel| texel[3] < 1.0);
-    let mut levels = match texture.lookups.levels || (coverage && holes(&picture)) {
-        true => levels::pyramid(picture, coverage),
-        false => vec![picture],
+    let mut levels = if texture.lookups.levels || (coverage && holes(&picture)) {
+        levels::pyramid(picture, coverage)
+    } else {
+        vec![picture]
     };
     if !texture.lookups.levels {
         levels.truncate(1);

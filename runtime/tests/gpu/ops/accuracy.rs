@@ -124,9 +124,10 @@ fn by_component(op: Op, [a, b, c]: [f64; 3], off: f64, x: f64) -> f64 {
 
 /// The error of a logarithm: absolute about 1, else relative.
 fn logarithm(x: f64) -> f64 {
-    match (0.5..=2.0).contains(&x) {
-        true => 2f64.powi(-21),
-        false => 4.0 * EPSILON * x.max(FLUSHED).log2().abs(),
+    if (0.5..=2.0).contains(&x) {
+        2f64.powi(-21)
+    } else {
+        4.0 * EPSILON * x.max(FLUSHED).log2().abs()
     }
 }
 

@@ -163,10 +163,11 @@ pub fn tuples(op: Op, types: &[Type]) -> Vec<Vec<Value<f32>>> {
         .collect();
     let all: usize = counts.iter().product();
     let scalar = types.iter().all(|ty| ty.width().is_none_or(|w| w == 1));
-    let step = match scalar {
-        true => 1,
+    let step = if scalar {
+        1
+    } else {
         // Odd, so that it meets all values of every operand.
-        false => (all / MAX_WITH_VECTORS) | 1,
+        (all / MAX_WITH_VECTORS) | 1
     };
     let tuple = |mut number: usize| {
         let operand = |(ty, count): (&Type, &usize)| {
