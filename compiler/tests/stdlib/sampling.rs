@@ -344,9 +344,10 @@ fn bsdfs_pass_no_more_than_they_leave() {
 /// `albedo` is the integral, within what its documentation promises.
 fn albedo_fault(bsdf: &Bsdf, case: &Case, wo: [f64; 3], outcome: &Outcome) -> Option<String> {
     let said = albedo(bsdf, case, wo);
-    let within = match (wo[2] > 0.0) == (case.ior >= 1.0) {
-        true => bsdf.albedo_within,
-        false => bsdf.albedo_within_inside,
+    let within = if (wo[2] > 0.0) == (case.ior >= 1.0) {
+        bsdf.albedo_within
+    } else {
+        bsdf.albedo_within_inside
     };
     let right = (0..3).all(|c| {
         let close = (said[c] - outcome.energy[c]).abs() < within + 1e-3;
