@@ -1,6 +1,7 @@
 //! From WGSL text to a pipeline: validation first, so that a defect of code generation is
 //! reported with the line it concerns and never reaches a driver.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -70,15 +71,15 @@ impl Gpu {
         if let Some(known) = self.pipelines.get(wgsl) {
             return Ok(known);
         }
-        validate(kernel, wgsl)?;
-        let build = || Ok(self.build_pipeline(kernel, wgsl, layout));
+        let (module, _) = validate(kernel, wgsl)?;
+        let build = || Ok(self.build_pipeline(kernel, wgsl, &module, layout));
         Ok(match self.guarded(build) {
             Ok(pipeline) => {
                 self.pipelines.keep(wgsl, &pipeline);
                 pipeline
             }
             // Once more, so that whoever listens hears of it.
-            Err(_) => self.build_pipeline(kernel, wgsl, layout),
+            Err(_) => self.build_pipeline(kernel, wgsl, &module, layout),
         })
     }
 
@@ -86,9 +87,10 @@ impl Gpu {
         &self,
         kernel: &str,
         wgsl: &str,
+        module: &naga::Module,
         layout: &wgpu::BindGroupLayout,
     ) -> wgpu::ComputePipeline {
-        let module = self.shader_module(kernel, wgsl);
+        let module = self.shader_module(kernel, module);
         let compilation_options = wgpu::PipelineCompilationOptions {
             zero_initialize_workgroup_memory: self.checked || !bvh::shares_stack(wgsl),
             ..Default::default()
@@ -111,11 +113,13 @@ impl Gpu {
             })
     }
 
+    /// Of what was parsed to be validated: wgpu would parse the text again, which takes longer than to
+    /// copy the module.
     #[allow(unsafe_code)]
-    fn shader_module(&self, kernel: &str, wgsl: &str) -> wgpu::ShaderModule {
+    fn shader_module(&self, kernel: &str, module: &naga::Module) -> wgpu::ShaderModule {
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(kernel),
-            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+            source: wgpu::ShaderSource::Naga(Cow::Owned(module.clone())),
         };
         if self.checked {
             return self.device.create_shader_module(descriptor);

@@ -44,15 +44,19 @@ fn pieces(text: &str) -> Vec<Piece<'_>> {
     let mut piece = Piece::empty();
     let mut open = 0i32;
     for line in text.lines() {
-        let code = line.split("//").next().unwrap_or("").trim_end();
+        let code = before_comment(line).trim_end();
         piece.text += line;
         piece.text.push('\n');
         if open == 0 {
             piece.name = piece.name.or_else(|| declared(code));
             piece.is_entry |= code.starts_with("@compute");
         }
-        let opened = code.matches(['{', '(', '[']).count() as i32;
-        open += opened - code.matches(['}', ')', ']']).count() as i32;
+        let opened = code.bytes().map(|byte| match byte {
+            b'{' | b'(' | b'[' => 1,
+            b'}' | b')' | b']' => -1,
+            _ => 0,
+        });
+        open += opened.sum::<i32>();
         let ends = open == 0 && piece.name.is_some() && code.ends_with(['}', ';']);
         let is_gap = open == 0 && line.is_empty() && piece.name.is_none();
         if ends || is_gap {
@@ -107,9 +111,16 @@ pub(crate) fn mentions(text: &str, name: &str) -> bool {
 
 /// `text` without its `//` comments.
 pub(crate) fn without_comments(text: &str) -> String {
-    let code = |line: &str| line.split("//").next().unwrap_or("").to_string();
-    let lines: Vec<String> = text.lines().map(code).collect();
+    let lines: Vec<&str> = text.lines().map(before_comment).collect();
     lines.join("\n")
+}
+
+/// A line until its `//`. Byte by byte: searching for a string prepares for more than a line.
+fn before_comment(line: &str) -> &str {
+    let mut pairs = line.as_bytes().windows(2);
+    pairs
+        .position(|pair| pair == b"//")
+        .map_or(line, |at| &line[..at])
 }
 
 /// A function of an instance, of some material `among` a few, that is true if that is one for which

@@ -17,7 +17,7 @@ use crate::wgsl::template::template;
 use crate::world::bvh::{self, Bvh};
 use crate::world::surface::geometry_part;
 
-/// Casts before those that are timed.
+/// Casts before those that are timed, on a GPU. A processor is awake, having built the kernel.
 const WARM_UP: Duration = Duration::from_millis(200);
 
 /// The buffers of a kernel beside the scene's: name, type, access.
@@ -117,7 +117,8 @@ impl<'g> Caster<'g> {
         // a tree was built, takes its time to get up to speed.
         let begin = Instant::now();
         cast()?;
-        while repetitions > 0 && begin.elapsed() < WARM_UP {
+        let warms_up = repetitions > 0 && !self.gpu.is_software();
+        while warms_up && begin.elapsed() < WARM_UP {
             cast()?;
         }
         let seconds: Result<_, _> = (0..repetitions).map(|_| cast()).collect();

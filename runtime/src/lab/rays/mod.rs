@@ -131,14 +131,17 @@ pub fn measure(
         sets.push(RaySet { kind, rays, hits });
     }
     let mut rates = Vec::new();
+    // Several techniques walk the same hierarchy.
+    let mut built = vec![(default.traversal, reference)];
     for technique in &options.techniques {
         progress(technique);
-        let bvh = if technique.traversal == default.traversal {
-            reference.clone()
-        } else {
-            Bvh::build(&scene.mesh, technique.traversal)
-        };
-        let caster = Caster::new(gpu, scene, &bvh, technique)?;
+        let traversal = technique.traversal;
+        let index = built.iter().position(|(known, _)| *known == traversal);
+        let index = index.unwrap_or_else(|| {
+            built.push((traversal, Bvh::build(&scene.mesh, traversal)));
+            built.len() - 1
+        });
+        let caster = Caster::new(gpu, scene, &built[index].1, technique)?;
         for set in &sets {
             rates.push(rate(&caster, technique, set, options.repetitions)?);
         }
