@@ -7,10 +7,10 @@ use crate::shell::{self, Result, cargo};
 pub(crate) fn run() -> Result {
     shell::section("Writing snapshots");
     let mut test = cargo();
-    test.args(["test", "--package", "impasto"])
+    test.args(["test", "--workspace"])
         .args([
             "--test",
-            "it",
+            "pipeline",
             "--",
             "snapshots::",
             "plans::",

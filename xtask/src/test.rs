@@ -21,22 +21,29 @@ pub(crate) struct TestArgs {
     all: bool,
 }
 
-/// A crate, and which of its tests `--quick` leaves out: whole groups, by what their names contain.
+/// A program of tests, and what `--quick` leaves out of it: whole groups, by what the names of tests contain.
 /// None is less thorough for it; it is run as it always is, or not at all.
 const LEFT_OUT: &[(&str, &[(&str, &str)])] = &[
     (
-        "impasto-compiler",
-        &[(
-            "stdlib::",
-            "what the library promises, by sampling and search",
-        )],
+        "compiler",
+        &[
+            (
+                "stdlib::",
+                "what the library promises, by sampling and search",
+            ),
+            (
+                "materials::no_material_makes_light",
+                "energy of materials, by sampling",
+            ),
+        ],
     ),
     (
-        "impasto-runtime",
+        "runtime",
         &[("gpu::", "pictures of small worlds, and numbers of kernels")],
     ),
+    ("limits", &[]),
     (
-        "impasto",
+        "pipeline",
         &[
             ("needs::", "the pairs of scenes of the table of needs"),
             ("filtering::", "ray cones"),
@@ -45,6 +52,10 @@ const LEFT_OUT: &[(&str, &[(&str, &str)])] = &[
             ("textures::", "textures far away"),
             ("trace::", "replays of paths"),
             ("until::", "estimates of errors"),
+            (
+                "cli::cost::the_papers_scenes",
+                "scenes of a million triangles",
+            ),
             ("cli::calibrate::", "the command, rendering"),
             ("cli::converge::", "the command, rendering"),
             ("cli::film::", "the command, rendering"),
@@ -71,7 +82,7 @@ pub(crate) fn run(args: &TestArgs) -> Result {
     let result = shell::run(test.arg("--workspace").args(&args.filter));
     if !args.takes_all() {
         shell::section("Left to `cargo xtask test --all`");
-        eprintln!("impasto-compiler  stdlib::sampling   two of three views of each setting of a BSDF");
+        eprintln!("compiler   stdlib::sampling   two of three views of each setting of a BSDF");
     }
     result
 }
@@ -104,10 +115,11 @@ fn quick(args: &TestArgs) -> Result {
     let mut units = testing(args);
     units.args(["--workspace", "--lib", "--bins"]);
     let mut result = shell::run(units.args(&args.filter));
-    for (package, groups) in LEFT_OUT {
-        shell::section(&format!("Running the quick tests of {package}"));
+    for (program, groups) in LEFT_OUT {
+        shell::section(&format!("Running the quick tests of {program}"));
         let mut tests = testing(args);
-        tests.args(["--package", package, "--test", "*"]);
+        // Of the workspace: for a package of it, cargo would build with other features.
+        tests.args(["--workspace", "--test", program]);
         tests.args(&args.filter).arg("--");
         for (group, _) in *groups {
             tests.args(["--skip", group]);
@@ -115,9 +127,9 @@ fn quick(args: &TestArgs) -> Result {
         result = result.and(shell::run(&mut tests));
     }
     shell::section("Left out by --quick");
-    for (package, groups) in LEFT_OUT {
+    for (program, groups) in LEFT_OUT {
         for (group, what) in *groups {
-            eprintln!("{package:<17} {group:<18} {what}");
+            eprintln!("{program:<10} {group:<34} {what}");
         }
     }
     eprintln!("examples of documentation");

@@ -16,9 +16,9 @@ use clap::Args;
 use xtask::adapter;
 use xtask::shell::{self, Result, cargo};
 
-/// Tests that measure stability: what they are called together, their package, and the beginnings of their names.
+/// Tests that measure stability: what they are called together, their program, and the beginnings of their names.
 struct Target {
-    package: &'static str,
+    program: &'static str,
     name: &'static str,
     filters: &'static [&'static str],
     needs_adapter: bool,
@@ -26,31 +26,31 @@ struct Target {
 
 const TARGETS: &[Target] = &[
     Target {
-        package: "impasto-compiler",
+        program: "compiler",
         name: "stdlib",
         filters: &["stdlib::"],
         needs_adapter: false,
     },
     Target {
-        package: "impasto-compiler",
+        program: "compiler",
         name: "materials",
         filters: &["materials::", "--skip", "stdlib::"],
         needs_adapter: false,
     },
     Target {
-        package: "impasto",
+        program: "pipeline",
         name: "trace",
         filters: &["trace::examples"],
         needs_adapter: false,
     },
     Target {
-        package: "impasto-runtime",
+        program: "runtime",
         name: "gpu",
         filters: &["gpu::extremes", "gpu::media::"],
         needs_adapter: true,
     },
     Target {
-        package: "impasto-runtime",
+        program: "runtime",
         name: "environment",
         filters: &["environment::"],
         needs_adapter: false,
@@ -148,15 +148,14 @@ fn command(args: &StressArgs) -> String {
 
 /// Runs one target. A failure is kept, not returned: the others' rows are wanted all the same.
 fn tested(target: &Target, args: &StressArgs, folder: &Path) -> Ended {
-    let name = format!("{} {}", target.package, target.name);
+    let name = format!("{} {}", target.program, target.name);
     shell::section(&format!("Testing {name}"));
     let mut test = cargo();
     test.args([
         "test",
-        "-p",
-        target.package,
+        "--workspace",
         "--test",
-        "it",
+        target.program,
         "--no-fail-fast",
     ]);
     test.arg("--").args(target.filters);

@@ -61,10 +61,7 @@ pub fn fast<F: Real>(op: Op, args: Vec<Lanes<F>>) -> Result<Lanes<F>, Vec<Lanes<
             let [v] = taken(args);
             let inverse = |d: F| if d > tiny { one / d.sqrt() } else { zero };
             let scale = map1(vec![vec![dot(&v, &v)]], inverse);
-            map2(
-                vec![v, scale],
-                |x, s| if s == zero { zero } else { x * s },
-            )
+            map2(vec![v, scale], |x, s| if s == zero { zero } else { x * s })
         }
         Op::Sqrt => map1(args, |x| high(x, zero).sqrt()),
         Op::Sin => map1(args, |x| x.map(f64::sin)),
