@@ -12,5 +12,20 @@ use crate::scene::{Scene, load_with};
 /// # Errors
 /// The first thing that is wrong, with its place.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_with(path, FORMATS, &readers(LIGHT_KINDS))
+    load_with(path, FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
+}
+
+/// The folder of an example whose files are too large to be kept with it.
+const GENERATED: &str = "generated";
+
+/// Whoever renders an example for the first time misses the files that are to be generated.
+fn explain_generated(error: SceneError) -> SceneError {
+    let file = error.path.as_deref();
+    let folder = file.and_then(Path::parent).and_then(Path::file_name);
+    let is_missing = file.is_some_and(|file| !file.exists());
+    if is_missing && folder.is_some_and(|name| name == GENERATED) {
+        error.or_hint("`cargo scenes` makes the generated files of the example scenes")
+    } else {
+        error
+    }
 }
