@@ -290,3 +290,177 @@ fn seconds(weights: &Weights, issued: &Classes) -> f64 {
         + weights.texture * issued.texture
         + weights.turns * issued.turns
 }
+
+/// Against numbers worked out by hand: searches compare the model with itself only.
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cost::{LANES, Operations};
+
+    /// Slots of a subgroup's worth: 2^20 slots are 32768 subgroups of 32 lanes.
+    const POOL: u32 = 1 << 20;
+    /// What every evaluation issues: 135 operations, 215 ps of a subgroup by the weights below.
+    const ISSUED: Classes = Classes {
+        alu: 100.0,
+        special: 10.0,
+        integer: 20.0,
+        texture: 2.0,
+        turns: 3.0,
+    };
+
+    fn profile() -> DeviceProfile {
+        let mut profile = DeviceProfile::named("h200").expect("it is shipped");
+        profile.subgroup = 32;
+        profile.weights = Weights {
+            launch: 5e-6,
+            latency: 1e-9,
+            alu: 1e-12,
+            special: 4e-12,
+            integer: 2e-12,
+            texture: 10e-12,
+            turns: 5e-12,
+            memory: 1e-13,
+            scatter: 3e-13,
+            code: 4000.0,
+            miss: 0.5,
+            overlap: 1.0,
+            inline_loads: 0.5,
+            free_registers: 30.0,
+            pressure: 0.2,
+        };
+        profile
+    }
+
+    fn cost(live: u32, code: u32, issued: [Classes; LANES.len()]) -> Option<Cost> {
+        let operations = Operations {
+            evaluations: 1,
+            mean: ISSUED.sum(),
+            min: 0,
+            max: 135,
+            classes: ISSUED,
+        };
+        Some(Cost {
+            operations,
+            issued,
+            live,
+            code,
+            loops: 0,
+            bytes: 8.0,
+        })
+    }
+
+    /// Two materials, each hit by a quarter of the slots: by neighbours together (`draws` 1), or
+    /// whatever their neighbours hit (32).
+    fn workload(draws: i32) -> Workload {
+        let hits = |name: &str| Hits {
+            material: name.into(),
+            on_surface: true,
+            share: 0.25,
+            present: 1.0 - 0.75f64.powi(draws),
+            loads: 64.0,
+            stores: 96.0,
+        };
+        Workload {
+            pool: POOL,
+            materials: vec![hits("a"), hits("b")],
+            logic_seconds: 1e-4,
+            other_seconds: 0.0,
+        }
+    }
+
+    fn predicted(form: Form, members: &[usize], draws: i32) -> Prediction {
+        let costs = [
+            cost(80, 3000, [ISSUED; LANES.len()]),
+            cost(40, 2000, [ISSUED; LANES.len()]),
+        ];
+        let (workload, profile) = (workload(draws), profile());
+        let model = Calibrated {
+            costs: &costs,
+            workload: &workload,
+            profile: &profile,
+        };
+        model.predict(form, members)
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!(
+            (found / expected - 1.0).abs() < 1e-4,
+            "{found} in the place of {expected}"
+        );
+    }
+
+    #[test]
+    fn an_own_kernel_takes_its_launch_its_operations_and_its_memory() {
+        let found = predicted(Form::Own, &[0], 1);
+        // 2^18 hits in 8192 full subgroups; 160 bytes of state and 8 of its own.
+        near(found.issue, 8192.0 * 215e-12);
+        near(found.memory, 262_144.0 * 168.0 * 1e-13);
+        near(found.latency, 135e-9);
+        near(
+            found.total,
+            5e-6 + found.issue + found.memory + found.latency,
+        );
+        assert_eq!((found.launch, found.logic, found.doubt), (5e-6, 0.0, 0.0));
+    }
+
+    #[test]
+    fn hits_that_are_apart_read_lines_of_memory_alone() {
+        // Of 16 slots in a line, 4 hit: 1 - 0.75^16 of the lines are met, by 4 hits each, so a hit
+        // needs 0.2475 of a line where neighbours would share a sixteenth.
+        let apart = (0.247_494 - 0.0625) / 0.9375;
+        let found = predicted(Form::Own, &[0], 32);
+        let bytes = 160.0 * (1e-13 + apart * 3e-13) + 8.0 * 1e-13;
+        near(found.memory, 262_144.0 * bytes);
+        // A queue makes full subgroups of them all the same.
+        near(found.issue, 8192.0 * 215e-12);
+    }
+
+    #[test]
+    fn side_by_side_every_subgroup_runs_what_it_meets() {
+        // The caches hold 4000 operations of the 5000: an eighth more.
+        let together = predicted(Form::Mixed, &[0, 1], 1);
+        near(together.issue, 1.125 * 2.0 * 8192.0 * 215e-12);
+        // Half of the subgroups meet each material, and of the 8 of a workgroup nearly always one does.
+        near(together.latency, 1.125e-9 * 2.0 * 0.996_093_75 * 135.0);
+        // Where neighbours differ, all of the 16384 subgroups meet both.
+        let mixed = predicted(Form::Mixed, &[0, 1], 32);
+        near(mixed.issue, 1.125 * 2.0 * 16384.0 * 215e-12);
+        // Binned, each workgroup evaluates one material, whatever the neighbours.
+        let binned = predicted(Form::Binned, &[0, 1], 32);
+        near(binned.issue, 2.0 * 8192.0 * 215e-12);
+        near(binned.latency, 135e-9);
+    }
+
+    #[test]
+    fn inline_materials_cost_the_logic_kernel_registers() {
+        let found = predicted(Form::Inline, &[0, 1], 1);
+        // 80 live numbers are 50 more than are free.
+        near(found.logic, 1e-4 * 0.2 * 0.5);
+        // A quarter of 32768 subgroups meets each; of 64 bytes to load, half are at hand.
+        near(found.issue, 1.125 * 2.0 * 8192.0 * 215e-12);
+        near(found.memory, 2.0 * 262_144.0 * (32.0 + 96.0 + 8.0) * 1e-13);
+        near(found.doubt, 0.1 * found.total);
+        assert_eq!(found.launch, 0.0);
+        near(predicted(Form::Inline, &[1], 1).logic, 1e-4 * 0.2 * 0.1);
+    }
+
+    #[test]
+    fn operations_and_memory_overlap_by_their_norm() {
+        near(norm([3.0, 4.0, 0.0], 1.0), 7.0);
+        near(norm([3.0, 4.0, 0.0], 2.0), 5.0);
+        near(norm([3e-6, 4e-6, 1e-9], 64.0), 4e-6);
+        assert_eq!(norm([0.0; 3], 2.0), 0.0);
+    }
+
+    #[test]
+    fn what_is_issued_lies_between_the_known_numbers_of_lanes() {
+        let mut issued = [ISSUED; LANES.len()];
+        (issued[3].alu, issued[4].alu) = (200.0, 400.0);
+        let cost = cost(0, 0, issued).expect("a cost");
+        near(cost.issued_by(8.0).alu, 200.0);
+        near(cost.issued_by(16.0).alu, 400.0);
+        // Half way by the logarithm.
+        near(cost.issued_by(128f64.sqrt()).alu, 300.0);
+        near(cost.issued_by(1000.0).alu, 100.0);
+    }
+}

@@ -1,11 +1,11 @@
 //! What each op gives, in both precisions, at ordinary operands and where mathematics gives
 //! nothing ("Nothing is undefined" in docs/language.md).
 
-use impasto_compiler::ir::build::Builder;
+use impasto_compiler::ir::build::{Builder, const_type};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::ops::{self, Op, Shape};
 use impasto_compiler::ir::value::{Real, Value};
-use impasto_compiler::ir::{Local, Module, Type};
+use impasto_compiler::ir::{Const, Local, Module, Type};
 
 use super::HERE;
 
@@ -263,6 +263,81 @@ fn single_precision_rounds_every_operation() {
 
 fn wide(v: &Value<f32>) -> Value<f64> {
     Value::vector(&v.to_f64())
+}
+
+/// Numbers at which ops are special, or overflow.
+const EDGES: [f64; 12] = [
+    0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.5, 1e-30, -1e-30, 1e30, -3e38, 3e38,
+];
+const EDGE_INTS: [i32; 7] = [0, 1, -1, 2, 13, i32::MAX, i32::MIN];
+
+/// The constants of a type that are tried; vectors have an edge in one component.
+fn edges(ty: Type) -> Vec<Const> {
+    match ty {
+        Type::Bool => [false, true].map(Const::Bool).to_vec(),
+        Type::Int => EDGE_INTS.map(Const::Int).to_vec(),
+        Type::Float => EDGES.map(|x| Const::Float(vec![x])).to_vec(),
+        _ => EDGES.map(|x| Const::Float(vec![0.25, x, -1.5])).to_vec(),
+    }
+}
+
+/// Every choice of one element of each list.
+fn products(lists: &[Vec<Const>]) -> Vec<Vec<Const>> {
+    lists.iter().fold(vec![Vec::new()], |all, list| {
+        let longer = |c: &Vec<Const>| {
+            list.iter()
+                .map(|x| [&c[..], &[x.clone()]].concat())
+                .collect()
+        };
+        all.iter().flat_map(|c| -> Vec<_> { longer(c) }).collect()
+    })
+}
+
+/// What the builder makes of an op on constants.
+fn folded(op: Op, args: &[Const]) -> Option<Const> {
+    let mut b = Builder::new("f", Vec::new(), HERE);
+    let constants = args.iter().map(|c| b.constant(c.clone(), HERE));
+    let ids: Vec<_> = constants.collect();
+    let value = b.op(op, &ids, HERE);
+    b.finish(value).constant(value).cloned()
+}
+
+/// A constant is what the op gives at run time, within the range of single precision.
+#[test]
+fn constants_fold_to_what_every_op_gives() {
+    const MAX: f64 = f32::MAX as f64;
+    let mut tried = 0;
+    for &op in Op::ALL {
+        let types = [Type::Bool, Type::Int, Type::Float, Type::Vec3];
+        let lists = (1..=3).flat_map(|n| products(&vec![types.map(marker).to_vec(); n]));
+        for list in lists {
+            let types: Vec<Type> = list.iter().map(const_type).collect();
+            if op.result(&types).is_none() {
+                continue;
+            }
+            for args in products(&types.iter().map(|ty| edges(*ty)).collect::<Vec<_>>()) {
+                let Some(found) = folded(op, &args) else {
+                    continue;
+                };
+                let values: Vec<Value<f64>> = args.iter().map(Value::constant).collect();
+                let expected = match run(op, &values).to_const() {
+                    Some(Const::Float(v)) => {
+                        Const::Float(v.into_iter().map(|x| x.clamp(-MAX, MAX)).collect())
+                    }
+                    Some(other) => other,
+                    None => panic!("{op:?} {args:?} is no constant at run time"),
+                };
+                assert_eq!(found, expected, "{op:?} {args:?}");
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 20_000, "{tried} foldings");
+}
+
+/// Some constant of a type.
+fn marker(ty: Type) -> Const {
+    edges(ty).swap_remove(0)
 }
 
 /// By-component ops treat every component alike, and floats as vectors of equal components.

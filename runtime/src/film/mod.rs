@@ -226,10 +226,18 @@ mod tests {
     #[test]
     fn sums_add_with_every_carry() {
         let values = [(1u128 << 32) - 1, (1 << 64) - 1, (1 << 56) + 12345];
-        let mut sum = pixel(values, 100_000_000);
-        sum.add(&pixel([1, 1, (1 << 80) + (1 << 63)], 3));
+        let more = [1, 1, (1 << 80) + (1 << 63)];
         let expected = [1 << 32, 1 << 64, (1 << 80) + (1 << 63) + (1 << 56) + 12345];
-        assert_eq!(sum, pixel(expected, 100_000_003));
+        // Each of them in every channel.
+        for turn in 0..3 {
+            let turned = |mut sums: [u128; 3]| {
+                sums.rotate_left(turn);
+                sums
+            };
+            let mut sum = pixel(turned(values), 100_000_000);
+            sum.add(&pixel(turned(more), 3));
+            assert_eq!(sum, pixel(turned(expected), 100_000_003));
+        }
     }
 
     #[test]
