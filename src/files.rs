@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use impasto_compiler::source::MAX_SOURCE_BYTES;
 use impasto_compiler::{Loader, library_text};
+use impasto_runtime::input;
 
 /// The name by which standard input is asked for.
 pub const STDIN: &str = "-";
@@ -37,7 +38,7 @@ impl FileLoader {
         if path == STDIN {
             read_source(io::stdin().lock())
         } else {
-            read_source(std::fs::File::open(self.base.join(path))?)
+            read_source(input::open(&self.base.join(path))?)
         }
     }
 }

@@ -12,6 +12,7 @@ use image::{
 };
 
 use crate::error::SceneError;
+use crate::input;
 
 /// Texels a side of the largest picture that is read.
 pub(crate) const MAX_SIDE: u32 = 16_384;
@@ -72,7 +73,7 @@ fn open<'a>(
 ) -> Result<(ImageFormat, Box<dyn ImageDecoder + 'a>), SceneError> {
     let error = |message: String| SceneError::in_file(path, message);
     let unreadable = |e: std::io::Error| error(format!("cannot read the {what}: {e}"));
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(input::open(path).map_err(unreadable)?);
     let start = file.fill_buf().map_err(unreadable)?.to_vec();
     if start.is_empty() {
         return Err(error(format!("the {what} is an empty file")).hint(FORMATS));
@@ -149,7 +150,7 @@ fn jpeg_is_whole(path: &Path) -> std::io::Result<bool> {
     const END: u8 = 0xd9;
     let mut whole = false;
     let mut before = 0;
-    for byte in BufReader::new(File::open(path)?).bytes() {
+    for byte in BufReader::new(input::open(path)?).bytes() {
         let byte = byte?;
         // Pictures within the header end as well; what counts is the end after the last scan.
         match (before, byte) {

@@ -18,6 +18,7 @@ pub mod film;
 mod fingerprint;
 pub mod gpu;
 mod image_file;
+pub mod input;
 pub mod kernels;
 pub mod lab;
 pub mod options;

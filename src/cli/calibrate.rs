@@ -106,7 +106,8 @@ fn measure(args: &CalibrateArgs, global: &Global) -> Result<Vec<Measurement>, Fa
 
 fn read(path: &std::path::Path) -> Result<Vec<Measurement>, Failure> {
     let cannot = |why: String| format!("cannot use `{}`: {why}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|error| cannot(files::reason(&error)))?;
+    let text = impasto::runtime::input::read_to_string(path);
+    let text = text.map_err(|error| cannot(files::reason(&error)))?;
     Ok(Data::parse(&text).map_err(cannot)?.sets)
 }
 

@@ -1,22 +1,30 @@
-//! Ctrl-C: the first one asks for an end, the second one is the end.
+//! Ctrl-C, and the signals by which a system or a closed terminal ends programs (SIGTERM, SIGHUP): the first one
+//! asks for an end, the second one is the end.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
-/// Set by the first Ctrl-C.
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// When the first one came.
+static REQUESTED: OnceLock<Instant> = OnceLock::new();
 
-/// From now on the first Ctrl-C only sets what [`requested`] tells; the second one exits with 130.
+/// Signals that follow the first one so soon belong to it: a closed terminal sends SIGHUP, and so does its shell.
+const TOGETHER: Duration = Duration::from_millis(300);
+
+/// From now on the first signal only sets what [`requested`] tells; the second one exits with 130.
 pub(super) fn install() -> Result<(), String> {
     let handler = || {
-        if REQUESTED.swap(true, Ordering::SeqCst) {
+        let now = Instant::now();
+        let first = *REQUESTED.get_or_init(|| now);
+        if first == now {
+            super::say("\nstopping; once more to quit at once");
+        } else if now.duration_since(first) > TOGETHER {
             std::process::exit(130);
         }
-        super::say("\nstopping; once more to quit at once");
     };
     ctrlc::set_handler(handler).map_err(|error| format!("cannot handle Ctrl-C: {error}"))
 }
 
 /// Has an end been asked for?
 pub(super) fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+    REQUESTED.get().is_some()
 }

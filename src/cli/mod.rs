@@ -260,7 +260,7 @@ fn compiled_scene(path: &std::path::Path, global: &Global) -> Result<(Scene, Pro
 
 /// The text of a file that an option names.
 fn read_text(path: &std::path::Path) -> Result<String, Failure> {
-    let text = std::fs::read_to_string(path);
+    let text = impasto::runtime::input::read_to_string(path);
     text.map_err(|error| {
         let why = impasto::files::reason(&error);
         Failure::Error(format!("cannot read `{}`: {why}", path.display()))

@@ -18,5 +18,7 @@ mod plan;
 mod plans;
 mod rays;
 mod render;
+#[cfg(unix)]
+mod streams;
 mod trace;
 mod until;

@@ -180,6 +180,18 @@ fn scenes_that_are_none() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_what_is_rendered() {
+    keeps_what_is_rendered_after("-INT");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_system_that_ends_programs_keeps_what_is_rendered() {
+    keeps_what_is_rendered_after("-TERM");
+    keeps_what_is_rendered_after("-HUP");
+}
+
+#[cfg(unix)]
+fn keeps_what_is_rendered_after(signal: &str) {
     use std::io::{BufRead, BufReader};
     use std::process::Stdio;
 
@@ -205,7 +217,7 @@ fn ctrl_c_keeps_what_is_rendered() {
     assert!(started, "it never started");
     std::thread::sleep(std::time::Duration::from_secs(1));
     let interrupt = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
+        .args([signal, &child.id().to_string()])
         .status();
     assert!(interrupt.is_ok_and(|status| status.success()));
     let rest: Vec<String> = stderr.map_while(Result::ok).collect();

@@ -16,6 +16,7 @@ use crate::film::layers::{Layer, Layers};
 use crate::film::output;
 use crate::film::outputs::Output;
 use crate::fingerprint;
+use crate::input;
 use crate::technique::{Choice, Sampler};
 
 const MAGIC: [u8; 8] = *b"IMPASTOF";
@@ -84,7 +85,7 @@ impl FilmFile {
             path: path.to_path_buf(),
             reason,
         };
-        let bytes = std::fs::read(path).map_err(|e| failure(e.to_string()))?;
+        let bytes = input::read(path).map_err(|e| failure(e.to_string()))?;
         Self::from_bytes(&bytes).map_err(failure)
     }
 

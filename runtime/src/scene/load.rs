@@ -13,6 +13,7 @@ use super::formats::{Format, Geometry};
 use super::{Environment, EnvironmentMap, EnvironmentSource, LightReader, Scene};
 use crate::error::SceneError;
 use crate::image_file;
+use crate::input;
 
 /// Texels of the largest environment map.
 const MAX_ENVIRONMENT: usize = 8192 * 4096;
@@ -29,7 +30,7 @@ pub fn load_with(
     formats: &[Format],
     lights: &[LightReader],
 ) -> Result<Scene, SceneError> {
-    let text = std::fs::read(path)
+    let text = input::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
     let text = String::from_utf8(text)
         .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;

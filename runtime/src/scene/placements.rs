@@ -10,6 +10,7 @@ use super::Transform;
 use super::description::MaterialName;
 use super::document::{Table, Value, list};
 use crate::error::SceneError;
+use crate::input;
 
 /// Most placements of one entry, and of a scene.
 pub(super) const MAX_PLACEMENTS: usize = 1 << 24;
@@ -171,7 +172,7 @@ const MATERIAL: &str = "material";
 
 /// Reads a file of places: a line that names the columns, then a line a place.
 pub(super) fn read_file(path: &Path) -> Result<Places, SceneError> {
-    let bytes = std::fs::read(path)
+    let bytes = input::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the placements: {e}")))?;
     let text = String::from_utf8(bytes)
         .map_err(|_| SceneError::in_file(path, "the placements are not UTF-8 text"))?;

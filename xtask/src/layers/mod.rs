@@ -54,7 +54,14 @@ const CRATES: &[Crate] = &[
         name: "impasto-runtime",
         folder: "runtime/src",
         layers: &[
-            &["error", "technique", "parallel", "fingerprint", "wgsl"],
+            &[
+                "error",
+                "input",
+                "technique",
+                "parallel",
+                "fingerprint",
+                "wgsl",
+            ],
             &["image_file", "options"],
             &["film", "scene"],
             &["world"],

@@ -12,6 +12,7 @@ use impasto_compiler::ParameterValue;
 
 use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning};
 use crate::error::SceneError;
+use crate::input;
 
 mod mtl;
 
@@ -28,7 +29,7 @@ pub(super) const FORMAT: Format = Format {
 /// Reads an OBJ file and cuts its faces into fans of triangles.
 fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
-    let bytes = std::fs::read(path)
+    let bytes = input::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
     if bytes.contains(&0) {
         let error = SceneError::in_file(path, "the OBJ file is binary or in UTF-16");

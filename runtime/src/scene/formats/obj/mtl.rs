@@ -5,6 +5,7 @@ use std::path::Path;
 use impasto_compiler::ParameterValue;
 
 use crate::error::SceneError;
+use crate::input;
 use crate::scene::formats::{FileMaterial, FileValue};
 
 /// The values that are read, by their keys in MTL files.
@@ -25,7 +26,7 @@ const fn value(name: &'static str, fallback: &'static [f64]) -> FileValue {
 /// Reads the materials of the MTL file `name`, which is relative to the folder `base` of the scene.
 pub(super) fn load(base: &Path, name: &Path) -> Result<Vec<FileMaterial>, SceneError> {
     let path = &base.join(name);
-    let bytes = std::fs::read(path)
+    let bytes = input::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the MTL file: {e}")))?;
     let text = normalise(path, &String::from_utf8_lossy(&bytes))?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())

@@ -1,0 +1,62 @@
+//! Opening files that are read to their end. A FIFO or a socket that nobody writes to, or a device, would never
+//! come to one: they are refused by their kind, before anything waits for them.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Standard input by its name as a file, and what a shell puts for `<(command)`: whoever names one of these means
+/// to wait for it.
+const STREAMS: [&str; 2] = ["/dev/stdin", "/dev/fd"];
+
+/// Opens the file at `path` for reading.
+///
+/// # Errors
+/// If it cannot be opened, or is neither a file nor standard input.
+pub fn open(path: &Path) -> io::Result<File> {
+    let kind = std::fs::metadata(path)?.file_type();
+    let is_stream = STREAMS.iter().any(|stream| path.starts_with(stream));
+    // Reading a folder fails with an error of its own.
+    if !kind.is_file() && !kind.is_dir() && !is_stream {
+        return Err(io::Error::other(refusal(&kind)));
+    }
+    File::open(path)
+}
+
+/// The contents of the file at `path`.
+///
+/// # Errors
+/// As [`open`], or if it cannot be read.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of the file at `path`.
+///
+/// # Errors
+/// As [`read`], or if it is not UTF-8.
+pub fn read_to_string(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    open(path)?.read_to_string(&mut text)?;
+    Ok(text)
+}
+
+#[cfg(unix)]
+fn refusal(kind: &std::fs::FileType) -> String {
+    use std::os::unix::fs::FileTypeExt;
+    let name = if kind.is_fifo() {
+        "a FIFO"
+    } else if kind.is_socket() {
+        "a socket"
+    } else {
+        "a device"
+    };
+    format!("it is {name}, which may never end; write it to a file first")
+}
+
+#[cfg(not(unix))]
+fn refusal(_: &std::fs::FileType) -> String {
+    "it is no file".into()
+}
