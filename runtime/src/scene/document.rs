@@ -9,6 +9,7 @@ use impasto_compiler::diag::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::mesh::MAX_COORDINATE;
 use crate::error::SceneError;
 
 /// The text of a TOML file.
@@ -208,16 +209,27 @@ impl<'d> Value<'d> {
             .ok_or_else(|| self.mismatch(expected))
     }
 
-    /// Three finite numbers.
+    /// Three finite numbers: a direction, factors by axis.
     pub(crate) fn vector(&self) -> Result<Vec3, SceneError> {
-        Ok(self.place()?.as_vec3())
+        Ok(self.three_numbers()?.as_vec3())
     }
 
-    /// Three finite numbers that say where something is. Single precision would lose what is small
-    /// against its distance from the origin.
+    /// Where something is, or how far an edge reaches from there, in metres. Single precision would lose
+    /// what is small against its distance from the origin.
     pub(crate) fn place(&self) -> Result<DVec3, SceneError> {
-        let place: [f64; 3] = self.array("three finite numbers, as [x, y, z]")?;
-        Ok(place.into())
+        let place = self.three_numbers()?;
+        let reach = place.abs().max_element();
+        if reach > MAX_COORDINATE {
+            let message = format!("{} reaches {:e} m", self.name, reach as f32);
+            let hint = format!("coordinates may go up to {MAX_COORDINATE:e}");
+            return Err(self.error(message).hint(hint));
+        }
+        Ok(place)
+    }
+
+    fn three_numbers(&self) -> Result<DVec3, SceneError> {
+        let numbers: [f64; 3] = self.array("three finite numbers, as [x, y, z]")?;
+        Ok(numbers.into())
     }
 
     /// Linear RGB, not negative: three numbers, or one for a grey.

@@ -65,8 +65,8 @@ fn read(table: &mut Table) -> Result<(Light, Option<DVec3>), SceneError> {
     let corner = table.require("corner")?.place()?;
     let quad = QuadLight {
         corner: Vec3::ZERO,
-        u: table.require("u")?.vector()?,
-        v: table.require("v")?.vector()?,
+        u: table.require("u")?.place()?.as_vec3(),
+        v: table.require("v")?.place()?.as_vec3(),
         radiance: table.require("radiance")?.rgb()?,
         two_sided: optional(table, "two_sided", Value::boolean, false)?,
         sample: optional(table, "sample", Value::boolean, true)?,
