@@ -40,8 +40,8 @@ fn make_fifo(path: &Path) {
 fn planned(folder: &Path, more: &str) -> Run {
     write(folder, "tinted.impasto", TINTED);
     write(folder, "triangle.obj", TRIANGLE);
-    write(folder, "with_mtl.obj", &format!("mtllib pipe\n{TRIANGLE}"));
-    let scene = write(folder, "scene.toml", &SCENE.replace("{}", more));
+    write(folder, "with_mtl.obj", format!("mtllib pipe\n{TRIANGLE}"));
+    let scene = write(folder, "scene.toml", SCENE.replace("{}", more));
     impasto(&["plan", &scene])
 }
 

@@ -286,7 +286,7 @@ fn products(lists: &[Vec<Const>]) -> Vec<Vec<Const>> {
     lists.iter().fold(vec![Vec::new()], |all, list| {
         let longer = |c: &Vec<Const>| {
             list.iter()
-                .map(|x| [&c[..], &[x.clone()]].concat())
+                .map(|x| [&c[..], std::slice::from_ref(x)].concat())
                 .collect()
         };
         all.iter().flat_map(|c| -> Vec<_> { longer(c) }).collect()
