@@ -3,9 +3,10 @@
 //!
 //! `IMPASTO_EFFORT=full` has the same tests look at more directions, samples and restarts;
 //! `IMPASTO_EFFORT=share`, as `cargo xtask test` has it without `--all`, has the longest of them take a
-//! share of their cases, each as thoroughly as ever. There is no second list of cases. `IMPASTO_STRESS_ROWS` names a folder: each `Row` noted becomes a line
-//! of a file there, written at once, so that a test which fails later does not lose it. A test
-//! notes what it measured before it asserts. Tests of other crates include this file by `#[path]`.
+//! share of their cases, each as thoroughly as ever. There is no second list of cases.
+//! `IMPASTO_STRESS_ROWS` names a folder: each `Row` noted becomes a line of a file there, written at
+//! once, so that a test which fails later does not lose it. A test notes what it measured before it
+//! asserts. Tests of other crates include this file by `#[path]`.
 
 #![allow(dead_code)]
 

@@ -126,12 +126,13 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     )
 }
 
-pub fn render(
+/// A renderer by a strategy of that name, or with all materials `inline`.
+pub fn renderer(
     scene: &Scene,
     program: &Program,
     strategy: &str,
     options: &RenderOptions,
-) -> Rendering {
+) -> Renderer<'static> {
     let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
     let inline = strategy == "inline";
     let strategy = Strategy::parse(if inline { "shared" } else { strategy });
@@ -142,8 +143,16 @@ pub fn render(
             kernel.form = Form::Inline;
         }
     }
-    let mut renderer =
-        Renderer::new(gpu(), scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"));
+    Renderer::new(gpu(), scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+pub fn render(
+    scene: &Scene,
+    program: &Program,
+    strategy: &str,
+    options: &RenderOptions,
+) -> Rendering {
+    let mut renderer = renderer(scene, program, strategy, options);
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(rendering.report.queue_overflow, 0);

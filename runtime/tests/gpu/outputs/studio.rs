@@ -3,14 +3,11 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use impasto_compiler::partition::{Form, PlanInputs, Strategy};
 use impasto_compiler::{Loader, MaterialRequest, Program, compile, compile_with_looks};
 use impasto_runtime::film::outputs::{ALL_GROUPS, At, OUTPUTS, ask_for_looks};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::{self, Scene};
-
-use crate::gpu::stub::gpu;
 
 /// A card from -1 to 1 in the plane z = 0 with coordinates from 0 to 1, in two parts; a tile before it whose normals
 /// lean; and a tile behind the camera.
@@ -104,17 +101,7 @@ pub(super) fn renderer(
     strategy: &str,
     options: &RenderOptions,
 ) -> Renderer<'static> {
-    let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
-    let inline = strategy == "inline";
-    let strategy = Strategy::parse(if inline { "mixed" } else { strategy });
-    let plan = strategy.and_then(|strategy| strategy.plan(&PlanInputs::of_names(&names)));
-    let mut plan = plan.unwrap_or_else(|e| panic!("{e}"));
-    for kernel in &mut plan.kernels {
-        if inline {
-            kernel.form = Form::Inline;
-        }
-    }
-    Renderer::new(gpu(), scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"))
+    crate::gpu::scene::renderer(scene, program, strategy, options)
 }
 
 pub(super) fn render(
