@@ -118,7 +118,6 @@ const FILM: &str = "
     fn glass(c: float, ior: float) -> float = fresnel_dielectric(c, ior);
     fn schlick(c: float, f0: color, f82: color, f90: color, e: float) -> color =
         schlick82(c, f0, f82, f90, e);
-    fn loss(wo: vector, alpha: vec2) -> float = ggx_loss_anisotropic(wo, alpha);
 ";
 
 #[test]
@@ -312,19 +311,17 @@ fn white_metals_keep_all_light() {
     // Without absorption and at an index of next to nothing a metal is white.
     let white = "ior: color(1e-6), extinction: color(5)";
     for (name, args, anisotropy, least) in [
-        ("conductor", white, "0", 0.99),
-        ("conductor", white, "0.9", 0.94),
-        ("generalized_schlick", "color0: 1", "0", 0.99),
-        ("generalized_schlick", "color0: 1", "-0.7", 0.94),
+        ("conductor", white, "0", 0.998),
+        ("conductor", white, "0.9", 0.99),
+        ("generalized_schlick", "color0: 1", "0", 0.998),
+        ("generalized_schlick", "color0: 1", "-0.7", 0.99),
     ] {
         for roughness in ["0.05", "0.2", "0.3", "0.6", "0.8", "1"] {
             let metal = Given::new(
                 name,
                 &format!("{args}, roughness: {roughness}, anisotropy: {anisotropy}"),
             );
-            // On nearly smooth metal the lobe of several facets fades out next to the horizon.
-            let grazing = if roughness == "0.2" { 70.0 } else { 88.0 };
-            for degrees in [0.0, 40.0, 60.0, grazing] {
+            for degrees in [0.0, 40.0, 60.0, 88.0, 89.9] {
                 let kept = metal.furnace(view(degrees), 1 << 14);
                 assert!(
                     (least - 0.004..1.004).contains(&kept),

@@ -27,6 +27,7 @@ mod region;
 mod sampling;
 mod scattered;
 mod search;
+mod several_facets;
 mod sheen;
 mod space;
 mod statistics;
