@@ -12,9 +12,6 @@ pub enum Error {
     /// A material has errors; the text shows each with its place, expectation and hint.
     #[error("the scene's materials have errors\n{0}")]
     Materials(String),
-    /// What materials cost cannot be told in reasonable time.
-    #[error("the materials take too long to evaluate, so that nothing is known of what they cost")]
-    Costs,
     /// The strategy has no plan for these materials.
     #[error(transparent)]
     Plan(#[from] PlanError),

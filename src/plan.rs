@@ -11,7 +11,7 @@
 //! let workload = impasto::plan::workload(&gpu, &scene, &program, None)?;
 //! let info = gpu.info();
 //! let profile = DeviceProfile::shipped(&info.name, info.kind)?.profile;
-//! let materials = SceneMaterials::new(&scene, &program, 1024)?;
+//! let materials = SceneMaterials::new(&scene, &program, 1024);
 //! let plan = Strategy::AUTO.plan(&materials.inputs(&workload, &profile))?;
 //! # Ok(())
 //! # }
@@ -21,7 +21,6 @@ use std::sync::Arc;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
-use impasto_compiler::ir::interp::OutOfFuel;
 use impasto_compiler::partition::{DeviceProfile, PlanInputs, Strategy, Workload};
 use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
@@ -45,17 +44,14 @@ pub struct SceneMaterials {
 
 impl SceneMaterials {
     /// The materials of `scene`, which compiled to `program`; each is evaluated at `samples` points of the
-    /// scene's surfaces.
-    ///
-    /// # Errors
-    /// If the evaluations of a material take too long together.
-    pub fn new(scene: &Scene, program: &Program, samples: usize) -> Result<Self, OutOfFuel> {
-        let costs = crate::cost::of_scene(scene, program, samples)?;
-        Ok(Self {
+    /// scene's surfaces, or at fewer if it takes so long that its budget is spent before.
+    pub fn new(scene: &Scene, program: &Program, samples: usize) -> Self {
+        let costs = crate::cost::of_scene(scene, program, samples);
+        Self {
             names: program.materials().map(|m| m.name.clone()).collect(),
             unused: unused(scene, program),
             costs: costs.into_iter().map(|m| m.cost).collect(),
-        })
+        }
     }
 
     /// All that strategies ask for.
@@ -85,8 +81,6 @@ pub fn planner(
 ) -> Planner {
     Box::new(move |workload| {
         let materials = SceneMaterials::new(&scene, &program, samples);
-        let materials =
-            materials.map_err(|_| "its materials take too long to evaluate".to_owned())?;
         let plan = strategy.plan(&materials.inputs(workload, &profile));
         plan.map_err(|error| error.to_string())
     })

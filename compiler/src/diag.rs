@@ -135,7 +135,7 @@ codes! {
     NotFinite = "E0314", Error, "not a finite number",
         "Parameters and constants must be finite numbers.";
     TooLarge = "E0315", Error, "material too large",
-        "Functions are inlined for the GPU, and a material may grow to at most 400,000 operations. Calls of materials and of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions per material; closures nest at most 256 levels deep.";
+        "Functions are inlined for the GPU, and a material may grow to at most 400,000 operations. No function of its code may have more than 50,000 operations, constants and assignments, because shader compilers take time with the square of that. A function or closure has at most 250 parameters, a struct 1023 fields, a file 1024 materials. Calls of materials and of functions that return closures nest at most 32 deep and expand to at most 50,000 expressions per material; closures nest at most 256 levels deep.";
     VaryingMedium = "E0316", Error, "varying medium",
         "The medium inside an object is uniform: `interior` may depend on parameters and constants only, not on the point of the surface or on textures.";
     Metadata = "E0317", Error, "contradictory metadata",

@@ -2,7 +2,8 @@
 //! machine, so that a pass which goes over everything too often fails here and not in somebody's
 //! patience.
 
-use impasto_compiler::{MaterialRequest, MemoryLoader, Program, compile, diag};
+use impasto_compiler::diag::Diagnostic;
+use impasto_compiler::{MaterialRequest, MemoryLoader, Program, check, compile, diag};
 
 const IMPORTS: &str = "use std::bsdf::{conductor, dielectric_reflection, diffuse, generalized_schlick, sheen_zeltner};\n";
 
@@ -112,4 +113,51 @@ fn car_paint_by_open_pbr_fits_a_reviewer() {
         .lines()
         .count();
     assert!((100..600).contains(&lines), "{lines} lines");
+}
+
+fn errors(text: &str) -> Vec<Diagnostic> {
+    let mut files = MemoryLoader::default();
+    files.add("m.impasto", text);
+    let found = check("m.impasto", &mut files).diagnostics;
+    found.into_iter().filter(Diagnostic::is_error).collect()
+}
+
+/// Sizes that are refused, each with what is said of them.
+#[test]
+fn what_is_too_large_is_said() {
+    let list = |n: usize, part: &dyn Fn(usize) -> String| (0..n).map(part).collect::<String>();
+    let parameter = |i: usize| format!("a{i}: float, ");
+    let function = |n: usize| format!("fn f({}) -> float = a0;", list(n, &parameter));
+    let structure = |n: usize| format!("struct S {{ {} }}", list(n, &parameter));
+    let materials = |n: usize| {
+        let material = |i: usize| format!("material m{i} {{ surface = diffuse(0.5); }}\n");
+        format!("use std::bsdf::diffuse;\n{}", list(n, &material))
+    };
+    let sums = |n: usize| {
+        let sum = |i: usize| format!("x += uv.x * {i}.5;\n");
+        let sums = list(n, &sum);
+        format!(
+            "use std::bsdf::diffuse;\nmaterial m {{ var x = uv.y; {sums} surface = diffuse(x); }}"
+        )
+    };
+    let cases: [(String, Option<&str>); 7] = [
+        (function(250), None),
+        (function(251), Some("251 parameters are too many")),
+        (structure(1023), None),
+        (structure(1024), Some("`S` has 1024 fields")),
+        (materials(1025), Some("the file defines too many materials")),
+        (sums(10_000), None),
+        (sums(18_000), Some("`m` needs a function of")),
+    ];
+    for (text, refused) in cases {
+        let found = errors(&text);
+        let first = found.first();
+        match refused {
+            Some(why) => assert!(
+                first.is_some_and(|d| d.message.starts_with(why) && d.code.id() == "E0315"),
+                "{why}: {found:?}"
+            ),
+            None => assert_eq!(first, None),
+        }
+    }
 }

@@ -1,7 +1,11 @@
 //! The worst inputs of 64 KiB that we could think of: each takes less than a second and less than
-//! 256 MiB. One test alone in its process, since it measures the process's memory.
+//! 256 MiB. And long sources of every shape, whose time must not grow with the square of their length.
+//! One test alone in its process, since it measures the process's memory.
 
-use impasto_fuzz::{MAX_INPUT, Target, ir, run, source};
+use std::time::Duration;
+
+use impasto_fuzz::sources::{SHAPES, shape};
+use impasto_fuzz::{MAX_INPUT, MAX_TIME, Target, checked_and_formatted, ir, run, source, timed};
 
 /// `part(0)`, `part(1)`, ... as long as they and `rest` fit.
 fn fill(rest: usize, part: impl Fn(usize) -> String) -> (String, usize) {
@@ -259,5 +263,60 @@ fn the_worst_inputs_take_little_time_and_memory() {
             }
         }
     }
+    problems.extend(short_sources());
+    problems.extend(COMPARED.iter().filter_map(|name| growth(name)));
     assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+/// What is wrong with sources of each shape of a length that takes no time.
+fn short_sources() -> Vec<String> {
+    let failed = SHAPES.iter().filter_map(|shape| {
+        let source = shape.source(4 << 10);
+        assert!(source.len() <= 32 << 10, "{}: {}", shape.name, source.len());
+        let failure = run(checked_and_formatted, source.as_bytes()).err()?;
+        Some(format!("{}: {failure:?}", shape.name))
+    });
+    failed.collect()
+}
+
+/// A shape for each stage whose work once grew with the square of a source: what a longer one takes is
+/// compared with what a shorter one takes. `cargo run --release -p impasto-fuzz --bin long all` measures
+/// all shapes at the longest that a source may be.
+const COMPARED: [&str; 9] = [
+    "constant lets",
+    "branches",
+    "branches on one condition",
+    "chains of stores",
+    "loops without effect",
+    "unread closures",
+    "a chain of functions",
+    "a chain of functions that grow",
+    "a call with many arguments",
+];
+
+/// Lengths of sources that are compared, in bytes.
+const LENGTHS: [usize; 2] = [64 << 10, 256 << 10];
+
+/// How much longer the longer may take: four times what the shorter does, as it should, and as much for
+/// caches and chance; with the square of the length it would be sixteen times.
+const MOST_GROWTH: f64 = 8.0;
+
+/// What is wrong with how the time of a shape grows, if anything.
+fn growth(name: &str) -> Option<String> {
+    let shape = shape(name).expect("the table has it");
+    let [short, long] = LENGTHS.map(|bytes| {
+        let source = shape.source(bytes);
+        // The lesser of two: a busy machine only adds.
+        let times = (0..2).map(|_| timed(checked_and_formatted, source.as_bytes()));
+        let times: Result<Vec<Duration>, _> = times.collect();
+        let least = times.map(|all| all.into_iter().min().unwrap_or_default());
+        least.map_err(|failure| format!("{name}: {failure:?}"))
+    });
+    let (short, long) = match (short, long) {
+        (Ok(short), Ok(long)) => (short, long),
+        (Err(why), _) | (_, Err(why)) => return Some(why),
+    };
+    let growth = long.as_secs_f64() / short.as_secs_f64();
+    let fine = growth < MOST_GROWTH && long < 2 * MAX_TIME;
+    (!fine).then(|| format!("{name}: {short:?} grow to {long:?}"))
 }

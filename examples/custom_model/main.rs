@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let workload = args.next().unwrap_or_else(|| WORKLOAD.into());
     let scene = impasto::load(Path::new(&scene))?;
     let program = impasto::compile(&scene)?;
-    let materials = SceneMaterials::new(&scene, &program, 256)?;
+    let materials = SceneMaterials::new(&scene, &program, 256);
     let workload = Workload::parse(&std::fs::read_to_string(workload)?, &materials.names)?;
     let profile = DeviceProfile::named("h200").ok_or("there is no profile of that name")?;
 

@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 pub mod corpus;
 pub mod mutate;
 pub mod search;
+pub mod sources;
 pub mod target;
 
 pub use mutate::Random;
-pub use target::{Target, ir, source};
+pub use target::{Target, checked_and_formatted, ir, source};
 
 /// Longest input that the limits below are stated for, in bytes.
 pub const MAX_INPUT: usize = 64 * 1024;
@@ -58,7 +59,10 @@ pub fn run(target: Target, input: &[u8]) -> Result<(), Failure> {
 
 /// How long a target takes: time of the processor, where the system tells it (Linux), since a busy
 /// machine is not a slow compiler.
-fn timed(target: Target, input: &[u8]) -> Result<Duration, Failure> {
+///
+/// # Errors
+/// That it panicked.
+pub fn timed(target: Target, input: &[u8]) -> Result<Duration, Failure> {
     let start = Instant::now();
     let input = input.to_vec();
     let thread = std::thread::Builder::new()

@@ -1,5 +1,6 @@
 //! What is run on an input: the compiler from end to end, and the IR's text with all passes.
 
+use impasto_compiler::format::{Unformatted, format};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::parse::parse;
 use impasto_compiler::ir::value::Value;
@@ -44,6 +45,21 @@ pub fn source(input: &[u8]) {
     };
     for m in program.compiled() {
         execute(program.ir(), &m.evaluate, &[], &[]);
+    }
+}
+
+/// Checks a source and formats it, as `impasto check` and `impasto fmt` do.
+pub fn checked_and_formatted(input: &[u8]) {
+    let mut files = MemoryLoader::default();
+    files.add("m.impasto", input);
+    let checked = check("m.impasto", &mut files);
+    let text = diag::render::text(&checked.sources, &checked.diagnostics, false);
+    let failed = diag::has_errors(&checked.diagnostics);
+    assert!(!failed || !text.is_empty(), "an error without words");
+    if let Ok(text) = std::str::from_utf8(input)
+        && let Err(Unformatted::Lost) = format(FileId(0), text)
+    {
+        panic!("formatting loses something");
     }
 }
 

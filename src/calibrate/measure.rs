@@ -108,7 +108,7 @@ fn one(
         statistics: true,
         ..LabOptions::default()
     };
-    let materials = SceneMaterials::new(scene, &program, COST_SAMPLES).map_err(|_| Error::Costs)?;
+    let materials = SceneMaterials::new(scene, &program, COST_SAMPLES);
     let subject = MeasuredScene::new(scene, &program, materials, &options)?;
     let mut lab = subject.lab(gpu, &options)?;
     let candidates = sample_for_fit(&subject.on_surface(), effort.pairs);

@@ -188,9 +188,6 @@ impl RenderArgs {
             Requires::Nothing | Requires::Measurements => planned(&inputs),
             Requires::Costs => {
                 let materials = plan::SceneMaterials::new(scene, program, POINTS);
-                let materials = materials.map_err(|_| {
-                    "the materials take too long to evaluate; choose another strategy".to_owned()
-                })?;
                 planned(&PlanInputs {
                     costs: Some(&materials.costs),
                     ..inputs

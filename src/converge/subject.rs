@@ -98,8 +98,7 @@ impl<'a> Stage<'a> {
         if requires == Requires::Nothing || requires == Requires::Measurements {
             return strategy.plan(&inputs).map_err(error);
         }
-        let materials =
-            SceneMaterials::new(scene, program, POINTS).map_err(|_| crate::Error::Costs)?;
+        let materials = SceneMaterials::new(scene, program, POINTS);
         inputs.costs = Some(&materials.costs);
         if requires == Requires::Costs {
             return strategy.plan(&inputs).map_err(error);

@@ -1,9 +1,8 @@
 //! What the materials of a scene, or of a file, cost where they are used: operations of one
 //! evaluation at points of the scene's own surfaces.
 
-use impasto_compiler::cost::{Cost, Inputs, LineCost, Measured, Operations};
+use impasto_compiler::cost::{BUDGET, Cost, Inputs, LineCost, Measured, Operations, Spent};
 use impasto_compiler::inspect::At;
-use impasto_compiler::ir::interp::OutOfFuel;
 use impasto_compiler::{Program, abi::MaterialInfo};
 use serde::Serialize;
 
@@ -30,6 +29,26 @@ pub struct MaterialCost {
     pub cost: Option<Cost>,
     /// What the lines of its source cost, those first that cost most with what they call.
     pub lines: Vec<LineCost>,
+    /// What cut its evaluations short, if anything did: then the cost is that of fewer.
+    pub spent: Option<Spent>,
+}
+
+/// How a material is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// At how many points.
+    pub samples: usize,
+    /// How many expressions each may take, over all of them together.
+    pub budget: u64,
+}
+
+impl From<usize> for Effort {
+    fn from(samples: usize) -> Self {
+        Self {
+            samples,
+            budget: BUDGET,
+        }
+    }
 }
 
 impl MaterialCost {
@@ -39,30 +58,24 @@ impl MaterialCost {
     }
 }
 
-/// The materials of `program`, which a scene's bindings compiled to, each evaluated at `samples`
+/// The materials of `program`, which a scene's bindings compiled to, each evaluated at a number of
 /// points: spread by area over the surfaces that bind it, seen from random directions.
-///
-/// # Errors
-/// If the evaluations of a material take too long together.
-pub fn of_scene(
-    scene: &Scene,
-    program: &Program,
-    samples: usize,
-) -> Result<Vec<MaterialCost>, OutOfFuel> {
+pub fn of_scene(scene: &Scene, program: &Program, effort: impl Into<Effort>) -> Vec<MaterialCost> {
+    let effort = effort.into();
     let mesh = &*scene.sampled(SAMPLED_COPIES);
     let surfaces = points::surfaces(mesh, program);
-    measure(program, |material, info| {
+    measure(program, effort, |material, info| {
         let mut inputs = Inputs::named(&info.name);
-        surfaces[material].points((mesh, scene.origin), samples, info.crosses, &mut inputs)
+        let place = (mesh, scene.origin);
+        surfaces[material].points(place, effort.samples, info.crosses, &mut inputs)
     })
 }
 
-/// The materials of `program`, each evaluated at `samples` points anywhere within a few metres.
-///
-/// # Errors
-/// If the evaluations of a material take too long together.
-pub fn anywhere(program: &Program, samples: usize) -> Result<Vec<MaterialCost>, OutOfFuel> {
-    measure(program, |material, info| {
+/// The materials of `program`, each evaluated at a number of points anywhere within a few metres.
+pub fn anywhere(program: &Program, effort: impl Into<Effort>) -> Vec<MaterialCost> {
+    let effort = effort.into();
+    let samples = effort.samples;
+    measure(program, effort, |material, info| {
         let of = |i: &usize| program.instances()[*i].info.material == material;
         let instances: Vec<usize> = (0..program.instances().len()).filter(of).collect();
         let mut inputs = Inputs::named(&info.name);
@@ -73,18 +86,21 @@ pub fn anywhere(program: &Program, samples: usize) -> Result<Vec<MaterialCost>, 
 
 fn measure(
     program: &Program,
+    effort: Effort,
     mut points: impl FnMut(usize, &MaterialInfo) -> Vec<(usize, At)>,
-) -> Result<Vec<MaterialCost>, OutOfFuel> {
+) -> Vec<MaterialCost> {
     let cost = |(material, info): (usize, &MaterialInfo)| {
         let instances = program.instances().iter();
-        let measured = Measured::new(program, material, &points(material, info))?;
-        Ok(MaterialCost {
+        let points = points(material, info);
+        let measured = Measured::within(program, material, &points, effort.budget);
+        MaterialCost {
             name: info.name.clone(),
             instances: instances.filter(|i| i.info.material == material).count(),
             lobes: info.lobes,
             cost: measured.as_ref().map(Measured::cost),
             lines: measured.as_ref().map_or(Vec::new(), Measured::lines),
-        })
+            spent: measured.and_then(|m| m.spent().cloned()),
+        }
     };
     program.materials().enumerate().map(cost).collect()
 }

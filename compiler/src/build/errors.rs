@@ -7,6 +7,21 @@ use crate::passes::HOIST_FUEL;
 /// Most expressions of a material after its calls are put in line, as a GPU driver does.
 pub(super) const MAX_SIZE: u64 = 400_000;
 
+/// Most expressions of one function as it is printed, with the constants that they read and the
+/// variables that they are stored to. Naga, which reads every shader, takes time with the square.
+pub(super) const MAX_TEXT: u64 = 50_000;
+
+/// A material of whose code too much stands in one function.
+pub(super) fn too_long_a_function(material: &Material, size: u64) -> Diagnostic {
+    let message = format!(
+        "`{}` needs a function of {size} operations, constants and assignments",
+        material.name
+    );
+    Diagnostic::new(Code::TooLarge, material.span, message)
+        .expected(format!("at most {MAX_TEXT} in one function"))
+        .hint("repeat code in loops, or by functions that are called several times")
+}
+
 /// A material whose calls multiply beyond what a driver can compile.
 pub(super) fn too_large(material: &Material, size: u64) -> Diagnostic {
     let message = format!(

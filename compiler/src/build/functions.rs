@@ -2,18 +2,34 @@
 
 use std::collections::BTreeSet;
 
-use crate::ir::{ExprKind, Function, FunctionId, Module};
+use crate::ir::{Block, ExprKind, Function, FunctionId, Module, Stmt};
 use crate::passes;
+
+/// How large a function is.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Size {
+    /// Its expressions with its calls put in line.
+    pub(super) expanded: u64,
+    /// What the longest function among it and those that it calls has of expressions, constants that
+    /// they read, and assignments.
+    pub(super) longest: u64,
+}
 
 /// The checker's module, with what passes made of its functions.
 #[derive(Default)]
 pub(super) struct Functions {
     pub(super) module: Module,
-    /// Expressions of each function with its calls put in line; none if it is as it was checked.
-    sizes: Vec<Option<u64>>,
+    /// Each function's size; none if it is as it was checked.
+    sizes: Vec<Option<Size>>,
     /// Statements that passes walked.
     pub(super) effort: u64,
+    /// Of these, those of functions that others call and that are not of the library.
+    in_callees: u64,
 }
+
+/// Statements that passes walk in functions of users that others call before these keep their calls:
+/// copies of callees in callers make code grow with the square of the source.
+const MOST_COPIED: u64 = 1 << 20;
 
 impl Functions {
     /// Takes over what was checked since the last material.
@@ -50,20 +66,52 @@ impl Functions {
         // Callees stand before their callers.
         for id in found {
             let mut f = self.module.functions[id.index()].clone();
-            self.effort += passes::run_callee(&self.module, &mut f);
+            let run = if self.in_callees < MOST_COPIED {
+                passes::run_callee
+            } else {
+                passes::run_callee_of_many
+            };
+            let walked = run(&self.module, &mut f);
+            if f.span.file.0 as usize >= impasto_stdlib::files().len() {
+                self.in_callees += walked;
+            }
+            self.effort += walked;
             self.sizes[id.index()] = Some(self.size(&f));
             self.module.functions[id.index()] = f;
         }
     }
 
-    /// Expressions of a function with its calls put in line.
-    pub(super) fn size(&self, f: &Function) -> u64 {
-        f.evaluated().into_iter().fold(0u64, |n, id| {
-            let inner = match f.expr(id).kind {
-                ExprKind::Call(callee, _) => self.sizes[callee.index()].unwrap_or(0),
+    /// The size of a function whose callees are optimised.
+    pub(super) fn size(&self, f: &Function) -> Size {
+        let mut size = Size::default();
+        let mut own = stores(&f.body);
+        for id in f.evaluated() {
+            let kind = &f.expr(id).kind;
+            let inner = match kind {
+                ExprKind::Call(callee, _) => {
+                    let callee = self.sizes[callee.index()].unwrap_or_default();
+                    size.longest = size.longest.max(callee.longest);
+                    callee.expanded
+                }
                 _ => 1,
             };
-            n.saturating_add(inner)
-        })
+            size.expanded = size.expanded.saturating_add(inner);
+            let constants = kind
+                .operands()
+                .iter()
+                .filter(|id| f.constant(**id).is_some());
+            own += 1 + constants.count() as u64;
+        }
+        size.longest = size.longest.max(own);
+        size
     }
+}
+
+/// Assignments of a block.
+fn stores(block: &Block) -> u64 {
+    let count = |stmt: &Stmt| {
+        let inner: u64 = stmt.blocks().map(stores).sum();
+        u64::from(matches!(stmt, Stmt::Store(..))) + inner
+    };
+    block.iter().map(count).sum()
 }

@@ -20,7 +20,7 @@ mod instances;
 mod interior;
 mod lookups;
 
-use functions::Functions;
+use functions::{Functions, Size};
 pub(crate) use instances::Setting;
 
 /// Collects lowered materials.
@@ -133,12 +133,21 @@ impl ProgramBuilder {
         progress.enter(rows[0].stage());
         let walked = passes::apply(rows, &self.functions.module, &self.core, state)?;
         self.functions.effort += walked;
-        let evaluate = state.functions.first().filter(|_| rows[0].is_repeated());
-        let size = evaluate.map_or(0, |f| self.functions.size(f));
-        if size > errors::MAX_SIZE {
-            return Err(errors::too_large(&state.material, size));
+        if !rows[0].is_repeated() {
+            return Ok(());
         }
-        Ok(())
+        let sizes = state.functions.iter().map(|f| self.functions.size(f));
+        let sizes: Vec<Size> = sizes.collect();
+        let evaluate = sizes.first().map_or(0, |size| size.expanded);
+        if evaluate > errors::MAX_SIZE {
+            return Err(errors::too_large(&state.material, evaluate));
+        }
+        match sizes.iter().map(|size| size.longest).max() {
+            Some(longest) if longest > errors::MAX_TEXT => {
+                Err(errors::too_long_a_function(&state.material, longest))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// A material when the pass `name` has gone over it for the first time, with the module that it

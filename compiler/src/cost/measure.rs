@@ -3,7 +3,7 @@
 
 use super::size::Size;
 use super::subgroups::{BATCH, Subgroups};
-use super::{Classes, Cost, FUEL, Operations, live};
+use super::{BUDGET, Classes, Cost, Operations, Spent, live};
 use crate::codegen;
 use crate::inspect::{self, At};
 use crate::ir::interp::{Interpreter, OutOfFuel};
@@ -31,6 +31,7 @@ pub struct Measured<'p> {
     evaluations: u64,
     least: u64,
     most: u64,
+    spent: Option<Spent>,
 }
 
 impl<'p> Measured<'p> {
@@ -39,35 +40,46 @@ impl<'p> Measured<'p> {
     ///
     /// One evaluation is what a path asks at a surface: scattering, and emission where it varies.
     /// Textures are not read; each gives one half.
-    ///
-    /// # Errors
-    /// If the evaluations take too long together.
-    pub fn new(
+    pub fn new(program: &'p Program, material: usize, inputs: &[(usize, At)]) -> Option<Self> {
+        Self::within(program, material, inputs, BUDGET)
+    }
+
+    /// The same with `budget` expressions for each evaluation, over all of them together.
+    pub fn within(
         program: &'p Program,
         material: usize,
         inputs: &[(usize, At)],
-    ) -> Result<Option<Self>, OutOfFuel> {
+        budget: u64,
+    ) -> Option<Self> {
+        let budget = budget.saturating_mul(inputs.len() as u64);
         let mut this = Self {
             program,
             material: &program.compiled()[material],
-            run: Interpreter::new(program.ir(), FUEL).with_calls_apart(),
+            run: Interpreter::new(program.ir(), budget).with_calls_apart(),
             subgroups: Subgroups::default(),
             evaluations: 0,
             least: u64::MAX,
             most: 0,
+            spent: None,
         };
         // Every batch takes its inputs from all over the list.
         let batches = inputs.len().div_ceil(BATCH);
         for batch in 0..batches {
-            this.batch(inputs.iter().skip(batch).step_by(batches))?;
+            this.batch(inputs.iter().skip(batch).step_by(batches));
+            if let Some(spent) = &mut this.spent {
+                (spent.budget, spent.wanted) = (budget, inputs.len() as u64);
+                break;
+            }
         }
-        Ok((this.evaluations > 0).then_some(this))
+        (this.evaluations > 0).then_some(this)
     }
 
-    fn batch<'i>(
-        &mut self,
-        inputs: impl Iterator<Item = &'i (usize, At)>,
-    ) -> Result<(), OutOfFuel> {
+    /// What is said of a budget that was spent before all inputs were evaluated.
+    pub fn spent(&self) -> Option<&Spent> {
+        self.spent.as_ref()
+    }
+
+    fn batch<'i>(&mut self, inputs: impl Iterator<Item = &'i (usize, At)>) {
         let mut batch = Vec::new();
         let (mut set, mut counted) = (None, 0);
         for (instance, at) in inputs {
@@ -76,7 +88,18 @@ impl<'p> Measured<'p> {
                     .set_table(&self.program.instances()[*instance].values);
                 set = Some(*instance);
             }
-            self.evaluate(at)?;
+            if self.evaluate(at).is_err() {
+                self.spent = Some(Spent {
+                    evaluations: self.evaluations,
+                    place: self.busiest_loop(),
+                    ..Spent::default()
+                });
+                // What is known of it is a lower bound, and better than nothing.
+                if self.evaluations == 0 {
+                    batch.push(self.count());
+                }
+                break;
+            }
             batch.push(self.count());
             counted += batch.last().map_or(0, Vec::len);
             if counted > MOST_COUNTS {
@@ -85,7 +108,12 @@ impl<'p> Measured<'p> {
             }
         }
         self.subgroups.add(&batch);
-        Ok(())
+    }
+
+    /// `file:line` of the loop that took most turns in the present evaluation.
+    fn busiest_loop(&self) -> Option<String> {
+        let span = self.run.busiest_loop()?;
+        Some(self.program.sources().file_line(span))
     }
 
     fn evaluate(&mut self, at: &At) -> Result<(), OutOfFuel> {

@@ -31,8 +31,42 @@ pub use live::live;
 pub use measure::Measured;
 pub use vector::{Cost, LANES};
 
-/// Most operations of all evaluations that one measurement makes.
-const FUEL: u64 = 1 << 34;
+/// Expressions that one evaluation of a material may take, unless more are granted: those that need more
+/// may use what others leave.
+pub const BUDGET: u64 = 1 << 19;
+
+/// A budget that was spent before a material was evaluated at all inputs, so that its costs are those of
+/// the first.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Spent {
+    /// Expressions that all evaluations together could take.
+    pub budget: u64,
+    /// Evaluations that came to their end. If none did, costs are what the first took until then.
+    pub evaluations: u64,
+    /// Evaluations that were asked for.
+    pub wanted: u64,
+    /// `file:line` of the loop that took most turns, if there was one.
+    pub place: Option<String>,
+}
+
+impl std::fmt::Display for Spent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Spent {
+            budget,
+            evaluations,
+            wanted,
+            ..
+        } = self;
+        write!(
+            f,
+            "the budget of {budget} expressions was spent after {evaluations} of {wanted} evaluations"
+        )?;
+        match &self.place {
+            Some(place) => write!(f, ", most of it by the loop at {place}"),
+            None => Ok(()),
+        }
+    }
+}
 
 /// Operations of one evaluation, over several.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,30 +119,15 @@ impl Classes {
 
 /// What material `material` of `program` costs over `inputs`: instances of it, and where they are
 /// evaluated. `None` without inputs.
-///
-/// # Errors
-/// If the evaluations take too long together.
-pub fn vector(
-    program: &Program,
-    material: usize,
-    inputs: &[(usize, At)],
-) -> Result<Option<Cost>, OutOfFuel> {
-    let measured = Measured::new(program, material, inputs)?;
-    Ok(measured.map(|m| m.cost()))
+pub fn vector(program: &Program, material: usize, inputs: &[(usize, At)]) -> Option<Cost> {
+    Measured::new(program, material, inputs).map(|m| m.cost())
 }
 
 /// The lines of the source that evaluating material `material` of `program` over `inputs` costs,
 /// those first that cost most with what they call. None without inputs.
-///
-/// # Errors
-/// If the evaluations take too long together.
-pub fn lines(
-    program: &Program,
-    material: usize,
-    inputs: &[(usize, At)],
-) -> Result<Vec<LineCost>, OutOfFuel> {
-    let measured = Measured::new(program, material, inputs)?;
-    Ok(measured.map_or(Vec::new(), |m| m.lines()))
+pub fn lines(program: &Program, material: usize, inputs: &[(usize, At)]) -> Vec<LineCost> {
+    let measured = Measured::new(program, material, inputs);
+    measured.map_or(Vec::new(), |m| m.lines())
 }
 
 /// The operations of a function of the library, such as `std::noise::perlin`, with its defaults at
@@ -120,7 +139,7 @@ pub fn library_function(path: &str, inputs: &[At]) -> Result<Option<Operations>,
     let Some((module, index)) = inspect::library_call(path) else {
         return Ok(None);
     };
-    let mut run = Interpreter::<f32>::new(&module, FUEL);
+    let mut run = Interpreter::<f32>::new(&module, BUDGET * inputs.len() as u64);
     let mut tally = Tally::default();
     for at in inputs {
         run.run(&module.functions[index], inspect::context(at))?;

@@ -333,12 +333,15 @@ fn answer(
 /// Why there is no answer: diagnostics with the texts they point into.
 type Problems = (SourceMap, Vec<Diagnostic>);
 
-fn too_long(name: &str) -> Diagnostic {
-    Diagnostic::without_span(
-        Code::TooLarge,
-        format!("evaluating `{name}` takes too long"),
-    )
-    .expected(format!("at most {FUEL} operations"))
+/// An evaluation of `name` spent its budget, most of it in the loop `spent` if there was one.
+fn too_long(name: &str, spent: run::Spent) -> Diagnostic {
+    let message = format!("evaluating `{name}` takes too long: its budget is spent");
+    let diagnostic = match spent.busiest_loop {
+        Some(span) => Diagnostic::new(Code::TooLarge, span, message)
+            .hint("of all loops this one took most turns"),
+        None => Diagnostic::without_span(Code::TooLarge, message),
+    };
+    diagnostic.expected(format!("at most {FUEL} expressions"))
 }
 
 /// Runs a function of each precision that is asked for.
@@ -374,7 +377,7 @@ fn function(
     );
     match results.into_iter().collect() {
         Ok(results) => answer.results = results,
-        Err(_) => return Err((checked.sources, vec![too_long(&answer.name)])),
+        Err(spent) => return Err((checked.sources, vec![too_long(&answer.name, spent)])),
     }
     Ok(())
 }
@@ -447,7 +450,7 @@ fn material(
     );
     match results.into_iter().collect() {
         Ok(results) => answer.results = results,
-        Err(_) => return Err((compiled.sources, vec![too_long(&answer.name)])),
+        Err(spent) => return Err((compiled.sources, vec![too_long(&answer.name, spent)])),
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use super::{At, FUEL, Lobe, Named, Precision, Results, Sampled, Shown, Surface, 
 use crate::build::ProgramBuilder;
 use crate::closure::{self, Probe};
 use crate::driver::MaterialRequest;
-use crate::ir::interp::{Interpreter, OutOfFuel};
+use crate::ir::interp::Interpreter;
 use crate::ir::ops::Counts;
 use crate::ir::value::{Real, Value};
 use crate::ir::{Const, Function, Material, Module, Struct, Type};
@@ -12,6 +12,7 @@ use crate::loader::Loader;
 use crate::passes;
 use crate::program::Program;
 use crate::sema::Checker;
+use crate::source::Span;
 
 /// A material that can be looked into.
 pub(super) struct Probed {
@@ -81,15 +82,33 @@ pub(crate) fn context<F: Real>(at: &At) -> Vec<Value<F>> {
     args.collect()
 }
 
+/// The budget of an evaluation is spent.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spent {
+    /// The loop that took most turns, if any did.
+    pub busiest_loop: Option<Span>,
+}
+
+/// Evaluates a function.
+fn value<'a, F: Real>(
+    run: &mut Interpreter<'a, F>,
+    f: &'a Function,
+    args: Vec<Value<F>>,
+) -> Result<Value<F>, Spent> {
+    run.run(f, args).map_err(|_| Spent {
+        busiest_loop: run.busiest_loop(),
+    })
+}
+
 /// The value of a function over the context of [`items::CONTEXT`].
 pub(super) fn function<F: Real>(
     module: &Module,
     f: &Function,
     at: &At,
     precision: Precision,
-) -> Result<Results, OutOfFuel> {
-    let mut run = Interpreter::<F>::new(module, FUEL);
-    let value = run.run(f, context(at))?;
+) -> Result<Results, Spent> {
+    let mut run = Interpreter::<F>::new(module, FUEL).with_parts();
+    let value = value(&mut run, f, context(at))?;
     Ok(Results {
         value: Some(Shown::new(&value, f.result, module)),
         ..nothing(precision, run.counts())
@@ -114,11 +133,11 @@ pub(super) fn material<F: Real>(
     probed: &Probed,
     at: &At,
     precision: Precision,
-) -> Result<Results, OutOfFuel> {
+) -> Result<Results, Spent> {
     let structs = &program.ir().structs;
     let compiled = &program.compiled()[0];
-    let mut run =
-        Interpreter::<F>::new(program.ir(), FUEL).with_table(&program.instances()[0].values);
+    let run = Interpreter::<F>::new(program.ir(), FUEL).with_parts();
+    let mut run = run.with_table(&program.instances()[0].values);
     let here = |f: &Function, module: &Module| match f.params.first().map(|p| p.ty) {
         Some(Type::Struct(id)) => point::<F>(at, &module.structs[id.index()]),
         _ => Value::float(0.0),
@@ -129,9 +148,12 @@ pub(super) fn material<F: Real>(
         vector(&at.wi),
         vector(&at.u),
     ];
-    let sample = run.run(&compiled.evaluate, args)?;
+    let sample = value(&mut run, &compiled.evaluate, args)?;
     let emission = match &compiled.emission {
-        Some(f) => Some(run.run(f, vec![here(f, program.ir()), vector(&at.wo)])?),
+        Some(f) => {
+            let args = vec![here(f, program.ir()), vector(&at.wo)];
+            Some(value(&mut run, f, args)?)
+        }
         None => None,
     };
     let operations = run.counts();
@@ -149,9 +171,9 @@ pub(super) fn material<F: Real>(
         },
     );
     let probe = &probed.probe;
-    let mut run = Interpreter::<F>::new(&probe.module, FUEL);
+    let mut run = Interpreter::<F>::new(&probe.module, FUEL).with_parts();
     let args = vec![here(&probe.function, &probe.module), vector(&at.wo)];
-    let mut fields = Fields::new(probe, &run.run(&probe.function, args)?);
+    let mut fields = Fields::new(probe, &value(&mut run, &probe.function, args)?);
     let patterns = fields.named(&probe.patterns);
     let lobes: Vec<Lobe> = probe.lobes.iter().map(|l| fields.lobe(l)).collect();
     let mut outputs = fields.named(&probe.rest);

@@ -54,8 +54,10 @@ pub struct Interpreter<'a, F> {
     others: Vec<(&'a Function, usize)>,
     /// The frames of all calls.
     stack: Numbers<F>,
-    /// Does each call have code of its own, which knows what it is made of?
+    /// Does each call have code of its own?
     apart: bool,
+    /// Does code know what it is made of?
+    has_parts: bool,
 }
 
 /// The work limit was reached.
@@ -105,6 +107,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
             others: Vec::new(),
             stack: Numbers::new(),
             apart: false,
+            has_parts: false,
         }
     }
 
@@ -178,7 +181,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
     /// Runs a function without parameters once, for the values of some of its expressions, which
     /// stand in no block within another.
     pub fn values(&mut self, f: &Function, of: &[ExprId]) -> Result<Vec<Value<F>>, OutOfFuel> {
-        let (code, places) = lower::lower(self.module, f, &self.outside, of, self.apart);
+        let (code, places) = lower::lower(self.module, f, &self.outside, of, self.has_parts);
         self.codes.push(code);
         self.sources.push(None);
         self.execute(self.codes.len() - 1)?;
@@ -216,7 +219,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
     }
 
     fn lower(&mut self, f: &'a Function) -> usize {
-        let (code, _) = lower::lower(self.module, f, &self.outside, &[], self.apart);
+        let (code, _) = lower::lower(self.module, f, &self.outside, &[], self.has_parts);
         self.codes.push(code);
         self.sources.push(Some(f));
         self.codes.len() - 1

@@ -14,78 +14,90 @@ pub fn dead_code(f: &mut Function) -> bool {
 
 /// Removes dead code in place.
 pub fn remove(f: &mut Function) {
-    let mut live = Live {
-        exprs: vec![false; f.exprs.len()],
-        locals: vec![false; f.locals.len()],
-    };
-    live.mark(f, f.value);
-    // A store matters once its variable is loaded by something live, and makes its operand live;
-    // repeat until nothing changes.
     let body = std::mem::take(&mut f.body);
-    while live.block(f, &body) {}
+    let live = Live::of(f, &body);
     f.body = sweep(body, &live);
     Renumber::function(f);
 }
 
+/// What is read.
 struct Live {
     exprs: Vec<bool>,
     locals: Vec<bool>,
 }
 
 impl Live {
-    /// Marks an expression and what it reads; true if that is new.
-    fn mark(&mut self, f: &Function, id: ExprId) -> bool {
-        if std::mem::replace(&mut self.exprs[id.index()], true) {
-            return false;
+    /// What the value of a function with this body reads, and what decides how it comes to it.
+    fn of(f: &Function, body: &Block) -> Self {
+        let mut places = Places::of(body);
+        let mut live = Self {
+            exprs: vec![false; f.exprs.len()],
+            locals: vec![false; f.locals.len()],
+        };
+        // Of variables that became live the stores are looked at, and of statements that became
+        // needed what decides about them: each once.
+        let mut pending = Vec::new();
+        live.mark(f, f.value, &mut pending);
+        while let Some(local) = pending.pop() {
+            let first = places.stores.partition_point(|s| s.local < local);
+            let stores = places.stores[first..].iter();
+            let stores: Vec<Store> = stores.take_while(|s| s.local == local).copied().collect();
+            for store in stores {
+                live.mark(f, store.value, &mut pending);
+                live.need(f, store.within, &mut places, &mut pending);
+            }
         }
-        let mut pending = vec![id];
-        while let Some(id) = pending.pop() {
+        live
+    }
+
+    /// Marks an expression and what it reads. Variables that become live go to `pending`.
+    fn mark(&mut self, f: &Function, id: ExprId, pending: &mut Vec<LocalId>) {
+        if std::mem::replace(&mut self.exprs[id.index()], true) {
+            return;
+        }
+        let mut exprs = vec![id];
+        while let Some(id) = exprs.pop() {
             let kind = &f.expr(id).kind;
             if let ExprKind::Load(local) = kind {
-                self.locals[local.index()] = true;
+                self.mark_local(*local, pending);
             }
             for &operand in kind.operands() {
                 if !std::mem::replace(&mut self.exprs[operand.index()], true) {
-                    pending.push(operand);
+                    exprs.push(operand);
                 }
             }
         }
-        true
     }
 
-    /// Marks what live stores and control flow read; true if anything was new.
-    fn block(&mut self, f: &Function, block: &Block) -> bool {
-        let mut changed = false;
-        // From the end: what is read there says what matters before.
-        for stmt in block.iter().rev() {
-            changed |= self.stmt(f, stmt);
+    fn mark_local(&mut self, local: LocalId, pending: &mut Vec<LocalId>) {
+        if !std::mem::replace(&mut self.locals[local.index()], true) {
+            pending.push(local);
         }
-        changed
     }
 
-    fn stmt(&mut self, f: &Function, stmt: &Stmt) -> bool {
-        if !self.needed(stmt) {
-            return false;
-        }
-        match stmt {
-            Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
-            Stmt::Store(_, _, value) => self.mark(f, *value),
-            Stmt::If(cond, then, otherwise) => {
-                self.block(f, otherwise) | self.block(f, then) | self.mark(f, *cond)
+    /// A branch or loop is needed, and so is what it stands in. With a loop its jumps are.
+    fn need(
+        &mut self,
+        f: &Function,
+        within: Option<usize>,
+        places: &mut Places,
+        pending: &mut Vec<LocalId>,
+    ) {
+        let mut all: Vec<usize> = within.into_iter().collect();
+        while let Some(at) = all.pop() {
+            let place = &mut places.all[at];
+            if std::mem::replace(&mut place.needed, true) {
+                continue;
             }
-            Stmt::For {
-                local,
-                low,
-                high,
-                body,
-            } => {
-                let counter = !std::mem::replace(&mut self.locals[local.index()], true);
-                let bounds = self.mark(f, *low) | self.mark(f, *high);
-                self.block(f, body) | counter | bounds
+            all.extend(place.within);
+            all.append(&mut place.jumps);
+            let (reads, counter) = (place.reads, place.counter);
+            for id in reads.into_iter().flatten() {
+                self.mark(f, id, pending);
             }
-            Stmt::While {
-                head, test, body, ..
-            } => self.block(f, body) | self.block(f, head) | self.mark(f, *test),
+            if let Some(local) = counter {
+                self.mark_local(local, pending);
+            }
         }
     }
 
@@ -113,6 +125,104 @@ impl Live {
             Stmt::While { head, body, .. } => self.has_effect(head) || self.has_effect(body),
             Stmt::Eval(_) | Stmt::Break | Stmt::Continue => false,
         })
+    }
+}
+
+/// The branches and loops of a body, and its stores.
+#[derive(Default)]
+struct Places {
+    all: Vec<Place>,
+    /// In the order of variables.
+    stores: Vec<Store>,
+}
+
+/// A branch or loop.
+struct Place {
+    /// The branch or loop that it stands in.
+    within: Option<usize>,
+    /// What decides about it.
+    reads: [Option<ExprId>; 2],
+    /// The variable of a loop.
+    counter: Option<LocalId>,
+    /// Of a loop, the branches in which it is left or goes to its next turn.
+    jumps: Vec<usize>,
+    needed: bool,
+}
+
+/// A store to a variable.
+#[derive(Clone, Copy)]
+struct Store {
+    local: LocalId,
+    value: ExprId,
+    /// The branch or loop that it stands in.
+    within: Option<usize>,
+}
+
+impl Places {
+    fn of(body: &Block) -> Self {
+        let mut places = Self::default();
+        places.block(body, None, None);
+        places.stores.sort_by_key(|s| s.local);
+        places
+    }
+
+    /// Adds what stands in a block: in the branch or loop `within`, and in the loop `innermost`.
+    fn block(&mut self, block: &Block, within: Option<usize>, innermost: Option<usize>) {
+        for stmt in block {
+            match stmt {
+                Stmt::Eval(_) => {}
+                &Stmt::Store(local, _, value) => self.stores.push(Store {
+                    local,
+                    value,
+                    within,
+                }),
+                Stmt::If(cond, a, b) => {
+                    let at = self.add(within, [Some(*cond), None], None);
+                    self.block(a, at, innermost);
+                    self.block(b, at, innermost);
+                }
+                Stmt::For {
+                    local,
+                    low,
+                    high,
+                    body,
+                } => {
+                    let at = self.add(within, [Some(*low), Some(*high)], Some(*local));
+                    self.block(body, at, at);
+                }
+                Stmt::While {
+                    head, test, body, ..
+                } => {
+                    let at = self.add(within, [Some(*test), None], None);
+                    self.block(head, at, at);
+                    self.block(body, at, at);
+                }
+                // Branches around the innermost in which it stands are needed with that one.
+                Stmt::Break | Stmt::Continue => {
+                    if let (Some(looped), Some(branch)) = (innermost, within)
+                        && looped != branch
+                    {
+                        self.all[looped].jumps.push(branch);
+                    }
+                }
+            }
+        }
+    }
+
+    fn add(
+        &mut self,
+        within: Option<usize>,
+        reads: [Option<ExprId>; 2],
+        counter: Option<LocalId>,
+    ) -> Option<usize> {
+        self.all.push(Place {
+            within,
+            reads,
+            counter,
+            jumps: Vec::new(),
+            needed: false,
+        });
+        Some(self.all.len() - 1)
     }
 }
 

@@ -185,7 +185,12 @@ pub(super) fn call(
         .map(|&a| w.f.constant(a).map(Value::constant))
         .collect();
     let values = values?;
-    let result = Interpreter::<f64>::new(w.module, CALL_FUEL).call(callee, values);
+    // One interpreter for all calls, which goes through each callee's code once.
+    let fresh = || Interpreter::new(w.module, CALL_FUEL);
+    let mut interpreter = w.interpreter.take().unwrap_or_else(fresh);
+    interpreter.refill(CALL_FUEL);
+    let result = interpreter.call(callee, values);
+    w.interpreter = Some(interpreter);
     let result = result.ok()?;
     // What others refer to can become a constant, but not a value made of several.
     if w.rules.keep && result.to_const().is_none() {

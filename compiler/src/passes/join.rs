@@ -22,22 +22,23 @@ pub fn join(f: &mut Function) -> bool {
 
 /// Joins the branches of a block, and of the blocks that result.
 fn block(f: &Function, stmts: Block, joined: &mut bool) -> Block {
-    let mut out: Block = Vec::with_capacity(stmts.len());
+    let mut before = Before::default();
     for stmt in stmts {
-        match earlier(f, &out, &stmt) {
-            Some(at) => match movers(f, &out[at..], &stmt) {
-                Some(movers) => {
-                    merge(&mut out, at, &movers, stmt);
-                    *joined = true;
-                }
-                None => out.push(stmt),
-            },
-            None => out.push(stmt),
+        let Some(at) = earlier(f, &before.stmts, &stmt) else {
+            before.push(stmt);
+            continue;
+        };
+        let effects = Effects::of(f, &stmt);
+        match before.movers(f, at, &effects) {
+            Some(movers) => {
+                before.merge(at, &movers, stmt, effects);
+                *joined = true;
+            }
+            None => before.push(stmt),
         }
     }
-    out.into_iter()
-        .map(|stmt| stmt.map_blocks(|inner| block(f, inner, joined)))
-        .collect()
+    let joined_in = |stmt: Stmt| stmt.map_blocks(|inner| block(f, inner, joined));
+    before.stmts.into_iter().map(joined_in).collect()
 }
 
 /// The last branch before `stmt` on its condition.
@@ -56,50 +57,85 @@ fn earlier(f: &Function, before: &[Stmt], stmt: &Stmt) -> Option<usize> {
     found.map(|at| first + at)
 }
 
-/// Which statements must move up with `later`, as positions in `from`, so that it can join the
-/// branch that `from` begins with; none if it cannot.
-fn movers(f: &Function, from: &[Stmt], later: &Stmt) -> Option<Vec<usize>> {
-    let (first, between) = from.split_first()?;
-    let branch = Effects::of(f, first);
-    let mut moving = Effects::of(f, later);
-    if branch.jumps || moving.jumps {
-        return None;
-    }
-    let mut found = Vec::new();
-    for (i, stmt) in between.iter().enumerate().rev() {
-        let own = Effects::of(f, stmt);
-        if own.jumps {
-            return None;
-        }
-        if !own.must_precede(&moving) {
-            continue;
-        }
-        // It moves up too, across the earlier branch.
-        let simple = matches!(stmt, Stmt::Eval(_) | Stmt::Store(..));
-        if !simple || branch.must_precede(&own) {
-            return None;
-        }
-        moving.add(own);
-        found.push(i + 1);
-    }
-    found.reverse();
-    Some(found)
+/// The statements before the one that is looked at, each with what it does, where asked. A branch that
+/// others have joined may be long, so that is found once.
+#[derive(Default)]
+struct Before {
+    stmts: Block,
+    effects: Vec<Option<Effects>>,
 }
 
-/// Joins `later` to the branch at `at`, before which the statements `movers` after it go.
-fn merge(out: &mut Block, at: usize, movers: &[usize], later: Stmt) {
-    let mut tail = out.split_off(at).into_iter();
-    let first = tail.next();
-    let (moved, kept): (Vec<_>, Vec<_>) = tail
-        .enumerate()
-        .partition(|(i, _)| movers.binary_search(&(i + 1)).is_ok());
-    out.extend(moved.into_iter().map(|(_, s)| s));
-    if let (Some(Stmt::If(cond, mut a, mut b)), Stmt::If(_, then, otherwise)) = (first, later) {
-        a.extend(then);
-        b.extend(otherwise);
-        out.push(Stmt::If(cond, a, b));
+impl Before {
+    fn push(&mut self, stmt: Stmt) {
+        self.stmts.push(stmt);
+        self.effects.push(None);
     }
-    out.extend(kept.into_iter().map(|(_, s)| s));
+
+    /// Which statements behind the branch at `at` must move up with a later branch, which does
+    /// `later`, so that it can join that branch; counted from `at`. None if it cannot.
+    fn movers(&mut self, f: &Function, at: usize, later: &Effects) -> Option<Vec<usize>> {
+        let all = self.stmts[at..].iter().zip(&mut self.effects[at..]);
+        for (stmt, effects) in all {
+            effects.get_or_insert_with(|| Effects::of(f, stmt));
+        }
+        let mut all = self.effects[at..].iter().flatten();
+        let branch = all.next()?;
+        if branch.jumps || later.jumps {
+            return None;
+        }
+        let mut moving = Effects::default();
+        moving.add(later);
+        let mut found = Vec::new();
+        let between: Vec<&Effects> = all.collect();
+        for (i, own) in between.into_iter().enumerate().rev() {
+            if own.jumps {
+                return None;
+            }
+            if !own.must_precede(&moving) {
+                continue;
+            }
+            // It moves up too, across the earlier branch.
+            let stmt = &self.stmts[at + 1 + i];
+            let simple = matches!(stmt, Stmt::Eval(_) | Stmt::Store(..));
+            if !simple || branch.must_precede(own) {
+                return None;
+            }
+            moving.add(own);
+            found.push(i + 1);
+        }
+        found.reverse();
+        Some(found)
+    }
+
+    /// Joins `later` to the branch at `at`, before which the statements `movers` behind it go.
+    fn merge(&mut self, at: usize, movers: &[usize], later: Stmt, effects: Effects) {
+        let stmts = self.stmts.split_off(at).into_iter();
+        let mut tail = stmts.zip(self.effects.split_off(at));
+        let first = tail.next();
+        let (moved, kept): (Vec<_>, Vec<_>) = tail
+            .enumerate()
+            .partition(|(i, _)| movers.binary_search(&(i + 1)).is_ok());
+        self.extend(moved);
+        if let (Some((Stmt::If(cond, mut a, mut b), done)), Stmt::If(_, then, otherwise)) =
+            (first, later)
+        {
+            a.extend(then);
+            b.extend(otherwise);
+            self.stmts.push(Stmt::If(cond, a, b));
+            self.effects.push(done.map(|mut done| {
+                done.add(&effects);
+                done
+            }));
+        }
+        self.extend(kept);
+    }
+
+    fn extend(&mut self, all: Vec<(usize, (Stmt, Option<Effects>))>) {
+        for (_, (stmt, effects)) in all {
+            self.stmts.push(stmt);
+            self.effects.push(effects);
+        }
+    }
 }
 
 /// What a statement does that the order of statements matters to.
@@ -173,10 +209,10 @@ impl Effects {
             || !self.loads.is_disjoint(&other.stores)
     }
 
-    fn add(&mut self, other: Self) {
-        self.evaluates.extend(other.evaluates);
-        self.uses.extend(other.uses);
-        self.loads.extend(other.loads);
-        self.stores.extend(other.stores);
+    fn add(&mut self, other: &Self) {
+        self.evaluates.extend(&other.evaluates);
+        self.uses.extend(&other.uses);
+        self.loads.extend(&other.loads);
+        self.stores.extend(&other.stores);
     }
 }

@@ -13,24 +13,27 @@ use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 /// Moves invariant work out of loops in place.
 pub fn licm(f: &mut Function) -> bool {
     let body = std::mem::take(&mut f.body);
-    f.body = block(f, body);
+    f.body = block(f, &mut Flags::new(f), body);
     true
 }
 
 /// Rewrites a block; inner loops first, so that their invariants can go on moving out.
-fn block(f: &Function, stmts: Block) -> Block {
+fn block(f: &Function, flags: &mut Flags, stmts: Block) -> Block {
     let mut out = Vec::with_capacity(stmts.len());
     for stmt in stmts {
         match stmt {
-            Stmt::If(cond, a, b) => out.push(Stmt::If(cond, block(f, a), block(f, b))),
+            Stmt::If(cond, a, b) => {
+                let (a, b) = (block(f, flags, a), block(f, flags, b));
+                out.push(Stmt::If(cond, a, b));
+            }
             Stmt::For {
                 local,
                 low,
                 high,
                 body,
             } => {
-                let mut body = block(f, body);
-                let mut looped = Loop::new(f, &[&body], Some(local));
+                let mut body = block(f, flags, body);
+                let looped = Loop::new(f, flags, &[&body], Some(local));
                 looped.take_out(&mut [&mut body], &mut out);
                 out.push(Stmt::For {
                     local,
@@ -45,8 +48,8 @@ fn block(f: &Function, stmts: Block) -> Block {
                 limit,
                 body,
             } => {
-                let (mut head, mut body) = (block(f, head), block(f, body));
-                let mut looped = Loop::new(f, &[&head, &body], None);
+                let (mut head, mut body) = (block(f, flags, head), block(f, flags, body));
+                let looped = Loop::new(f, flags, &[&head, &body], None);
                 looped.take_out(&mut [&mut head, &mut body], &mut out);
                 out.push(Stmt::While {
                     head,
@@ -61,46 +64,94 @@ fn block(f: &Function, stmts: Block) -> Block {
     out
 }
 
+/// What is known of the variables and expressions of a function in one loop, by id. Every loop
+/// leaves them unset, since there may be as many loops as expressions.
+struct Flags {
+    /// Variables that some turn changes.
+    stored: Vec<bool>,
+    /// Expressions that are evaluated in the loop and may change.
+    varying: Vec<bool>,
+    /// Expressions that every turn computes alike.
+    invariant: Vec<bool>,
+    /// Those of them that go out of the loop.
+    moved: Vec<bool>,
+}
+
+impl Flags {
+    fn new(f: &Function) -> Self {
+        Self {
+            stored: vec![false; f.locals.len()],
+            varying: vec![false; f.exprs.len()],
+            invariant: vec![false; f.exprs.len()],
+            moved: vec![false; f.exprs.len()],
+        }
+    }
+}
+
 /// What is known of one loop.
 struct Loop<'a> {
     f: &'a Function,
+    flags: &'a mut Flags,
     /// Variables that some turn changes.
-    stored: Vec<bool>,
-    /// Expressions that are evaluated in the loop and may change. By id, as all flags here.
-    varying: Vec<bool>,
+    changed: Vec<LocalId>,
+    /// Expressions that are evaluated in the loop.
+    evaluated: Vec<ExprId>,
 }
 
 impl<'a> Loop<'a> {
-    fn new(f: &'a Function, blocks: &[&Block], counter: Option<LocalId>) -> Self {
+    fn new(
+        f: &'a Function,
+        flags: &'a mut Flags,
+        blocks: &[&Block],
+        counter: Option<LocalId>,
+    ) -> Self {
         let mut changed: Vec<LocalId> = counter.into_iter().collect();
         let mut evaluated = Vec::new();
         for block in blocks {
             stored_in(block, &mut changed);
             evaluated_in(block, &mut evaluated);
         }
-        let mut looped = Self {
-            f,
-            stored: vec![false; f.locals.len()],
-            varying: vec![false; f.exprs.len()],
-        };
-        changed.iter().for_each(|l| looped.stored[l.index()] = true);
+        changed.iter().for_each(|l| flags.stored[l.index()] = true);
         evaluated
             .iter()
-            .for_each(|e| looped.varying[e.index()] = true);
-        looped
+            .for_each(|e| flags.varying[e.index()] = true);
+        Self {
+            f,
+            flags,
+            changed,
+            evaluated,
+        }
     }
 
     /// Moves what is invariant and worth it from the blocks to `out`.
-    fn take_out(&mut self, blocks: &mut [&mut Block], out: &mut Block) {
+    fn take_out(mut self, blocks: &mut [&mut Block], out: &mut Block) {
         let invariant = self.invariant(blocks);
-        if invariant.is_empty() {
-            return;
+        if !invariant.is_empty() {
+            self.choose_moved(&invariant);
+            let moved = &self.flags.moved;
+            let goes = |id: &ExprId| moved[id.index()];
+            out.extend(invariant.iter().copied().filter(goes).map(Stmt::Eval));
+            for block in blocks {
+                block.retain(|s| !matches!(s, Stmt::Eval(id) if goes(id)));
+            }
         }
-        let moved = self.worth_moving(&invariant);
-        let goes = |id: &ExprId| moved[id.index()];
-        out.extend(invariant.into_iter().filter(goes).map(Stmt::Eval));
-        for block in blocks {
-            block.retain(|s| !matches!(s, Stmt::Eval(id) if goes(id)));
+        self.unset_flags();
+    }
+
+    fn unset_flags(self) {
+        let Flags {
+            stored,
+            varying,
+            invariant,
+            moved,
+        } = self.flags;
+        for local in self.changed {
+            stored[local.index()] = false;
+        }
+        for id in self.evaluated {
+            for flags in [&mut *varying, &mut *invariant, &mut *moved] {
+                flags[id.index()] = false;
+            }
         }
     }
 
@@ -111,7 +162,7 @@ impl<'a> Loop<'a> {
             if let Stmt::Eval(id) = stmt
                 && self.is_invariant(*id)
             {
-                self.varying[id.index()] = false;
+                self.flags.varying[id.index()] = false;
                 found.push(*id);
             }
         }
@@ -120,26 +171,29 @@ impl<'a> Loop<'a> {
 
     fn is_invariant(&self, id: ExprId) -> bool {
         match &self.f.expr(id).kind {
-            ExprKind::Load(local) => !self.stored[local.index()],
-            kind => !kind.operands().iter().any(|a| self.varying[a.index()]),
+            ExprKind::Load(local) => !self.flags.stored[local.index()],
+            kind => !kind
+                .operands()
+                .iter()
+                .any(|a| self.flags.varying[a.index()]),
         }
     }
 
-    /// Of what is invariant, operations and calls, and what these read.
-    fn worth_moving(&self, invariant: &[ExprId]) -> Vec<bool> {
-        let mut inside = vec![false; self.f.exprs.len()];
-        invariant.iter().for_each(|id| inside[id.index()] = true);
-        let mut moved = vec![false; self.f.exprs.len()];
-        for &id in invariant.iter().rev() {
+    /// Of what is invariant, operations and calls go out, and what these read.
+    fn choose_moved(&mut self, of: &[ExprId]) {
+        let Flags {
+            invariant, moved, ..
+        } = &mut *self.flags;
+        of.iter().for_each(|id| invariant[id.index()] = true);
+        for &id in of.iter().rev() {
             let kind = &self.f.expr(id).kind;
             if moved[id.index()] || matches!(kind, ExprKind::Op(..) | ExprKind::Call(..)) {
                 moved[id.index()] = true;
                 for operand in kind.operands() {
-                    moved[operand.index()] |= inside[operand.index()];
+                    moved[operand.index()] |= invariant[operand.index()];
                 }
             }
         }
-        moved
     }
 }
 

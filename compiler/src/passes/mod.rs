@@ -37,7 +37,10 @@ use rewrite::Rules;
 
 pub use dead_code::remove as drop_dead_code;
 pub use hoist::{HOIST_FUEL, Hoisted};
-pub use run::{MaterialState, apply, library, run, run_callee, run_material_until, run_until};
+pub use run::{
+    MaterialState, apply, library, run, run_callee, run_callee_of_many, run_material_until,
+    run_until,
+};
 
 /// The passes in the order they run, over every material and every function that reaches code
 /// generation.

@@ -89,7 +89,9 @@ pub fn apply(
         }
         Work::Walk(_) | Work::WalkAgain(_) | Work::Function(_) => {
             let functions = state.functions.iter_mut();
-            return Ok(functions.map(|f| repeat(rows, module, f, false)).sum());
+            return Ok(functions
+                .map(|f| repeat(rows, module, f, Calls::InLine))
+                .sum());
         }
     }
     Ok(0)
@@ -173,7 +175,7 @@ impl Pass {
 /// # Panics
 /// As [`apply`].
 pub fn run(module: &Module, function: &mut Function) -> u64 {
-    repeat(function_passes(), module, function, false)
+    repeat(function_passes(), module, function, Calls::InLine)
 }
 
 /// The same for a function that others call: what its arguments may rid it of stays apart, so that
@@ -182,15 +184,35 @@ pub fn run(module: &Module, function: &mut Function) -> u64 {
 /// # Panics
 /// As [`apply`].
 pub fn run_callee(module: &Module, function: &mut Function) -> u64 {
-    repeat(function_passes(), module, function, true)
+    repeat(function_passes(), module, function, Calls::KeepOptions)
 }
 
-fn repeat(passes: &[Pass], module: &Module, function: &mut Function, callee: bool) -> u64 {
+/// The same, where functions are so many that copies of what they call would be too much work: only
+/// small ones are copied.
+///
+/// # Panics
+/// As [`apply`].
+pub fn run_callee_of_many(module: &Module, function: &mut Function) -> u64 {
+    repeat(function_passes(), module, function, Calls::KeepLarge)
+}
+
+/// Which calls of a function go in line.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Calls {
+    /// All that are worth it.
+    InLine,
+    /// Not those that its callers may rid it of.
+    KeepOptions,
+    /// Of the others, only those of small functions.
+    KeepLarge,
+}
+
+fn repeat(passes: &[Pass], module: &Module, function: &mut Function, calls: Calls) -> u64 {
     verify(module, function, "lowering");
     let mut walked = 0;
     let mut before = cse::fingerprint(function);
     for _ in 0..MAX_ROUNDS {
-        walked += round(passes, module, function, callee);
+        walked += round(passes, module, function, calls);
         let after = cse::fingerprint(function);
         // Were two functions with one fingerprint, the second would only be left as it is.
         if before == after {
@@ -203,7 +225,7 @@ fn repeat(passes: &[Pass], module: &Module, function: &mut Function, callee: boo
 
 /// Runs passes over functions once; those that are walks and follow each other in one walk. Gives
 /// the statements that were walked.
-fn round(passes: &[Pass], module: &Module, f: &mut Function, callee: bool) -> u64 {
+fn round(passes: &[Pass], module: &Module, f: &mut Function, calls: Calls) -> u64 {
     let mut walked = 0;
     let mut rest = passes;
     let mut changed = true;
@@ -216,8 +238,13 @@ fn round(passes: &[Pass], module: &Module, f: &mut Function, callee: bool) -> u6
         let count = rules.len().max(1);
         match (rules.into_iter().reduce(Rules::and), &first.work) {
             (Some(mut rules), _) => {
-                if let Some(policy) = rules.inline.as_mut().filter(|_| callee) {
-                    policy.keep_options(f);
+                if let Some(policy) = &mut rules.inline {
+                    if calls != Calls::InLine {
+                        policy.keep_options(f);
+                    }
+                    if calls == Calls::KeepLarge {
+                        policy.keep_large();
+                    }
                 }
                 walked += rewrite::run(module, f, rules);
             }

@@ -9,9 +9,13 @@ use crate::source::Span;
 use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::outputs::OUTPUTS;
+use super::scopes::Scopes;
 use super::tree::TreeSize;
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
+
+/// Most parameters of a function or closure: WGSL allows 255, of which some are the compiler's.
+const MAX_PARAMETERS: usize = 250;
 
 /// What an expression turned out to be.
 #[derive(Clone, Copy, Debug)]
@@ -85,8 +89,8 @@ pub struct Body<'c, 'l> {
     pub module: ModuleId,
     /// Its IR.
     pub builder: Builder,
-    /// Names, innermost scope last.
-    pub scopes: Vec<Vec<Entry>>,
+    /// Names.
+    pub scopes: Scopes,
     /// So many outer scopes whose variables cannot be assigned here.
     pub fixed_scopes: usize,
     /// Turns of the enclosing loops together.
@@ -114,12 +118,11 @@ pub struct Body<'c, 'l> {
 impl<'c, 'l> Body<'c, 'l> {
     /// Starts checking a body.
     pub fn new(cx: &'c mut Checker<'l>, module: ModuleId, builder: Builder) -> Self {
-        let scopes = vec![Vec::new()];
         Self {
             cx,
             module,
             builder,
-            scopes,
+            scopes: Scopes::default(),
             fixed_scopes: 0,
             turns: 1,
             loops: 0,
@@ -142,9 +145,9 @@ impl<'c, 'l> Body<'c, 'l> {
 
     /// Runs `f` in a scope of its own.
     pub fn scoped<T>(&mut self, f: impl FnOnce(&mut Self) -> T) -> T {
-        self.scopes.push(Vec::new());
+        self.scopes.open();
         let result = f(self);
-        let scope = self.scopes.pop().unwrap_or_default();
+        let scope = self.scopes.close();
         self.report_unused(scope);
         result
     }
@@ -172,39 +175,24 @@ impl<'c, 'l> Body<'c, 'l> {
             used: false,
             watched,
         };
-        if let Some(scope) = self.scopes.last_mut() {
-            let clash = scope.iter().find(|e| e.name == entry.name).map(|e| e.span);
-            scope.push(entry);
-            if let Some(first) = clash {
-                let message = format!("`{}` is defined twice in this block", name.node);
-                let duplicate = Diagnostic::new(Code::Duplicate, name.span, message)
-                    .expected("one definition a name")
-                    .label(first, "first defined here")
-                    .hint("rename it, or use `var` and assign it anew");
-                self.cx.report(duplicate);
-            }
+        if let Some(first) = self.scopes.add(entry) {
+            let message = format!("`{}` is defined twice in this block", name.node);
+            let duplicate = Diagnostic::new(Code::Duplicate, name.span, message)
+                .expected("one definition a name")
+                .label(first, "first defined here")
+                .hint("rename it, or use `var` and assign it anew");
+            self.cx.report(duplicate);
         }
     }
 
     /// What a local name stands for.
     pub fn local(&mut self, name: &str) -> Option<Binding> {
-        let entries = self
-            .scopes
-            .iter_mut()
-            .rev()
-            .flat_map(|s| s.iter_mut().rev());
-        let entry = entries.into_iter().find(|e| e.name == name)?;
-        entry.used = true;
-        Some(entry.binding)
+        self.scopes.read(name)
     }
 
     /// Names in scope, for hints.
     pub fn local_names(&self) -> Vec<String> {
-        self.scopes
-            .iter()
-            .flatten()
-            .map(|e| e.name.clone())
-            .collect()
+        self.scopes.entries().map(|e| e.name.clone()).collect()
     }
 
     /// Gives a value the type that a place needs; what does not convert is reported.
@@ -330,6 +318,14 @@ impl Checker<'_> {
 
     /// Types and defaults of parameters.
     pub(super) fn params(&mut self, module: ModuleId, params: &[ast::Param]) -> Option<Vec<Param>> {
+        if let Some(extra) = params.get(MAX_PARAMETERS) {
+            let message = format!("{} parameters are too many", params.len());
+            let wrong = Diagnostic::new(Code::TooLarge, extra.name.span, message)
+                .expected(format!("at most {MAX_PARAMETERS}"))
+                .hint("put some together in a struct");
+            self.report(wrong);
+            return None;
+        }
         let mut typed: Vec<Param> = Vec::new();
         for p in params {
             let ty = self.type_name(module, &p.ty)?;
@@ -386,7 +382,7 @@ impl Checker<'_> {
             cx.bind(name, Binding::Fixed(Operand::Value(id, *ty)), false);
         }
         let value = prologue(&mut cx).and_then(|()| cx.scoped(|cx| cx.body(body, result, span)));
-        let scope = cx.scopes.pop().unwrap_or_default();
+        let scope = cx.scopes.close();
         cx.report_unused(scope);
         let function = cx.builder.finish(value?);
         Some(self.add_function(function))

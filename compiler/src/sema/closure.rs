@@ -165,10 +165,7 @@ impl Checker<'_> {
         let lets = |cx: &mut Body| {
             let ok = cx.statements(&def.lets);
             // A `let` that one method needs another may leave alone.
-            cx.scopes
-                .iter_mut()
-                .flatten()
-                .for_each(|e| e.watched = false);
+            cx.scopes.watch_none();
             ok.then_some(())
         };
         self.lower_function(

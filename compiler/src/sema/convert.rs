@@ -9,6 +9,9 @@ use crate::source::Span;
 use super::body::{Body, Operand};
 use super::types::Ty;
 
+/// Types of arguments that a message lists.
+const MOST_SHOWN: usize = 16;
+
 impl Body<'_, '_> {
     /// `srgb(0xRRGGBB)` or `srgb(r, g, b)`: a linear color.
     pub fn srgb(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
@@ -87,15 +90,14 @@ impl Body<'_, '_> {
         match id {
             Some(id) => Some(Operand::Value(id, to)),
             None => {
-                let shown: Vec<String> = types.iter().map(|&t| self.cx.type_text(t)).collect();
-                let message = format!(
-                    "a {name} cannot be made from {}",
-                    if shown.is_empty() {
-                        "nothing".into()
-                    } else {
-                        shown.join(", ")
-                    }
-                );
+                let first = types.iter().take(MOST_SHOWN);
+                let shown: Vec<String> = first.map(|&t| self.cx.type_text(t)).collect();
+                let more = types.len() - shown.len();
+                let message = match (shown.join(", "), more) {
+                    (_, _) if types.is_empty() => format!("a {name} cannot be made from nothing"),
+                    (shown, 0) => format!("a {name} cannot be made from {shown}"),
+                    (shown, n) => format!("a {name} cannot be made from {shown} and {n} more"),
+                };
                 let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
                     .expected(conversion_help(to));
                 self.report(wrong)

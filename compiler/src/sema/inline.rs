@@ -13,9 +13,10 @@ use crate::ir::build::Builder;
 use crate::ir::{self, ClosureId, Interior, SiteId};
 use crate::source::Span;
 
-use super::body::{Binding, Body, Entry, Operand, Place};
+use super::body::{Binding, Body, Operand, Place};
 use super::medium::empty_space;
 use super::modules::{ItemRef, ModuleId};
+use super::scopes::Scopes;
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
 
@@ -39,7 +40,7 @@ pub struct Expansion {
 pub struct Caller {
     via: Option<SiteId>,
     module: ModuleId,
-    scopes: Vec<Vec<Entry>>,
+    scopes: Scopes,
     fixed_scopes: usize,
     place: Place,
     loops: usize,
@@ -170,7 +171,7 @@ impl Body<'_, '_> {
         Caller {
             via: self.builder.enter_call(span),
             module: std::mem::replace(&mut self.module, module),
-            scopes: std::mem::replace(&mut self.scopes, vec![Vec::new()]),
+            scopes: std::mem::take(&mut self.scopes),
             fixed_scopes: std::mem::take(&mut self.fixed_scopes),
             place: std::mem::replace(&mut self.place, place),
             loops: std::mem::take(&mut self.loops),
@@ -212,8 +213,7 @@ impl Body<'_, '_> {
             return Some(());
         }
         // Names are looked for one by one, so that work grows with what is in scope.
-        let names: usize = self.scopes.iter().map(Vec::len).sum();
-        let work = 1 + names as u64 / 32;
+        let work = 1 + self.scopes.names() as u64 / 32;
         let within = |steps: u64, all: u64| steps <= MAX_STEPS && all <= MAX_STEPS_IN_ALL;
         let before = within(self.expansion.steps, self.cx.expanded);
         self.expansion.steps += work;

@@ -87,7 +87,7 @@ impl Checker<'_> {
         body.place = Place::Material;
         body.bind_params(&material.params, declared);
         let ok = body.scoped(|cx| cx.statements(&material.body));
-        let scope = body.scopes.pop().unwrap_or_default();
+        let scope = body.scopes.close();
         body.report_unused(scope);
         if !ok {
             return None;

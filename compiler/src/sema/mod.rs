@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crate::ast::{self, ItemKind, TypeName};
 use crate::diag::{Code, Diagnostic};
+use crate::ir::verify::MAX_FIELDS;
 use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
 use crate::loader::Loader;
 use crate::source::{SourceMap, Span};
@@ -32,6 +33,7 @@ mod metadata;
 mod modules;
 mod outputs;
 mod params;
+mod scopes;
 mod stmt;
 mod texture;
 mod tree;
@@ -82,12 +84,17 @@ pub struct Checker<'a> {
     expanded: u64,
     /// Errors reported.
     errors: usize,
+    /// Warnings reported.
+    warnings: usize,
     /// Expressions that evaluating constants took.
     evaluated: u64,
 }
 
 /// Errors of checking that are reported; what is as wrong as that is not looked at further.
 const MAX_ERRORS: usize = 64;
+
+/// Warnings that are reported.
+const MAX_WARNINGS: usize = 256;
 
 /// How far an item is checked.
 #[derive(Clone, Debug)]
@@ -148,6 +155,7 @@ impl<'a> Checker<'a> {
             closure_params: Vec::new(),
             expanded: 0,
             errors: 0,
+            warnings: 0,
             evaluated: 0,
         };
         checker.add_std_sources();
@@ -227,14 +235,20 @@ impl<'a> Checker<'a> {
 
     /// Notes a problem.
     fn report(&mut self, mut diagnostic: Diagnostic) {
-        self.errors += usize::from(diagnostic.is_error());
-        if self.has_enough_errors() {
-            if !diagnostic.is_error() || self.errors > MAX_ERRORS {
-                return;
-            }
-            let more = "this is the last error that is shown; there may be more";
+        let (count, most, word) = if diagnostic.is_error() {
+            (&mut self.errors, MAX_ERRORS, "error")
+        } else {
+            (&mut self.warnings, MAX_WARNINGS, "warning")
+        };
+        *count += 1;
+        let count = *count;
+        if count > most || (self.has_enough_errors() && !diagnostic.is_error()) {
+            return;
+        }
+        if count == most {
+            let more = format!("this is the last {word} that is shown; there may be more");
             let hint = diagnostic.hint.map_or(String::new(), |h| h + "; ");
-            diagnostic.hint = Some(hint + more);
+            diagnostic.hint = Some(hint + &more);
         }
         self.diagnostics.push(diagnostic);
     }
@@ -294,6 +308,14 @@ impl<'a> Checker<'a> {
         item: &ast::Item,
         fields: &[ast::Field],
     ) -> Option<Checked> {
+        if let Some(extra) = fields.get(MAX_FIELDS) {
+            let message = format!("`{}` has {} fields", item.name.node, fields.len());
+            let wrong = Diagnostic::new(Code::TooLarge, extra.name.span, message)
+                .expected(format!("at most {MAX_FIELDS}"))
+                .hint("put some together in structs of their own");
+            self.report(wrong);
+            return None;
+        }
         let mut typed: Vec<Param> = Vec::new();
         for field in fields {
             let ty = self.type_name(module, &field.ty)?;

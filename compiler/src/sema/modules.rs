@@ -53,6 +53,9 @@ pub enum Loading {
     Failed,
 }
 
+/// Most materials of a file. Each is compiled, however small.
+const MAX_MATERIALS: usize = 1024;
+
 impl Checker<'_> {
     /// Loads a user's file; `asked` is the import that needs it.
     pub(super) fn load_module(&mut self, path: &str, asked: Option<&Name>) -> Option<ModuleId> {
@@ -203,6 +206,14 @@ impl Checker<'_> {
     }
 
     fn define_items(&mut self, module: ModuleId, ast: &ast::Module) {
+        let is_material = |item: &&ast::Item| matches!(item.kind, ItemKind::Material(_));
+        if let Some(extra) = ast.items.iter().filter(is_material).nth(MAX_MATERIALS) {
+            let message = "the file defines too many materials";
+            let wrong = Diagnostic::new(Code::TooLarge, extra.name.span, message)
+                .expected(format!("at most {MAX_MATERIALS}"))
+                .hint("divide it into several files, or let instances of one material differ in parameters");
+            self.report(wrong);
+        }
         for (index, item) in ast.items.iter().enumerate() {
             self.define(module, &item.name, ItemRef { module, index });
         }

@@ -37,8 +37,7 @@ impl Body<'_, '_> {
     /// Does assigning to `name` mean the output? A variable of that name goes first; a parameter
     /// or `let` does not, since it cannot be assigned: `opacity = opacity;` works.
     pub fn means_output(&self, name: &str) -> bool {
-        let mut entries = self.scopes.iter().rev().flat_map(|s| s.iter().rev());
-        match entries.find(|e| e.name == name).map(|e| e.binding) {
+        match self.scopes.find(name).map(|(_, binding)| binding) {
             None => true,
             Some(Binding::Variable(..)) => false,
             Some(_) => OUTPUTS.iter().any(|(n, _)| *n == name),
@@ -94,7 +93,7 @@ impl Body<'_, '_> {
 
     /// Outputs are assigned whole, where nothing decides whether or how often.
     fn directly(&mut self, name: &str, at: Span, op: Option<ast::BinaryOp>) -> Option<()> {
-        if op.is_none() && self.scopes.len() <= 2 {
+        if op.is_none() && self.scopes.depth() <= 2 {
             return Some(());
         }
         let message = format!("`{name}` is assigned once, outside branches and loops");

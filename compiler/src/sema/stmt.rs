@@ -160,10 +160,7 @@ impl Body<'_, '_> {
     }
 
     fn variable(&mut self, name: &str, span: Span) -> Option<(LocalId, Ty)> {
-        let declared = self
-            .scopes
-            .iter()
-            .rposition(|s| s.iter().any(|e| e.name == name));
+        let declared = self.scopes.find(name).map(|(scope, _)| scope);
         match self.local(name) {
             Some(Binding::Variable(..)) if declared.is_some_and(|s| s < self.fixed_scopes) => {
                 let message = format!("`{name}` is assigned where a closure is chosen");
@@ -313,12 +310,12 @@ impl Body<'_, '_> {
         self.turns = outer.saturating_mul(turns.max(1));
         self.check_turns(self.turns, span)?;
         self.loops += 1;
-        self.scopes.push(Vec::new());
+        self.scopes.open();
         if let Some((name, local)) = counter {
             self.bind(name, Binding::Counter(local), false);
         }
         let result = self.nested(body);
-        self.scopes.pop();
+        self.scopes.close();
         self.loops -= 1;
         self.turns = outer;
         Some(result)

@@ -12,7 +12,7 @@ fn cost(text: &str, samples: usize) -> Cost {
     let program = program(text);
     let mut inputs = Inputs::new(0);
     let points: Vec<(usize, At)> = (0..samples).map(|_| (0, inputs.anywhere())).collect();
-    let found = cost::vector(&program, 0, &points).expect("it ends");
+    let found = cost::vector(&program, 0, &points);
     found.expect("there are inputs")
 }
 
@@ -156,7 +156,7 @@ fn over_instances(program: &Program, each: usize) -> Cost {
     let mut inputs = Inputs::new(0);
     let of = (0..program.instances().len() * each).map(|i| i / each);
     let points: Vec<(usize, At)> = of.map(|i| (i, inputs.anywhere())).collect();
-    let found = cost::vector(program, 0, &points).expect("it ends");
+    let found = cost::vector(program, 0, &points);
     found.expect("there are inputs")
 }
 
@@ -237,6 +237,6 @@ fn code_counts_once_what_loops_repeat_and_what_branches_skip() {
 #[test]
 fn nothing_is_known_without_inputs() {
     let program = program(&emitting("color(uv.x)", ""));
-    assert_eq!(cost::vector(&program, 0, &[]), Ok(None));
-    assert_eq!(cost::lines(&program, 0, &[]).map(|l| l.len()), Ok(0));
+    assert_eq!(cost::vector(&program, 0, &[]), None);
+    assert!(cost::lines(&program, 0, &[]).is_empty());
 }

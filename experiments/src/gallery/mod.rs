@@ -242,8 +242,7 @@ impl Studio {
             let why = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
             format!("{} does not compile:\n{why}", entry.id())
         })?;
-        let costs = anywhere(&program, SAMPLES)
-            .map_err(|_| format!("{} takes too long to evaluate", entry.id()))?;
+        let costs = anywhere(&program, SAMPLES);
         let ours = costs.iter().find(|m| m.name == example.material);
         ours.or(costs.first())
             .and_then(|m| Some(m.operations()?.mean))

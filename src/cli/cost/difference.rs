@@ -7,7 +7,7 @@ use impasto::cost::{Change, Difference, LineChange, MaterialCost, difference};
 use serde_json::json;
 
 use super::table::{percent, shortened};
-use super::{CostArgs, Failure, Global, Outcome, one_source, print};
+use super::{CostArgs, Failure, Global, Outcome, complete, one_source, print};
 
 pub fn run(args: &CostArgs, global: &Global) -> Outcome {
     let [old, new] = args.files.as_slice() else {
@@ -19,18 +19,18 @@ pub fn run(args: &CostArgs, global: &Global) -> Outcome {
         );
         return Err(Failure::Error(message));
     };
-    let samples = args.samples as usize;
-    let before = one_source(old, samples, global)?;
-    let after = one_source(new, samples, global)?;
+    let before = one_source(old, args.effort(), global)?;
+    let after = one_source(new, args.effort(), global)?;
     let found = difference(&before, &after);
     if found.materials.is_empty() {
         return Err(Failure::Error(nothing_in_common(old, &before, new, &after)));
     }
     if global.json() {
-        print(&format!("{:#}\n", json(args, &found)))
+        print(&format!("{:#}\n", json(args, &found)))?;
     } else {
-        print(&text(args, old, new, &found))
+        print(&text(args, old, new, &found))?;
     }
+    complete(&before, global).and(complete(&after, global))
 }
 
 fn nothing_in_common(

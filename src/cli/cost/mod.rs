@@ -10,7 +10,7 @@ use clap::Args;
 use impasto::FileLoader;
 use impasto::compiler::Loader;
 use impasto::compiler::cost::{self, Cost, Inputs, Operations};
-use impasto::cost::{MaterialCost, anywhere, of_scene};
+use impasto::cost::{Effort, MaterialCost, anywhere, of_scene};
 use serde::Serialize;
 use serde_json::json;
 
@@ -24,6 +24,9 @@ pub(super) struct CostArgs {
     /// At how many points each material is evaluated
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
+    /// How many expressions one evaluation may take, over all points together
+    #[arg(long, value_name = "N", default_value_t = cost::BUDGET, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    budget: u64,
     /// How many lines of each material's source are shown, those that cost most
     #[arg(long, value_name = "N", default_value_t = 8)]
     lines: usize,
@@ -50,30 +53,56 @@ pub(super) fn run(args: &CostArgs, global: &Global) -> Outcome {
         return difference::run(args, global);
     }
     let samples = args.samples as usize;
+    let effort = args.effort();
     let materials = match args.files.as_slice() {
-        [one] => one_source(one, samples, global)?,
+        [one] => one_source(one, effort, global)?,
         files => match files.iter().find(|f| is_scene(f)) {
             Some(scene) => {
                 let message = format!("`{scene}` is a scene: give it alone, without other files");
                 return Err(Failure::Error(message));
             }
-            None => file_materials(files, samples, global)?,
+            None => file_materials(files, effort, global)?,
         },
     };
     let noise = noise(samples)?;
     if global.json() {
-        print(&format!("{:#}\n", json(args, &materials, &noise)))
+        print(&format!("{:#}\n", json(args, &materials, &noise)))?;
     } else {
-        print(&table::text(args, &materials, &noise))
+        print(&table::text(args, &materials, &noise))?;
+    }
+    complete(&materials, global)
+}
+
+/// Fails if materials were evaluated at fewer points than asked, and says why.
+fn complete(materials: &[MaterialCost], global: &Global) -> Outcome {
+    let mut outcome = Ok(());
+    for m in materials {
+        if let Some(spent) = &m.spent {
+            global.note(&format!(
+                "the cost of `{}` is incomplete: {spent}; `--budget` grants more",
+                m.name
+            ));
+            outcome = Err(Failure::Diagnostics);
+        }
+    }
+    outcome
+}
+
+impl CostArgs {
+    fn effort(&self) -> Effort {
+        Effort {
+            samples: self.samples as usize,
+            budget: self.budget,
+        }
     }
 }
 
 /// The materials of a scene or of a file.
-fn one_source(path: &str, samples: usize, global: &Global) -> Result<Vec<MaterialCost>, Failure> {
+fn one_source(path: &str, effort: Effort, global: &Global) -> Result<Vec<MaterialCost>, Failure> {
     if is_scene(path) {
-        scene_materials(path, samples, global)
+        scene_materials(path, effort, global)
     } else {
-        file_materials(&[path.to_owned()], samples, global)
+        file_materials(&[path.to_owned()], effort, global)
     }
 }
 
@@ -82,21 +111,23 @@ fn is_scene(file: &str) -> bool {
 }
 
 fn too_long(_: impl Sized) -> Failure {
-    Failure::Error("the materials take too long to evaluate; try fewer `--samples`".into())
+    Failure::Error(
+        "the noise of the library takes too long to evaluate; try fewer `--samples`".into(),
+    )
 }
 
 fn scene_materials(
     path: &str,
-    samples: usize,
+    effort: Effort,
     global: &Global,
 ) -> Result<Vec<MaterialCost>, Failure> {
     let (scene, program) = compiled_scene(path.as_ref(), global)?;
-    of_scene(&scene, &program, samples).map_err(too_long)
+    Ok(of_scene(&scene, &program, effort))
 }
 
 fn file_materials(
     files: &[String],
-    samples: usize,
+    effort: Effort,
     global: &Global,
 ) -> Result<Vec<MaterialCost>, Failure> {
     let mut loader = FileLoader::new("");
@@ -108,7 +139,7 @@ fn file_materials(
         requests.extend(impasto::file_requests(file, &mut loader));
     }
     let program = compile(&requests, &mut loader, global)?;
-    anywhere(&program, samples).map_err(too_long)
+    Ok(anywhere(&program, effort))
 }
 
 fn noise(samples: usize) -> Result<Vec<NoiseCost>, Failure> {
@@ -133,6 +164,7 @@ fn json(args: &CostArgs, materials: &[MaterialCost], noise: &[NoiseCost]) -> ser
             "cost": m.cost,
             "efficiency": m.cost.as_ref().map(Cost::efficiency),
             "lines": m.lines,
+            "spent": m.spent,
         })
     };
     json!({

@@ -72,8 +72,14 @@ fn material(out: &mut String, width: usize, m: &MaterialCost) {
     let efficiency = percent(cost);
     let _ = writeln!(
         out,
-        "{row}  {:>7} {:>7} {efficiency:>5}",
-        cost.live, cost.code
+        "{row}  {:>7} {:>7} {efficiency:>5}{}",
+        cost.live,
+        cost.code,
+        if m.spent.is_some() {
+            "  incomplete"
+        } else {
+            ""
+        }
     );
 }
 

@@ -1,11 +1,14 @@
 //! What was executed how often, for whoever wants to know more than sums: by stretch of code that is
 //! executed as a whole, with every call standing for itself, as if it were in line.
 
+use std::collections::BTreeMap;
+
 use super::Interpreter;
 use super::code::Numbers;
 use crate::ir::ops::Counts;
 use crate::ir::value::{Real, Value};
 use crate::ir::{Const, ExprId, Function};
+use crate::source::Span;
 
 /// A part of a run of operations.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +34,35 @@ pub struct Origin<'a> {
 
 impl<'a, F: Real> Interpreter<'a, F> {
     /// Keeps calls apart: the same function called from two places is counted in each.
-    pub fn with_calls_apart(mut self) -> Self {
-        self.apart = true;
+    pub fn with_calls_apart(self) -> Self {
+        Self {
+            apart: true,
+            ..self.with_parts()
+        }
+    }
+
+    /// Keeps what code is made of, for [`Interpreter::busiest_loop`].
+    pub fn with_parts(mut self) -> Self {
+        self.has_parts = true;
         self
+    }
+
+    /// The loop that took most turns since [`Interpreter::take_times`] was last called, where its bound
+    /// or test stands in the source. Only code that keeps its parts knows.
+    pub fn busiest_loop(&self) -> Option<Span> {
+        let mut turns: BTreeMap<Span, u64> = BTreeMap::new();
+        for (code, source) in self.codes.iter().zip(&self.sources) {
+            let Some(f) = source else { continue };
+            let looped = code.parts.iter().filter(|part| part.counts.turns > 0);
+            for part in looped {
+                let taken = code.runs[part.run as usize].times;
+                *turns.entry(f.expr(part.expr).span).or_default() += taken;
+            }
+        }
+        // Of several the first.
+        let most = *turns.values().max()?;
+        let found = turns.into_iter().find(|(_, taken)| *taken == most);
+        found.filter(|_| most > 0).map(|(span, _)| span)
     }
 
     /// Goes on with other values of the parameter table. Numbers of runs stay.
@@ -60,7 +89,7 @@ impl<'a, F: Real> Interpreter<'a, F> {
         runs.map(|r| std::mem::take(&mut r.times))
     }
 
-    /// What runs are made of, in the order of runs. Only calls kept apart know.
+    /// What runs are made of, in the order of runs. Only code that keeps its parts knows.
     pub fn parts(&self) -> impl Iterator<Item = Part> {
         let first = self.codes.iter().scan(0, |next, code| {
             let first = *next;

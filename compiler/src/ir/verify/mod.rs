@@ -14,7 +14,7 @@ use crate::source::Span;
 
 mod items;
 
-pub use items::{material, module};
+pub use items::{MAX_FIELDS, material, module};
 
 /// What is wrong with a piece of IR.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,20 +7,22 @@ use crate::ir::{Block, Const, ExprId, ExprKind, Function, FunctionId, Stmt};
 /// Operations within operations that a condition is looked into.
 const DEPTH: u32 = 8;
 
-/// Expressions that are left of `callee` when it is called from `f` with `args`; none if that
-/// decides no branch.
-pub(super) fn size(callee: &Function, f: &Function, args: &[ExprId]) -> Option<u32> {
+/// Do constants among `args` decide branches of `callee`, called from `f`, so that at most `most`
+/// expressions are left of it?
+pub(super) fn leaves(callee: &Function, f: &Function, args: &[ExprId], most: u32) -> bool {
     let constants: Vec<Option<&Const>> = args.iter().map(|&a| f.constant(a)).collect();
     if constants.iter().all(Option::is_none) {
-        return None;
+        return false;
     }
     let mut count = Count {
         callee,
         constants,
         decided: false,
+        left: 0,
+        most,
     };
-    let left = count.block(&callee.body);
-    count.decided.then_some(left)
+    count.block(&callee.body);
+    count.decided && count.left <= most
 }
 
 struct Count<'a> {
@@ -29,26 +31,40 @@ struct Count<'a> {
     constants: Vec<Option<&'a Const>>,
     /// Was a branch decided?
     decided: bool,
+    /// Expressions that are left, as far as counted: no further than `most`.
+    left: u32,
+    most: u32,
 }
 
 impl Count<'_> {
-    fn block(&mut self, block: &Block) -> u32 {
-        block.iter().map(|stmt| self.stmt(stmt)).sum()
+    fn block(&mut self, block: &Block) {
+        for stmt in block {
+            if self.left > self.most {
+                return;
+            }
+            self.stmt(stmt);
+        }
     }
 
-    fn stmt(&mut self, stmt: &Stmt) -> u32 {
+    fn stmt(&mut self, stmt: &Stmt) {
         match stmt {
-            Stmt::Eval(_) => 1,
+            Stmt::Eval(_) => self.left += 1,
             Stmt::If(cond, then, otherwise) => match self.value(*cond, DEPTH) {
                 Some(Const::Bool(taken)) => {
                     self.decided = true;
-                    self.block(if taken { then } else { otherwise })
+                    self.block(if taken { then } else { otherwise });
                 }
-                _ => self.block(then) + self.block(otherwise),
+                _ => {
+                    self.block(then);
+                    self.block(otherwise);
+                }
             },
             Stmt::For { body, .. } => self.block(body),
-            Stmt::While { head, body, .. } => self.block(head) + self.block(body),
-            Stmt::Store(..) | Stmt::Break | Stmt::Continue => 0,
+            Stmt::While { head, body, .. } => {
+                self.block(head);
+                self.block(body);
+            }
+            Stmt::Store(..) | Stmt::Break | Stmt::Continue => {}
         }
     }
 

@@ -15,6 +15,8 @@
 //! Callees are copied through the walk that folds and simplifies, so a lobe with constant
 //! parameters arrives small.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::rewrite::{Rewriter, Rules};
 use crate::ir::ops::CostClass;
 use crate::ir::{ExprId, ExprKind, Function, FunctionId, Module, walk};
@@ -37,86 +39,113 @@ const MAX_EXPRS: usize = 1 << 15;
 const MAX_ALL_EXPRS: usize = 1 << 17;
 
 /// Inlines calls, and folds and simplifies what is copied.
-pub(super) fn inline(module: &Module, f: &Function) -> Rules {
+pub(super) fn inline(_: &Module, f: &Function) -> Rules {
     Rules {
         simplify: true,
         forward: true,
-        inline: Some(Policy::new(module, f)),
+        inline: Some(Policy::new(f)),
         ..Rules::default()
     }
 }
 
-/// What decides whether a call goes in line.
+/// What decides whether a call goes in line. It knows only the functions that are called: a module may
+/// have many more.
 pub(super) struct Policy {
-    /// How often each function would be called if all that can go in line did.
-    sites: Vec<u32>,
-    /// Is a function the method of a bsdf or edf?
-    method: Vec<bool>,
-    /// Is a function called where the caller's own arguments may decide that it is not?
-    optional: Vec<bool>,
-    /// Expressions that each function evaluates, where asked.
-    sizes: Vec<Option<u32>>,
+    known: BTreeMap<FunctionId, Known>,
+    /// What the function calls whose calls these are, until calls are counted.
+    calls: Option<Vec<FunctionId>>,
+    /// The methods of bsdfs and edfs, once asked.
+    methods: Option<BTreeSet<FunctionId>>,
     /// Is an expression the same for a whole instance? By expression.
     uniform: Vec<bool>,
-    /// Does a function look up textures, which only the kernel can? Where asked.
-    textures: Vec<Option<bool>>,
+    /// Do small functions alone go in line?
+    only_small: bool,
+}
+
+/// What is known of a function that is called.
+#[derive(Clone, Copy, Default)]
+struct Known {
+    /// How often it would be called if all that can go in line did.
+    sites: u32,
+    /// Is it called where the caller's own arguments may decide that it is not?
+    is_optional: bool,
+    /// Expressions that it evaluates, where asked.
+    size: Option<u32>,
+    /// Does it look up textures, which only the kernel can? Where asked.
+    textures: Option<bool>,
 }
 
 impl Policy {
-    fn new(module: &Module, f: &Function) -> Self {
-        let n = module.functions.len();
-        let mut policy = Self {
-            sites: vec![0; n],
-            method: vec![false; n],
-            optional: vec![false; n],
-            sizes: vec![None; n],
+    fn new(f: &Function) -> Self {
+        Self {
+            known: BTreeMap::new(),
+            calls: Some(f.calls().collect()),
+            methods: None,
             uniform: Vec::new(),
-            textures: vec![None; n],
-        };
-        for def in &module.closures {
-            for id in def.methods.functions() {
-                // A module that is being built lists closures before all their methods.
-                if let Some(method) = policy.method.get_mut(id.index()) {
-                    *method = true;
-                }
-            }
+            only_small: false,
         }
-        policy.count_sites(module, f);
-        policy
+    }
+
+    fn of(&mut self, id: FunctionId) -> &mut Known {
+        self.known.entry(id).or_default()
     }
 
     /// Counts calls, those within callees that go in line included. Callees stand before their
-    /// callers in a module, so one walk from the last to the first sees each count final.
-    fn count_sites(&mut self, module: &Module, f: &Function) {
-        f.calls().for_each(|id| self.sites[id.index()] += 1);
-        for index in (0..module.functions.len()).rev() {
-            let id = FunctionId(index as u32);
-            let calls = self.sites[index];
-            if calls > 0 && self.wanted(module, id) {
-                for inner in module.functions[index].calls() {
-                    let sites = &mut self.sites[inner.index()];
-                    *sites = sites.saturating_add(calls);
-                }
+    /// callers in a module, so a walk from the last to the first sees each count final.
+    fn count_sites(&mut self, module: &Module, calls: Vec<FunctionId>) {
+        let mut called = BTreeSet::new();
+        for id in calls {
+            self.of(id).sites += 1;
+            called.insert(id);
+        }
+        while let Some(id) = called.pop_last() {
+            let calls = self.of(id).sites;
+            if calls > 1 && self.size(module, id) > SMALL && !self.is_method(module, id) {
+                continue;
+            }
+            for inner in module.functions[id.index()].calls() {
+                let sites = &mut self.of(inner).sites;
+                *sites = sites.saturating_add(calls);
+                called.insert(inner);
             }
         }
     }
 
     /// Does a function go in line, as far as it alone decides?
     fn wanted(&mut self, module: &Module, id: FunctionId) -> bool {
-        let single = self.sites[id.index()] == 1 && !self.optional[id.index()];
-        self.method[id.index()] || single || self.size(module, id) <= SMALL
+        if let Some(calls) = self.calls.take() {
+            self.count_sites(module, calls);
+        }
+        let Known {
+            sites, is_optional, ..
+        } = *self.of(id);
+        let single = sites == 1 && !is_optional;
+        single || self.size(module, id) <= SMALL || self.is_method(module, id)
+    }
+
+    fn is_method(&mut self, module: &Module, id: FunctionId) -> bool {
+        let all = || {
+            let closures = module.closures.iter();
+            closures.flat_map(|def| def.methods.functions()).collect()
+        };
+        self.methods.get_or_insert_with(all).contains(&id)
     }
 
     /// Leaves the calls of `f` that its callers may rid it of, even where each is the only one.
     pub(super) fn keep_options(&mut self, f: &Function) {
         for id in decided::optional_calls(f) {
-            self.optional[id.index()] = true;
+            self.of(id).is_optional = true;
         }
+    }
+
+    /// Lets small functions alone go in line.
+    pub(super) fn keep_large(&mut self) {
+        self.only_small = true;
     }
 
     fn size(&mut self, module: &Module, id: FunctionId) -> u32 {
         let count = || module.functions[id.index()].evaluated().len() as u32;
-        *self.sizes[id.index()].get_or_insert_with(count)
+        *self.of(id).size.get_or_insert_with(count)
     }
 
     /// Notes of an expression that is evaluated whether it is the same for a whole instance.
@@ -141,17 +170,34 @@ impl Policy {
     }
 
     fn reads_textures(&mut self, module: &Module, id: FunctionId) -> bool {
-        if let Some(known) = self.textures[id.index()] {
-            return known;
+        // Not by recursion: calls may be as deep as there are functions.
+        let mut pending = vec![id];
+        let mut met = BTreeSet::from([id]);
+        let mut reads = false;
+        while let Some(next) = pending.pop() {
+            let known = self.of(next).textures;
+            let f = &module.functions[next.index()];
+            if known.unwrap_or_else(|| looks_up(f)) {
+                reads = true;
+                break;
+            }
+            if known.is_none() {
+                pending.extend(f.calls().filter(|callee| met.insert(*callee)));
+            }
         }
-        let callee = &module.functions[id.index()];
-        let lookup = callee.exprs.iter().any(
-            |e| matches!(e.kind, ExprKind::Op(op, _) if op.info().class == CostClass::Texture),
-        );
-        let reads = lookup || callee.calls().any(|id| self.reads_textures(module, id));
-        self.textures[id.index()] = Some(reads);
+        if reads {
+            met = BTreeSet::from([id]);
+        }
+        met.into_iter()
+            .for_each(|id| self.of(id).textures = Some(reads));
         reads
     }
+}
+
+/// Does a function look up textures itself?
+fn looks_up(f: &Function) -> bool {
+    let is_lookup = |kind: &ExprKind| matches!(kind, ExprKind::Op(op, _) if op.info().class == CostClass::Texture);
+    f.exprs.iter().any(|e| is_lookup(&e.kind))
 }
 
 /// The value of a call that goes in line.
@@ -178,8 +224,10 @@ fn goes_in_line(
         return false;
     }
     let small = policy.size(w.module, callee) <= SMALL
-        || decided::size(&w.module.functions[callee.index()], w.f, args)
-            .is_some_and(|left| left <= SMALL);
+        || decided::leaves(&w.module.functions[callee.index()], w.f, args, SMALL);
+    if policy.only_small && !small {
+        return false;
+    }
     let room = if small { MAX_ALL_EXPRS } else { MAX_EXPRS };
     (small || policy.wanted(w.module, callee))
         && w.f.exprs.len() < room

@@ -22,13 +22,16 @@ pub(super) fn splice(
         exprs: w.f.exprs.len() as u32,
         locals: w.f.locals.len() as u32,
         site: w.f.sites.len() as u32,
+        in_one: depth(&callee.sites) >= MAX_SITES,
     };
     let Expr { span, via, .. } = *w.f.expr(call);
     w.f.sites.push(CallSite { span, via });
-    w.f.sites.extend(callee.sites.iter().map(|site| CallSite {
-        via: shift.via(site.via),
-        ..*site
-    }));
+    if !shift.in_one {
+        w.f.sites.extend(callee.sites.iter().map(|site| CallSite {
+            via: shift.via(site.via),
+            ..*site
+        }));
+    }
     for local in &callee.locals {
         w.local(local.clone());
     }
@@ -53,17 +56,35 @@ pub(super) fn splice(
     w.resolve(shift.expr(callee.value))
 }
 
+/// Most calls within each other that are told apart in code in line. In a long chain of functions every
+/// expression would have as many.
+const MAX_SITES: u32 = 64;
+
+/// How many calls stand within each other.
+fn depth(sites: &[CallSite]) -> u32 {
+    let mut depths: Vec<u32> = Vec::with_capacity(sites.len());
+    for site in sites {
+        // Those around a call come before it.
+        let around = site.via.and_then(|id| depths.get(id.index()));
+        depths.push(around.map_or(1, |d| d + 1));
+    }
+    depths.into_iter().max().unwrap_or(0)
+}
+
 /// How far a callee's numbers are moved in its caller.
 struct Shift {
     exprs: u32,
     locals: u32,
     /// The call itself; those in the callee come after it.
     site: u32,
+    /// Does the call stand for those in the callee as well?
+    in_one: bool,
 }
 
 impl Shift {
     fn via(&self, via: Option<SiteId>) -> Option<SiteId> {
-        Some(SiteId(via.map_or(self.site, |id| self.site + 1 + id.0)))
+        let own = via.filter(|_| !self.in_one);
+        Some(SiteId(own.map_or(self.site, |id| self.site + 1 + id.0)))
     }
 
     fn kind(&self, kind: &mut ExprKind) {
@@ -93,6 +114,7 @@ pub(in crate::passes) fn unset(f: &Function) -> Vec<LocalId> {
         f,
         set: vec![false; f.locals.len()],
         read: vec![false; f.locals.len()],
+        stored: Vec::new(),
     };
     state.block(&f.body);
     let ids = (0..f.locals.len() as u32).map(LocalId);
@@ -103,6 +125,8 @@ struct Unset<'a> {
     f: &'a Function,
     set: Vec<bool>,
     read: Vec<bool>,
+    /// The variables that are set, in the order of their first stores.
+    stored: Vec<LocalId>,
 }
 
 impl Unset<'_> {
@@ -119,34 +143,48 @@ impl Unset<'_> {
                     self.read[local.index()] |= !self.set[local.index()];
                 }
             }
-            Stmt::Store(local, None, _) => self.set[local.index()] = true,
+            Stmt::Store(local, None, _) => self.store(*local),
             // The other components keep what they were.
             Stmt::Store(local, Some(_), _) => {
                 self.read[local.index()] |= !self.set[local.index()];
             }
             Stmt::If(_, a, b) => {
-                let before = self.set.clone();
+                let before = self.stored.len();
                 self.block(a);
-                let after = std::mem::replace(&mut self.set, before);
+                let by_a = self.back_to(before);
                 self.block(b);
-                for (b, a) in self.set.iter_mut().zip(after) {
-                    *b &= a;
-                }
+                let mut by_b = self.back_to(before);
+                by_b.sort_unstable();
+                let both = by_a.into_iter().filter(|l| by_b.binary_search(l).is_ok());
+                both.for_each(|local| self.store(local));
             }
             Stmt::For { local, body, .. } => {
-                let before = self.set.clone();
-                self.set[local.index()] = true;
+                let before = self.stored.len();
+                self.store(*local);
                 self.block(body);
-                self.set = before;
+                self.back_to(before);
             }
             Stmt::While { head, body, .. } => {
                 self.block(head);
-                let before = self.set.clone();
+                let before = self.stored.len();
                 self.block(body);
-                self.set = before;
+                self.back_to(before);
             }
             Stmt::Break | Stmt::Continue => {}
         }
+    }
+
+    fn store(&mut self, local: LocalId) {
+        if !std::mem::replace(&mut self.set[local.index()], true) {
+            self.stored.push(local);
+        }
+    }
+
+    /// Takes back all stores but the first so many; gives their variables.
+    fn back_to(&mut self, stores: usize) -> Vec<LocalId> {
+        let undone = self.stored.split_off(stores);
+        undone.iter().for_each(|l| self.set[l.index()] = false);
+        undone
     }
 }
 

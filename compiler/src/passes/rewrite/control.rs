@@ -1,6 +1,7 @@
 //! Statements, branches and loops of the shared walk, and what is known where they meet.
 
 use super::Rewriter;
+use super::held::{self, Change, Mark};
 use crate::ir::ops::Op;
 use crate::ir::{Block, Const, ExprId, LocalId, Stmt};
 use crate::passes::{cse, simplify};
@@ -42,11 +43,11 @@ impl Rewriter<'_> {
 
     /// Stores, unless the variable holds the value already.
     pub fn store(&mut self, local: LocalId, part: Option<u8>, value: ExprId) {
-        let held = self.held[local.index()];
+        let held = self.held.get(local);
         if part.is_none() && held.is_some_and(|h| self.same(h, value)) {
             return;
         }
-        self.held[local.index()] = if part.is_none() { Some(value) } else { None };
+        self.held.set(local, part.is_none().then_some(value));
         self.out.push(Stmt::Store(local, part, value));
     }
 
@@ -55,21 +56,17 @@ impl Rewriter<'_> {
         if let Some(Const::Bool(taken)) = self.f.constant(cond) {
             return self.block(if *taken { then } else { otherwise });
         }
-        let before = self.held.clone();
+        let before = self.held.mark();
         let (then, then_left) = self.arm(cond, true, then);
-        let after_then = std::mem::replace(&mut self.held, before.clone());
-        // The first side may have brought variables of its own.
-        self.held.resize(self.f.locals.len(), None);
+        let by_then = self.held.back_to(before);
         let (otherwise, otherwise_left) = self.arm(cond, false, otherwise);
-        let after_otherwise = std::mem::take(&mut self.held);
-        self.held = match (then_left, otherwise_left) {
-            (true, _) => after_otherwise,
-            (false, true) => after_then,
-            (false, false) => self.agreed(&after_then, &after_otherwise),
-        };
-        self.held.resize(self.f.locals.len(), None);
-        self.forget_unavailable();
-        self.emit_branch(cond, then, otherwise, &before);
+        let by_otherwise = self.held.back_to(before);
+        match (then_left, otherwise_left) {
+            (true, _) => self.go_on(&by_otherwise),
+            (false, true) => self.go_on(&by_then),
+            (false, false) => self.meet(&by_then, &by_otherwise),
+        }
+        self.emit_branch(cond, then, otherwise, [&by_then, &by_otherwise]);
         then_left && otherwise_left
     }
 
@@ -109,7 +106,7 @@ impl Rewriter<'_> {
         cond: ExprId,
         then: Block,
         otherwise: Block,
-        before: &[Option<ExprId>],
+        changes: [&[Change]; 2],
     ) {
         if then == otherwise {
             // Nothing is evaluated twice, so these are empty, or the same stores and jumps.
@@ -117,7 +114,7 @@ impl Rewriter<'_> {
             return;
         }
         self.via = self.f.expr(cond).via;
-        if self.rules.simplify && simplify::pick(self, cond, &then, &otherwise, before) {
+        if self.rules.simplify && simplify::pick(self, cond, &then, &otherwise, changes) {
             return;
         }
         let branch = match self.operation(cond) {
@@ -137,16 +134,17 @@ impl Rewriter<'_> {
             }
             if first.checked_add(1) == Some(end) && !jumps(&body) {
                 // The counter is this constant wherever the body reads it.
-                self.held[local.index()] = Some(low);
+                self.held.set(local, Some(low));
                 return self.block(body);
             }
         }
         let mut stored = vec![local];
         stored_in(&body, &mut stored);
+        let before = self.held.mark();
         self.forget(&stored);
         let (body, _) = self.scoped(body);
         self.forget(&stored);
-        self.forget_unavailable();
+        self.forget_unavailable(before);
         self.out.push(Stmt::For {
             local,
             low,
@@ -163,6 +161,7 @@ impl Rewriter<'_> {
         let mut stored = Vec::new();
         stored_in(&head, &mut stored);
         stored_in(&body, &mut stored);
+        let before = self.held.mark();
         self.forget(&stored);
         let outer = std::mem::take(&mut self.out);
         let mark = self.mark();
@@ -179,7 +178,7 @@ impl Rewriter<'_> {
         self.close(mark);
         self.out = outer;
         self.forget(&stored);
-        self.forget_unavailable();
+        self.forget_unavailable(before);
         self.out.push(Stmt::While {
             head,
             test,
@@ -215,31 +214,55 @@ impl Rewriter<'_> {
         }
     }
 
-    /// What variables hold after a branch both of whose sides go on.
-    fn agreed(&self, a: &[Option<ExprId>], b: &[Option<ExprId>]) -> Vec<Option<ExprId>> {
-        let both = a.iter().zip(b);
-        let one = both.map(|pair| match pair {
-            (Some(a), Some(b)) if self.same(*a, *b) => Some(*a),
-            _ => None,
+    /// What a variable held before a branch whose sides made these changes.
+    pub fn before(&self, local: LocalId, changes: [&[Change]; 2]) -> Option<ExprId> {
+        let changed = changes.iter().find_map(|side| held::find(side, local));
+        changed.map_or_else(|| self.held.get(local), |c| c.before)
+    }
+
+    /// Goes on after a branch of which one side does.
+    fn go_on(&mut self, changes: &[Change]) {
+        for change in changes {
+            self.hold(change.local, change.after);
+        }
+    }
+
+    /// Goes on after a branch both of whose sides do: variables hold what they agree on.
+    fn meet(&mut self, then: &[Change], otherwise: &[Change]) {
+        let alone = |c: &&Change| held::find(then, c.local).is_none();
+        let by_then = then.iter().map(|c| {
+            let other = held::find(otherwise, c.local);
+            (c.local, c.after, other.map_or(c.before, |o| o.after))
         });
-        one.collect()
+        let by_otherwise = otherwise.iter().filter(alone);
+        let by_otherwise = by_otherwise.map(|c| (c.local, c.before, c.after));
+        for (local, a, b) in by_then.chain(by_otherwise) {
+            let agreed = match (a, b) {
+                (Some(a), Some(b)) if self.same(a, b) => Some(a),
+                _ => None,
+            };
+            self.hold(local, agreed);
+        }
     }
 
     fn forget(&mut self, locals: &[LocalId]) {
         for local in locals {
-            self.held[local.index()] = None;
+            self.held.set(*local, None);
         }
     }
 
-    /// Forgets values that were computed in blocks now closed.
-    fn forget_unavailable(&mut self) {
-        for held in &mut self.held {
-            if held.is_some_and(|id| {
-                !self.available[id.index()] && !self.f.exprs[id.index()].kind.is_free()
-            }) {
-                *held = None;
-            }
+    /// Forgets values since `mark` that were computed in blocks now closed.
+    fn forget_unavailable(&mut self, mark: Mark) {
+        for local in self.held.since(mark) {
+            self.hold(local, self.held.get(local));
         }
+    }
+
+    /// A variable holds a value from now on, if that is still there.
+    fn hold(&mut self, local: LocalId, value: Option<ExprId>) {
+        let is_free = |id: &ExprId| self.f.expr(*id).kind.is_free();
+        let there = value.filter(|id| self.available[id.index()] || is_free(id));
+        self.held.set(local, there);
     }
 }
 

@@ -7,10 +7,14 @@
 //! through the same walk, so what its constant arguments decide is never even emitted.
 
 mod control;
+mod held;
 
 pub(super) use control::stored_in;
+pub(super) use held::Change;
+use held::Held;
 
 use super::{cse, fold, inline, simplify};
+use crate::ir::interp::Interpreter;
 use crate::ir::ops::Op;
 use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, SiteId, Stmt, Type};
 use crate::source::Span;
@@ -73,12 +77,14 @@ pub(super) struct Rewriter<'a> {
     params: Vec<Option<ExprId>>,
     material_params: Vec<Option<ExprId>>,
     /// What each variable holds here, where that is known.
-    held: Vec<Option<ExprId>>,
+    held: Held,
     /// Evaluated in a block that is open; `evaluated` lists them in order, to close blocks.
     available: Vec<bool>,
     evaluated: Vec<ExprId>,
     /// The call that what is rewritten stands in place of, and so what is added for it.
     pub via: Option<SiteId>,
+    /// Runs calls with constant arguments, once there was one.
+    pub interpreter: Option<Interpreter<'a, f64>>,
     /// Statements met.
     walked: u64,
 }
@@ -96,10 +102,11 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) -> u64 {
         alias: vec![None; exprs],
         params: Vec::new(),
         material_params: Vec::new(),
-        held: vec![None; locals],
+        held: Held::unknown(locals),
         available: vec![false; exprs],
         evaluated: Vec::new(),
         via: None,
+        interpreter: None,
         walked: 0,
     };
     walk.block(body);
@@ -184,7 +191,7 @@ impl Rewriter<'_> {
     /// Adds a variable.
     pub fn local(&mut self, local: crate::ir::Local) {
         self.f.locals.push(local);
-        self.held.push(None);
+        self.held.declare();
     }
 
     // ---- Expressions -----------------------------------------------------------------------
@@ -222,7 +229,7 @@ impl Rewriter<'_> {
             *operand = self.resolve(*operand);
         }
         let load = match kind {
-            ExprKind::Load(local) => self.held[local.index()],
+            ExprKind::Load(local) => self.held.get(local),
             _ => None,
         };
         self.f.exprs[id.index()].kind = kind;
@@ -276,7 +283,7 @@ impl Rewriter<'_> {
 
     fn emit(&mut self, id: ExprId) -> ExprId {
         if let ExprKind::Load(local) = *self.kind(id) {
-            self.held[local.index()] = Some(id);
+            self.held.set(local, Some(id));
         }
         if let Some(policy) = &mut self.rules.inline {
             policy.note(self.f, id);

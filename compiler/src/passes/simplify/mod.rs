@@ -8,7 +8,7 @@
 //! One function an operation holds its rules, each with its reason. The tests run every rule over
 //! random and extreme operands against the expression it replaces.
 
-use super::rewrite::{New, Rewriter, Rules};
+use super::rewrite::{Change, New, Rewriter, Rules};
 use crate::ir::ops::Op;
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Module, Stmt, Type};
 use crate::source::Span;
@@ -163,7 +163,7 @@ pub(super) fn pick(
     cond: ExprId,
     then: &Block,
     otherwise: &Block,
-    before: &[Option<ExprId>],
+    changes: [&[Change]; 2],
 ) -> bool {
     let (Some(then), Some(otherwise)) = (stores_only(then), stores_only(otherwise)) else {
         return false;
@@ -176,7 +176,7 @@ pub(super) fn pick(
     }
     let last = |stores: &[(LocalId, ExprId)], local: LocalId| {
         let own = stores.iter().rev().find(|s| s.0 == local).map(|s| s.1);
-        own.or_else(|| before.get(local.index()).copied().flatten())
+        own.or_else(|| w.before(local, changes))
     };
     let mut picks = Vec::new();
     for local in locals {

@@ -17,7 +17,7 @@ impl Body<'_, '_> {
         otherwise: &ast::Block,
         span: Span,
     ) -> Option<Operand> {
-        let outside = std::mem::replace(&mut self.fixed_scopes, self.scopes.len());
+        let outside = std::mem::replace(&mut self.fixed_scopes, self.scopes.depth());
         let a = self.scoped(|cx| cx.block_value(then, span));
         let b = self.scoped(|cx| cx.block_value(otherwise, span));
         self.fixed_scopes = outside;

@@ -25,14 +25,11 @@ impl Body<'_, '_> {
     /// Will an expression be a closure?
     pub fn is_closure(&self, expr: &Expr) -> bool {
         match &expr.kind {
-            ExprKind::Name(name) => {
-                let mut entries = self.scopes.iter().rev().flat_map(|s| s.iter().rev());
-                match entries.find(|e| e.name == *name).map(|e| e.binding) {
-                    Some(Binding::Fixed(operand)) => operand.ty().is_closure(),
-                    Some(_) => false,
-                    None => name == NO_MEDIUM && self.cx.lookup(self.module, name).is_none(),
-                }
-            }
+            ExprKind::Name(name) => match self.scopes.find(name).map(|(_, binding)| binding) {
+                Some(Binding::Fixed(operand)) => operand.ty().is_closure(),
+                Some(_) => false,
+                None => name == NO_MEDIUM && self.cx.lookup(self.module, name).is_none(),
+            },
             ExprKind::Call { callee, args } => match self.cx.lookup(self.module, &callee.node) {
                 Some(item) => match &self.cx.item(item).kind {
                     ItemKind::Closure(_) | ItemKind::Material(_) => true,
