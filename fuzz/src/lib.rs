@@ -8,6 +8,7 @@
 use std::time::{Duration, Instant};
 
 pub mod corpus;
+pub mod geometry;
 pub mod mutate;
 pub mod search;
 pub mod target;
