@@ -307,7 +307,7 @@ fn polygon(n: usize) -> Parts {
 }
 
 fn star(n: usize) -> Parts {
-    face((0..n).map(|i| around(share(i, n), if i % 2 == 0 { 1.2 } else { 0.8 })))
+    face((0..n).map(|i| around(share(i, n), if i.is_multiple_of(2) { 1.2 } else { 0.8 })))
 }
 
 fn comb(n: usize) -> Parts {
@@ -315,7 +315,7 @@ fn comb(n: usize) -> Parts {
     let tooth = |i: usize| {
         [
             1.0 - 2.0 * share(i, teeth),
-            if i % 2 == 0 { 1.0 } else { -0.8 },
+            if i.is_multiple_of(2) { 1.0 } else { -0.8 },
         ]
     };
     let base = [[-1.2, -1.0], [1.2, -1.0]];
