@@ -14,8 +14,8 @@ use super::{cluster, reinsert};
 /// and sums of them would leave the range of floats.
 const MAX_COORDINATE: f32 = 1e13;
 
-/// Nodes on the longest path of a tree. Ordinary scenes have 25 to 60; what is deeper than this is left as
-/// it was clustered, which is no deeper than the rounds that it took.
+/// Nodes on the longest path of a tree. What is deeper than this once nodes were moved is left as it was
+/// clustered: no deeper than the rounds that it took.
 const MAX_DEPTH: usize = 128;
 
 /// The tree with one box a leaf. What of a box is no number is 0 instead, and what is out of range is at
