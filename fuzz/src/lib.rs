@@ -4,10 +4,13 @@
 //! `cargo run -p impasto-fuzz --bin source -- --seconds 60` (or `--bin ir`) searches; what it finds
 //! goes to `compiler/tests/regressions/`, where a test keeps it found. `compiler/tests/bad_input.rs`
 //! runs the same targets on random input in every test run.
+//!
+//! [`geometry`] generates scenes that are hard on what is built over geometry; tests render them.
 
 use std::time::{Duration, Instant};
 
 pub mod corpus;
+pub mod geometry;
 pub mod mutate;
 pub mod search;
 pub mod sources;

@@ -96,7 +96,10 @@ fn what_is_repeated_often_is_shared_and_nothing_else() {
         )
     };
     let entry = "[[geometry]]\nobj = 's.obj'\n";
-    let many = |times: usize| format!("{entry}placements = [{}]\n", "{}, ".repeat(times));
+    // Each at a place of its own, and none at that of an entry without placements.
+    let place = |index: usize| format!("{{ translate = [0, 0, {}] }}, ", index + 1);
+    let places = |times: usize| (0..times).map(place).collect::<String>();
+    let many = |times: usize| format!("{entry}placements = [{}]\n", places(times));
     // 2^20 triangles saved.
     assert_eq!(counts(4096, &many(257)), (0, 1, 257));
     assert_eq!(counts(4095, &many(257)), (257 * 4095, 0, 0));
@@ -144,7 +147,7 @@ fn copies_are_placed_triangles() {
 #[test]
 fn too_many_copies_are_an_error_before_they_fill_the_memory() {
     let mut places = String::from("x y z\n");
-    places += &"0 0 0\n".repeat(100_000);
+    (0..100_000).for_each(|i| places += &format!("{i} 0 0\n"));
     let files = [("s.obj", strip(1000)), ("p.txt", places)];
     let entry = "[[geometry]]\nobj = 's.obj'\nplacements = 'p.txt'\n";
     let shared = load_with(&files, entry).expect("100 M triangles are fine if they are shared");

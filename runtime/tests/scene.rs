@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
+use impasto_fuzz::geometry::HostileScene;
 use impasto_runtime::error::SceneError;
 use impasto_runtime::scene::{EnvironmentSource, Integrator, NO_MATERIAL, Scene};
 use impasto_runtime::world::lights::distant::DistantLight;
@@ -92,8 +93,9 @@ fn a_scene_has_what_its_file_says() {
 #[test]
 fn geometry_is_cut_into_triangles_and_placed() {
     let mesh = room().mesh;
-    // Twice: the quad's two triangles, two single ones and three of the pentagon; and a quad light.
-    assert_eq!(mesh.len(), 2 * 7 + 2);
+    // Twice: the quad's two triangles, two single ones and three of the pentagon; and a quad light. Where all
+    // have one material, a triangle of the pentagon is the first of the single ones.
+    assert_eq!(mesh.len(), 7 + 6 + 2);
     // x -> -z and z -> x by a quarter turn about y, after doubling.
     let near = |a: Vec3, b: [f32; 3]| a.distance(b.into()) < 1e-5;
     let [a, b, c] = mesh.positions[0];
@@ -107,17 +109,17 @@ fn geometry_is_cut_into_triangles_and_placed() {
     assert_eq!([a, b, c], [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
     // A fourth coordinate divides the others.
     assert!(
-        mesh.positions[7..14]
+        mesh.positions[7..13]
             .iter()
             .flatten()
             .any(|p| *p == Vec3::new(1.0, 1.0, 0.0))
     );
-    assert!(!mesh.positions[7..14].iter().flatten().any(|p| p.x > 1.0));
+    assert!(!mesh.positions[7..13].iter().flatten().any(|p| p.x > 1.0));
     // The quad light comes last.
-    assert_eq!(mesh.materials[14..], [NO_MATERIAL; 2]);
-    assert_eq!(mesh.lights[13..], [None, Some(0), Some(0)]);
+    assert_eq!(mesh.materials[13..], [NO_MATERIAL; 2]);
+    assert_eq!(mesh.lights[12..], [None, Some(0), Some(0)]);
     assert_eq!(
-        mesh.positions[14],
+        mesh.positions[13],
         [[0.0, 3.0, 0.0], [1.0, 3.0, 0.0], [1.0, 3.0, 1.0]].map(Vec3::from)
     );
 }
@@ -178,7 +180,6 @@ fn materials_are_bound_by_name() {
             3,
             3,
             3,
-            3,
             NO_MATERIAL,
             NO_MATERIAL
         ]
@@ -201,7 +202,41 @@ fn oddities_are_told() {
         has("faces of fewer than three corners, left out: 1"),
         "{warnings:?}"
     );
+    assert!(
+        has("room.obj: faces that cross themselves, cut into triangles that overlap: 1"),
+        "{warnings:?}"
+    );
+    assert!(
+        has("the scene: triangles that are where equal ones are, left out: 1"),
+        "{warnings:?}"
+    );
     assert!(has("nothing uses the material `unused`"), "{warnings:?}");
+}
+
+/// The example of the manual: a frame whose opening an edge, there and back, joins to the outline; and a dart
+/// with normals and texture coordinates, which stay with their corners.
+#[test]
+fn concave_faces_and_faces_with_holes_are_cut_along_their_outline() {
+    let obj = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 0\nv 1 2 0\nv 2 2 0\nv 2 1 0\n\
+               f 1 2 3 4 1 5 6 7 8 5\n\
+               v 9 0 0\nv 11 -1 0\nv 9.5 0 0\nv 11 1 0\nvn 0 0 1\n\
+               vt 9 0\nvt 11 -1\nvt 9.5 0\nvt 11 1\nf 10/2/1 11/3/1 12/4/1 9/1/1\n";
+    let scene = load_with(&[("t.obj", obj.into())], "").expect("it loads");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let area = |[a, b, c]: &[Vec3; 3]| 0.5 * (b - a).cross(c - a).z;
+    let areas: Vec<f32> = scene.mesh.positions.iter().map(area).collect();
+    assert!(areas.iter().all(|area| *area > 0.0), "{areas:?}");
+    assert!(
+        (areas[..8].iter().sum::<f32>() - 15.0).abs() < 1e-5,
+        "{areas:?}"
+    );
+    assert!(
+        (areas[8..].iter().sum::<f32>() - 0.5).abs() < 1e-5,
+        "{areas:?}"
+    );
+    for (corners, uvs) in scene.mesh.positions[8..].iter().zip(&scene.mesh.uvs[8..]) {
+        assert_eq!(corners.map(|c| Vec2::new(c.x, c.y)), *uvs);
+    }
 }
 
 /// Loads a scene of one triangle from a folder of its own, with more files and text.
@@ -224,7 +259,7 @@ fn load_with(files: &[(&str, Vec<u8>)], text: &str) -> Result<Scene, SceneError>
 #[test]
 fn identical_bindings_are_one_material() {
     let obj =
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl c\nf 1 2 3\n";
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 2\nusemtl c\nf 1 2 3\n";
     let text =
         "[materials.b]\nfile = \"x.impasto\"\n[materials.c]\nfile = \"x.impasto\"\nparams.k = 1\n";
     let scene = load_with(&[("t.obj", obj.into())], text).expect("it loads");
@@ -323,4 +358,42 @@ fn environment_maps_keep_their_range_and_repair_what_is_no_radiance() {
         let error = load_with(&[("sky.exr", exr[..end].to_vec())], text);
         assert!(error.is_err(), "{end} of {} bytes load", exr.len());
     }
+}
+
+/// Where several lights are equal they are one, and the scene is that of the one.
+#[test]
+fn a_light_that_is_there_twice_shines_once() {
+    for name in ["quads", "glowing"] {
+        let hostile = HostileScene::named(name).expect("a row of the table");
+        let [one, three] = [1, 3].map(|count| {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = hostile
+                .write(count, folder.path())
+                .expect("it can be written");
+            load(&path).expect("it loads")
+        });
+        assert_eq!(one.mesh, three.mesh, "{name}");
+        assert!(one.warnings.is_empty(), "{:?}", one.warnings);
+        let warned = |part: &str| three.warnings.iter().any(|w| w.contains(part));
+        assert!(
+            warned("that are where equal ones are, left out: 2"),
+            "{:?}",
+            three.warnings
+        );
+    }
+}
+
+/// Lights in one place that differ in anything are different lights.
+#[test]
+fn lights_in_one_place_that_differ_all_stay() {
+    let quads = HostileScene::named("quads").expect("a row of the table");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = quads.write(3, folder.path()).expect("it can be written");
+    let text = std::fs::read_to_string(&path).expect("it can be read");
+    let text = text.replacen("radiance = 3.0", "radiance = 3.0\ngroup = 'key'", 1);
+    let text = text.replacen("radiance = 3.0\n[[", "radiance = 2.0\n[[", 1);
+    std::fs::write(&path, text).expect("it can be written");
+    let scene = load(&path).expect("it loads");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert_eq!(scene.mesh.len(), 1 + 3 * 2);
 }

@@ -12,6 +12,7 @@ mod eval;
 mod explain;
 mod film;
 mod fmt;
+mod hostile;
 mod limits;
 mod new;
 mod plan;

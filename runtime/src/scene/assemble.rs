@@ -10,9 +10,10 @@ use glam::DVec3;
 use super::MAX_TRIANGLES;
 use super::bindings::Bindings;
 use super::description::{Description, GeometrySpec};
+use super::duplicates::{self, Removed};
 use super::formats::{self, Format};
 use super::load::Source;
-use super::mesh::{MAX_COORDINATE, Repairs};
+use super::mesh::{Repairs, check_reach};
 use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
 use super::{Labels, Light, MaterialBinding, Mesh, Object, Placement, Transform, labels};
@@ -260,12 +261,8 @@ impl<'d> Assembly<'d, '_> {
             let columns = transform.matrix.abs();
             let transform = transform.before(self.object_origins[object as usize]);
             let reach = columns * DVec3::splat(largest.into()) + transform.translation.abs();
-            if reach.max_element() > MAX_COORDINATE {
-                let reach = reach.max_element() as f32;
-                let message = format!("the geometry reaches {reach:e} m from the origin");
-                let hint = format!("coordinates may go up to {MAX_COORDINATE:e}; see `scale`");
-                return Err(SceneError::in_file(&entry.source.path, message).hint(hint));
-            }
+            let error = |message| SceneError::in_file(&entry.source.path, message);
+            check_reach("the geometry", reach.max_element(), error)?;
             self.placements.push(Placement {
                 object,
                 transform: transform.moved(-self.origin),
@@ -292,6 +289,8 @@ impl<'d> Assembly<'d, '_> {
         let home = Transform::default();
         let repairs = mesh.push_geometry(path, geometry, &home, at, &slots, part)?;
         mesh.simplify();
+        let removed = duplicates::remove_triangles(&mut mesh, &[], &Labels::default());
+        self.counted(name, "triangles", removed.triangles);
         let name = name.clone();
         self.objects.push(Object { name, mesh });
         self.object_origins.push(at);
@@ -341,8 +340,9 @@ impl<'d> Assembly<'d, '_> {
             return Err(self.no_triangle(description.geometry.is_empty()));
         }
         self.mesh.simplify();
-        let camera_media = self.bindings.of_camera(&description.camera_media)?;
         self.labels.lights = description.lights.iter().map(|l| l.group.clone()).collect();
+        self.remove_duplicates(&lights);
+        let camera_media = self.bindings.of_camera(&description.camera_media)?;
         let environment = description.environment.as_ref();
         self.labels.environment = environment.and_then(|e| e.group.clone());
         self.labels.materials = self.bindings.groups();
@@ -357,6 +357,26 @@ impl<'d> Assembly<'d, '_> {
             labels: self.labels,
         })
     }
+
+    /// Leaves one of what is in one place several times.
+    fn remove_duplicates(&mut self, lights: &[Light]) {
+        let Removed { triangles, lights } =
+            duplicates::remove_triangles(&mut self.mesh, lights, &self.labels);
+        let copies = &mut self.labels.copies;
+        let placements = duplicates::remove_placements(&mut self.placements, copies);
+        self.counted("the scene", "triangles", triangles);
+        self.counted("the scene", "lights", lights);
+        self.counted("the scene", "placements", placements);
+    }
+
+    fn counted(&mut self, place: &str, what: &str, count: usize) {
+        if count > 0 {
+            let warning =
+                format!("{place}: {what} that are where equal ones are, left out: {count}");
+            self.warnings.push(warning);
+        }
+    }
+
     fn too_many_triangles(&self) -> SceneError {
         let message = format!("the scene stores more than {MAX_TRIANGLES} triangles");
         let formats = formats::names(self.formats);

@@ -9,7 +9,7 @@ use impasto_compiler::diag::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::mesh::MAX_COORDINATE;
+use super::mesh::check_reach;
 use crate::error::SceneError;
 
 /// The text of a TOML file.
@@ -219,11 +219,7 @@ impl<'d> Value<'d> {
     pub(crate) fn place(&self) -> Result<DVec3, SceneError> {
         let place = self.three_numbers()?;
         let reach = place.abs().max_element();
-        if reach > MAX_COORDINATE {
-            let message = format!("{} reaches {:e} m", self.name, reach as f32);
-            let hint = format!("coordinates may go up to {MAX_COORDINATE:e}");
-            return Err(self.error(message).hint(hint));
-        }
+        check_reach(&self.name, reach, |message| self.error(message))?;
         Ok(place)
     }
 

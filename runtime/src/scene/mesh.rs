@@ -15,7 +15,7 @@ pub(crate) const MAX_TRIANGLES: usize = (u32::MAX / 48) as usize;
 pub const NO_MATERIAL: u32 = u32::MAX;
 
 /// Largest coordinate in metres: products of three still fit a float.
-pub(super) const MAX_COORDINATE: f64 = 1e12;
+const MAX_COORDINATE: f64 = 1e12;
 
 /// Triangles, one entry a triangle in each list.
 ///
@@ -96,7 +96,9 @@ impl Mesh {
         let mirrored = transform.is_mirrored();
         for (index, triangle) in geometry.triangles.iter().enumerate() {
             let places = triangle.positions.map(|p| transform.place(p));
-            check_range(path, &places)?;
+            let reach = places.iter().map(|p| p.abs().max_element());
+            let error = |message| SceneError::in_file(path, message);
+            check_reach("the geometry", reach.fold(0.0, f64::max), error)?;
             let positions = places.map(|p| (p - origin).as_vec3());
             if !has_area(&positions) {
                 repairs.degenerate += 1;
@@ -207,19 +209,17 @@ impl Mesh {
     }
 }
 
-fn check_range(path: &Path, places: &[DVec3; 3]) -> Result<(), SceneError> {
-    let largest = places.iter().map(|p| p.abs().max_element());
-    let largest = largest.fold(0.0, f64::max);
-    if largest <= MAX_COORDINATE {
+/// Fails if something reaches too far from the origin; `error` makes an error of a message.
+pub(super) fn check_reach(
+    what: &str,
+    reach: f64,
+    error: impl FnOnce(String) -> SceneError,
+) -> Result<(), SceneError> {
+    if reach <= MAX_COORDINATE {
         return Ok(());
     }
-    let message = format!(
-        "the geometry reaches {:e} m from the origin",
-        largest as f32
-    );
-    Err(SceneError::in_file(path, message).hint(format!(
-        "coordinates may go up to {MAX_COORDINATE:e}; see `scale`"
-    )))
+    let message = format!("{what} reaches {:e} m", reach as f32);
+    Err(error(message).hint(format!("coordinates may go up to {MAX_COORDINATE:e} m")))
 }
 
 /// What was done to the triangles of a file.

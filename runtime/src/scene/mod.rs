@@ -14,6 +14,7 @@ mod bindings;
 mod bound;
 mod description;
 mod document;
+mod duplicates;
 pub mod formats;
 mod labels;
 mod lights;

@@ -12,6 +12,7 @@ use impasto_compiler::ParameterValue;
 use crate::error::SceneError;
 
 mod obj;
+mod polygon;
 #[cfg(test)]
 mod tests;
 

@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use impasto_compiler::ParameterValue;
 
-use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning};
+use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning, polygon};
 use crate::error::SceneError;
 use crate::input;
 
@@ -26,7 +26,7 @@ pub(super) const FORMAT: Format = Format {
     values_of: "an MTL file",
 };
 
-/// Reads an OBJ file and cuts its faces into fans of triangles.
+/// Reads an OBJ file and cuts its faces into triangles.
 fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     let bytes = input::read(path)
@@ -46,7 +46,7 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         return Err(SceneError::in_file(path, "the OBJ file has no faces")
             .hint("is it complete? faces are lines that start with `f`"));
     }
-    let triangles = parse(&scan)
+    let (triangles, crossing_faces) = parse(&scan)
         .map_err(|e| SceneError::in_file(path, format!("the OBJ file cannot be read: {e}")))?;
     let mut library = Library::load(base, name, &scan.mtl_files);
     let of_faces = |name: String| FileMaterial {
@@ -58,14 +58,26 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         materials: scan.materials.into_iter().map(of_faces).collect(),
         parts: scan.parts,
         missing: library.missing,
-        warnings: left_out(scan.degenerate_faces).into_iter().collect(),
+        warnings: [
+            counted(
+                "faces of fewer than three corners, left out",
+                scan.degenerate_faces,
+            ),
+            counted(
+                "faces that cross themselves, cut into triangles that overlap",
+                crossing_faces,
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
     })
 }
 
-fn left_out(degenerate_faces: usize) -> Option<Warning> {
-    (degenerate_faces > 0).then(|| Warning {
+fn counted(what: &str, count: usize) -> Option<Warning> {
+    (count > 0).then(|| Warning {
         line: None,
-        message: format!("faces of fewer than three corners, left out: {degenerate_faces}"),
+        message: format!("{what}: {count}"),
     })
 }
 
@@ -345,42 +357,73 @@ impl<'p> Scan<'p> {
     }
 }
 
-fn parse(scan: &Scan) -> Result<Vec<Triangle>, tobj::LoadError> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ..tobj::LoadOptions::default()
-    };
+/// The triangles, and how many faces cross themselves.
+fn parse(scan: &Scan) -> Result<(Vec<Triangle>, usize), tobj::LoadError> {
     // The library is made up: it has a material for each index that `faces` uses.
     let names = 0..scan.materials.len();
     let text = format!("mtllib all\n{}{}", scan.vertices, scan.faces);
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| {
-        let material = |i: usize| tobj::Material {
-            name: i.to_string(),
-            ..tobj::Material::default()
-        };
-        let by_name = names.clone().map(|i| (i.to_string(), i)).collect();
-        Ok((names.clone().map(material).collect(), by_name))
-    })?;
+    let (models, _) =
+        tobj::load_obj_buf(&mut text.as_bytes(), &tobj::LoadOptions::default(), |_| {
+            let material = |i: usize| tobj::Material {
+                name: i.to_string(),
+                ..tobj::Material::default()
+            };
+            let by_name = names.clone().map(|i| (i.to_string(), i)).collect();
+            Ok((names.clone().map(material).collect(), by_name))
+        })?;
     let mut triangles = Vec::with_capacity(scan.attributes.len());
+    let mut crossing = 0;
     for mesh in models.iter().map(|m| &m.mesh) {
-        for first in (0..mesh.indices.len()).step_by(3) {
+        let mut first = 0;
+        let mut push = |corners: [usize; 3]| {
             let [has_uv, has_normal] = scan.attributes[triangles.len()];
-            let corners = [first, first + 1, first + 2];
-            let triple = |values: &[f64], indices: &[u32]| {
-                corners.map(|k| DVec3::from_slice(&values[3 * indices[k] as usize..]))
-            };
-            let pair = |k: usize| {
-                let first = 2 * mesh.texcoord_indices[k] as usize;
-                DVec2::from_slice(&mesh.texcoords[first..]).as_vec2()
-            };
-            triangles.push(Triangle {
-                positions: triple(&mesh.positions, &mesh.indices),
-                normals: has_normal
-                    .then(|| triple(&mesh.normals, &mesh.normal_indices).map(|n| n.as_vec3())),
-                uvs: has_uv.then(|| corners.map(pair)),
-                material: mesh.material_id.unwrap_or_default(),
-            });
+            triangles.push(triangle(mesh, corners, has_uv, has_normal));
+        };
+        // Without arities all faces are triangles.
+        let faces = match mesh.face_arities.len() {
+            0 => mesh.indices.len() / 3,
+            faces => faces,
+        };
+        for face in 0..faces {
+            let count = mesh
+                .face_arities
+                .get(face)
+                .map_or(3, |&count| count as usize);
+            let corners = first..first + count;
+            first += count;
+            if count == 3 {
+                push([corners.start, corners.start + 1, corners.start + 2]);
+                continue;
+            }
+            let corner = |k: usize| position(mesh, k);
+            let cut = polygon::cut(&corners.clone().map(corner).collect::<Vec<_>>());
+            crossing += usize::from(cut.crosses);
+            let each = cut.triangles.into_iter();
+            each.for_each(|triangle| push(triangle.map(|k| corners.start + k)));
         }
     }
-    Ok(triangles)
+    Ok((triangles, crossing))
+}
+
+/// Where the corner numbered `k` of a mesh is.
+fn position(mesh: &tobj::Mesh, k: usize) -> DVec3 {
+    DVec3::from_slice(&mesh.positions[3 * mesh.indices[k] as usize..])
+}
+
+/// The triangle of three corners of a mesh.
+fn triangle(mesh: &tobj::Mesh, corners: [usize; 3], has_uv: bool, has_normal: bool) -> Triangle {
+    let normal = |k: usize| {
+        let first = 3 * mesh.normal_indices[k] as usize;
+        DVec3::from_slice(&mesh.normals[first..]).as_vec3()
+    };
+    let pair = |k: usize| {
+        let first = 2 * mesh.texcoord_indices[k] as usize;
+        DVec2::from_slice(&mesh.texcoords[first..]).as_vec2()
+    };
+    Triangle {
+        positions: corners.map(|k| position(mesh, k)),
+        normals: has_normal.then(|| corners.map(normal)),
+        uvs: has_uv.then(|| corners.map(pair)),
+        material: mesh.material_id.unwrap_or_default(),
+    }
 }

@@ -1,31 +1,27 @@
 //! The acceleration structures of ray casts, which are all made of one binary tree.
 //!
-//! obvhs builds it; `wide` and `binary` lay it out for kernels, and `text` puts the WGSL of a
-//! cast together. Triangles are stored in the order of the leaves, so that a leaf is a
+//! `build` makes it, of what `cluster` and `reinsert` do; `wide` and `binary` lay it out for kernels, and
+//! `text` puts the WGSL of a cast together. Triangles are stored in the order of the leaves, so that a leaf is a
 //! contiguous range and a *primitive* is an index in that order.
 
 mod binary;
+mod build;
+mod cluster;
 mod levels;
+mod reinsert;
 mod text;
 mod wide;
 
 use glam::Vec3A;
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
 
 use crate::scene::Mesh;
 use crate::technique::{Stack, Technique, Traversal};
 use crate::wgsl::{BufferData, ShaderPart};
 
+pub(crate) use build::binary_tree;
 pub use levels::{Levels, ObjectTree};
 pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
-
-/// The builder's settings. Which of several triangles at one distance a ray hits depends on
-/// them, and so do pictures: never change them by what a scene looks like.
-const PRESET: BvhBuildParams = BvhBuildParams::medium_build();
 
 /// The parent of the root, which nobody asks for.
 const NO_PARENT: u32 = 0;
@@ -112,21 +108,6 @@ fn tree_over(boxes: &[Aabb], traversal: Traversal, leaf_size: u32) -> Bvh {
         Traversal::Cwbvh => wide::layout(&binary_tree(boxes), leaf_size),
         Traversal::Bvh2 => binary::layout(binary_tree(boxes)),
     }
-}
-
-/// The tree with one triangle a leaf.
-pub(crate) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
-    let indices = (0..boxes.len() as u32).collect();
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        PRESET.ploc_search_distance,
-        boxes,
-        indices,
-        PRESET.sort_precision,
-        PRESET.search_depth_threshold,
-    );
-    let batch_ratio = PRESET.reinsertion_batch_ratio;
-    ReinsertionOptimizer::default().run(&mut tree, batch_ratio, None);
-    tree
 }
 
 pub(crate) fn bounds(corners: &[glam::Vec3; 3]) -> Aabb {

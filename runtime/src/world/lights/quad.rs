@@ -80,9 +80,14 @@ fn read(table: &mut Table) -> Result<(Light, Option<DVec3>), SceneError> {
 }
 
 fn present(context: &Context, _first: u32) -> Option<Kind> {
+    let first_triangles = first_triangles(context);
     let lights = context.scene.lights.iter().enumerate();
     let lights: Vec<Sampled> = lights
-        .filter_map(|(index, light)| sampled(context, index as u32, light.get()?))
+        .filter_map(|(index, light)| {
+            // A quad where an equal one is has none.
+            let first = first_triangles[index]?;
+            sampled(context, index as u32, first, light.get()?)
+        })
         .collect();
     let count = lights.len();
     let mut rows = vec![(
@@ -107,10 +112,18 @@ fn without_lights() -> Kind {
     }
 }
 
-fn sampled(context: &Context, index: u32, quad: &QuadLight) -> Option<Sampled> {
-    let of_quad = |light: &Option<u32>| *light == Some(index);
-    let lights = &context.mesh.lights;
-    let first = lights.iter().position(of_quad)?;
+/// The first triangle of each light.
+fn first_triangles(context: &Context) -> Vec<Option<usize>> {
+    let mut first = vec![None; context.scene.lights.len()];
+    for (triangle, light) in context.mesh.lights.iter().enumerate() {
+        if let Some(light) = light {
+            first[*light as usize].get_or_insert(triangle);
+        }
+    }
+    first
+}
+
+fn sampled(context: &Context, index: u32, first: usize, quad: &QuadLight) -> Option<Sampled> {
     let area = quad.u.as_dvec3().cross(quad.v.as_dvec3()).length();
     let sides = if quad.two_sided { 2.0 } else { 1.0 };
     let power = std::f64::consts::PI * sides * area * luminance(quad.radiance);
