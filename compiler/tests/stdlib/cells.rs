@@ -49,8 +49,9 @@ const DEEPEST: usize = 14;
 
 /// An integral of the density explains the samples of a cell if it is at least this share of theirs.
 /// Below, the few points of the rule have missed where the density is: the tails of a lobe that is
-/// next to a direction are in cells far wider than the tails.
+/// next to a direction are in cells far wider than the tails. One sample alone says little.
 const EXPLAINED: f64 = 0.2;
+const SAYS_LITTLE: usize = 1;
 
 /// Nodes and weights of Gauss and Legendre's rule with four points on [0, 1].
 const NODES: [(f64, f64); 4] = [
@@ -332,7 +333,8 @@ pub fn integrate(
         let mut next = Vec::new();
         for ((part, coarse), finer) in open.into_iter().zip(finer.chunks(4)) {
             let sum: Measures = std::array::from_fn(|c| finer.iter().map(|p| p[c]).sum());
-            let explained = sum[0] >= share * part.inside.len() as f64;
+            let samples = part.inside.len();
+            let explained = samples <= SAYS_LITTLE || sum[0] >= share * samples as f64;
             let good =
                 (0..4).all(|c| (sum[c] - coarse[c]).abs() <= RELATIVE * sum[c].abs() + ABSOLUTE);
             if (good && explained) || depth == DEEPEST {

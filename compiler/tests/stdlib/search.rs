@@ -105,9 +105,9 @@ fn four<F: Real>(pdf: &Lanes<F>, value: &Lanes<F>, l: usize) -> [f64; 4] {
     [lanes::float_at(pdf, 0, l), v(0), v(1), v(2)]
 }
 
-/// Below this share of the light, or this density, errors are no longer relative: a ten-thousandth
+/// Below this share of the light, or this density, errors are no longer relative: a thousandth
 /// of it is what single precision can tell of numbers next to 1.
-const FLOOR: f64 = 1e-3;
+const FLOOR: f64 = 1e-4;
 
 /// Relative errors of density, value and their quotient.
 pub fn errors(exact: &[f64; 4], found: &[f64; 4], is_free: bool) -> [f64; 3] {

@@ -93,7 +93,7 @@ const INTRODUCTION: &str = "\
 A test measured every number here, and fails if the number is beyond its bound. The tests walk the
 BSDFs of `stdlib/bsdf` and the materials of `materials/` from their folders. The reference is the
 interpreter of the compiler's IR in double precision. Errors are relative to the value, or to a
-thousandth of the light where less is reflected.
+ten-thousandth of the light where less is reflected.
 
 Bounds come from the doc comment of each BSDF:
 
