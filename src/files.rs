@@ -3,12 +3,15 @@
 //! The compiler does no I/O of its own; it asks a [`Loader`] for every file it meets.
 
 use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use impasto_compiler::source::MAX_SOURCE_BYTES;
 use impasto_compiler::{Loader, library_text};
+use impasto_runtime::film::output;
 use impasto_runtime::input;
+pub use impasto_runtime::input::reason;
 
 /// The name by which standard input is asked for.
 pub const STDIN: &str = "-";
@@ -82,19 +85,6 @@ fn read_source(reader: impl Read) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// An I/O error in a few words, without the operating system's number where the kind is clear.
-pub fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotFound => "no such file or folder".into(),
-        io::ErrorKind::PermissionDenied => "permission denied".into(),
-        io::ErrorKind::IsADirectory => "it is a folder".into(),
-        io::ErrorKind::NotADirectory => "a part of the path is not a folder".into(),
-        io::ErrorKind::StorageFull => "no space left on the device".into(),
-        io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".into(),
-        _ => error.to_string(),
-    }
-}
-
 /// Checks that a file could be created at `path`, so that one learns it before the work and not
 /// after. Nothing is left behind.
 pub fn check_writable(path: &Path) -> Result<(), String> {
@@ -119,29 +109,13 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
 /// Devices and pipes are written to as they are.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
     let written = if is_device(path) {
-        std::fs::write(path, bytes)
+        std::fs::write(path, bytes).map_err(|error| reason(&error))
     } else {
-        replace(path, bytes)
+        output::replace(path, |file| {
+            file.write_all(bytes).map_err(|error| reason(&error))
+        })
     };
-    written.map_err(|error| format!("cannot write `{}`: {}", path.display(), reason(&error)))
-}
-
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // A link stays a link: what it points to is replaced.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".impasto-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As for any new file, less what the user's mask takes away.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder_of(&target))?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(&target)?;
-    Ok(())
+    written.map_err(|why| format!("cannot write `{}`: {why}", path.display()))
 }
 
 /// Does `path` name something that exists and is neither file nor folder?
@@ -154,6 +128,88 @@ fn folder_of(path: &Path) -> &Path {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
     }
+}
+
+/// Keeps a file to one process at a time. The operating system ends it with the process, however that ends.
+///
+/// What is locked is a file of its own beside it, since a file that is replaced while it is kept up to date is
+/// another one each time.
+#[derive(Debug)]
+pub struct Lock {
+    path: PathBuf,
+    file: Option<File>,
+}
+
+impl Lock {
+    /// Keeps others from the file at `path`, which need not exist.
+    ///
+    /// # Errors
+    /// If another process has it, or the file beside it cannot be made.
+    pub fn take(path: &Path) -> Result<Self, String> {
+        let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let mut name = target.into_os_string();
+        name.push(".lock");
+        let lock = PathBuf::from(name);
+        let cannot = |error: io::Error| {
+            let (name, why) = (lock.display(), reason(&error));
+            format!("cannot lock `{}` by `{name}`: {why}", path.display())
+        };
+        loop {
+            let mut options = OpenOptions::new();
+            let options = options.create(true).truncate(false).write(true);
+            let file = options.open(&lock).map_err(cannot)?;
+            match file.try_lock() {
+                // Whoever had it may have removed it after it was opened.
+                Ok(()) if !is_at(&file, &lock) => {}
+                Ok(()) => {
+                    return Ok(Self {
+                        path: lock,
+                        file: Some(file),
+                    });
+                }
+                Err(TryLockError::WouldBlock) => {
+                    let name = path.display();
+                    return Err(format!("`{name}` is in use by another process"));
+                }
+                // A file system without locks holds nobody back, as before.
+                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
+                    return Ok(Self {
+                        path: lock,
+                        file: None,
+                    });
+                }
+                Err(TryLockError::Error(error)) => return Err(cannot(error)),
+            }
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // It is removed while it is locked: nobody else can have it then.
+        if self
+            .file
+            .as_ref()
+            .is_none_or(|file| is_at(file, &self.path))
+        {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Is an open file the one at `path`?
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    let found = path.metadata().map(place).ok();
+    found.is_some() && found == file.metadata().map(place).ok()
+}
+
+/// Is an open file the one at `path`? Where open files cannot be removed, it is.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
 }
 
 #[cfg(test)]
@@ -196,6 +252,46 @@ mod tests {
         check_writable(null).expect("it can be written");
         write_whole(null, b"gone").expect("it can be written");
         assert!(is_device(null));
+    }
+
+    #[test]
+    fn a_lock_is_held_once_and_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("c.film");
+        let held = Lock::take(&path).expect("it is free");
+        let refusal = Lock::take(&path).expect_err("it is held");
+        assert!(refusal.contains("in use by another process"), "{refusal}");
+        drop(held);
+        assert!(!folder.path().join("c.film.lock").exists());
+        // What a killed process leaves is a file that nobody has locked.
+        std::fs::write(folder.path().join("c.film.lock"), "").expect("written");
+        drop(Lock::take(&path).expect("it is free"));
+        let missing = folder.path().join("missing/c.film");
+        let refusal = Lock::take(&missing).expect_err("there is no folder");
+        assert!(refusal.contains("no such file or folder"), "{refusal}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_by_another_name_is_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("c.film"), "").expect("written");
+        std::os::unix::fs::symlink(at("c.film"), at("link.film")).expect("a link");
+        let _held = Lock::take(&at("c.film")).expect("it is free");
+        Lock::take(&at("link.film")).expect_err("it is held");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.txt"), "first").expect("written");
+        std::os::unix::fs::symlink(at("a.txt"), at("link.txt")).expect("a link");
+        write_whole(&at("link.txt"), b"second").expect("written");
+        assert!(at("link.txt").is_symlink());
+        assert_eq!(std::fs::read(at("a.txt")).expect("the file"), b"second");
     }
 
     #[test]

@@ -5,12 +5,16 @@
 //! goes to `compiler/tests/regressions/`, where a test keeps it found. `compiler/tests/bad_input.rs`
 //! runs the same targets on random input in every test run.
 //!
+//! `hostile` runs the built command on hostile files of every kind that it reads, each in a process with limits.
+//!
 //! [`geometry`] generates scenes that are hard on what is built over geometry; tests render them.
 
 use std::time::{Duration, Instant};
 
 pub mod corpus;
 pub mod geometry;
+#[cfg(unix)]
+pub mod hostile;
 pub mod mutate;
 pub mod search;
 pub mod sources;

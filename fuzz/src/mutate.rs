@@ -122,6 +122,67 @@ fn once(random: &mut Random, text: &mut Vec<u8>, others: &[Vec<u8>], words: &[&s
     }
 }
 
+/// Puts other values in the place of one to three numbers or quoted texts, so that what is around them is still
+/// read.
+pub fn revalue(random: &mut Random, text: &[u8], values: &[&str]) -> Vec<u8> {
+    let mut out = text.to_vec();
+    for _ in 0..=random.below(3) {
+        let places = values_of(&out);
+        let Some(place) = places.get(random.below(places.len())) else {
+            break;
+        };
+        // Mostly a text for a text, and a number for a number: what is of the wrong type is read no further.
+        let is_text = out[place.start] == b'"';
+        let is_number = |value: &&&str| value.starts_with(|c: char| c.is_ascii_digit() || c == '-');
+        let same: Vec<&str> = match random.below(4) {
+            0 => values.to_vec(),
+            _ if is_text => values
+                .iter()
+                .filter(|v| v.starts_with('"'))
+                .copied()
+                .collect(),
+            _ => values.iter().filter(is_number).copied().collect(),
+        };
+        let value = random.one(&same).unwrap_or_default().bytes();
+        drop(out.splice(place.clone(), value));
+    }
+    out
+}
+
+/// Where a text has numbers, and texts in quotes.
+fn values_of(text: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let mut places = Vec::new();
+    let mut at = 0;
+    while at < text.len() {
+        let length = match text[at] {
+            b'"' => text[at + 1..]
+                .iter()
+                .position(|b| *b == b'"')
+                .map_or(1, |end| end + 2),
+            b'0'..=b'9' | b'-' | b'.' => {
+                let in_number = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
+                text[at..].iter().take_while(|b| in_number(b)).count()
+            }
+            b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
+                let in_name = |b: &u8| b.is_ascii_alphanumeric() || *b == b'_';
+                at += text[at..].iter().take_while(|b| in_name(b)).count();
+                continue;
+            }
+            _ => {
+                at += 1;
+                continue;
+            }
+        };
+        // What a colon follows is the key of a JSON object.
+        let is_key = text[at] == b'"' && text.get(at + length) == Some(&b':');
+        if !is_key {
+            places.push(at..at + length);
+        }
+        at += length;
+    }
+    places
+}
+
 fn replace_word(random: &mut Random, text: &mut Vec<u8>, by: impl Fn(&mut Random) -> Vec<u8>) {
     let place = word(text, random.below(text.len() + 1));
     let by = by(random);
@@ -147,4 +208,18 @@ pub fn soup(random: &mut Random, words: &[&str], count: usize) -> Vec<u8> {
     }
     out.truncate(MAX_INPUT);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_numbers_and_texts_and_no_names() {
+        let text = b"v1 = [-1.5e3, \"a 2\"] # x2";
+        let found: Vec<&[u8]> = values_of(text).into_iter().map(|p| &text[p]).collect();
+        assert_eq!(found, [b"-1.5e3".as_slice(), b"\"a 2\""]);
+        assert_eq!(values_of(br#"{"key": "x"}"#).first(), Some(&(8..11)));
+        assert_eq!(revalue(&mut Random(1), b"names", &["1"]), b"names");
+    }
 }

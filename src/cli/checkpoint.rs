@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use impasto::files::{self, Lock};
 use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::film::output::remove_unfinished;
 use impasto::runtime::options::Progress;
 use impasto::runtime::render::passes::Keeping;
-use impasto::{Renderer, Rendering, RuntimeError, files};
+use impasto::{Renderer, Rendering, RuntimeError};
 
 use super::{Failure, Global};
 
@@ -33,12 +35,25 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 type OnProgress<'a> = &'a mut dyn FnMut(&Progress) -> std::ops::ControlFlow<()>;
 
 impl CheckpointArgs {
+    /// Keeps the checkpoint to this process. Two renders that go on from one would each undo what the other kept.
+    pub(super) fn lock(&self) -> Result<Option<Lock>, Failure> {
+        let Some(path) = &self.checkpoint else {
+            return Ok(None);
+        };
+        files::check_writable(path)?;
+        let lock = Lock::take(path).map_err(|why| {
+            let hint = "wait until that render ends, or name another with `--checkpoint`";
+            Failure::Error(format!("cannot use the checkpoint: {why}\n  hint: {hint}"))
+        })?;
+        remove_unfinished(path);
+        Ok(Some(lock))
+    }
+
     /// The film that an earlier run left. Whether it can be used is asked before any work.
     pub(super) fn read(&self) -> Result<Option<FilmFile>, Failure> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
         };
-        files::check_writable(path)?;
         if !path.exists() {
             return Ok(None);
         }

@@ -261,8 +261,9 @@ fn make_folder(folder: &Path) -> Result<(), String> {
 
 /// What was typed, with the program's name alone in the place of its path.
 fn command() -> String {
-    let words = std::env::args().skip(1);
+    let words = std::env::args_os().skip(1);
     let quoted = words.map(|word| {
+        let word = word.to_string_lossy().into_owned();
         if word.contains(char::is_whitespace) {
             format!("'{word}'")
         } else {

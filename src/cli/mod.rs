@@ -133,6 +133,7 @@ type Outcome = Result<(), Failure>;
 
 /// Reads the arguments, runs the command, reports its failure.
 pub(crate) fn main() -> ExitCode {
+    interrupt::outlive_file_limit();
     let cli = Cli::parse();
     let global = cli.global;
     let outcome = match cli.command {

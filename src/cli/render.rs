@@ -106,6 +106,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         files::check_writable(report)?;
     }
     let goals = args.until.goals(args.spp, &outputs)?;
+    let _lock = args.checkpoint.lock()?;
     let start = args.checkpoint.read()?;
     interrupt::install()?;
     let scene = Arc::new(load(args, global)?);

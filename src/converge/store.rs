@@ -83,10 +83,11 @@ struct Times {
     seconds: Vec<(Option<u32>, f64)>,
 }
 
-/// The folder of one scene.
-#[derive(Clone, Debug)]
+/// The folder of one scene, which is this process's as long as this lives.
+#[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
+    _lock: files::Lock,
 }
 
 impl Key {
@@ -135,12 +136,20 @@ impl Store {
     /// what an earlier study left is removed.
     ///
     /// # Errors
-    /// If it holds results that do not agree, or cannot be written.
+    /// If it holds results that do not agree, another process has it, or it cannot be written.
     pub fn open(folder: &Path, key: &Key, fresh: bool) -> Result<Self, StudyError> {
+        make_folder(folder)?;
+        let lock = files::Lock::take(&folder.join(KEY)).map_err(|why| {
+            StudyError::Folder(format!(
+                "cannot go on in `{}`: {why}\n  hint: wait until that study ends, or name another folder with `--out`",
+                folder.display()
+            ))
+        })?;
         let store = Self {
             folder: folder.to_owned(),
+            _lock: lock,
         };
-        store.make_folder(folder)?;
+        store.remove_unfinished();
         if fresh {
             store.clear()?;
         }
@@ -185,7 +194,7 @@ impl Store {
     /// If it cannot be written. What was kept before stays.
     pub fn keep_run(&self, record: &Record, film: &Film) -> Result<(), StudyError> {
         let path = self.folder.join(record.path());
-        self.make_folder(path.parent().unwrap_or(&self.folder))?;
+        make_folder(path.parent().unwrap_or(&self.folder))?;
         output::write(film, &path.with_extension("exr"), 0.0)?;
         self.write(
             &record.path().with_extension("json").to_string_lossy(),
@@ -269,14 +278,16 @@ impl Store {
         written.map_err(StudyError::Folder)
     }
 
-    fn make_folder(&self, folder: &Path) -> Result<(), StudyError> {
-        fs::create_dir_all(folder).map_err(|error| {
-            let why = files::reason(&error);
-            StudyError::Folder(format!(
-                "cannot make the folder `{}`: {why}",
-                folder.display()
-            ))
-        })
+    /// Removes what a study that was killed had begun to write.
+    fn remove_unfinished(&self) {
+        let runs = fs::read_dir(self.folder.join(RUNS));
+        let series = runs.into_iter().flatten().flatten().map(|e| e.path());
+        for folder in series.chain([self.folder.clone()]) {
+            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+            let begun = entries.filter(|e| output::is_unfinished(&e.file_name()));
+            // What cannot be removed is in nobody's way.
+            begun.for_each(|e| drop(fs::remove_file(e.path())));
+        }
     }
 
     /// Removes what a study keeps, and nothing else, from a folder that is one of results.
@@ -302,6 +313,16 @@ impl Store {
         }
         Ok(())
     }
+}
+
+fn make_folder(folder: &Path) -> Result<(), StudyError> {
+    fs::create_dir_all(folder).map_err(|error| {
+        let why = files::reason(&error);
+        StudyError::Folder(format!(
+            "cannot make the folder `{}`: {why}",
+            folder.display()
+        ))
+    })
 }
 
 /// What a JSON file says; none if it is not there, or says something else.
@@ -362,6 +383,7 @@ mod tests {
             gpu_seconds: 0.0,
             ..kept.clone()
         };
+        drop(store);
         let store = Store::open(&at, &key(), false).expect("opened again");
         assert_eq!(store.run(&asked), Some(kept.clone()));
         assert_eq!(store.film(&kept).expect("its picture"), film(0.5));
@@ -390,6 +412,11 @@ mod tests {
         let store = Store::open(at, &key(), false).expect("opened");
         store.keep_run(&record(4, 1), &film(0.5)).expect("kept");
         std::fs::write(at.join("notes.txt"), "mine").expect("written");
+        let second = Store::open(at, &key(), false)
+            .expect_err("it is held")
+            .to_string();
+        assert!(second.contains("is in use by another process"), "{second}");
+        drop(store);
         type Change = fn(&mut Key);
         let changes: [(Change, &str); 6] = [
             (|k| k.version = "2".into(), "version 1, not 2"),
@@ -416,6 +443,7 @@ mod tests {
         };
         let store = Store::open(at, &other, true).expect("begun anew");
         assert_eq!(store.run(&record(4, 1)), None);
+        drop(store);
         assert!(Store::open(at, &key(), false).is_err());
         assert_eq!(std::fs::read(at.join("notes.txt")).expect("kept"), b"mine");
     }

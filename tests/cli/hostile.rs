@@ -1,9 +1,14 @@
+//! Hostile files: a few of each kind that `cargo xtask hostile` tries for long, which must be refused or read, within
+//! limits on time and memory.
+//!
 //! Scenes whose geometry is hard on what is built over it are rendered, in no long time and with a warning
 //! where something was left out. The generators are those of `fuzz/src/geometry.rs`.
 
 use std::time::{Duration, Instant};
 
 use impasto_fuzz::geometry::SCENES;
+#[cfg(unix)]
+use impasto_fuzz::hostile::{Amount, Hostile, KINDS};
 
 use crate::cli::common::{folder, impasto};
 
@@ -69,4 +74,29 @@ fn much_in_one_place_is_rendered_in_no_long_time() {
         }
     }
     assert!(slow.is_empty(), "{slow:?}");
+}
+
+/// Cases of each kind: about ten seconds on two cores.
+#[cfg(unix)]
+const CASES: u64 = 8;
+
+#[cfg(unix)]
+#[test]
+fn hostile_files_of_every_kind_are_read_or_refused() {
+    let folder = folder();
+    let hostile = Hostile {
+        impasto: env!("CARGO_BIN_EXE_impasto").as_ref(),
+        folder: folder.path(),
+        seed: 12,
+        amount: Amount::Cases(CASES),
+        only: None,
+    };
+    let tally = hostile.run().expect("cases can be made");
+    eprint!("{}", tally.text());
+    assert!(tally.findings.is_empty(), "{}", tally.text());
+    for kind in KINDS {
+        let count = tally.counts.get(kind.name).map(|count| count.codes);
+        let tried: u64 = count.iter().flatten().sum();
+        assert_eq!(tried, CASES, "{}", kind.name);
+    }
 }

@@ -10,6 +10,8 @@ mod cost_lines;
 mod emit_check;
 mod eval;
 mod explain;
+#[cfg(unix)]
+mod faults;
 mod film;
 mod fmt;
 mod hostile;

@@ -10,7 +10,10 @@ use xtask::{adapter, shell};
 
 mod bless;
 mod demo;
+mod hostile;
 mod layers;
+#[cfg(test)]
+mod licenses;
 mod test;
 
 #[derive(Parser)]
@@ -26,6 +29,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Build and run every test of the workspace
     Test(test::TestArgs),
+    /// Run the command on hostile files of every kind for some minutes, with limits on time and memory
+    Hostile(hostile::HostileArgs),
     /// Draw the folders of each crate with the folders that they name; fail if one may not
     Layers(layers::LayersArgs),
     /// Accept the present output as the expected one of the snapshot tests
@@ -36,6 +41,7 @@ fn main() -> ExitCode {
     shell::exit_code(match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
+        Command::Hostile(args) => hostile::run(&args),
         Command::Layers(args) => layers::run(&args),
         Command::Bless => bless::run(),
     })

@@ -14,6 +14,7 @@ use crate::film::cryptomatte;
 use crate::film::file::FilmFile;
 use crate::film::output;
 use crate::film::outputs::Kind;
+use crate::input;
 use crate::technique::Choice;
 
 /// The primaries and the white of Rec. 709, which the picture's values are of.
@@ -30,7 +31,7 @@ pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
     };
     let bytes = encode(film).map_err(failure)?;
     output::replace(path, |file| {
-        file.write_all(&bytes).map_err(|e| e.to_string())
+        file.write_all(&bytes).map_err(|e| input::reason(&e))
     })
     .map_err(failure)
 }

@@ -11,10 +11,10 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::error::RuntimeError;
-use crate::film::Sums;
 use crate::film::layers::{Layer, Layers};
 use crate::film::output;
 use crate::film::outputs::Output;
+use crate::film::{COUNT_PLANE, Sums};
 use crate::fingerprint;
 use crate::input;
 use crate::technique::{Choice, Sampler};
@@ -85,7 +85,7 @@ impl FilmFile {
             path: path.to_path_buf(),
             reason,
         };
-        let bytes = input::read(path).map_err(|e| failure(e.to_string()))?;
+        let bytes = input::read(path).map_err(|e| failure(input::reason(&e)))?;
         Self::from_bytes(&bytes).map_err(failure)
     }
 
@@ -93,7 +93,7 @@ impl FilmFile {
     pub fn write(&self, path: &Path) -> Result<(), RuntimeError> {
         let bytes = self.to_bytes();
         output::replace(path, |file| {
-            file.write_all(&bytes).map_err(|e| e.to_string())
+            file.write_all(&bytes).map_err(|e| input::reason(&e))
         })
         .map_err(|reason| RuntimeError::Output {
             path: path.to_path_buf(),
@@ -178,6 +178,12 @@ impl FilmFile {
             (name, layers) = (reader.text()?, reader.layers()?);
         }
         let sums = reader.sums(width, height, layers)?;
+        // Every pixel has taken all of the samples, or the film was not written by a render.
+        let samples: u64 = ranges.iter().map(|r| r.count).sum();
+        let counts = sums.plane(COUNT_PLANE);
+        if counts.iter().any(|count| *count != samples as u32) {
+            return Err(damaged());
+        }
         Ok(Self {
             identity,
             scene: name,
@@ -390,6 +396,19 @@ pub(super) mod tests {
         bytes.extend(fingerprint::of(&bytes).to_le_bytes());
         let read = FilmFile::from_bytes(&bytes).expect("it is read");
         assert_eq!((&read.sums, read.scene.as_str()), (&film.sums, ""));
+    }
+
+    /// A resumed render would take a film for unfinished whose pixels lack samples.
+    #[test]
+    fn films_whose_pixels_lack_samples_are_refused() {
+        let film = part(3, 5, 9);
+        for more in [Range { first: 3, count: 6 }, Range { first: 3, count: 4 }] {
+            let other = FilmFile {
+                ranges: vec![more],
+                ..film.clone()
+            };
+            assert_eq!(FilmFile::from_bytes(&other.to_bytes()), Err(damaged()));
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! A file appears under its name only when it is complete: it is written beside it and then
 //! renamed, so that a full disk or an interruption leaves an older picture as it was.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -13,6 +14,7 @@ use crate::error::RuntimeError;
 use crate::error::SceneError;
 use crate::film::Film;
 use crate::image_file;
+use crate::input;
 
 /// Reads a picture that this or another program wrote, `what` naming its use in errors. The values of
 /// OpenEXR and Radiance HDR files are taken as linear radiance, those of others are made linear; nothing
@@ -73,40 +75,77 @@ pub fn write(film: &Film, path: &Path, exposure: f32) -> Result<(), RuntimeError
     .map_err(failure)
 }
 
-/// Writes a file through `content`, or leaves what was there before.
-pub(crate) fn replace(
+/// How the names of files begin that are still written.
+const UNFINISHED: &str = ".impasto-";
+
+/// Writes a whole file through `content`, or leaves what was there before. A link stays a link: what it points to
+/// is replaced.
+///
+/// # Errors
+/// Why it could not be written.
+pub fn replace(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
 ) -> Result<(), String> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let text = |e: std::io::Error| e.to_string();
-    let mut file = tempfile::Builder::new()
-        .prefix(".impasto-")
-        .tempfile_in(folder)
-        .map_err(text)?;
+    let text = |e: std::io::Error| input::reason(&e);
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let prefix = unfinished(&target);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As for any new file, less what the user's mask takes away.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder_of(&target)).map_err(text)?;
     let mut writer = BufWriter::new(file.as_file_mut());
     content(&mut writer)?;
     writer.flush().map_err(text)?;
     drop(writer);
     file.as_file().sync_all().map_err(text)?;
-    make_readable(file.as_file()).map_err(text)?;
-    file.persist(path).map_err(|e| text(e.error))?;
+    file.persist(&target).map_err(|e| text(e.error))?;
     Ok(())
 }
 
-/// Temporary files are private; a picture is not.
-#[cfg(unix)]
-fn make_readable(file: &File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+/// Removes what processes that were killed while they wrote the file at `path` left beside it. Only for who is
+/// sure to be the only one that writes it.
+pub fn remove_unfinished(path: &Path) {
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let prefix = unfinished(&target);
+    let Ok(entries) = std::fs::read_dir(folder_of(&target)) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name
+            .to_string_lossy()
+            .starts_with(&*prefix.to_string_lossy())
+        {
+            // What cannot be removed is in nobody's way.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
-#[cfg(not(unix))]
-fn make_readable(_: &File) -> std::io::Result<()> {
-    Ok(())
+/// Is this the name of a file that was to become another?
+pub fn is_unfinished(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with(UNFINISHED)
+}
+
+/// How the names of files begin that are to become the one at `path`.
+fn unfinished(path: &Path) -> OsString {
+    let mut prefix = OsString::from(UNFINISHED);
+    prefix.push(path.file_name().unwrap_or_default());
+    prefix.push("-");
+    prefix
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
 }
 
 fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), String> {
@@ -120,7 +159,8 @@ fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), String>
             ExtendedColorType::Rgb32F,
         )
         .map_err(|e| e.to_string())?;
-    file.write_all(bytes.get_ref()).map_err(|e| e.to_string())
+    file.write_all(bytes.get_ref())
+        .map_err(|e| input::reason(&e))
 }
 
 fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Result<(), String> {
@@ -131,9 +171,11 @@ fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Res
         .flatten()
         .map(|v| srgb_byte(v * scale))
         .collect();
-    image::codecs::png::PngEncoder::new(file)
+    let mut encoded = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut encoded)
         .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
-        .map_err(|e| e.to_string())
+        .map_err(|e| e.to_string())?;
+    file.write_all(&encoded).map_err(|e| input::reason(&e))
 }
 
 /// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1].

@@ -124,12 +124,12 @@ impl Gpu {
         if self.checked {
             return self.device.create_shader_module(descriptor);
         }
+        let checks = wgpu::ShaderRuntimeChecks::unchecked();
         // SAFETY: the text is generated, not the user's. Its indices are slots and items that
         // are compared with the pool's size, primitives from the hierarchy that was built
         // over them, and pixels of a path that was begun inside the picture. Loops are bounded:
         // the language demands a bound of every loop and traversal descends a finite tree.
         // Divisors are constants or guarded.
-        let checks = wgpu::ShaderRuntimeChecks::unchecked();
         unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
     }
 }
