@@ -5,13 +5,14 @@
 //! goes to `compiler/tests/regressions/`, where a test keeps it found. `compiler/tests/bad_input.rs`
 //! runs the same targets on random input in every test run.
 //!
-//! [`geometry`] generates scenes that are hard on what is built over geometry; tests render them.
+//! [`scenes`] generates scenes that are hard on some stage of reading and rendering; tests render them.
 
 use std::time::{Duration, Instant};
 
 pub mod corpus;
 pub mod geometry;
 pub mod mutate;
+pub mod scenes;
 pub mod search;
 pub mod sources;
 pub mod target;
