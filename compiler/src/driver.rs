@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::build::alike::{self, Requested};
 use crate::build::{ProgramBuilder, Setting};
 use crate::diag::{self, Code, Diagnostic};
 use crate::ir::{self, Module};
@@ -90,6 +91,16 @@ pub fn compile(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compila
 /// [`compile`] with functions that say how materials look, for outputs of a film.
 pub fn compile_with_looks(requests: &[MaterialRequest], loader: &mut dyn Loader) -> Compilation {
     compile_as(requests, loader, Progress::silent(), true)
+}
+
+/// Either of the two, which ends without a program, and without a diagnostic, soon after `stop` tells so.
+pub fn compile_until(
+    requests: &[MaterialRequest],
+    loader: &mut dyn Loader,
+    looks: bool,
+    stop: &dyn Fn() -> bool,
+) -> Compilation {
+    compile_as(requests, loader, Progress::until(stop), looks)
 }
 
 /// [`compile`], which says the stage it is at.
@@ -203,13 +214,6 @@ fn generate_all(
     validate(checker, &builder.finish(checker));
 }
 
-/// A material that requests ask for, with the settings they ask for it in.
-struct Requested {
-    material: ir::Material,
-    /// Settings with their places in the list of requests.
-    settings: Vec<(usize, Setting)>,
-}
-
 fn compile_all(
     checker: &mut Checker,
     requests: &[MaterialRequest],
@@ -217,11 +221,21 @@ fn compile_all(
 ) -> Option<Program> {
     let mut builder = ProgramBuilder::new(checker)?.with_looks(looks);
     let requested = requested(checker, requests);
-    if diag::has_errors(&checker.diagnostics) {
+    if diag::has_errors(&checker.diagnostics) || checker.progress.is_stopped() {
         return None;
     }
+    let requested = match alike::merged(requested) {
+        Ok(requested) => requested,
+        Err(too_many) => {
+            checker.diagnostics.push(too_many);
+            return None;
+        }
+    };
     let mut order = Vec::new();
     for Requested { material, settings } in requested {
+        if checker.progress.is_stopped() {
+            return None;
+        }
         let (places, settings): (Vec<usize>, Vec<Setting>) = settings.into_iter().unzip();
         builder.add(checker, material, &settings);
         order.extend(places);
@@ -241,6 +255,9 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
     let mut known: BTreeMap<(&str, usize), Option<ir::Material>> = BTreeMap::new();
     let mut places: BTreeMap<(&str, usize, Option<String>), usize> = BTreeMap::new();
     for (place, request) in requests.iter().enumerate() {
+        if checker.progress.is_stopped() {
+            break;
+        }
         let Some(module) = checker.load(&request.file) else {
             continue;
         };
@@ -282,6 +299,9 @@ const CHECKED_TOGETHER: usize = 50;
 fn validate(checker: &mut Checker, program: &Program) {
     let all: Vec<usize> = (0..program.materials.len()).collect();
     for members in all.chunks(CHECKED_TOGETHER) {
+        if checker.progress.is_stopped() {
+            return;
+        }
         checker.progress.enter(Stage::Generate);
         let text = codegen::complete(program, members, codegen::Target::Native);
         if let Err(problem) = codegen::validate_with_progress(&text, &mut checker.progress) {

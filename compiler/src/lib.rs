@@ -46,7 +46,7 @@ pub mod source;
 pub mod stages;
 
 pub use driver::{
-    Checked, Compilation, MaterialRequest, Parameters, after_pass, check, compile,
+    Checked, Compilation, MaterialRequest, Parameters, after_pass, check, compile, compile_until,
     compile_with_looks, compile_with_progress,
 };
 pub use loader::{Loader, MemoryLoader, library_text};

@@ -57,6 +57,7 @@ impl Stage {
 pub struct Progress<'a> {
     now: Stage,
     listener: Option<&'a mut dyn FnMut(Stage)>,
+    stop: Option<&'a dyn Fn() -> bool>,
 }
 
 impl<'a> Progress<'a> {
@@ -65,6 +66,7 @@ impl<'a> Progress<'a> {
         Self {
             now: Stage::Read,
             listener: None,
+            stop: None,
         }
     }
 
@@ -73,7 +75,21 @@ impl<'a> Progress<'a> {
         Self {
             now: Stage::Read,
             listener: Some(listener),
+            stop: None,
         }
+    }
+
+    /// Nobody listens, and the compilation is of no more use once `stop` tells so.
+    pub fn until(stop: &'a dyn Fn() -> bool) -> Self {
+        Self {
+            stop: Some(stop),
+            ..Self::silent()
+        }
+    }
+
+    /// Whether the compilation is of no more use.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop())
     }
 
     /// A stage begins; gives the one that it interrupts, for going back to it.

@@ -1,36 +1,10 @@
 //! Scenes whose geometry is hard on what is built over it: much in one place, nested, or cut from polygons
-//! that are no ordinary ones. [`SCENES`] is the table; each row writes a scene of a size that the caller names.
+//! that are no ordinary ones. [`SCENES`] is the table.
 
 use std::fmt::Write as _;
-use std::io;
-use std::path::{Path, PathBuf};
 
 use crate::Random;
-
-/// A row of the table.
-#[derive(Clone, Copy, Debug)]
-pub struct HostileScene {
-    /// What it is called.
-    pub name: &'static str,
-    /// What is in it, where `n` is its size.
-    pub what: &'static str,
-    /// A size at which a renderer that takes time or memory in the square of it fails.
-    pub size: usize,
-    make: fn(usize) -> Parts,
-}
-
-/// What differs from row to row.
-#[derive(Default)]
-struct Parts {
-    obj: String,
-    placements: String,
-    /// Keys of the `[[geometry]]` entry.
-    entry: String,
-    /// Entries of `[[lights]]`.
-    lights: String,
-    /// The material of `m.impasto`; `matte` if it is empty.
-    material: &'static str,
-}
+use crate::scenes::{HostileScene, Parts, row};
 
 /// All of them.
 pub const SCENES: &[HostileScene] = &[
@@ -117,63 +91,8 @@ pub const SCENES: &[HostileScene] = &[
     ),
 ];
 
-const fn row(
-    name: &'static str,
-    what: &'static str,
-    size: usize,
-    make: fn(usize) -> Parts,
-) -> HostileScene {
-    HostileScene {
-        name,
-        what,
-        size,
-        make,
-    }
-}
-
-impl HostileScene {
-    /// The row of this name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<&'static HostileScene> {
-        SCENES.iter().find(|scene| scene.name == name)
-    }
-
-    /// Writes the scene at size `n` with its files into a folder; returns the path of the scene.
-    ///
-    /// # Errors
-    /// A file cannot be written.
-    pub fn write(&self, n: usize, folder: &Path) -> io::Result<PathBuf> {
-        let parts = (self.make)(n);
-        std::fs::write(folder.join("g.obj"), &parts.obj)?;
-        std::fs::write(folder.join("m.impasto"), MATERIALS)?;
-        if !parts.placements.is_empty() {
-            std::fs::write(folder.join("placements.txt"), &parts.placements)?;
-        }
-        let material = if parts.material.is_empty() {
-            "matte"
-        } else {
-            parts.material
-        };
-        let Parts { entry, lights, .. } = &parts;
-        let scene = format!(
-            "film = {{ width = 48, height = 32 }}\nintegrator = {{ max_depth = 4 }}\n\
-             camera = {{ position = [0.0, 0.0, 4.0], look_at = [0.0, 0.0, 0.0], fov = 40 }}\n\
-             environment.color = 0.5\n\
-             [[geometry]]\nobj = 'g.obj'\n{entry}\n{lights}\n\
-             [materials.\"*\"]\nfile = 'm.impasto'\nmaterial = '{material}'\n"
-        );
-        let path = folder.join("scene.toml");
-        std::fs::write(&path, scene)?;
-        Ok(path)
-    }
-}
-
-const MATERIALS: &str = "use std::bsdf::diffuse;\nuse std::edf::uniform;\n\
-    material matte { surface = diffuse(0.6); }\n\
-    material bright { surface = diffuse(0.6); emission = uniform(color(1)); }\n";
-
 /// Triangles around the z axis: how far each reaches, and where it is on the axis.
-fn triangles(rows: impl Iterator<Item = (f64, f64)>) -> Parts {
+pub(crate) fn triangles(rows: impl Iterator<Item = (f64, f64)>) -> Parts {
     let mut obj = String::new();
     for (index, (size, z)) in rows.enumerate() {
         let at = 3 * index;
@@ -350,23 +269,4 @@ fn point(n: usize) -> Parts {
 /// A number from -1 to 1.
 fn unit(random: &mut Random) -> f64 {
     random.bits() as f64 / u64::MAX as f64 * 2.0 - 1.0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_scene_has_a_name_of_its_own_and_its_size() {
-        for (index, scene) in SCENES.iter().enumerate() {
-            assert!(SCENES[..index].iter().all(|other| other.name != scene.name));
-            let [small, large] = [10, 100].map(|n| {
-                let parts = (scene.make)(n);
-                parts.obj.len() + parts.placements.len() + parts.lights.len()
-            });
-            assert!(small < large, "{}", scene.name);
-        }
-        assert_eq!(HostileScene::named("star").map(|s| s.size), Some(100_000));
-        assert!(HostileScene::named("stars").is_none());
-    }
 }

@@ -7,7 +7,7 @@
 //!
 //! `hostile` runs the built command on hostile files of every kind that it reads, each in a process with limits.
 //!
-//! [`geometry`] generates scenes that are hard on what is built over geometry; tests render them.
+//! [`scenes`] generates scenes that are hard on some stage of reading and rendering; tests render them.
 
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,7 @@ pub mod geometry;
 #[cfg(unix)]
 pub mod hostile;
 pub mod mutate;
+pub mod scenes;
 pub mod search;
 pub mod sources;
 pub mod target;

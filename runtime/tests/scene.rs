@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
-use impasto_fuzz::geometry::HostileScene;
+use impasto_fuzz::scenes::HostileScene;
 use impasto_runtime::error::SceneError;
 use impasto_runtime::scene::{EnvironmentSource, Integrator, NO_MATERIAL, Scene};
 use impasto_runtime::world::lights::distant::DistantLight;

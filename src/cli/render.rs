@@ -20,7 +20,8 @@ use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
-    FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, Scene, Strategy, files, plan,
+    FileLoader, Gpu, Plan, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene,
+    Strategy, files, plan,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -118,8 +119,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let given = given.transpose()?;
     let gpu = args.gpu.open()?;
     let options = args.options(planned.renewed_by.is_some(), goals.is_some());
-    let mut renderer =
-        Renderer::new(&gpu, &scene, &program, &planned.plan, &options).map_err(runtime)?;
+    let mut renderer = build(&gpu, &scene, &program, &planned.plan, &options, global)?;
     if let Some(strategy) = planned.renewed_by {
         let profile = given.map_or_else(|| Profile::of(&gpu.info()), Ok)?;
         if !profile.exact {
@@ -135,8 +135,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     };
     rendering.report.compile_seconds += material_seconds;
     if rendering.report.paths == 0 {
-        global.note("interrupted before the first sample: nothing is written");
-        return Err(Failure::Interrupted);
+        return Err(interrupted_early(global));
     }
     outputs.write(&rendering.film, &rendering.sums, args.exposure)?;
     write_report(&rendering.report, args)?;
@@ -152,6 +151,9 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
 
 /// Samples per pixel where nothing is said of them.
 const SAMPLES: u32 = 64;
+
+/// Materials for which a plan is renewed: searching one and compiling it takes too long for more.
+const MOST_RENEWED: usize = 256;
 
 /// At how many points of surfaces materials are evaluated to see what they cost.
 const POINTS: usize = 1024;
@@ -197,9 +199,9 @@ impl RenderArgs {
             Requires::Workload => Ok(Planned {
                 plan: Plan {
                     strategy: strategy.to_string(),
-                    ..Plan::own(&names, &unused)
+                    ..Plan::few_kernels(&names, &unused)
                 },
-                renewed_by: Some(strategy),
+                renewed_by: (names.len() <= MOST_RENEWED).then_some(strategy),
             }),
         }
     }
@@ -251,11 +253,11 @@ fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program,
             format!("cannot read `{file}`, which the scene names for the material `{name}`: {why}")
         })?;
     }
-    let compiled = if ask_for_looks(&args.aov) {
-        compiler::compile_with_looks(&requests, &mut loader)
-    } else {
-        compiler::compile(&requests, &mut loader)
-    };
+    let looks = ask_for_looks(&args.aov);
+    let compiled = compiler::compile_until(&requests, &mut loader, looks, &interrupt::requested);
+    if interrupt::requested() {
+        return Err(interrupted_early(global));
+    }
     if global.json() {
         let found = super::json(&compiled.sources, &compiled.diagnostics);
         print(&format!(
@@ -266,6 +268,40 @@ fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program,
         global.report(&compiled.sources, &compiled.diagnostics);
     }
     compiled.program.ok_or(Failure::Diagnostics)
+}
+
+/// Ends a render that has nothing to show.
+fn interrupted_early(global: &Global) -> Failure {
+    global.note("interrupted before the first sample: nothing is written");
+    Failure::Interrupted
+}
+
+/// Makes everything ready for sampling, and shows how far that is: very many materials take a while.
+fn build<'g>(
+    gpu: &'g Gpu,
+    scene: &Scene,
+    program: &Program,
+    plan: &Plan,
+    options: &RenderOptions,
+    global: &Global,
+) -> Result<Renderer<'g>, Failure> {
+    let bar = progress_bar(global);
+    bar.set_message("building kernels: ");
+    let watch = |done: usize, total: usize| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        if interrupt::requested() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let renderer = Renderer::new_watched(gpu, scene, program, plan, options, &watch);
+    bar.finish_and_clear();
+    renderer.map_err(|error| match error {
+        RuntimeError::Interrupted => interrupted_early(global),
+        other => runtime(other),
+    })
 }
 
 /// Takes all samples, or those until Ctrl-C.
@@ -416,7 +452,7 @@ pub(super) fn progress_bar(global: &Global) -> ProgressBar {
     } else {
         ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
     };
-    let template = "{wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
+    let template = "{msg}{wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }

@@ -1,16 +1,18 @@
 //! Hostile files: a few of each kind that `cargo xtask hostile` tries for long, which must be refused or read, within
 //! limits on time and memory.
 //!
-//! Scenes whose geometry is hard on what is built over it are rendered, in no long time and with a warning
-//! where something was left out. The generators are those of `fuzz/src/geometry.rs`.
+//! Scenes that are hard on some stage are rendered, in no long time and with a warning where something was left
+//! out, or refused with what is wrong. The generators are those of `fuzz/src/scenes.rs` and `geometry.rs`.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use impasto_fuzz::geometry::SCENES;
 #[cfg(unix)]
 use impasto_fuzz::hostile::{Amount, Hostile, KINDS};
+use impasto_fuzz::scenes::HostileScene;
+use impasto_fuzz::{geometry, scenes};
 
-use crate::cli::common::{folder, impasto};
+use crate::cli::common::{Run, command, folder, impasto};
 
 /// Longest time for a scene, reading to picture, in a debug build with a software device: mostly that of
 /// making kernels. What grew with the square of a scene's size took minutes.
@@ -40,7 +42,7 @@ fn warning(name: &str, size: usize) -> Option<String> {
 #[test]
 fn much_in_one_place_is_rendered_in_no_long_time() {
     let mut slow = Vec::new();
-    for scene in SCENES {
+    for scene in geometry::SCENES {
         let folder = folder();
         let size = scene.size / PART;
         let path = scene
@@ -99,4 +101,145 @@ fn hostile_files_of_every_kind_are_read_or_refused() {
         let tried: u64 = count.iter().flatten().sum();
         assert_eq!(tried, CASES, "{}", kind.name);
     }
+}
+
+/// Of each scene of many things a size, at which most took minutes, and what the render says of it.
+const MANY: &[(&str, usize, &str)] = &[
+    ("instances", 2_000, "1 material for 2000 instances"),
+    ("values", 2_000, "1 material for 2000 instances"),
+    ("baked", 2_000, "1 material for 2000 instances"),
+    ("constants", 1_000, "1 material for 1000 instances"),
+    ("unused", 2_000, "nothing uses the material `m1`"),
+    ("suns", 2_000, "1 material for 1 instance"),
+    ("lamps", 2_000, "1 material for 1 instance"),
+    ("textures", 1_000, "1 material for 1000 instances"),
+];
+
+/// The longest time for one of them.
+const MAX_TIME_OF_MANY: Duration = Duration::from_secs(15);
+
+/// Renders a scene of the table in few pixels; its run, with the time.
+fn rendered(name: &str, size: usize, folder: &Path) -> (Run, Duration) {
+    let scene = HostileScene::named(name).expect("a row of the table");
+    let path = scene
+        .write(size, folder)
+        .expect("the folder can be written to");
+    let (path, out) = (path.display().to_string(), folder.join("p.exr"));
+    let out = out.display().to_string();
+    let start = Instant::now();
+    let run = impasto(&[
+        "render", &path, "--size", "12x8", "--spp", "1", "--out", &out,
+    ]);
+    let time = start.elapsed();
+    eprintln!("{name}: {time:.1?}");
+    (run, time)
+}
+
+#[test]
+fn many_things_are_rendered_in_no_long_time() {
+    let listed: Vec<&str> = MANY.iter().map(|row| row.0).chain(["codes"]).collect();
+    let missing = scenes::SCENES.iter().find(|s| !listed.contains(&s.name));
+    assert!(missing.is_none(), "{missing:?}");
+    for (name, size, says) in MANY {
+        let folder = folder();
+        let (run, time) = rendered(name, *size, folder.path());
+        run.exits(0).says(says);
+        assert!(time < MAX_TIME_OF_MANY, "{name}: {time:?}");
+    }
+}
+
+#[test]
+fn more_code_than_can_be_compiled_is_refused() {
+    let folder = folder();
+    let (run, time) = rendered("codes", 1_100, folder.path());
+    run.exits(1)
+        .says("error[E0315]: the materials come to 1100 shaders that differ by more than constants")
+        .says("expected: at most 1024")
+        .says("hint: let instances of one material differ in parameters");
+    assert!(time < MAX_TIME_OF_MANY, "{time:?}");
+    assert!(!folder.path().join("p.exr").exists());
+}
+
+/// More materials than have kernels of their own, each of its own code: few kernels, and the same picture
+/// as with a kernel each.
+#[test]
+fn many_codes_share_kernels() {
+    let folder = folder();
+    let scene = HostileScene::named("codes").expect("a row of the table");
+    let path = scene
+        .write(66, folder.path())
+        .expect("the folder can be written to");
+    let picture = |strategy: &str| {
+        let [path, out, report] = [
+            path.clone(),
+            folder.path().join(format!("{strategy}.exr")),
+            folder.path().join("r.json"),
+        ]
+        .map(|p| p.display().to_string());
+        let run = impasto(&[
+            "render",
+            &path,
+            "--size",
+            "12x8",
+            "--spp",
+            "1",
+            "--strategy",
+            strategy,
+            "--out",
+            &out,
+            "--report",
+            &report,
+        ]);
+        run.exits(0).says("66 materials for 66 instances");
+        let report = std::fs::read_to_string(&report).expect("there is a report");
+        let kernels = report.matches("\"form\": \"mixed\"").count();
+        (std::fs::read(&out).expect("there is a picture"), kernels)
+    };
+    let ((few, mixed), (own, _)) = (picture("auto"), picture("own"));
+    assert_eq!(mixed, 33);
+    assert!(few == own, "the pictures differ");
+}
+
+/// More materials than have code of their own, which are equal but for constants, are one.
+#[test]
+fn materials_that_differ_in_constants_are_one() {
+    let folder = folder();
+    let scene = HostileScene::named("constants").expect("a row of the table");
+    let path = scene
+        .write(66, folder.path())
+        .expect("the folder can be written to");
+    let merged = impasto(&["cost", &path.display().to_string()])
+        .exits(0)
+        .stdout;
+    assert!(merged.contains("d0"), "{merged}");
+    assert!(!merged.contains("d1 "), "{merged}");
+}
+
+#[cfg(unix)]
+#[test]
+fn building_kernels_can_be_interrupted() {
+    let folder = folder();
+    let scene = HostileScene::named("codes").expect("a row of the table");
+    let path = scene
+        .write(200, folder.path())
+        .expect("the folder can be written to");
+    let out = folder.path().join("p.exr");
+    let [path, out_text] = [&path, &out].map(|p| p.display().to_string());
+    let mut command = command(&["render", &path, "--spp", "1", "--out", &out_text]);
+    let child = command
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    std::thread::sleep(Duration::from_secs(2));
+    let kill = std::process::Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(kill.is_ok_and(|status| status.success()));
+    let start = Instant::now();
+    let run = Run::from(child.wait_with_output().expect("it ends"));
+    let time = start.elapsed();
+    run.exits(130)
+        .says("interrupted before the first sample: nothing is written");
+    assert!(time < Duration::from_secs(5), "{time:?}");
+    assert!(!out.exists());
 }

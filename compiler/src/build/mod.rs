@@ -14,6 +14,7 @@ use crate::program::{CompiledMaterial, Instance, Names, Program, unique};
 use crate::sema::Checker;
 use crate::stages::{Progress, Stage};
 
+pub(crate) mod alike;
 mod errors;
 mod functions;
 mod instances;

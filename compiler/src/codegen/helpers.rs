@@ -65,19 +65,79 @@ impl Helpers {
             }
         }
         for &space in &self.texture_slots {
-            let slots: Vec<String> = (0..program.module.textures.len())
-                .map(|t| format!("{}u", program.slot(t, space)))
-                .collect();
-            let n = slots.len().max(1);
-            let name = texture_slot_name(space);
-            let _ = writeln!(
-                out,
-                "fn {name}(texture: i32) -> u32 {{\n    var slots = array<u32, {n}>({});\n    return slots[clamp(texture, 0, {})];\n}}\n",
-                slots.join(", "),
-                n - 1
-            );
+            texture_slot(program, space, out);
         }
     }
+}
+
+/// Slots that are listed in code. Drivers take long for longer lists that functions have.
+const MOST_LISTED: usize = 32;
+
+/// The function from a texture to its slot.
+fn texture_slot(program: &Program, space: TextureSpace, out: &mut String) {
+    let name = texture_slot_name(space);
+    let n = program.module.textures.len().max(1);
+    if n > MOST_LISTED {
+        let read = program.textures.iter().enumerate();
+        let read = read.filter(|(_, (_, read_as, _))| *read_as == space);
+        let slots: Vec<(usize, usize)> =
+            read.map(|(slot, (texture, ..))| (*texture, slot)).collect();
+        let _ = writeln!(out, "fn {name}(texture: i32) -> u32 {{");
+        for run in runs(&slots).iter().rev() {
+            let Run {
+                texture,
+                slot,
+                step,
+            } = run;
+            let value = format!("u32({slot} + {step} * (texture - {texture}))");
+            let _ = writeln!(out, "    if texture >= {texture} {{ return {value}; }}");
+        }
+        let _ = writeln!(out, "    return 0u;\n}}\n");
+        return;
+    }
+    let slots: Vec<String> = (0..program.module.textures.len())
+        .map(|t| format!("{}u", program.slot(t, space)))
+        .collect();
+    let _ = writeln!(
+        out,
+        "fn {name}(texture: i32) -> u32 {{\n    var slots = array<u32, {n}>({});\n    return slots[clamp(texture, 0, {})];\n}}\n",
+        slots.join(", "),
+        n - 1
+    );
+}
+
+/// Textures whose slots lie `step` apart from one texture to the next, from `texture` in `slot` on.
+#[derive(Debug, PartialEq)]
+struct Run {
+    texture: usize,
+    slot: usize,
+    step: usize,
+}
+
+/// The runs of ascending textures with their slots.
+fn runs(slots: &[(usize, usize)]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    let mut alone = true;
+    for &(texture, slot) in slots {
+        if let Some(last) = runs.last_mut() {
+            let (right, up) = (texture - last.texture, slot - last.slot);
+            if alone && up.is_multiple_of(right) {
+                last.step = up / right;
+                alone = false;
+                continue;
+            }
+            if !alone && up == right * last.step {
+                continue;
+            }
+        }
+        runs.push(Run {
+            texture,
+            slot,
+            step: 0,
+        });
+        alone = true;
+    }
+    runs
 }
 
 /// The function from a texture to the slot where it is read in one way.
@@ -139,4 +199,32 @@ fn with_type(body: &str, ty: &str) -> String {
     }
     out.pop();
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_give_every_texture_its_slot() {
+        let of = |slots: &[usize]| -> Vec<(usize, usize)> {
+            slots
+                .iter()
+                .copied()
+                .enumerate()
+                .map(|(slot, t)| (t, slot))
+                .collect()
+        };
+        let doubled: Vec<(usize, usize)> = (0..100).map(|t| (t, 2 * t + 1)).collect();
+        let mixed = of(&[3, 4, 5, 9, 10, 12, 14, 20, 21]);
+        for (slots, most) in [(of(&[7]), 1), (doubled, 1), (mixed, 5)] {
+            let runs = runs(&slots);
+            assert!(runs.len() <= most, "{runs:?}");
+            for (texture, slot) in slots {
+                let run = runs.iter().rev().find(|run| texture >= run.texture);
+                let found = run.map(|run| run.slot + run.step * (texture - run.texture));
+                assert_eq!(found, Some(slot), "{texture} in {runs:?}");
+            }
+        }
+    }
 }

@@ -80,6 +80,9 @@ pub enum RuntimeError {
         /// Iterations that the longest path takes.
         expected: u64,
     },
+    /// Whoever watched the building of a renderer broke it off.
+    #[error("interrupted while kernels were built")]
+    Interrupted,
     /// Kernels are to be timed on a GPU that cannot.
     #[error(
         "the GPU `{0}` has no timestamps, by which kernels are timed\n  hint: choose another GPU (`--gpu`), or update its driver"

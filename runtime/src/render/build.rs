@@ -1,5 +1,7 @@
 //! Building a renderer: composing the kernels of a plan, making buffers, compiling pipelines.
 
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use impasto_compiler::Program;
@@ -56,6 +58,39 @@ pub(crate) struct CompositionInputs<'a> {
     random: ShaderPart,
 }
 
+/// Hears how many parts of how many are done of a renderer that is being built, on any thread, and may break it off.
+pub type Watch<'w> = &'w (dyn Fn(usize, usize) -> ControlFlow<()> + Sync);
+
+/// Nobody watches.
+const NOBODY: Watch<'static> = &|_, _| ControlFlow::Continue(());
+
+/// How far the kernels of a plan are: each is built, and then run for the first time.
+struct Building<'w> {
+    done: AtomicUsize,
+    total: usize,
+    watch: Watch<'w>,
+}
+
+impl<'w> Building<'w> {
+    fn of(kernels: usize, watch: Watch<'w>) -> Self {
+        Self {
+            done: AtomicUsize::new(0),
+            total: 2 * kernels,
+            watch,
+        }
+    }
+
+    /// Does a part, unless nobody waits for it any more.
+    fn next<T>(&self, part: impl FnOnce() -> Result<T, RuntimeError>) -> Result<T, RuntimeError> {
+        if (self.watch)(self.done.load(Ordering::Relaxed), self.total).is_break() {
+            return Err(RuntimeError::Interrupted);
+        }
+        let done = part();
+        self.done.fetch_add(1, Ordering::Relaxed);
+        done
+    }
+}
+
 impl<'g> Renderer<'g> {
     /// Prepares to render `scene`, whose materials compiled to `program`.
     pub fn new(
@@ -65,8 +100,23 @@ impl<'g> Renderer<'g> {
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
+        Self::new_watched(gpu, scene, program, plan, options, NOBODY)
+    }
+
+    /// The same under the eyes of `watch`, which can break it off.
+    ///
+    /// # Errors
+    /// Also [`RuntimeError::Interrupted`] if `watch` did.
+    pub fn new_watched(
+        gpu: &'g Gpu,
+        scene: &Scene,
+        program: &Program,
+        plan: &Plan,
+        options: &RenderOptions,
+        watch: Watch<'_>,
+    ) -> Result<Self, RuntimeError> {
         let world = World::of_render(scene, program, &options.technique, &options.outputs)?;
-        let mut renderer = Self::from_world(gpu, &world, program, plan, options)?;
+        let mut renderer = Self::build(gpu, &world, program, plan, options, watch)?;
         renderer.facts.name.clone_from(&scene.name);
         Ok(renderer)
     }
@@ -78,6 +128,17 @@ impl<'g> Renderer<'g> {
         source: &dyn MaterialSource,
         plan: &Plan,
         options: &RenderOptions,
+    ) -> Result<Self, RuntimeError> {
+        Self::build(gpu, world, source, plan, options, NOBODY)
+    }
+
+    fn build(
+        gpu: &'g Gpu,
+        world: &World,
+        source: &dyn MaterialSource,
+        plan: &Plan,
+        options: &RenderOptions,
+        watch: Watch<'_>,
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
         let mut options = options.clone();
@@ -96,7 +157,8 @@ impl<'g> Renderer<'g> {
         }
         let facts = ReportInputs::of(&composer, &options);
         let resources = Resources::new(gpu, &composer, &options)?;
-        let build = |kernel: &Kernel| build_step(gpu, kernel, &resources, sizes);
+        let building = Building::of(composer.descs().len(), watch);
+        let build = |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
         let (kernels, steps) = build_all(&composer, build)?;
         gpu.check()?;
         let schedule = Schedule {
@@ -104,7 +166,7 @@ impl<'g> Renderer<'g> {
             arguments: resources.arguments().clone(),
             timing: gpu.timing,
         };
-        warm_up(gpu, &resources, &schedule, &options)?;
+        warm_up(gpu, &resources, &schedule, &options, &building)?;
         Ok(Self {
             gpu,
             texts: options.count_hits.then(|| world.without_contents()),
@@ -293,6 +355,7 @@ fn warm_up(
     resources: &Resources,
     schedule: &Schedule,
     options: &RenderOptions,
+    building: &Building<'_>,
 ) -> Result<(), RuntimeError> {
     let no_work = RenderOptions {
         samples: 0,
@@ -300,10 +363,20 @@ fn warm_up(
     };
     resources.set_run(gpu, &no_work);
     resources.clear(gpu);
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    schedule.record(&mut encoder, 1, None);
-    let index = gpu.queue.submit([encoder.finish()]);
-    gpu.wait(index)?;
+    // One by one, so that it can be broken off between any two.
+    for step in &schedule.steps {
+        building.next(|| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let only = Schedule {
+                steps: vec![step.clone()],
+                arguments: schedule.arguments.clone(),
+                timing: schedule.timing,
+            };
+            only.record(&mut encoder, 1, None);
+            let index = gpu.queue.submit([encoder.finish()]);
+            gpu.wait(index)
+        })?;
+    }
     resources.set_run(gpu, options);
     Ok(())
 }

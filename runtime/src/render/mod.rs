@@ -16,8 +16,8 @@ pub(crate) mod status;
 pub mod until;
 pub(crate) mod workload;
 
-pub use build::identity;
 pub(crate) use build::{CompositionInputs, build_step};
+pub use build::{Watch, identity};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
 pub use selection::Samples;

@@ -1,6 +1,6 @@
 //! Which material of the scene each material name of a geometry file gets.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use impasto_compiler::ParameterValue;
@@ -23,6 +23,10 @@ pub(super) struct Bindings<'d> {
     resolved: Vec<MaterialBinding>,
     groups: Vec<Option<String>>,
     by_content: HashMap<Content, u32>,
+    by_name: HashMap<&'d str, usize>,
+    taken: HashSet<String>,
+    /// For each name that several bindings ask for the next number to try.
+    next_number: HashMap<String, usize>,
 }
 
 /// What makes two bindings the same material: file, item, parameters as text, how they are compiled, and the group
@@ -43,6 +47,15 @@ impl<'d> Bindings<'d> {
             resolved: Vec::new(),
             groups: Vec::new(),
             by_content: HashMap::new(),
+            // The first of equal names.
+            by_name: specs
+                .iter()
+                .enumerate()
+                .rev()
+                .map(|(i, s)| (s.name.as_str(), i))
+                .collect(),
+            taken: HashSet::new(),
+            next_number: HashMap::new(),
         }
     }
 
@@ -100,7 +113,7 @@ impl<'d> Bindings<'d> {
     }
 
     fn find(&self, name: &str) -> Option<usize> {
-        self.specs.iter().position(|spec| spec.name == name)
+        self.by_name.get(name).copied()
     }
 
     fn overriding(&self, material: &MaterialName) -> Result<usize, SceneError> {
@@ -168,8 +181,9 @@ impl<'d> Bindings<'d> {
         let index = self.resolved.len() as u32;
         self.by_content.insert(content, index);
         self.groups.push(spec.group.clone());
+        let name = self.unique_name(spec, name);
         self.resolved.push(MaterialBinding {
-            name: self.unique_name(spec, name),
+            name,
             file,
             material: item,
             params,
@@ -179,17 +193,25 @@ impl<'d> Bindings<'d> {
     }
 
     /// The binding's name; for the wildcard, the name it stands for, or that of its file.
-    fn unique_name(&self, spec: &MaterialSpec, name: &str) -> String {
+    fn unique_name(&mut self, spec: &MaterialSpec, name: &str) -> String {
         let stem = Path::new(&spec.file).file_stem().and_then(|s| s.to_str());
         let name = match spec.name.as_str() {
             WILDCARD if spec.reads_files() && !name.is_empty() => name,
             WILDCARD => stem.unwrap_or("material"),
             own => own,
         };
-        let taken = |candidate: &str| self.resolved.iter().any(|m| m.name == candidate);
-        let numbered = (2..).map(|i| format!("{name}_{i}"));
-        let mut candidates = std::iter::once(name.to_owned()).chain(numbered);
-        candidates.find(|c| !taken(c)).unwrap_or_default()
+        if self.taken.insert(name.to_owned()) {
+            return name.to_owned();
+        }
+        // Numbers below the next one are taken, and stay so.
+        let next = self.next_number.entry(name.to_owned()).or_insert(2);
+        loop {
+            let numbered = format!("{name}_{next}");
+            *next += 1;
+            if self.taken.insert(numbered.clone()) {
+                return numbered;
+            }
+        }
     }
 }
 

@@ -8,8 +8,8 @@ use super::table::Share;
 use super::{Context, Kind, LightKind, Piece, Sampled, Source, luminance};
 use crate::error::SceneError;
 use crate::scene::{Light, SceneLight, Table, Value, optional};
-use crate::wgsl;
 use crate::wgsl::template::template;
+use crate::wgsl::{self, BufferData};
 use crate::world::needs::{Need, Needs};
 
 /// The kind.
@@ -115,18 +115,32 @@ fn absent(needs: Needs) -> Kind {
 
 /// The kind with code for `lights`. What is no disc, but a single direction, is never met by chance.
 fn kind(is_disc: bool, lights: &[&DistantLight], first: u32) -> Kind {
+    let constants = wgsl::constants_u32(&[
+        ("FIRST_DISTANT_LIGHT", first),
+        ("DISTANT_LIGHTS", lights.len() as u32),
+    ]);
+    let (lookup, buffers) = if lights.len() > MOST_IN_TEXT {
+        (FROM_TABLE.to_owned(), vec![table(lights)])
+    } else {
+        (from_text(lights), Vec::new())
+    };
     Kind {
-        wgsl: text(lights, first),
+        wgsl: vec![
+            Piece::Written(constants),
+            Piece::File(template!("distant.wgsl")),
+            Piece::Written(lookup),
+        ],
+        buffers,
         escape: KIND.escape.filter(|_| is_disc),
         ..Kind::of(&KIND)
     }
 }
 
-fn text(lights: &[&DistantLight], first: u32) -> Vec<Piece> {
-    let constants = wgsl::constants_u32(&[
-        ("FIRST_DISTANT_LIGHT", first),
-        ("DISTANT_LIGHTS", lights.len() as u32),
-    ]);
+/// So many lights are constants of the code, which is fastest. Drivers take long for more.
+const MOST_IN_TEXT: usize = 16;
+
+/// `distant_light` by a switch over constants.
+fn from_text(lights: &[&DistantLight]) -> String {
     let mut text =
         "\nfn distant_light(index: u32) -> DistantLight {\n    switch index {\n".to_owned();
     for (index, light) in lights.iter().enumerate() {
@@ -137,15 +151,36 @@ fn text(lights: &[&DistantLight], first: u32) -> Vec<Piece> {
         };
         text += &format!("        {case}: {{ return {}; }}\n", literal(light));
     }
-    text += "    }\n}\n";
-    vec![
-        Piece::Written(constants),
-        Piece::File(template!("distant.wgsl")),
-        Piece::Written(text),
-    ]
+    text + "    }\n}\n"
+}
+
+/// The same by a buffer of two rows a light.
+const FROM_TABLE: &str = "
+fn distant_light(index: u32) -> DistantLight {
+    let axis = distant_lights[2u * index];
+    let value = distant_lights[2u * index + 1u];
+    return DistantLight(axis.xyz, value.xyz, axis.w, value.w);
+}
+";
+
+fn table(lights: &[&DistantLight]) -> BufferData {
+    let rows = lights.iter().flat_map(|light| {
+        let (value, sine2, pdf) = fields(light);
+        [light.to_light.extend(sine2), value.extend(pdf)].map(|row| row.to_array())
+    });
+    let rows: Vec<[f32; 4]> = rows.collect();
+    BufferData::new("distant_lights", "array<vec4<f32>>", &rows)
 }
 
 fn literal(light: &DistantLight) -> String {
+    let (value, sine2, pdf) = fields(light);
+    let (axis, value) = (wgsl::vec3(light.to_light), wgsl::vec3(value));
+    let [sine2, pdf] = [sine2, pdf].map(wgsl::float);
+    format!("DistantLight({axis}, {value}, {sine2}, {pdf})")
+}
+
+/// `value`, `sine2` and `pdf` of the WGSL struct.
+fn fields(light: &DistantLight) -> (Vec3, f32, f32) {
     let radius = 0.5 * f64::from(light.angle).to_radians();
     let sine2 = (0.5 * radius).sin().powi(2);
     let (value, pdf) = if sine2 > 0.0 {
@@ -158,7 +193,5 @@ fn literal(light: &DistantLight) -> String {
     } else {
         (light.irradiance, 0.0)
     };
-    let (axis, value) = (wgsl::vec3(light.to_light), wgsl::vec3(value));
-    let [sine2, pdf] = [sine2, pdf].map(|x| wgsl::float(x as f32));
-    format!("DistantLight({axis}, {value}, {sine2}, {pdf})")
+    (value, sine2 as f32, pdf as f32)
 }
