@@ -18,10 +18,12 @@ points until the greatest error is least. Errors may be larger below the truth t
 import numpy as np
 from numpy.polynomial import chebyshev
 
-# Degrees in m by powers of d^2: of the parts of a coefficient by powers of p, and of `white`.
+# Degrees in m by powers of d^2: of the parts of a coefficient by powers of p, and of `white`. Some of the
+# coefficients are the same for all azimuths, and for all anisotropies: the fit is no better if they are not.
 PARTS = ((6, 3), (4, 2), (2, 1))
 WHITE = (6, 3, 1)
 NAMES = ("t1", "t2", "t3", "t4", "t5", "log")
+TURNING = ("t2", "t4", "log")
 
 
 def points(count):
@@ -79,7 +81,7 @@ def design(ax, ay, p, t):
     s, tail = 1 - t, t * np.log1p(1 / np.maximum(t, 1e-12))
     columns, names = [], []
     for name, base in zip(NAMES, [s * t**k for k in range(1, 6)] + [s * tail]):
-        for q, degrees in enumerate(PARTS):
+        for q, degrees in enumerate(PARTS if name in TURNING else [PARTS[0][:1]]):
             for e, degree in enumerate(degrees):
                 for k in range(degree + 1):
                     columns.append(base * p**q * d ** (q + 2 * e) * of_m[k])
@@ -128,7 +130,7 @@ def evaluate(polynomials, x, y, z, ax, ay):
     t, s = z / stretch, (x2 + y2) / (stretch * (stretch + z))
     p = (x2 - y2) / np.maximum(x2 + y2, 1e-30)
     tail = t * np.log1p(1 / np.maximum(t, 1e-12))
-    of = lambda n: k[n, 0] + p * (k[n, 1] + p * k[n, 2])
+    of = lambda n: k[n, 0] + (p * (k[n, 1] + p * k[n, 2]) if n in TURNING else 0)
     steep = sum(of(f"t{j}") * t**j for j in range(1, 6))
     return np.clip(s * (steep + of("log") * tail) + k["white", 0] * tail, 0, 1)
 
@@ -173,7 +175,15 @@ def fit_mean(polynomials):
     print(f"mean: off by at most {np.abs(off[d == 0]).max():.5f} of the light, {np.abs(off).max():.5f} with anisotropy")
     for power in range(3):
         of = {kind: [v for (q, n, _), v in zip(names, c) if (q, n) == (power, kind)] for kind in ("b", "log m")}
-        print(f"  mean (d/m)^{2 * power}: b {np.round(chebyshev.cheb2poly(of['b']), 4)} log m {np.round(of['log m'], 4)}")
+        print(f"mean (d/m)^{2 * power}: {printed(chebyshev.cheb2poly(of['b']), 'b')}, times log m: {printed(of['log m'], 'm')}")
+
+
+def printed(polynomial, variable):
+    """By Horner's rule."""
+    text = f"{polynomial[-1]:.4f}"
+    for c in polynomial[-2::-1]:
+        text = f"{c:.4f} + {variable} * ({text})" if "+" in text else f"{c:.4f} + {variable} * {text}"
+    return text
 
 
 def main():
@@ -186,7 +196,7 @@ def main():
     turned = np.minimum(0.0037 * np.minimum(1, 4 * np.abs(d) / m), 0.12 * loss) + 0.0003 * least
     polynomials = power_form(names, lawson(columns, loss - np.where(even, 0.0006 * least, turned), tolerance, 250))
     for key, polynomial in polynomials.items():
-        print(*key, polynomial)
+        print(*key, printed(polynomial, "b"))
     cosine, s = t / np.sqrt(1 + 0 * t), np.sqrt(1 - t * t)
     x, y = s * np.sqrt((1 + p) / 2) / ax, s * np.sqrt((1 - p) / 2) / ay
     length = np.sqrt(x * x + y * y + cosine * cosine)

@@ -6,12 +6,12 @@ use super::text::Text;
 const LOSS: &str = "
     fn alpha(roughness: float, anisotropy: float) -> vec2 = ggx_alpha(roughness, anisotropy);
     fn loss(w: vector, alpha: vec2, anisotropy: float) -> float =
-        ggx_loss(ggx_loss_of(alpha, anisotropy), w, alpha);
+        ggx_loss(ggx_loss_of(alpha, anisotropy), ggx_terms(ggx_view(w, alpha)));
     fn mean(alpha: vec2, anisotropy: float) -> float = ggx_loss_of(alpha, anisotropy).mean;
     // How bright the lobe of several facets is, over how often `wi` is sampled for it.
     fn weight(wi: vector, alpha: vec2, anisotropy: float) -> float {
         let loss = ggx_loss_of(alpha, anisotropy);
-        ggx_diffuse(loss, 1.0, ggx_loss(loss, wi, alpha), wi)
+        ggx_diffuse(loss, 1.0, ggx_loss(loss, ggx_terms(ggx_view(wi, alpha))), wi)
             / ggx_or_diffuse_pdf(vector(0.0, 0.0, 1.0), wi, alpha, loss, 1.0)
     }
 ";
