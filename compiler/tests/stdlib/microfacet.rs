@@ -322,7 +322,7 @@ fn white_metals_keep_all_light() {
                 &format!("{args}, roughness: {roughness}, anisotropy: {anisotropy}"),
             );
             for degrees in [0.0, 40.0, 60.0, 88.0, 89.9] {
-                let kept = metal.furnace(view(degrees), 1 << 14);
+                let kept = metal.furnace(view(degrees), 1 << 16);
                 assert!(
                     (least - 0.004..1.004).contains(&kept),
                     "{name}, roughness {roughness}, anisotropy {anisotropy}: {kept} at {degrees}"
