@@ -129,7 +129,9 @@ impl Cell {
 
 /// Cosine and azimuth of a direction, the latter in [0, 2 pi).
 fn place(w: &[f64; 3]) -> [f64; 2] {
-    [w[2].clamp(-1.0, 1.0), w[1].atan2(w[0]).rem_euclid(TAU)]
+    let phi = w[1].atan2(w[0]).rem_euclid(TAU);
+    // The remainder of next to nothing below 0 rounds to all of the turn.
+    [w[2].clamp(-1.0, 1.0), if phi < TAU { phi } else { 0.0 }]
 }
 
 /// Cells, and what each is put together of for integration: finer where a sharp lobe lies in a

@@ -296,6 +296,7 @@ fn compiled_variants() -> Vec<Variant> {
 /// Lengths stay: a pattern of a tenth of a millimetre a metre from its origin has few digits left.
 fn drawn(text: &str, seed: u64) -> Vec<(String, String)> {
     let mut n = Numbers::new(seed);
+    let number = |text: &str| text.trim().parse::<f64>().ok();
     let declared = text.lines().filter_map(|l| l.trim().strip_prefix("param "));
     let values = declared.filter_map(|line| {
         // What a user interface is told comes after the range.
@@ -303,14 +304,16 @@ fn drawn(text: &str, seed: u64) -> Vec<(String, String)> {
         let (name, rest) = line.trim_end_matches(';').split_once(':')?;
         let (ty, value) = rest.split_once('=')?;
         let value = match (ty.trim(), value.split_once(" in ")) {
-            ("color", _) => format!("color({}, {}, {})", n.unit(), n.unit(), n.unit()),
+            ("color", within) => {
+                let range = within.and_then(|(_, range)| range.split_once(".."));
+                let ends = range.and_then(|(a, b)| Some((number(a)?, number(b)?)));
+                let (low, high) = ends.unwrap_or((0.0, 1.0));
+                let [r, g, b] = [(); 3].map(|()| low + (high - low) * n.unit());
+                format!("color({r}, {g}, {b})")
+            }
             ("float", Some((_, range))) => {
                 let (low, high) = range.split_once("..")?;
-                let between = low
-                    .trim()
-                    .parse::<f64>()
-                    .ok()
-                    .zip(high.trim().parse::<f64>().ok());
+                let between = number(low).zip(number(high));
                 match (n.unit(), between) {
                     (u, _) if u < 0.2 => low.trim().to_owned(),
                     (u, _) if u < 0.4 => high.trim().to_owned(),
