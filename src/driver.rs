@@ -25,6 +25,7 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
     let bindings = scene.materials.iter().cloned();
     bindings
         .map(|binding| MaterialRequest {
+            apart: false,
             name: binding.name,
             file: binding.file,
             material: binding.material,
@@ -47,6 +48,7 @@ pub fn file_requests(file: &str, loader: &mut FileLoader) -> Vec<MaterialRequest
     }
     let request = |name: String| MaterialRequest {
         material: Some(name.clone()),
+        apart: true,
         ..MaterialRequest::new(name, file)
     };
     names.into_iter().map(request).collect()

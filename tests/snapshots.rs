@@ -277,6 +277,7 @@ fn compile(file: &str, loader: &mut dyn Loader) -> Program {
         .materials
         .iter()
         .map(|name| MaterialRequest {
+            apart: false,
             name: name.clone(),
             file: file.into(),
             material: Some(name.clone()),

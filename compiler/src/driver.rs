@@ -28,6 +28,8 @@ pub struct MaterialRequest {
     pub params: Vec<(String, ParameterValue)>,
     /// Where the values of parameters go.
     pub parameters: Parameters,
+    /// Does it have code of its own even among many materials, of which some are equal up to constants?
+    pub apart: bool,
 }
 
 /// Where the values of an instance's parameters go.
@@ -51,6 +53,7 @@ impl MaterialRequest {
             material: None,
             params: Vec::new(),
             parameters: Parameters::default(),
+            apart: false,
         }
     }
 }
@@ -232,7 +235,10 @@ fn compile_all(
         }
     };
     let mut order = Vec::new();
-    for Requested { material, settings } in requested {
+    for Requested {
+        material, settings, ..
+    } in requested
+    {
         if checker.progress.is_stopped() {
             return None;
         }
@@ -278,6 +284,7 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
         let at = *places.entry((key.0, key.1, constants)).or_insert_with(|| {
             found.push(Requested {
                 material: material.clone(),
+                apart: request.apart,
                 settings: Vec::new(),
             });
             found.len() - 1

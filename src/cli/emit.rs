@@ -243,6 +243,7 @@ fn requests(args: &EmitArgs, loader: &mut FileLoader) -> Vec<MaterialRequest> {
     let request = |name: &str, material| MaterialRequest {
         material,
         parameters,
+        apart: true,
         ..MaterialRequest::new(name, &args.file)
     };
     if let Some(name) = &args.material {

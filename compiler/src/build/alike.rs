@@ -13,6 +13,8 @@ use crate::ir::{Closure, Const, ExprKind, Lobe, Material, MaterialParam};
 /// A material that requests ask for, with the settings they ask for it in.
 pub(crate) struct Requested {
     pub(crate) material: Material,
+    /// Does it stay a material of its own?
+    pub(crate) apart: bool,
     /// Settings with their places in the list of requests.
     pub(crate) settings: Vec<(usize, Setting)>,
 }
@@ -28,7 +30,7 @@ const MOST_CODES: usize = 1024;
 /// # Errors
 /// There is more code than can be compiled.
 pub(crate) fn merged(requested: Vec<Requested>) -> Result<Vec<Requested>, Diagnostic> {
-    if requested.len() <= MOST_APART {
+    if requested.len() <= MOST_APART || requested.iter().all(|r| r.apart) {
         return Ok(requested);
     }
     let mut groups: Vec<Vec<Requested>> = Vec::new();
@@ -134,6 +136,7 @@ fn instances(group: Vec<Requested>) -> Option<Requested> {
         one.settings.into_iter().map(with_own).collect::<Vec<_>>()
     });
     Some(Requested {
+        apart: false,
         settings: settings.collect(),
         material,
     })

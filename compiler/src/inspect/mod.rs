@@ -419,6 +419,7 @@ fn material(
     let own = *kind == Kind::Material;
     let name = if own { &answer.name } else { items::NAME };
     let request = MaterialRequest {
+        apart: false,
         name: answer.name.clone(),
         file: query.file.clone(),
         material: Some(name.to_owned()),

@@ -407,7 +407,13 @@ const FRACTALS: [&str; 1] = ["mandelbrot_wall"];
 /// The same for materials whose finest noise is a thousandth of the coordinates that the points have:
 /// there the last digits of a coordinate show in colors and normals.
 const FINE: f64 = 0.05;
-const FINE_NOISES: [&str; 3] = ["crushed_velvet", "verdigris_copper", "wet_asphalt"];
+const FINE_NOISES: [&str; 5] = [
+    "crushed_velvet",
+    "denim",
+    "spun_steel",
+    "verdigris_copper",
+    "wet_asphalt",
+];
 
 /// The relative error of all other directions.
 const NEAR: f64 = 1e-3;

@@ -101,6 +101,7 @@ impl Room {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cornell/scene.toml");
         let scene = crate::world::load(&path).unwrap_or_else(|e| panic!("{e}"));
         let requests = scene.materials.iter().cloned().map(|b| MaterialRequest {
+            apart: false,
             name: b.name,
             file: b.file,
             material: b.material,

@@ -107,6 +107,7 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     let scene = impasto_runtime::world::load(&folder.path().join("scene.toml"))
         .unwrap_or_else(|e| panic!("{e}"));
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
+        apart: false,
         name: binding.name.clone(),
         file: binding.file.clone(),
         material: binding.material.clone(),
