@@ -7,7 +7,7 @@ use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprKind, Function, Module, Type, print, verify};
 use impasto_compiler::passes;
 use impasto_compiler::source::FileId;
-use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile, diag};
+use impasto_compiler::{Checked, MaterialRequest, MemoryLoader, check, compile, diag};
 
 /// Takes any bytes; panics if they show a fault.
 pub type Target = fn(&[u8]);
@@ -20,16 +20,13 @@ const FUEL: u64 = 1 << 16;
 pub fn source(input: &[u8]) {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", input);
-    let checked = check("m.impasto", &mut files);
-    let text = diag::render::text(&checked.sources, &checked.diagnostics, false);
-    let failed = diag::has_errors(&checked.diagnostics);
-    assert!(!failed || !text.is_empty(), "an error without words");
+    let (checked, text) = checked(&mut files);
     let internal = checked
         .diagnostics
         .iter()
         .find(|d| d.code.id().starts_with("E09"));
     assert!(internal.is_none(), "{text}");
-    if failed {
+    if diag::has_errors(&checked.diagnostics) {
         return;
     }
     let Some(name) = checked.materials.first() else {
@@ -48,14 +45,20 @@ pub fn source(input: &[u8]) {
     }
 }
 
+/// Checks `m.impasto`; also its diagnostics as text.
+fn checked(files: &mut MemoryLoader) -> (Checked, String) {
+    let checked = check("m.impasto", files);
+    let text = diag::render::text(&checked.sources, &checked.diagnostics, false);
+    let failed = diag::has_errors(&checked.diagnostics);
+    assert!(!failed || !text.is_empty(), "an error without words");
+    (checked, text)
+}
+
 /// Checks a source and formats it, as `impasto check` and `impasto fmt` do.
 pub fn checked_and_formatted(input: &[u8]) {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", input);
-    let checked = check("m.impasto", &mut files);
-    let text = diag::render::text(&checked.sources, &checked.diagnostics, false);
-    let failed = diag::has_errors(&checked.diagnostics);
-    assert!(!failed || !text.is_empty(), "an error without words");
+    checked(&mut files);
     if let Ok(text) = std::str::from_utf8(input)
         && let Err(Unformatted::Lost) = format(FileId(0), text)
     {

@@ -39,37 +39,45 @@ fn warning(name: &str, size: usize) -> Option<String> {
     }
 }
 
+/// Renders a scene in few pixels as `p.exr`, with further arguments; its run, with the time.
+fn rendered(scene: &HostileScene, size: usize, folder: &Path, more: &[&str]) -> (Run, Duration) {
+    let path = scene
+        .write(size, folder)
+        .expect("the folder can be written to");
+    let [path, out, report] =
+        [path, folder.join("p.exr"), folder.join("r.json")].map(|path| path.display().to_string());
+    let args = [
+        "render", &path, "--size", "12x8", "--spp", "1", "--out", &out, "--report", &report,
+    ];
+    let start = Instant::now();
+    let run = impasto(&[&args, more].concat());
+    let time = start.elapsed();
+    eprintln!("{}: {time:.1?}", scene.name);
+    (run, time)
+}
+
+/// What the last render in a folder told of itself.
+fn report(folder: &Path) -> String {
+    std::fs::read_to_string(folder.join("r.json")).expect("there is a report")
+}
+
+/// A row of the table of scenes.
+fn scene(name: &str) -> &'static HostileScene {
+    HostileScene::named(name).expect("a row of the table")
+}
+
 #[test]
 fn much_in_one_place_is_rendered_in_no_long_time() {
     let mut slow = Vec::new();
     for scene in geometry::SCENES {
         let folder = folder();
         let size = scene.size / PART;
-        let path = scene
-            .write(size, folder.path())
-            .expect("the folder can be written to");
-        let (out, report) = (folder.path().join("p.exr"), folder.path().join("r.json"));
-        let [path, out, report_path] = [&path, &out, &report].map(|p| p.display().to_string());
-        let start = Instant::now();
-        let run = impasto(&[
-            "render",
-            &path,
-            "--size",
-            "12x8",
-            "--spp",
-            "1",
-            "--out",
-            &out,
-            "--report",
-            &report_path,
-        ]);
-        let time = start.elapsed();
-        eprintln!("{}: {time:.1?}", scene.name);
+        let (run, time) = rendered(scene, size, folder.path(), &[]);
         let run = run.exits(0);
         if let Some(warning) = warning(scene.name, size) {
             run.says(&warning);
         }
-        let report = std::fs::read_to_string(report).expect("there is a report");
+        let report = report(folder.path());
         assert!(report.contains("\"queue_overflow\": 0"), "{report}");
         if time > MAX_TIME {
             slow.push((scene.name, time));
@@ -118,23 +126,6 @@ const MANY: &[(&str, usize, &str)] = &[
 /// The longest time for one of them.
 const MAX_TIME_OF_MANY: Duration = Duration::from_secs(15);
 
-/// Renders a scene of the table in few pixels; its run, with the time.
-fn rendered(name: &str, size: usize, folder: &Path) -> (Run, Duration) {
-    let scene = HostileScene::named(name).expect("a row of the table");
-    let path = scene
-        .write(size, folder)
-        .expect("the folder can be written to");
-    let (path, out) = (path.display().to_string(), folder.join("p.exr"));
-    let out = out.display().to_string();
-    let start = Instant::now();
-    let run = impasto(&[
-        "render", &path, "--size", "12x8", "--spp", "1", "--out", &out,
-    ]);
-    let time = start.elapsed();
-    eprintln!("{name}: {time:.1?}");
-    (run, time)
-}
-
 #[test]
 fn many_things_are_rendered_in_no_long_time() {
     let listed: Vec<&str> = MANY.iter().map(|row| row.0).chain(["codes"]).collect();
@@ -142,7 +133,7 @@ fn many_things_are_rendered_in_no_long_time() {
     assert!(missing.is_none(), "{missing:?}");
     for (name, size, says) in MANY {
         let folder = folder();
-        let (run, time) = rendered(name, *size, folder.path());
+        let (run, time) = rendered(scene(name), *size, folder.path(), &[]);
         run.exits(0).says(says);
         assert!(time < MAX_TIME_OF_MANY, "{name}: {time:?}");
     }
@@ -151,7 +142,7 @@ fn many_things_are_rendered_in_no_long_time() {
 #[test]
 fn more_code_than_can_be_compiled_is_refused() {
     let folder = folder();
-    let (run, time) = rendered("codes", 1_100, folder.path());
+    let (run, time) = rendered(scene("codes"), 1_100, folder.path(), &[]);
     run.exits(1)
         .says("error[E0315]: the materials come to 1100 shaders that differ by more than constants")
         .says("expected: at most 1024")
@@ -165,35 +156,12 @@ fn more_code_than_can_be_compiled_is_refused() {
 #[test]
 fn many_codes_share_kernels() {
     let folder = folder();
-    let scene = HostileScene::named("codes").expect("a row of the table");
-    let path = scene
-        .write(66, folder.path())
-        .expect("the folder can be written to");
     let picture = |strategy: &str| {
-        let [path, out, report] = [
-            path.clone(),
-            folder.path().join(format!("{strategy}.exr")),
-            folder.path().join("r.json"),
-        ]
-        .map(|p| p.display().to_string());
-        let run = impasto(&[
-            "render",
-            &path,
-            "--size",
-            "12x8",
-            "--spp",
-            "1",
-            "--strategy",
-            strategy,
-            "--out",
-            &out,
-            "--report",
-            &report,
-        ]);
+        let (run, _) = rendered(scene("codes"), 66, folder.path(), &["--strategy", strategy]);
         run.exits(0).says("66 materials for 66 instances");
-        let report = std::fs::read_to_string(&report).expect("there is a report");
-        let kernels = report.matches("\"form\": \"mixed\"").count();
-        (std::fs::read(&out).expect("there is a picture"), kernels)
+        let kernels = report(folder.path()).matches("\"form\": \"mixed\"").count();
+        let picture = std::fs::read(folder.path().join("p.exr")).expect("there is a picture");
+        (picture, kernels)
     };
     let ((few, mixed), (own, _)) = (picture("auto"), picture("own"));
     assert_eq!(mixed, 33);
@@ -204,8 +172,7 @@ fn many_codes_share_kernels() {
 #[test]
 fn materials_that_differ_in_constants_are_one() {
     let folder = folder();
-    let scene = HostileScene::named("constants").expect("a row of the table");
-    let path = scene
+    let path = scene("constants")
         .write(66, folder.path())
         .expect("the folder can be written to");
     let merged = impasto(&["cost", &path.display().to_string()])

@@ -30,14 +30,18 @@ const MOST_CODES: usize = 1024;
 /// # Errors
 /// There is more code than can be compiled.
 pub(crate) fn merged(requested: Vec<Requested>) -> Result<Vec<Requested>, Diagnostic> {
-    if requested.len() <= MOST_APART || requested.iter().all(|r| r.apart) {
+    if requested.len() <= MOST_APART {
         return Ok(requested);
     }
     let mut groups: Vec<Vec<Requested>> = Vec::new();
     let mut known: BTreeMap<String, usize> = BTreeMap::new();
     for one in requested {
-        let next = known.len();
-        let group = *known.entry(code(&one.material)).or_insert(next);
+        let next = groups.len();
+        let group = if one.apart {
+            next
+        } else {
+            *known.entry(code(&one.material)).or_insert(next)
+        };
         if group == next {
             groups.push(Vec::new());
         }
@@ -95,6 +99,7 @@ fn code(material: &Material) -> String {
 
 /// One material for those of one code; none for none.
 fn instances(group: Vec<Requested>) -> Option<Requested> {
+    let apart = group.first()?.apart;
     let first = group.first()?.material.clone();
     let floats = |material: &Material, at: usize| match &material.body.exprs.get(at)?.kind {
         ExprKind::Const(value @ Const::Float(_)) => Some(value.clone()),
@@ -136,7 +141,7 @@ fn instances(group: Vec<Requested>) -> Option<Requested> {
         one.settings.into_iter().map(with_own).collect::<Vec<_>>()
     });
     Some(Requested {
-        apart: false,
+        apart,
         settings: settings.collect(),
         material,
     })
