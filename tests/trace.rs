@@ -73,6 +73,22 @@ impl Subject {
         (0..SAMPLES).map(picture).collect()
     }
 
+    /// The same, seen from as far away as the last digit of the largest coordinate
+    /// that paths came to.
+    fn beside(&self, paths: &[Vec<Path>]) -> Self {
+        let hits = paths.iter().flatten().flat_map(|path| &path.vertices);
+        let coordinates = hits
+            .filter_map(|v| v.hit.as_ref())
+            .flat_map(|hit| hit.position);
+        let largest = coordinates.fold(0.0, |most: f64, x| most.max(x.abs()));
+        let mut scene = self.scene.clone();
+        scene.camera.position += f32::EPSILON * largest as f32;
+        Self {
+            scene,
+            program: self.program.clone(),
+        }
+    }
+
     /// The paths of every sample of every pixel, sample by sample.
     fn replays<F: Float>(&self, materials: MaterialCode, sampler: Sampler) -> Vec<Vec<Path>> {
         self.paths::<F>(materials, sampler, SAMPLES)
@@ -317,7 +333,17 @@ fn examples_in_single_precision_follow_double() {
         let wrong = |p: &Path| p.left_out || p.vertices.iter().any(|v| v.dropped.is_some());
         let place = |p: &Path| format!("pixel {:?}, sample {}, seed {}", p.pixel, p.sample, p.seed);
         let left_out = pairs().filter(|(a, b)| wrong(a) || wrong(b));
-        let parted = pairs().filter(|(a, b)| parting(a, b).is_some());
+        let parted = || pairs().filter(|(a, b)| parting(a, b).is_some());
+        let share = parted().count() as f64 / count;
+        let most = if share > PARTED {
+            let moved = subject.beside(&doubles);
+            let moved = moved.paths::<f64>(MaterialCode::Ir, Sampler::Owen, samples);
+            let pairs = doubles.iter().flatten().zip(moved.iter().flatten());
+            let parted = pairs.filter(|(a, b)| parting(a, b).is_some()).count();
+            PARTED.max(parted as f64 / count)
+        } else {
+            PARTED
+        };
         let rows = [
             (
                 "paths left out",
@@ -327,9 +353,9 @@ fn examples_in_single_precision_follow_double() {
             ),
             (
                 "share of paths that part from f64",
-                parted.clone().count() as f64 / count,
-                PARTED,
-                parted.last(),
+                share,
+                most,
+                parted().last(),
             ),
         ];
         for (what, worst, most, example) in rows {
@@ -347,5 +373,8 @@ fn examples_in_single_precision_follow_double() {
     }
 }
 
-/// How many paths may part. Most do so late, after many reflections by curved mirrors.
+/// How many paths may part. Most do so late, after many reflections by curved mirrors. Scenes whose
+/// triangles are hardly larger than the last digits of their coordinates, such as needles of a tree
+/// that stands a hundred metres away, may part as many as in double precision part where the camera
+/// stands by those digits elsewhere.
 const PARTED: f64 = 0.15;
