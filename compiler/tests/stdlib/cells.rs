@@ -24,7 +24,7 @@ const ROWS: usize = 6;
 const COLUMNS: usize = 12;
 
 /// Relative error at which the integral over a cell is good, and the absolute one.
-const RELATIVE: f64 = 3e-4;
+pub const RELATIVE: f64 = 3e-4;
 const ABSOLUTE: f64 = 3e-7;
 
 /// Samples from which a cell is cut where they gather, before it is integrated: where as many as

@@ -187,14 +187,14 @@ pub fn examine(d: &Distribution<'_>, samples: usize, seed: u64) -> Outcome {
     let integrals = cells::integrate(&partition, &*d.measure);
     let total: f64 = integrals.iter().map(|m| m[0]).sum();
     let found = cells::counts(&partition.cells, tested);
-    // Failed samples are one more cell.
-    let failed = 0.75 * all - tested.len() as f64;
-    let expected = integrals
-        .iter()
-        .map(|m| m[0])
-        .chain([(1.0 - total).max(0.0)]);
-    let found = found.iter().map(|&n| n as f64).chain([failed.max(0.0)]);
-    let pairs: Vec<(f64, f64)> = expected.map(|p| p * 0.75 * all).zip(found).collect();
+    let count = 0.75 * all;
+    let expected = integrals.iter().map(|m| m[0] * count);
+    let mut pairs: Vec<(f64, f64)> = expected.zip(found.iter().map(|&n| n as f64)).collect();
+    // Failed samples are one more cell. What is missing in the integral is known no better than the
+    // integral itself is.
+    let failed = (count - tested.len() as f64).max(0.0);
+    let [low, high] = [-cells::RELATIVE, cells::RELATIVE].map(|e| (1.0 - total + e).max(0.0));
+    pairs.push((failed.clamp(low * count, high * count), failed));
     Outcome {
         fit: chi_squared(&pairs),
         total,
