@@ -375,7 +375,7 @@ fn every_material_is_sampled_as_it_is_evaluated() {
             let d = distribution(label.clone(), &variant.program, at, wo);
             let (outcome, found) = examined(&d, *degrees > 90.0, work.len(), i);
             if *degrees < 90.0 {
-                tell(&tally, name, &outcome, work.len(), &label);
+                tell(&tally, (name, FITTED), &outcome, work.len(), &label);
             }
             faults.extend(found);
         }

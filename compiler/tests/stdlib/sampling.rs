@@ -115,10 +115,12 @@ pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distrib
 /// Added to the seed where a fault is looked at again.
 pub const AGAIN: u64 = 1 << 32;
 
-/// Adds an outcome to what is kept of a BSDF or material.
-pub fn tell(tally: &Tally, name: &str, o: &Outcome, tests: usize, label: &str) {
+/// How much more than 1 the density or what is reflected may integrate to.
+pub const GAIN: f64 = 2e-3;
+
+/// Adds an outcome to what is kept of a BSDF or material, which may reflect `gain` more than 1.
+pub fn tell(tally: &Tally, (name, gain): (&str, f64), o: &Outcome, tests: usize, label: &str) {
     let least = Bound::AtLeast(sidak(SIGNIFICANCE, tests));
-    let most = Bound::AtMost(1.0 + 2e-3);
     let energy = o.energy.iter().fold(0.0f64, |a, &b| a.max(b));
     tally.add(
         ("chi-squared", name, "least probability"),
@@ -129,13 +131,13 @@ pub fn tell(tally: &Tally, name: &str, o: &Outcome, tests: usize, label: &str) {
     tally.add(
         ("density", name, "integral of the density"),
         o.total,
-        most,
+        Bound::AtMost(1.0 + GAIN),
         label,
     );
     tally.add(
         ("energy", name, "most that is reflected of 1, integrated"),
         energy,
-        most,
+        Bound::AtMost(1.0 + gain),
         label,
     );
 }
@@ -238,7 +240,7 @@ fn chi_squared(pairs: &[(f64, f64)]) -> f64 {
 /// is how many share the significance level.
 pub fn faults(o: &Outcome, tests: usize) -> Vec<String> {
     let mut faults = Vec::new();
-    if o.total > 1.0 + 2e-3 {
+    if o.total > 1.0 + GAIN {
         faults.push(format!("the density integrates to {}", o.total));
     }
     if o.fit < sidak(SIGNIFICANCE, tests) {
@@ -249,7 +251,7 @@ pub fn faults(o: &Outcome, tests: usize) -> Vec<String> {
     }
     for c in 0..3 {
         let (exact, sampled) = (o.energy[c], o.sampled_energy[c]);
-        if exact > 1.0 + 2e-3 {
+        if exact > 1.0 + GAIN {
             faults.push(format!("reflects {exact}"));
         }
         if (exact - sampled).abs() > 5.0 * o.error[c] + 2e-3 * exact + 1e-5 {
@@ -290,7 +292,7 @@ fn samples_follow_the_density_and_keep_energy() {
             }
             faults.extend(albedo_fault(bsdf, case, wo, &outcome));
             if good || seed >= AGAIN {
-                tell(&tally, &bsdf.name, &outcome, tests, &d.label);
+                tell(&tally, (&bsdf.name, GAIN), &outcome, tests, &d.label);
             }
             faults
         };

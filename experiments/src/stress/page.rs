@@ -103,6 +103,25 @@ Bounds come from the doc comment of each BSDF:
 - `Weights:` the greatest value over density (4 where nothing is said).
 
 Cases that a search once found to fail are lines of `compiler/tests/stdlib/regressions/`.
+
+Each row is the worst of many cases, and says for which it was measured. A verdict is good where the
+worst keeps to its bound. Rows with a number test what the second column names. The others mean:
+
+- `chi-squared`: the least probability of counts as uneven as those that sampling gave, over cells
+  of directions whose shares are integrals of `pdf`. Right sampling stays above the bound, which is
+  0.01 shared among all cases of a BSDF or material, in 99 of 100 runs.
+- `density`, `energy`: integrals of `pdf` and of what is reflected, over all directions; `energy`
+  also compares them with what sampling gives and with `albedo`.
+- `weight`: the greatest value over density, which is how bright a single sample can be.
+- `furnace`: what is left of light 1 from everywhere on a surface that absorbs nothing.
+- `reciprocity`: the value with the directions exchanged, in double precision.
+- `precision`: single against double precision at the same numbers. The error of a BSDF is the
+  greatest that a search finds. Of a material, it is the share of directions whose error is above
+  1e-3 and above what the last digits of the point and of `wo` change in double precision. Of an
+  example scene, it is the share of paths that meet another triangle, end elsewhere, or have a number
+  that differs by more than 1e-3; scenes whose triangles are hardly larger than the last digits of
+  their coordinates may have as many as the same paths of a camera that stands one such digit aside.
+- `finite`: answers that are not finite, or negative.
 ";
 
 /// Processor and system, without names of anybody's machine.
