@@ -10,6 +10,7 @@ use crate::support::{Random, Row, floats, row};
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::Scene;
+use impasto_runtime::world::lights::quad::QuadLight;
 use impasto_runtime::world::{KernelParts, lights};
 
 /// Mean and standard error.
@@ -444,5 +445,36 @@ fn the_power_heuristic_never_overflows_and_sums_to_one() {
                 "{a} {b}: {wa}"
             );
         }
+    }
+}
+
+/// A quad that emits to both sides does not make its neighbour do so.
+#[test]
+fn only_two_sided_lights_shine_to_the_back() {
+    let mut scene = dark_scene();
+    let above = |x: f32, two_sided| QuadLight {
+        two_sided,
+        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
+    };
+    // Their fronts point down.
+    push_quad(&mut scene, above(-2.0, true));
+    push_quad(&mut scene, above(1.0, false));
+    let parts = parts(&scene, &[]);
+    let cases = [
+        (-1.5, 0.0, 2.0),
+        (-1.5, 2.0, 2.0),
+        (1.5, 0.0, 2.0),
+        (1.5, 2.0, 0.0),
+    ];
+    for (x, y, radiance) in cases {
+        let position = Vec3::new(x, y, 0.0);
+        let towards = Vec3::Y * (1.0f32 - y).signum();
+        let seen = met(&parts, position, &[towards], 0.0)[0];
+        assert_eq!(seen.x, radiance, "from {position}");
+        // Samples of the quad that is near.
+        let samples = sample(&parts, position, 400, 3);
+        let near = samples.iter().filter(|s| s.wi.x.abs() < 0.8);
+        let lit = near.filter(|s| s.radiance != Vec3::ZERO).count();
+        assert_eq!(lit > 0, radiance > 0.0, "from {position}");
     }
 }
