@@ -478,3 +478,34 @@ fn only_two_sided_lights_shine_to_the_back() {
         assert_eq!(lit > 0, radiance > 0.0, "from {position}");
     }
 }
+
+/// The mean of samples is right however they are spread over a sky, so their spread is held as well: samples of
+/// a sky are all about as bright.
+#[test]
+fn a_sky_is_sampled_in_proportion_to_its_light() {
+    // Even, where rows towards the poles are smaller, and of two halves.
+    let skies: [(f64, fn(u32) -> f32); 2] =
+        [(0.02, |_| 1.0), (0.4, |x| if x < 16 { 1.0 } else { 10.0 })];
+    for (most, of_column) in skies {
+        let scene = map_scene(32, 16, |x, _| Vec3::splat(of_column(x)));
+        let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 20_000, 6);
+        let (mean, error) = statistics(samples.iter().map(|s| luminance(s.radiance)));
+        let deviation = error * (samples.len() as f64).sqrt() / mean;
+        assert!(deviation < most, "{deviation}, at most {most}");
+    }
+}
+
+/// A light that is to be found by chance takes no samples from the others.
+#[test]
+fn lights_found_by_chance_are_never_sampled() {
+    let mut scene = dark_scene();
+    let above = |x: f32, sample| QuadLight {
+        sample,
+        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
+    };
+    push_quad(&mut scene, above(-3.0, true));
+    push_quad(&mut scene, above(2.0, false));
+    let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 1000, 8);
+    let towards_sampled = |s: &Sample| s.radiance != Vec3::ZERO && s.wi.x < 0.0;
+    assert!(samples.iter().all(towards_sampled));
+}
