@@ -484,9 +484,8 @@ fn only_two_sided_lights_shine_to_the_back() {
 #[test]
 fn a_sky_is_sampled_in_proportion_to_its_light() {
     // Even, where rows towards the poles are smaller, and of two halves.
-    let skies: [(f64, fn(u32) -> f32); 2] =
-        [(0.02, |_| 1.0), (0.4, |x| if x < 16 { 1.0 } else { 10.0 })];
-    for (most, of_column) in skies {
+    for (most, right) in [(0.02, 1.0), (0.4, 10.0)] {
+        let of_column = |x: u32| if x < 16 { 1.0 } else { right };
         let scene = map_scene(32, 16, |x, _| Vec3::splat(of_column(x)));
         let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 20_000, 6);
         let (mean, error) = statistics(samples.iter().map(|s| luminance(s.radiance)));

@@ -467,7 +467,7 @@ fn media_are_entered_and_left_in_any_order() {
     let mut input = Vec::new();
     for _ in 0..4000 {
         let medium = media[random.bits() as usize % media.len()];
-        let inside = random.bits() % 2 == 0;
+        let inside = random.bits().is_multiple_of(2);
         input.extend([stack.words(), [medium, u32::from(inside), 0, 0]]);
         stack = stack.beyond(medium, inside);
     }

@@ -258,7 +258,7 @@ mod tests {
             let start = Instant::now();
             let (done, built) = mpsc::channel();
             // One that takes too long is left behind, and ends with the program.
-            std::thread::spawn(move || drop(done.send(build(&boxes))));
+            std::thread::spawn(move || done.send(build(&boxes)));
             let depth = built.recv_timeout(Duration::from_secs(20));
             let depth = depth.unwrap_or_else(|why| panic!("{what}: {why}"));
             let time = start.elapsed();
