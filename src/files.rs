@@ -231,6 +231,20 @@ mod tests {
         );
     }
 
+    /// Whoever reads the file before keeps it as it was: no moment has half of either.
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_is_open_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.txt");
+        write_whole(&path, b"first").expect("it is written");
+        let mut before = File::open(&path).expect("the file");
+        write_whole(&path, b"second").expect("it is written");
+        let mut text = String::new();
+        before.read_to_string(&mut text).expect("it can be read");
+        assert_eq!(text, "first");
+    }
+
     #[cfg(unix)]
     #[test]
     fn files_are_as_readable_as_others() {

@@ -189,6 +189,25 @@ fn what_a_material_lacks_is_absent() {
 }
 
 #[test]
+fn what_is_mixed_with_something_absent_keeps_its_own_share() {
+    for (tree, share) in [
+        ("mix(mirror(), l.surface, 0.25)", 0.75),
+        ("mix(l.surface, mirror(), 0.25)", 0.25),
+    ] {
+        let mixed = user(&format!(
+            "use std::edf::uniform;
+            private material lamp {{ emission = uniform(1.0); }}
+            material m {{ let l = lamp(); surface = {tree}; }}"
+        ));
+        let weighted = Asked::material(&format!(
+            "use std::bsdf::mirror;
+            material m {{ surface = {share:?} * mirror(); }}"
+        ));
+        same(&mixed, &weighted);
+    }
+}
+
+#[test]
 fn an_input_by_default_is_replaced_by_callers() {
     let bent = user("material m { material = model(bent: normalize(normal + 0.5 * tangent)); }");
     let flat = user("material m { material = model(bent: normal); }");

@@ -81,6 +81,50 @@ fn layers_pass_what_they_say() {
     under(tree, of(mixed, 0.1));
 }
 
+/// A light that is behind the surface does not shine through where the normal is bent towards it.
+#[test]
+fn bent_normals_let_no_light_through_the_surface() {
+    let bent = Asked::new(
+        USES,
+        "diffuse(0.8, normal: normalize(vector(0.6, 0.0, 0.8)))",
+    );
+    let wo = direction(20.0, 0.0);
+    for (degrees, shines) in [(60.0, true), (85.0, true), (95.0, false), (120.0, false)] {
+        let answer = bent.ask(wo, direction(degrees, 0.0), point4(0));
+        let lit = answer.light_throughput.iter().all(|x| *x > 0.0);
+        assert_eq!(lit, shines, "light from {degrees} degrees");
+        assert_eq!(
+            answer.light_pdf > 0.0,
+            shines,
+            "light from {degrees} degrees"
+        );
+    }
+}
+
+#[test]
+fn a_weight_below_zero_is_none() {
+    let (wo, wl) = (direction(30.0, 0.4), direction(50.0, 2.0));
+    // Weights that vary: constants are warned of.
+    let black = Asked::new(USES, "(uv.x - 1.0) * diffuse(0.8)");
+    let white = Asked::new(
+        USES,
+        "layer((uv.x - 1.0) * blinn_phong(20.0), diffuse(0.8))",
+    );
+    let plain = Asked::new(USES, "diffuse(0.8)");
+    for i in 0..16 {
+        let dark = black.ask(wo, wl, point4(i));
+        assert_eq!(
+            (dark.throughput, dark.light_throughput),
+            ([0.0; 3], [0.0; 3])
+        );
+        let [light, expected] = [&white, &plain].map(|m| m.ask(wo, wl, point4(i)));
+        for c in 0..3 {
+            let (a, b) = (light.light_throughput[c], expected.light_throughput[c]);
+            near(a, b, 1e-12, "what lies under no layer");
+        }
+    }
+}
+
 #[test]
 fn mix_is_linear_and_ends_are_exact() {
     for (t, expected) in [(0.0, 0.2), (0.25, 0.2 * 0.75 + 0.8 * 0.25), (1.0, 0.8)] {

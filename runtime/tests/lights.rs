@@ -10,6 +10,7 @@ use crate::support::{Random, Row, floats, row};
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::Scene;
+use impasto_runtime::world::lights::quad::QuadLight;
 use impasto_runtime::world::{KernelParts, lights};
 
 /// Mean and standard error.
@@ -445,4 +446,65 @@ fn the_power_heuristic_never_overflows_and_sums_to_one() {
             );
         }
     }
+}
+
+/// A quad that emits to both sides does not make its neighbour do so.
+#[test]
+fn only_two_sided_lights_shine_to_the_back() {
+    let mut scene = dark_scene();
+    let above = |x: f32, two_sided| QuadLight {
+        two_sided,
+        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
+    };
+    // Their fronts point down.
+    push_quad(&mut scene, above(-2.0, true));
+    push_quad(&mut scene, above(1.0, false));
+    let parts = parts(&scene, &[]);
+    let cases = [
+        (-1.5, 0.0, 2.0),
+        (-1.5, 2.0, 2.0),
+        (1.5, 0.0, 2.0),
+        (1.5, 2.0, 0.0),
+    ];
+    for (x, y, radiance) in cases {
+        let position = Vec3::new(x, y, 0.0);
+        let towards = Vec3::Y * (1.0f32 - y).signum();
+        let seen = met(&parts, position, &[towards], 0.0)[0];
+        assert_eq!(seen.x, radiance, "from {position}");
+        // Samples of the quad that is near.
+        let samples = sample(&parts, position, 400, 3);
+        let near = samples.iter().filter(|s| s.wi.x.abs() < 0.8);
+        let lit = near.filter(|s| s.radiance != Vec3::ZERO).count();
+        assert_eq!(lit > 0, radiance > 0.0, "from {position}");
+    }
+}
+
+/// The mean of samples is right however they are spread over a sky, so their spread is held as well: samples of
+/// a sky are all about as bright.
+#[test]
+fn a_sky_is_sampled_in_proportion_to_its_light() {
+    // Even, where rows towards the poles are smaller, and of two halves.
+    for (most, right) in [(0.02, 1.0), (0.4, 10.0)] {
+        let of_column = |x: u32| if x < 16 { 1.0 } else { right };
+        let scene = map_scene(32, 16, |x, _| Vec3::splat(of_column(x)));
+        let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 20_000, 6);
+        let (mean, error) = statistics(samples.iter().map(|s| luminance(s.radiance)));
+        let deviation = error * (samples.len() as f64).sqrt() / mean;
+        assert!(deviation < most, "{deviation}, at most {most}");
+    }
+}
+
+/// A light that is to be found by chance takes no samples from the others.
+#[test]
+fn lights_found_by_chance_are_never_sampled() {
+    let mut scene = dark_scene();
+    let above = |x: f32, sample| QuadLight {
+        sample,
+        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
+    };
+    push_quad(&mut scene, above(-3.0, true));
+    push_quad(&mut scene, above(2.0, false));
+    let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 1000, 8);
+    let towards_sampled = |s: &Sample| s.radiance != Vec3::ZERO && s.wi.x < 0.0;
+    assert!(samples.iter().all(towards_sampled));
 }

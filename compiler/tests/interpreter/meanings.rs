@@ -335,6 +335,53 @@ fn constants_fold_to_what_every_op_gives() {
     assert!(tried > 20_000, "{tried} foldings");
 }
 
+/// Components of a constant, and constants put together, are what they are of a value that is not known.
+#[test]
+fn parts_of_constants_are_those_of_values() {
+    let numbers = [1.0, 2.0, 3.0, 4.0];
+    let build = |known: bool, width: usize, picked: &[u8], times: usize| {
+        let whole = Const::Float(numbers[..width].to_vec());
+        let param = Local {
+            name: "x".into(),
+            ty: Type::of_width(width),
+        };
+        let mut b = Builder::new("f", vec![param], HERE);
+        let value = if known {
+            b.constant(whole.clone(), HERE)
+        } else {
+            b.param(0, HERE)
+        };
+        let part = b.swizzle(value, picked, HERE);
+        let ty = Type::of_width(picked.len() * times);
+        let result = match times {
+            1 => part,
+            _ => {
+                // Of two parts the other way round, so that their order is seen.
+                let turned: Vec<u8> = picked.iter().rev().copied().collect();
+                let other = b.swizzle(value, &turned, HERE);
+                b.compose(ty, &[part, other], HERE)
+            }
+        };
+        let f = b.finish(result);
+        assert_eq!(f.constant(f.value).is_some(), known, "{picked:?}");
+        let module = Module::default();
+        let mut run = Interpreter::<f64>::new(&module, 100);
+        let value = run.run(&f, vec![Value::constant(&whole)]);
+        value.expect("enough fuel").to_f64()
+    };
+    for width in 2..=4u8 {
+        let all = (0..width).flat_map(|a| (0..width).map(move |b| [a, b]));
+        for pair in all {
+            for (picked, times) in [(&pair[..1], 1), (&pair[..], 1), (&pair[..], 2)] {
+                let [known, unknown] =
+                    [true, false].map(|known| build(known, width.into(), picked, times));
+                assert_eq!(known, unknown, "{picked:?} of {width}, {times} times");
+                assert_eq!(known[0], f64::from(picked[0]) + 1.0);
+            }
+        }
+    }
+}
+
 /// Some constant of a type.
 fn marker(ty: Type) -> Const {
     edges(ty).swap_remove(0)

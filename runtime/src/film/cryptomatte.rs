@@ -99,6 +99,9 @@ fn ranks(sums: &Sums, layer: &Layer, ids: &[f32]) -> Vec<[[f32; 2]; ID_SLOTS]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PLANES;
+    use crate::film::layers::Layers;
+    use crate::film::outputs::Output;
 
     /// Values that are published for the hash.
     #[test]
@@ -132,5 +135,35 @@ mod tests {
         assert_eq!(read["hello"], "248bfa47");
         assert_eq!(read.len(), 2);
         assert_eq!(key("CryptoMaterial").len(), 7);
+    }
+
+    /// Readers take the first ranks for the largest, and two objects of a name for one.
+    #[test]
+    fn ids_are_ranked_by_coverage_and_equal_names_are_one() {
+        let names = ["floor", "leaf", "stem", "leaf"].map(str::to_owned);
+        let layer = Layer {
+            output: Output::named("object").expect("an output"),
+            name: "object".into(),
+            names: names.to_vec(),
+        };
+        // Of ten samples four met the floor, and three and two the leaves: together the most.
+        let mut words = vec![0; PLANES];
+        words[PLANES - 1] = 10;
+        let mut slots = [[0u32; 2]; ID_SLOTS];
+        slots[..4].copy_from_slice(&[[1, 4], [2, 3], [3, 1], [4, 2]]);
+        words.extend(slots.concat());
+        words.push(0);
+        let layers = Layers::new(vec![layer.clone()]);
+        let sums = Sums::new(1, 1, layers, words).expect("a pixel's words");
+        let found = channels(&sums, &layer);
+        let values: Vec<f32> = found.iter().map(|(_, values)| values[0]).collect();
+        let expected = [id("leaf"), 0.5, id("floor"), 0.4, id("stem"), 0.1];
+        assert_eq!(values[..6], expected);
+        assert!(values[6..].iter().all(|value| *value == 0.0));
+        let letters: Vec<&str> = found
+            .iter()
+            .map(|(name, _)| &name[name.len() - 4..])
+            .collect();
+        assert_eq!(letters[..5], ["00.R", "00.G", "00.B", "00.A", "01.R"]);
     }
 }

@@ -265,4 +265,25 @@ mod tests {
         film.set_words(PLANES, 0, 10 << 24);
         assert_eq!(film.values("variance"), [[1.0], [0.0], [0.0]]);
     }
+
+    /// What only surfaces have is a mean over the samples that met one; the rest is alpha's to tell.
+    #[test]
+    fn values_of_surfaces_are_means_over_hits() {
+        let layer = |name: &str| Layer {
+            output: Output::named(name).expect("an output"),
+            name: name.into(),
+            names: Vec::new(),
+        };
+        let names = ["alpha", "position"];
+        let mut planes = vec![0; PLANES];
+        planes[PLANES - 1] = 8;
+        // Two of eight samples met something, both in the same place.
+        planes.push(2);
+        let one = 1i128 << 24;
+        planes.extend([0, -2 * one, one].map(words).concat());
+        let layers = Layers::new(names.map(layer).to_vec());
+        let film = Sums::new(1, 1, layers, planes).expect("a pixel's words");
+        assert_eq!(film.values("alpha"), [[0.25]]);
+        assert_eq!(film.values("position"), [[0.0], [-1.0], [0.5]]);
+    }
 }

@@ -138,6 +138,21 @@ mod tests {
     }
 
     #[test]
+    fn turns_are_about_x_then_y_then_z() {
+        let turned = |x, y, z| {
+            let map = Transform::new(Vec3::ONE, Vec3::new(x, y, z), Vec3::ZERO);
+            map.point(Vec3::Y)
+        };
+        for (found, expected) in [
+            (turned(90.0, 90.0, 0.0), Vec3::X),
+            (turned(90.0, 0.0, 90.0), Vec3::Z),
+            (turned(0.0, 90.0, 90.0), Vec3::NEG_X),
+        ] {
+            assert!(found.distance(expected) < 1e-6, "{found}, not {expected}");
+        }
+    }
+
+    #[test]
     fn normals_stay_outside_and_at_right_angles() {
         let scale = Vec3::new(-3.0, 0.2, 1.0);
         let map = Transform::new(scale, Vec3::new(20.0, 40.0, 60.0), Vec3::ONE);

@@ -110,6 +110,28 @@ fn roulette_does_not_change_the_mean() {
     }
 }
 
+/// It decides after the segment that scenes name whether there is a next one, and not before: each path
+/// is the series up to there.
+#[test]
+fn roulette_begins_after_the_segment_that_is_named() {
+    let white = materials(&[Kind::Diffuse(0.9)]);
+    for start in [1, 2, 5] {
+        let spread = |max_depth| {
+            let room = Room {
+                max_depth,
+                roulette_start: start,
+                ..Room::default()
+            };
+            let rendering = render(&room.scattering().world(), &white, &samples(1));
+            let (mean, error) = mean(red(&rendering));
+            error / mean
+        };
+        let (before, after) = (spread(start), spread(start + 1));
+        assert!(before < 1e-6, "{before} to the segment {start}");
+        assert!(after > 1e-4, "{after} to the one after it");
+    }
+}
+
 /// Without roulette, whose survivors would outweigh everything here, each path is the series.
 #[test]
 fn nearly_white_box_to_depth_1000_does_not_drift() {

@@ -4,10 +4,13 @@
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
+use impasto_runtime::world::MaterialSource;
+use impasto_runtime::world::media::Media;
 
 use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, planned, render, slab};
 use crate::gpu::stub::{gpu, mean};
 use crate::record::{Bound, Row};
+use crate::support::{Random, run};
 
 const CLEAR: [f32; 3] = [0.0; 3];
 
@@ -399,4 +402,101 @@ fn kernels_follow_media_as_far_as_a_scene_needs() {
         let two = vec![ground, skin(0), skin(1)];
         assert(two, &[follow, &overlaps].concat(), &[absorbs]);
     }
+}
+
+/// The media that a path is in as a list, the one entered last first.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Entered(Vec<u32>);
+
+impl Entered {
+    fn words(&self) -> [u32; 4] {
+        std::array::from_fn(|i| self.0.get(i).copied().unwrap_or(0))
+    }
+
+    fn of(words: [u32; 4]) -> Self {
+        Self(words.into_iter().take_while(|word| *word != 0).collect())
+    }
+
+    /// Of equal priorities the one entered last.
+    fn active(&self) -> u32 {
+        let rank = |word: u32| word >> 16;
+        let better = |best: u32, word: &u32| {
+            if rank(*word) > rank(best) {
+                *word
+            } else {
+                best
+            }
+        };
+        self.0
+            .iter()
+            .fold(self.0.first().copied().unwrap_or(0), better)
+    }
+
+    fn without(&self, medium: u32) -> Self {
+        let mut left = self.clone();
+        if let Some(at) = left.0.iter().position(|word| *word == medium) {
+            left.0.remove(at);
+        }
+        left
+    }
+
+    fn beyond(&self, medium: u32, inside: bool) -> Self {
+        if inside {
+            return self.without(medium);
+        }
+        let mut entered = self.clone();
+        if self.0.len() < 4 {
+            entered.0.insert(0, medium);
+        }
+        entered
+    }
+}
+
+/// Kernels follow media as a list does, however deep they nest and in whatever order they are left.
+#[test]
+fn media_are_entered_and_left_in_any_order() {
+    let glass = Solid::smooth(CLEAR, 1.5, 0);
+    let glass = Solids(vec![glass]);
+    let media = Media::build(&glass.infos(), &glass.instances(), &[]).expect("few media");
+    let mut part = media.part.expect("glass is filled");
+    part.wgsl += "const COUNTER_MEDIA_OVERFLOW: u32 = 0u;\nvar<workgroup> counters: array<atomic<u32>, 1>;\n";
+    // Three priorities, two media of each.
+    let media: Vec<u32> = (0..6).map(|i| (1 + i / 2) << 16 | (1 + i)).collect();
+    let mut random = Random::new(4);
+    let mut stack = Entered::default();
+    let mut input = Vec::new();
+    for _ in 0..4000 {
+        let medium = media[random.bits() as usize % media.len()];
+        let inside = random.bits().is_multiple_of(2);
+        input.extend([stack.words(), [medium, u32::from(inside), 0, 0]]);
+        stack = stack.beyond(medium, inside);
+    }
+    let count = input.len() / 2;
+    let body = "
+        let stack = input[2u * i];
+        let medium = input[2u * i + 1u].x;
+        let inside = input[2u * i + 1u].y == 1u;
+        result[2u * i] = cross_boundary(stack, medium, inside);
+        let hidden = select(0u, 1u, is_false_boundary(stack, medium, inside));
+        result[2u * i + 1u] = vec4<u32>(active_medium(stack), hidden, 0u, 0u);";
+    let rows = run(&[&part], body, &input, count, 2 * count);
+    let mut deepest = 0;
+    for (asked, answer) in input.chunks(2).zip(rows.chunks(2)) {
+        let (stack, medium, inside) = (Entered::of(asked[0]), asked[1][0], asked[1][1] == 1);
+        let outside = if inside {
+            stack.without(medium)
+        } else {
+            stack.clone()
+        };
+        let is_hidden = outside.active() >> 16 > medium >> 16;
+        assert_eq!(
+            answer[0],
+            stack.beyond(medium, inside).words(),
+            "{asked:x?}"
+        );
+        let expected = [stack.active(), u32::from(is_hidden)];
+        assert_eq!(answer[1][..2], expected, "{asked:x?}");
+        deepest = deepest.max(stack.0.len());
+    }
+    assert_eq!(deepest, 4);
 }

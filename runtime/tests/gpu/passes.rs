@@ -10,6 +10,7 @@ use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::file::{FilmFile, Range};
 use impasto_runtime::options::{Progress, RenderOptions};
 use impasto_runtime::render::passes::Keeping;
+use impasto_runtime::render::until::Goals;
 use impasto_runtime::render::{Renderer, Rendering};
 
 fn room() -> Room {
@@ -237,4 +238,24 @@ fn a_stopped_render_is_one_of_fewer_samples() {
         assert_eq!(stopped.sums, reference.sums, "{strategy:?}");
         assert_eq!(stopped.report.paths, reference.report.paths);
     }
+}
+
+/// Half of its samples are by another seed, which no other part of a render has.
+#[test]
+fn a_render_in_two_halves_merges_with_no_other() {
+    let options = samples(16);
+    let rest = RenderOptions {
+        first_sample: 16,
+        ..samples(16)
+    };
+    let rest = whole(Strategy::OWN, &rest).sums;
+    let mut plain = whole(Strategy::OWN, &options).sums;
+    plain.merge(&rest).expect("parts of one render");
+    let mut go_on = |_: &Progress| ControlFlow::Continue(());
+    let mut halves = renderer(Strategy::OWN, &room(), &options)
+        .render_until(&Goals::default(), &mut |_| (), &mut go_on)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .sums;
+    let refusal = halves.merge(&rest).expect_err("it is of another render");
+    assert!(refusal.contains("different renders"), "{refusal}");
 }

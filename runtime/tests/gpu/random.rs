@@ -355,3 +355,24 @@ fn sequences_converge_faster_than_independent_numbers() {
         );
     }
 }
+
+/// What a path decides from one draw must not tell anything about what it decides from another.
+#[test]
+fn no_draw_of_a_path_is_used_for_two_purposes() {
+    let part = random::part(Sampler::Independent, DEMAND);
+    let run_of = "struct Run { seed: u32 }\nvar<private> run: Run = Run(1u);\n";
+    let part = ShaderPart {
+        wgsl: part.wgsl + run_of,
+        ..part
+    };
+    let vertices: Vec<Row> = (1..=DEMAND.max_depth).map(|v| [v, 0, 0, 0]).collect();
+    let body = "let v = input[i].x;
+        result[i] = vec4<u32>(DRAW_CAMERA, vertex_draw(v, DRAW_LOGIC), vertex_draw(v, DRAW_SCATTERING), 0u);";
+    let rows = run(&[&part], body, &vertices, vertices.len(), vertices.len());
+    let of_vertices = rows
+        .iter()
+        .flat_map(|&[_, logic, scattering, _]| [logic, scattering]);
+    let all: Vec<u32> = of_vertices.chain([rows[0][0]]).collect();
+    let different: BTreeSet<u32> = all.iter().copied().collect();
+    assert_eq!(different.len(), all.len(), "{all:?}");
+}

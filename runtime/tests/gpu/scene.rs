@@ -429,3 +429,34 @@ fn lights_give_as_much_whether_they_are_sampled_or_not() {
         );
     }
 }
+
+/// Instances that share code read each parameter where it lies in their rows.
+#[test]
+fn instances_have_their_own_values_of_every_parameter() {
+    const HALVES: &str = "v -9 -9 -1\nv 0 -9 -1\nv 0 9 -1\nv -9 9 -1\nv 9 -9 -1\nv 9 9 -1\n\
+                          usemtl left\nf 1 2 3 4\nusemtl right\nf 2 5 6 3\n";
+    const LAMP: &str = "use std::bsdf::diffuse;\nuse std::edf::uniform;\n\
+                        material lamp {\n\
+                        param a: float = 1.0;\nparam b: float = 1.0;\nparam tint: color = 1.0;\n\
+                        param c: float = 1.0;\nparam d: float = 1.0;\n\
+                        surface = diffuse(0.0);\n\
+                        emission = uniform(tint + color(a, b, c) * -position.z + d * position.z * position.z);\n\
+                        }";
+    let toml = "film = { width = 2, height = 1 }\nintegrator.max_depth = 1\n\
+                camera = { position = [0, 0, 0], look_at = [0, 0, -1], fov = 20 }\n\
+                [[geometry]]\nobj = 'halves.obj'\n\
+                [materials.left]\nfile = 'lamp.impasto'\n\
+                params = { a = 1, b = 2, c = 3, d = 4, tint = [0.1, 0.2, 0.3] }\n\
+                [materials.right]\nfile = 'lamp.impasto'\n\
+                params = { a = 8, b = 7, c = 6, d = 5, tint = [0.6, 0.5, 0.4] }\n";
+    let (scene, program) = load_with(toml, &[("halves.obj", HALVES), ("lamp.impasto", LAMP)]);
+    assert_eq!(program.infos().len(), 1, "they share their code");
+    let pixels = render(&scene, &program, "wavefront", &samples(4))
+        .film
+        .pixels;
+    for (found, expected) in pixels.iter().zip([[5.1, 6.2, 7.3], [13.6, 12.5, 11.4f32]]) {
+        for (x, y) in found.iter().zip(expected) {
+            assert!((x - y).abs() < 1e-4, "{found:?}, expected {expected:?}");
+        }
+    }
+}

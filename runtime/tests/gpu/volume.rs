@@ -7,7 +7,8 @@ use impasto_runtime::render::Rendering;
 
 use crate::gpu::media::assert_channel;
 use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, render, slab};
-use crate::gpu::stub::gpu;
+use crate::gpu::scene::{self, load_with};
+use crate::gpu::stub::{gpu, mean, red, samples};
 
 /// A solid with smooth surfaces.
 fn cloudy(medium: Medium) -> Solid {
@@ -222,4 +223,47 @@ fn a_hidden_medium_does_not_scatter() {
             "{mean} in {least} {most}"
         );
     }
+}
+
+/// A lamp in fog over a floor: light that the floor scatters and the fog turns into the lamp is found by
+/// chance only, and light samples take nothing from its weight.
+#[test]
+fn light_that_fog_turns_counts_in_full_beside_light_samples() {
+    const FLOOR: &str = "v -4 0 -4\nv -4 0 4\nv 4 0 4\nv 4 0 -4\nusemtl floor\nf 1 2 3 4\n";
+    const FOG: &str = "use std::bsdf::{diffuse, transparent};
+material fog { surface = transparent(); interior = medium(scattering: color(0.8)); }
+material floor { surface = diffuse(0.8); }
+";
+    let toml = |sample: bool| {
+        format!(
+            "film = {{ width = 8, height = 8 }}\n\
+             integrator = {{ max_depth = 3, roulette_start = 1000 }}\n\
+             camera = {{ position = [0, 0.6, 1], look_at = [0, 0, 0], fov = 40, medium = 'block' }}\n\
+             [[geometry]]\nobj = 'floor.obj'\n\
+             [[geometry]]\nobj = 'block.obj'\nscale = 40\n\
+             [materials.floor]\nfile = 'fog.impasto'\nmaterial = 'floor'\n\
+             [materials.block]\nfile = 'fog.impasto'\nmaterial = 'fog'\n\
+             [[lights]]\nkind = 'quad'\ncorner = [-1.5, 1.5, -1.5]\nu = [3, 0, 0]\nv = [0, 0, 3]\n\
+             radiance = [5, 5, 5]\nsample = {sample}\n"
+        )
+    };
+    let of = |sample| {
+        let files = [("floor.obj", FLOOR), ("fog.impasto", FOG)];
+        let (scene, program) = load_with(&toml(sample), &files);
+        scene::render(&scene, &program, "wavefront", &samples(512))
+    };
+    let (by_chance, with_samples) = (of(false), of(true));
+    assert!(
+        with_samples
+            .report
+            .kernels
+            .iter()
+            .any(|k| k.name == "shadow")
+    );
+    let pairs = red(&by_chance).zip(red(&with_samples));
+    let (difference, error) = mean(pairs.map(|(a, b)| a - b));
+    assert!(
+        difference.abs() <= 4.0 * error,
+        "{difference} +- {error} are missing"
+    );
 }

@@ -510,17 +510,18 @@ mod tests {
         ];
         for axis in axes.into_iter().flat_map(|a| [a, -a]) {
             let (u, v) = axis.normalize().any_orthonormal_pair();
-            let corners: Vec<DVec3> = points.iter().map(|[x, y]| 1e6 + *x * u + *y * v).collect();
+            let mut corners: Vec<DVec3> =
+                points.iter().map(|[x, y]| 1e6 + *x * u + *y * v).collect();
             let up = u.cross(v);
-            let cut = cut(&corners);
-            assert!(!cut.crosses);
-            for [a, b, c] in cut.triangles {
-                assert!(
-                    (corners[b] - corners[a])
-                        .cross(corners[c] - corners[a])
-                        .dot(up)
-                        > 0.1
-                );
+            // From some corners it is a fan, from others it is not.
+            for _ in 0..points.len() {
+                corners.rotate_left(1);
+                let cut = cut(&corners);
+                assert!(!cut.crosses);
+                for [a, b, c] in cut.triangles {
+                    let [along, across] = [b, c].map(|k| corners[k] - corners[a]);
+                    assert!(along.cross(across).dot(up) > 0.1);
+                }
             }
         }
     }

@@ -220,6 +220,32 @@ fn pixels_see_where_the_camera_says() {
     assert!(good, "{worst} pixels");
 }
 
+/// A lens samples all of its disc evenly: out of focus, the edge of a light is as bright as the part of
+/// the disc that sees it.
+#[test]
+fn an_edge_out_of_focus_is_seen_by_its_share_of_the_lens() {
+    // Rays through a point of the lens meet at 2 m, and come to half of that on the other side at 3 m.
+    for (radius, edge) in [(0.2, 0.05), (0.2, -0.05), (0.4, 0.15)] {
+        let toml = format!(
+            "film = {{ width = 4, height = 4 }}\nintegrator.max_depth = 1\n\
+             camera = {{ position = [0, 0, 3], look_at = [0, 0, 0], fov = 0.01, aperture = {}, focus = 2 }}\n\
+             [[geometry]]\nobj = 'block.obj'\ntranslate = [0, 0, -9]\n\
+             [materials.block]\nfile = 'm.impasto'\nmaterial = 'net'\n\
+             [[lights]]\nkind = 'quad'\ncorner = [{edge}, -5, 0]\nu = [9, 0, 0]\nv = [0, 10, 0]\n\
+             radiance = [1, 1, 1]\n",
+            2.0 * radius
+        );
+        let (scene, program) = load(&toml);
+        let rendering = render(&scene, &program, "wavefront", &samples(spp(256, 4096)));
+        // The segment of the disc beyond a chord.
+        let chord: f64 = 2.0 * edge / radius;
+        let share = (chord.acos() - chord * (1.0 - chord * chord).sqrt()) / PI;
+        let (found, error) = mean(red(&rendering));
+        let place = format!("lens of {radius}, edge at {edge}");
+        hold_z("11", "lens", &place, (found - share).abs() / error);
+    }
+}
+
 /// White furnace: no material that does not emit is brighter than the even sky around it.
 #[test]
 fn no_material_is_brighter_than_an_even_sky() {
