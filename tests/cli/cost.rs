@@ -55,6 +55,49 @@ fn branches_and_loops_count_as_often_as_they_are_taken() {
     assert!((sum - number(mean)).abs() < 1e-6, "{found:#}");
 }
 
+/// A budget that is spent is told with what took it, and grants what it says where it suffices.
+#[test]
+fn a_spent_budget_leaves_costs_incomplete() {
+    let folder = folder();
+    let source = "use std::edf::uniform;
+fn spin(x: float) -> float {
+    var sum = x;
+    for i in 0 .. 4096 { sum = sqrt(sum + float(i)); }
+    sum
+}
+material m { emission = uniform(color(spin(uv.x))); }
+";
+    let file = write(folder.path(), "m.impasto", source);
+    let cost = |budget: &str, format: &str| {
+        let args = ["--samples", "16", "--budget", budget, "--format", format];
+        impasto(&[&["cost", file.as_str()], args.as_slice()].concat())
+    };
+    let spent = cost("1000", "text").exits(1);
+    let row = spent.stdout.lines().find(|line| line.starts_with("m "));
+    assert!(
+        row.is_some_and(|row| row.ends_with("incomplete")),
+        "{row:?}"
+    );
+    let place = format!("{file}:4");
+    spent
+        .says("the cost of `m` is incomplete")
+        .says("the budget of 16000 expressions was spent after 0 of 16 evaluations")
+        .says(&format!("most of it by the loop at {place}"))
+        .says("`--budget` grants more");
+
+    let json = cost("1000", "json").exits(1).json();
+    let spent = &json["materials"][0]["spent"];
+    assert_eq!(spent["budget"], 16_000);
+    assert_eq!(spent["evaluations"], 0);
+    assert_eq!(spent["place"], place);
+
+    let enough = cost("100000", "json").exits(0).json();
+    let whole = &enough["materials"][0];
+    assert!(whole.get("spent").is_none_or(serde_json::Value::is_null));
+    assert_eq!(whole["operations"]["evaluations"], 16);
+    assert_eq!(whole["operations"]["classes"]["turns"], 4096.0);
+}
+
 #[test]
 fn what_cannot_be_counted_is_refused() {
     impasto(&["cost", "nothing.impasto"])
