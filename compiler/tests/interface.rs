@@ -97,6 +97,31 @@ fn lengths_are_in_metres_and_say_their_unit() {
 }
 
 #[test]
+fn every_unit_has_its_size() {
+    let degree = std::f64::consts::PI / 180.0;
+    for (written, ty, size) in [
+        ("7 nm", "length", 7e-9),
+        ("7 um", "length", 7e-6),
+        ("7 mm", "length", 7e-3),
+        ("7 cm", "length", 7e-2),
+        ("7 m", "length", 7.0),
+        ("7 km", "length", 7e3),
+        ("7 deg", "angle", 7.0 * degree),
+        ("0.7 rad", "angle", 0.7),
+    ] {
+        let found = read(&format!(
+            "material m {{ param a: {ty} = {written}; surface = unknown; }}"
+        ));
+        let param = serde_json::to_value(&found.materials[0].params[0]).expect("JSON");
+        let default = param["default"].as_f64().expect("a number");
+        assert!(
+            (default / size - 1.0).abs() < 1e-6,
+            "{written} is {default}"
+        );
+    }
+}
+
+#[test]
 fn values_are_of_the_type() {
     assert_eq!(param("seed")["default"], json!(3));
     assert_eq!(param("on")["default"], json!(true));

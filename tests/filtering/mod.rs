@@ -177,6 +177,29 @@ fn a_mirror_shows_widths_of_the_whole_way() {
     assert_near(case.middle(), [across, 0.0, across], 0.02);
 }
 
+/// A boundary inside of a medium of higher priority is none: the way to it counts like any other.
+#[test]
+fn hidden_boundaries_leave_widths_of_the_whole_way() {
+    let mut case = Case::floor(POSITION, [0.0, 8.0, 0.0]);
+    let clear = |priority: i32| {
+        format!(
+            "surface = smooth_dielectric(ior: 1.0); interior = medium(ior: 1.0, priority: {priority});"
+        )
+    };
+    // All are entered from above, one in the other.
+    for (material, y, priority) in [("around", 6.0, 3), ("hidden", 4.0, 2), ("deep", 1.0, 1)] {
+        case.squares.push(Square {
+            y,
+            turned: true,
+            ..Square::new(material)
+        });
+        case.materials.push((material, clear(priority)));
+    }
+    case.depth = 2;
+    let across = case.pixel() * 8.0;
+    assert_near(case.middle(), [across, 0.0, across], 0.01);
+}
+
 /// A diffuse ceiling shows the floor through the cones of rays of its density, cos / pi: integrated here.
 #[test]
 fn scattered_rays_stand_for_the_solid_angle_of_their_density() {

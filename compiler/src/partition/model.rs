@@ -440,6 +440,10 @@ mod tests {
         near(found.issue, 1.125 * 2.0 * 8192.0 * 215e-12);
         near(found.memory, 2.0 * 262_144.0 * (32.0 + 96.0 + 8.0) * 1e-13);
         near(found.doubt, 0.1 * found.total);
+        // A search compares it with what it may be short of; what has a launch of its own is sure.
+        near(found.weighed(), 1.1 * found.total);
+        let own = predicted(Form::Own, &[0], 1);
+        assert_eq!(own.weighed(), own.total);
         assert_eq!(found.launch, 0.0);
         near(predicted(Form::Inline, &[1], 1).logic, 1e-4 * 0.2 * 0.1);
     }

@@ -17,6 +17,7 @@ mod mappings;
 mod materials;
 mod matte;
 mod microfacet;
+mod models;
 mod noise;
 mod normals;
 mod octaves;

@@ -30,7 +30,7 @@ fn open_pbr(list: &[(&str, &str)]) -> Program {
 }
 
 /// The only material of a text.
-fn written(text: &str) -> Program {
+pub fn written(text: &str) -> Program {
     let mut files = MemoryLoader::default();
     files.add("m.impasto", text);
     let request = MaterialRequest {
@@ -49,7 +49,7 @@ fn closure(uses: &str, surface: &str) -> Program {
     ))
 }
 
-fn here() -> Vec<f64> {
+pub fn here() -> Vec<f64> {
     point([0.1, 0.2, 0.3], [0.4, 0.6])
 }
 
@@ -65,7 +65,7 @@ fn toward(p: &Program, wo: [f64; 3], wl: [f64; 3]) -> [f64; 4] {
 }
 
 /// Both materials answer the same, sampled and toward lights, to within `relative`.
-fn same(a: &Program, b: &Program, relative: f64) {
+pub fn same(a: &Program, b: &Program, relative: f64) {
     let mut n = Numbers::new(3);
     for i in 0..200 {
         let wo = direction(n.between(0.05, 1.0), n.between(0.0, TAU));

@@ -310,6 +310,43 @@ mod tests {
         assert_eq!(seen, expected.concat());
     }
 
+    /// Every corner of an object's box may be the outermost where the object is turned: a box that lacks
+    /// one cuts off what lies there.
+    #[test]
+    fn the_box_of_a_turned_object_has_all_of_its_corners() {
+        for i in 0..8u8 {
+            // An object that fills its box at one corner, turned so that this corner looks to the right.
+            let sign = |bit: u8| if i >> bit & 1 == 1 { 1.0f32 } else { -1.0 };
+            let tip = Vec3::new(sign(0), sign(1), sign(2));
+            let turn = glam::DQuat::from_rotation_arc(
+                tip.as_dvec3().normalize(),
+                DVec3::new(1.0, 0.0, 0.0),
+            );
+            let mut scene = scene(Mesh::default());
+            scene.objects = vec![Object {
+                name: String::new(),
+                mesh: Mesh {
+                    positions: vec![[tip, -tip, -tip]],
+                    materials: vec![0],
+                    lights: vec![None],
+                    ..Mesh::default()
+                },
+            }];
+            let mut transform = Transform::new(Vec3::ONE, Vec3::ZERO, Vec3::ZERO);
+            transform.matrix = glam::DMat3::from_quat(turn);
+            scene.placements = vec![Placement {
+                object: 0,
+                transform,
+                materials: Arc::from([0]),
+            }];
+            let found = placed_box(&scene, &scene.placements[0]);
+            let reach = 3f32.sqrt();
+            assert!((found.max.x - reach).abs() < 1e-5, "{tip}: {}", found.max);
+            // The opposite corner looks to the left.
+            assert!((found.min.x + reach).abs() < 1e-5, "{tip}: {}", found.min);
+        }
+    }
+
     #[test]
     fn the_majority_of_a_pixel_counts_and_the_first_of_equals() {
         assert_eq!(most_frequent([Some(1), Some(2), Some(2), None]), Some(2));

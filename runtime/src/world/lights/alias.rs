@@ -217,6 +217,20 @@ mod tests {
         assert_eq!(WordAlias::new(&[2.0]).probabilities, [1.0]);
     }
 
+    /// Weights whose sum has no inverse, or no end, in double precision leave slots over that no other fills:
+    /// those without weight are still never drawn.
+    #[test]
+    fn what_rounding_leaves_over_is_not_drawn_without_weight() {
+        for weights in [[0.0, 1e-310, 0.0], [0.0, 1e308, 1.5e308]] {
+            let lights = WordAlias::new(&weights).probabilities;
+            let texels = PackedAlias::new(&weights).probabilities;
+            for (i, w) in weights.iter().enumerate() {
+                assert_eq!(lights[i] > 0.0, *w > 0.0, "{weights:?}: {lights:?}");
+                assert_eq!(texels[i] > 0.0, *w > 0.0, "{weights:?}: {texels:?}");
+            }
+        }
+    }
+
     #[test]
     fn packed_tables_say_what_they_draw() {
         for weights in [vec![0.0, 1e-9, 5.0, 1.0], vec![0.3; 5], vec![0.0; 3]] {
