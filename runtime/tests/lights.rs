@@ -448,17 +448,22 @@ fn the_power_heuristic_never_overflows_and_sums_to_one() {
     }
 }
 
+/// A quad a metre above the origin, from `x` on, whose front points down.
+fn above(x: f32) -> QuadLight {
+    quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
+}
+
 /// A quad that emits to both sides does not make its neighbour do so.
 #[test]
 fn only_two_sided_lights_shine_to_the_back() {
     let mut scene = dark_scene();
-    let above = |x: f32, two_sided| QuadLight {
-        two_sided,
-        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
-    };
-    // Their fronts point down.
-    push_quad(&mut scene, above(-2.0, true));
-    push_quad(&mut scene, above(1.0, false));
+    for (x, two_sided) in [(-2.0, true), (1.0, false)] {
+        let light = QuadLight {
+            two_sided,
+            ..above(x)
+        };
+        push_quad(&mut scene, light);
+    }
     let parts = parts(&scene, &[]);
     let cases = [
         (-1.5, 0.0, 2.0),
@@ -498,12 +503,10 @@ fn a_sky_is_sampled_in_proportion_to_its_light() {
 #[test]
 fn lights_found_by_chance_are_never_sampled() {
     let mut scene = dark_scene();
-    let above = |x: f32, sample| QuadLight {
-        sample,
-        ..quad([x, 1.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 2.0)
-    };
-    push_quad(&mut scene, above(-3.0, true));
-    push_quad(&mut scene, above(2.0, false));
+    for (x, sample) in [(-3.0, true), (2.0, false)] {
+        let light = QuadLight { sample, ..above(x) };
+        push_quad(&mut scene, light);
+    }
     let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 1000, 8);
     let towards_sampled = |s: &Sample| s.radiance != Vec3::ZERO && s.wi.x < 0.0;
     assert!(samples.iter().all(towards_sampled));

@@ -186,8 +186,7 @@ fn materials_that_differ_in_constants_are_one() {
 #[test]
 fn building_kernels_can_be_interrupted() {
     let folder = folder();
-    let scene = HostileScene::named("codes").expect("a row of the table");
-    let path = scene
+    let path = scene("codes")
         .write(200, folder.path())
         .expect("the folder can be written to");
     let out = folder.path().join("p.exr");
