@@ -100,7 +100,7 @@ pub fn replay(scene: &Scene, program: &Program, request: &Request) -> Result<Rep
 }
 
 fn one<F: Float>(replayer: &Replayer<'_>, request: &Request) -> Result<Path, TraceError> {
-    let code = replayer.code::<F>(request.materials)?;
-    let mut session = replayer.session(&code)?;
+    let code = replayer.code(request.materials)?;
+    let mut session = replayer.session::<F>(&code)?;
     session.path(request.pixel, request.sample, request.seed)
 }

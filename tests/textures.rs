@@ -184,8 +184,8 @@ fn replay(scene: &Scene, program: &Program, code: MaterialCode) -> Vec<[f64; 3]>
     let world = world.unwrap_or_else(|e| panic!("{e}"));
     let pixels = with_room(|| {
         let replayer = Replayer::new(&world, program, technique.sampler).expect("a kernel");
-        let code = replayer.code::<f64>(code).expect("known code");
-        let mut session = replayer.session(&code).expect("known buffers");
+        let code = replayer.code(code).expect("known code");
+        let mut session = replayer.session::<f64>(&code).expect("known buffers");
         let mut pixel = |p: u32| {
             let path = session.path([p % SIDE, p / SIDE], 0, 5);
             path.unwrap_or_else(|e| panic!("{e}")).radiance

@@ -103,8 +103,8 @@ impl Subject {
         let world = self.world(sampler);
         let all = with_room(|| {
             let replayer = Replayer::new(&world, &self.program, sampler).expect("a kernel");
-            let code = replayer.code::<F>(materials).expect("known code");
-            let mut session = replayer.session(&code).expect("known buffers");
+            let code = replayer.code(materials).expect("known code");
+            let mut session = replayer.session::<F>(&code).expect("known buffers");
             let mut path = |sample: u32, pixel: u32| {
                 let path = session.path([pixel % WIDTH, pixel / WIDTH], sample, SEED);
                 path.unwrap_or_else(|e| panic!("{e}"))

@@ -158,8 +158,8 @@ impl Case {
         let world = world.unwrap_or_else(|e| panic!("{e}"));
         let all = with_room(|| {
             let replayer = Replayer::new(&world, &program, technique.sampler).expect("a kernel");
-            let code = replayer.code::<F>(materials).expect("known code");
-            let mut session = replayer.session(&code).expect("known buffers");
+            let code = replayer.code(materials).expect("known code");
+            let mut session = replayer.session::<F>(&code).expect("known buffers");
             let pixels = (0..self.size[0] * self.size[1]).map(|p| {
                 let place = [p % self.size[0], p / self.size[0]];
                 let path = session.path(place, 0, self.seed);

@@ -1,5 +1,6 @@
 //! Why a path could not be replayed.
 
+use impasto_cpu::KernelError;
 use impasto_runtime::error::RuntimeError;
 
 /// Steps that a path may take, and expressions that one evaluation of a material may.
@@ -35,30 +36,22 @@ pub enum TraceError {
         "the path does not end within {0} steps of the interpreter\n  hint: a material may loop for very long at a point of the path; `impasto cost` shows what it takes"
     )]
     Endless(u64),
-    /// The kernel uses what the interpreter does not know.
-    #[error(
-        "internal error: the interpreter of kernels knows no {what} (in the function `{function}`); please report this"
-    )]
-    Unsupported {
-        /// What.
-        what: String,
-        /// Where.
-        function: String,
-    },
-    /// The kernel reads or writes beyond the end of something.
-    #[error(
-        "internal error: the kernel's function `{function}` reached beyond the end of {what}; please report this"
-    )]
-    Bounds {
-        /// Of what.
-        what: String,
-        /// Where.
-        function: String,
-    },
+    /// The interpreter cannot run the kernel.
+    #[error("internal error: {0}; please report this")]
+    Kernel(KernelError),
     /// The kernel cannot be made.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
     /// No thread to replay in.
     #[error("no thread to replay the path in: {0}")]
     Thread(String),
+}
+
+impl From<KernelError> for TraceError {
+    fn from(error: KernelError) -> Self {
+        match error {
+            KernelError::Endless(limit) => TraceError::Endless(limit),
+            other => TraceError::Kernel(other),
+        }
+    }
 }

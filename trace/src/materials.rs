@@ -6,9 +6,10 @@ use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Function, Type};
 use impasto_compiler::program::{CompiledMaterial, Program};
 
+use impasto_cpu::KernelError;
+use impasto_cpu::interpret::Float;
+
 use crate::error::LIMIT;
-use crate::error::TraceError;
-use crate::float::Float;
 use crate::signature::Signature;
 
 /// Which code of materials is run.
@@ -51,7 +52,7 @@ impl<'p, F: Float> Oracle<'p, F> {
         instance: usize,
         function: &'p Function,
         arguments: Vec<Value<F>>,
-    ) -> Result<Value<F>, TraceError> {
+    ) -> Result<Value<F>, KernelError> {
         let program = self.program;
         let Some(place) = self.instances.get_mut(instance) else {
             return Err(unknown(instance));
@@ -66,7 +67,7 @@ impl<'p, F: Float> Oracle<'p, F> {
         });
         interpreter.refill(LIMIT);
         let value = interpreter.run(function, arguments);
-        value.map_err(|_| TraceError::Endless(LIMIT))
+        value.map_err(|_| KernelError::Endless(LIMIT))
     }
 
     /// The arguments of a material's function that the kernel gives by name.
@@ -111,15 +112,15 @@ fn asked<'p>(
     program: &'p Program,
     of: &Signature,
     cells: &[u64],
-) -> Result<(usize, &'p CompiledMaterial), TraceError> {
+) -> Result<(usize, &'p CompiledMaterial), KernelError> {
     let instance = of.arguments.word("instance", cells) as usize;
     let info = program.instances().get(instance);
     let material = info.map(|info| &program.compiled()[info.info.material]);
     Ok((instance, material.ok_or_else(|| unknown(instance))?))
 }
 
-fn unknown(instance: usize) -> TraceError {
-    TraceError::Unsupported {
+fn unknown(instance: usize) -> KernelError {
+    KernelError::Unsupported {
         what: format!("instance {instance} of materials"),
         function: "evaluate_material".into(),
     }
@@ -132,7 +133,7 @@ impl<F: Float> Materials<'_, F> {
         of: &Signature,
         cells: &[u64],
         result: &mut Vec<u64>,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let Materials::Ir(oracle) = self else {
             return Ok(());
         };
@@ -158,7 +159,7 @@ impl<F: Float> Materials<'_, F> {
         of: &Signature,
         cells: &[u64],
         result: &mut Vec<u64>,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let Materials::Ir(oracle) = self else {
             return Ok(());
         };

@@ -3,9 +3,9 @@
 //! The kernel knows nothing of this: functions are recognised by their names, and what they take and
 //! give by the names of arguments and members. `tests/trace.rs` notices when a name is no more.
 
-use crate::error::TraceError;
-use crate::float::Float;
-use crate::machine::Host;
+use impasto_cpu::KernelError;
+use impasto_cpu::interpret::{Float, Host};
+
 use crate::materials::Materials;
 use crate::path::{Emission, End, Hit, Light, Path, Roulette, Scattering, Triple, Vertex};
 use crate::signature::Signature;
@@ -424,7 +424,7 @@ impl<F: Float> Host for Recorder<'_, '_, F> {
         hook: usize,
         arguments: &[u64],
         result: &mut Vec<u64>,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let signatures = self.signatures;
         let (Some(&hook), Some(Some(signature))) = (self.hooks.get(hook), signatures.get(hook))
         else {

@@ -1,23 +1,23 @@
 //! Runs single paths in the megakernel of a world, composed for one slot.
 
-use std::marker::PhantomData;
 use std::time::Instant;
 
 use impasto_compiler::Program;
 use impasto_compiler::ir::interp::{TextureLookup, TextureRequest};
+use impasto_cpu::KernelError;
+use impasto_cpu::code::Code;
+use impasto_cpu::interpret::{Float, Machine};
+use impasto_cpu::shape::Shapes;
 use impasto_runtime::audit::PathKernel;
 use impasto_runtime::technique::Sampler;
 use impasto_runtime::world::{MaterialSource, World};
 
-use crate::code::Code;
 use crate::error::LIMIT;
 use crate::error::TraceError;
-use crate::float::Float;
-use crate::lower;
-use crate::machine::Machine;
 use crate::materials::{MaterialCode, Materials, Oracle};
 use crate::path::Path;
 use crate::record::{self, Names, Recorder};
+use crate::signature::Signature;
 use crate::textures::Textures;
 
 /// Bytes of the stack that code is interpreted on: blocks within blocks are calls within calls.
@@ -49,17 +49,18 @@ pub struct Replayer<'p> {
     texture: Option<Texture>,
 }
 
-/// The kernel as it is interpreted in one precision.
-pub struct KernelCode<F> {
+/// The kernel as it is interpreted, in either precision.
+pub struct KernelCode {
     code: Code,
     materials: MaterialCode,
-    floats: PhantomData<F>,
+    /// By hook: what its function takes and gives, if the kernel has it.
+    signatures: Vec<Option<Signature>>,
 }
 
 /// What replays one path after another.
 pub struct Session<'s, F> {
     replayer: &'s Replayer<'s>,
-    code: &'s Code,
+    kernel: &'s KernelCode,
     machine: Machine<'s, F>,
     materials: Materials<'s, F>,
 }
@@ -112,11 +113,11 @@ impl<'p> Replayer<'p> {
         self.kernel.size
     }
 
-    /// The kernel in the precision of `F`. Without a program, its materials are WGSL in any case.
+    /// The kernel's code. Without a program, its materials are WGSL in any case.
     ///
     /// # Errors
     /// If it uses what the interpreter does not know.
-    pub fn code<F: Float>(&self, materials: MaterialCode) -> Result<KernelCode<F>, TraceError> {
+    pub fn code(&self, materials: MaterialCode) -> Result<KernelCode, TraceError> {
         let materials = match self.program {
             Some(_) => materials,
             None => MaterialCode::Wgsl,
@@ -125,16 +126,17 @@ impl<'p> Replayer<'p> {
             MaterialCode::Ir => record::answered(),
             MaterialCode::Wgsl => Vec::new(),
         };
-        let code = lower::lower::<F>(
-            &self.kernel.module,
-            &self.kernel.info,
-            &record::names(),
-            &answered,
-        )?;
+        let (module, names) = (&self.kernel.module, record::names());
+        let code = impasto_cpu::lower(module, &self.kernel.info, &names, &answered)?;
+        let signature = |name: &&str| {
+            let mut functions = module.functions.iter().map(|(_, function)| function);
+            let named = functions.find(|f| f.name.as_deref() == Some(name));
+            named.map(|f| Signature::of(f, Shapes(module)))
+        };
         Ok(KernelCode {
             code,
             materials,
-            floats: PhantomData,
+            signatures: names.iter().map(signature).collect(),
         })
     }
 
@@ -144,7 +146,7 @@ impl<'p> Replayer<'p> {
     /// If the kernel binds a buffer that the interpreter does not know.
     pub fn session<'s, F: Float>(
         &'s self,
-        kernel: &'s KernelCode<F>,
+        kernel: &'s KernelCode,
     ) -> Result<Session<'s, F>, TraceError> {
         let buffers = kernel.code.buffers.iter().map(|name| self.buffer(name));
         let buffers = buffers.collect::<Result<Vec<_>, _>>()?;
@@ -155,8 +157,8 @@ impl<'p> Replayer<'p> {
         };
         Ok(Session {
             replayer: self,
-            code: &kernel.code,
-            machine: Machine::new(&kernel.code, buffers, LIMIT),
+            kernel,
+            machine: Machine::new(&kernel.code, buffers, LIMIT)?,
             materials,
         })
     }
@@ -164,7 +166,7 @@ impl<'p> Replayer<'p> {
     /// The words of a buffer before a path begins.
     fn buffer(&self, name: &str) -> Result<Vec<u32>, TraceError> {
         let words = self.kernel.buffer(name);
-        words.ok_or_else(|| lower::unsupported(&format!("buffer `{name}`"), "main"))
+        words.ok_or_else(|| unknown(&format!("buffer `{name}`"), "main").into())
     }
 }
 
@@ -186,12 +188,12 @@ impl<F: Float> Session<'_, F> {
         }
         let pixel = (y * width + x) as usize;
         let prepared = kernel.sample(pixel, sample, seed)?;
-        for (name, words) in self.code.buffers.iter().zip(&mut self.machine.buffers) {
+        for (name, words) in self.kernel.code.buffers.iter().zip(&mut self.machine.buffers) {
             prepared.prepare(name, words);
         }
         let names = &self.replayer.names;
         let mut recorder = Recorder::new(
-            &self.code.signatures,
+            &self.kernel.signatures,
             names,
             &mut self.materials,
             kernel.max_depth,
@@ -200,12 +202,19 @@ impl<F: Float> Session<'_, F> {
         self.machine.run(&mut recorder)?;
         let seconds = begin.elapsed().as_secs_f64();
         let path = recorder.finish();
-        let mut path = path.ok_or_else(|| lower::unsupported("path without an end", "film_add"))?;
+        let mut path = path.ok_or_else(|| unknown("path without an end", "film_add"))?;
         (path.pixel, path.sample, path.seed) = ([x, y], sample, seed);
         (path.steps, path.seconds) = (self.machine.steps(), seconds);
-        let mut buffers = self.code.buffers.iter().zip(&self.machine.buffers);
+        let mut buffers = self.kernel.code.buffers.iter().zip(&self.machine.buffers);
         let film = buffers.find(|(name, _)| *name == "film");
         path.added = film.map_or([0.0; 3], |(_, words)| kernel.radiance(words, pixel));
         Ok(path)
+    }
+}
+
+fn unknown(what: &str, function: &str) -> KernelError {
+    KernelError::Unsupported {
+        what: what.to_owned(),
+        function: function.to_owned(),
     }
 }

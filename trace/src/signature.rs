@@ -3,9 +3,10 @@
 
 use naga::{ScalarKind, TypeInner};
 
-use crate::float::Float;
+use impasto_cpu::interpret::Float;
+use impasto_cpu::shape::{Shapes, kind};
+
 use crate::path::Triple;
-use crate::shape::{Shapes, kind};
 
 /// What a function takes and gives.
 #[derive(Clone, Debug, Default)]

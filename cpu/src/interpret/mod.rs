@@ -1,28 +1,44 @@
-//! Runs the code of a kernel for one invocation.
+//! Runs the code of a kernel for one invocation, in single or double precision, and lets a host look at
+//! calls and answer them.
+//!
+//! `float` says what cells hold, `components` and `vectors` what operations do with them.
+
+mod components;
+mod float;
+mod vectors;
 
 use std::marker::PhantomData;
 
-use crate::code::{Block, Case, Code, First, Function, Ins, Node, Pointer, Slot};
-use crate::error::TraceError;
-use crate::float::Float;
-use crate::shape::Scalar;
+use crate::code::{
+    Atomic, Block, Case, Code, First, Function, Ins, Node, Op, Pointer, Scalar, Slot,
+};
+use crate::error::KernelError;
+use components::{Fn1, Fn2, Fn3};
+use vectors::Vectors;
+
+pub use float::Float;
 
 /// Who looks at some calls, and answers others.
-pub(super) trait Host {
+pub trait Host {
     /// Before a call of the function with this hook. If it fills the result, the call is answered.
     fn enter(
         &mut self,
         hook: usize,
         arguments: &[u64],
         result: &mut Vec<u64>,
-    ) -> Result<(), TraceError>;
+    ) -> Result<(), KernelError>;
     /// After a call.
     fn leave(&mut self, hook: usize, arguments: &[u64], result: &[u64]);
 }
 
 /// A kernel with its memory.
-pub(super) struct Machine<'c, F> {
+#[derive(Debug)]
+pub struct Machine<'c, F> {
     code: &'c Code,
+    /// What the operations of the code are in this precision, by their place there.
+    ops: Vec<Meaning>,
+    /// Frames at the beginning of calls, by function; that of the entry point is the last.
+    images: Vec<Vec<u64>>,
     /// The module's variables, then the frames of all calls.
     memory: Vec<u64>,
     /// The words of the buffers, in the code's order.
@@ -30,6 +46,15 @@ pub(super) struct Machine<'c, F> {
     steps: u64,
     limit: u64,
     floats: PhantomData<F>,
+}
+
+/// What an operation does.
+#[derive(Clone, Copy, Debug)]
+enum Meaning {
+    One(Fn1),
+    Two(Fn2),
+    Three(Fn3),
+    Vectors(Vectors),
 }
 
 /// How a block ended.
@@ -42,41 +67,61 @@ enum Flow {
 
 impl<'c, F: Float> Machine<'c, F> {
     /// A machine that takes at most `limit` steps in a run.
-    pub(super) fn new(code: &'c Code, buffers: Vec<Vec<u32>>, limit: u64) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// If the code has an operation that is not known.
+    pub fn new(code: &'c Code, buffers: Vec<Vec<u32>>, limit: u64) -> Result<Self, KernelError> {
+        let ops = code.ops.iter().map(|op| {
+            let meaning = meaning::<F>(*op);
+            meaning.ok_or_else(|| KernelError::unsupported(&format!("{op:?}"), &code.main.name))
+        });
+        let functions = code.functions.iter().map(Option::as_ref);
+        let images = functions.chain([Some(&code.main)]).map(|function| {
+            let of = |f: &Function| {
+                // There must be room for a result even if the function does not end by a return.
+                let mut image = cells::<F>(&f.image);
+                image.resize(image.len().max(f.result.len()), 0);
+                image
+            };
+            function.map(of).unwrap_or_default()
+        });
+        Ok(Self {
             code,
+            ops: ops.collect::<Result<_, _>>()?,
+            images: images.collect(),
             memory: Vec::new(),
             buffers,
             steps: 0,
             limit,
             floats: PhantomData,
-        }
+        })
     }
 
     /// Steps that the last run took.
-    pub(super) fn steps(&self) -> u64 {
+    pub fn steps(&self) -> u64 {
         self.steps
     }
 
     /// Runs the entry point; its arguments are zero: the first thread of the first workgroup.
-    pub(super) fn run(&mut self, host: &mut dyn Host) -> Result<(), TraceError> {
+    pub fn run(&mut self, host: &mut dyn Host) -> Result<(), KernelError> {
         self.steps = 0;
         self.memory.clear();
-        self.memory.extend(&self.code.private);
+        self.memory.extend(cells::<F>(&self.code.private));
         let base = self.memory.len();
         let main = &self.code.main;
-        self.enter(main, base);
+        self.enter(self.code.functions.len(), base);
         self.block(main, &main.body, base, host)?;
         Ok(())
     }
 
     /// Prepares the frame of a call.
-    fn enter(&mut self, function: &Function, base: usize) {
-        let end = base + function.image.len();
+    fn enter(&mut self, function: usize, base: usize) {
+        let image = &self.images[function];
+        let end = base + image.len();
         if self.memory.len() < end {
             self.memory.resize(end.next_power_of_two(), 0);
         }
-        self.memory[base..end].copy_from_slice(&function.image);
+        self.memory[base..end].copy_from_slice(image);
     }
 
     fn block(
@@ -85,10 +130,10 @@ impl<'c, F: Float> Machine<'c, F> {
         block: &'c Block,
         base: usize,
         host: &mut dyn Host,
-    ) -> Result<Flow, TraceError> {
+    ) -> Result<Flow, KernelError> {
         self.steps += 1 + block.len() as u64;
         if self.steps > self.limit {
-            return Err(TraceError::Endless(self.limit));
+            return Err(KernelError::Endless(self.limit));
         }
         for node in block {
             let flow = match node {
@@ -142,7 +187,7 @@ impl<'c, F: Float> Machine<'c, F> {
         cases: &'c [Case],
         base: usize,
         host: &mut dyn Host,
-    ) -> Result<Flow, TraceError> {
+    ) -> Result<Flow, KernelError> {
         let value = self.cell(base, selector) as u32;
         let fits = cases.iter().position(|case| case.value == Some(value));
         let default = || cases.iter().position(|case| case.value.is_none());
@@ -165,7 +210,7 @@ impl<'c, F: Float> Machine<'c, F> {
         (body, continuing, break_if): (&'c Block, &'c Block, Option<Slot>),
         base: usize,
         host: &mut dyn Host,
-    ) -> Result<Flow, TraceError> {
+    ) -> Result<Flow, KernelError> {
         loop {
             match self.block(function, body, base, host)? {
                 Flow::Next | Flow::Continue => {}
@@ -187,15 +232,15 @@ impl<'c, F: Float> Machine<'c, F> {
         to: Option<Slot>,
         base: usize,
         host: &mut dyn Host,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let Some(Some(function)) = self.code.functions.get(callee as usize) else {
-            return Err(TraceError::Unsupported {
+            return Err(KernelError::Unsupported {
                 what: "function that it calls".into(),
                 function: caller.name.clone(),
             });
         };
-        let frame = base + caller.image.len();
-        self.enter(function, frame);
+        let frame = base + caller.image.len().max(caller.result.len());
+        self.enter(callee as usize, frame);
         let mut next = frame;
         for (slot, count) in arguments {
             let from = base + *slot as usize;
@@ -203,7 +248,7 @@ impl<'c, F: Float> Machine<'c, F> {
             next += *count as usize;
         }
         let given = frame..frame + function.arguments as usize;
-        let size = function.result as usize;
+        let size = function.result.len();
         if let Some(hook) = function.hook {
             let mut answer = Vec::new();
             host.enter(hook, &self.memory[given.clone()], &mut answer)?;
@@ -240,43 +285,68 @@ impl<'c, F: Float> Machine<'c, F> {
         self.memory[base + slot as usize]
     }
 
-    fn step(&mut self, function: &Function, ins: &Ins, base: usize) -> Result<(), TraceError> {
+    fn step(&mut self, function: &Function, ins: &Ins, base: usize) -> Result<(), KernelError> {
         let frame = &mut self.memory[base..];
         match ins {
             Ins::Copy { from, to, count } => {
                 let from = *from as usize;
                 frame.copy_within(from..from + *count as usize, *to as usize);
             }
-            Ins::Map1 { f, from, to, count } => {
+            Ins::Map1 {
+                op,
+                from,
+                to,
+                count,
+            } => {
+                let Meaning::One(f) = self.ops[*op as usize] else {
+                    return Err(misused(function));
+                };
                 for i in 0..*count {
                     frame[(to + i) as usize] = f(frame[(from + i) as usize]);
                 }
             }
             Ins::Map2 {
-                f,
+                op,
                 from: [a, b],
                 step: [p, q],
                 to,
                 count,
             } => {
+                let Meaning::Two(f) = self.ops[*op as usize] else {
+                    return Err(misused(function));
+                };
                 for i in 0..*count {
                     let (x, y) = (frame[(a + p * i) as usize], frame[(b + q * i) as usize]);
                     frame[(to + i) as usize] = f(x, y);
                 }
             }
             Ins::Map3 {
-                f,
+                op,
                 from: [a, b, c],
                 step: [p, q, r],
                 to,
                 count,
             } => {
+                let Meaning::Three(f) = self.ops[*op as usize] else {
+                    return Err(misused(function));
+                };
                 for i in 0..*count {
                     let (x, y) = (frame[(a + p * i) as usize], frame[(b + q * i) as usize]);
                     frame[(to + i) as usize] = f(x, y, frame[(c + r * i) as usize]);
                 }
             }
-            Ins::Geometry { f, from, width, to } => f(frame, *from, *width, *to),
+            Ins::Vectors {
+                op,
+                from,
+                width,
+                to,
+                ..
+            } => {
+                let Meaning::Vectors(f) = self.ops[*op as usize] else {
+                    return Err(misused(function));
+                };
+                f(frame, *from, *width, *to);
+            }
             Ins::Element {
                 from,
                 index,
@@ -331,11 +401,18 @@ impl<'c, F: Float> Machine<'c, F> {
                 from,
             } => return self.store(function, *pointer, *layout, *count, base, *from),
             Ins::Atomic {
-                f,
+                function: atomic,
                 pointer,
                 value,
                 to,
             } => {
+                let f = match atomic {
+                    Atomic::Exchange => |_, new| new,
+                    Atomic::Op(op) => match self.ops[*op as usize] {
+                        Meaning::Two(f) => f,
+                        _ => return Err(misused(function)),
+                    },
+                };
                 let value = frame[*value as usize];
                 let (buffer, word) = self.word(function, *pointer, base)?;
                 let Some(place) = self.buffers[buffer].get_mut(word) else {
@@ -367,7 +444,7 @@ impl<'c, F: Float> Machine<'c, F> {
         function: &Function,
         pointer: Pointer,
         base: usize,
-    ) -> Result<(usize, usize), TraceError> {
+    ) -> Result<(usize, usize), KernelError> {
         let Pointer::Buffer {
             buffer,
             offset,
@@ -398,7 +475,7 @@ impl<'c, F: Float> Machine<'c, F> {
         count: u32,
         base: usize,
         to: Slot,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let to = base + to as usize;
         if !matches!(pointer, Pointer::Buffer { .. }) {
             let from = self.address(pointer, base);
@@ -411,9 +488,10 @@ impl<'c, F: Float> Machine<'c, F> {
             let Some(bits) = words.get(word + place.word as usize) else {
                 return Err(self.beyond_buffer(function, buffer));
             };
-            self.memory[to + i] = match place.scalar {
-                Scalar::Word => u64::from(*bits),
-                Scalar::Float => F::of_single(f32::from_bits(*bits)).cell(),
+            self.memory[to + i] = if place.float {
+                F::of_single(f32::from_bits(*bits)).cell()
+            } else {
+                u64::from(*bits)
             };
         }
         Ok(())
@@ -427,7 +505,7 @@ impl<'c, F: Float> Machine<'c, F> {
         count: u32,
         base: usize,
         from: Slot,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let from = base + from as usize;
         if !matches!(pointer, Pointer::Buffer { .. }) {
             let to = self.address(pointer, base);
@@ -440,22 +518,58 @@ impl<'c, F: Float> Machine<'c, F> {
             let Some(bits) = self.buffers[buffer].get_mut(word + place.word as usize) else {
                 return Err(self.beyond_buffer(function, buffer));
             };
-            *bits = match place.scalar {
-                Scalar::Word => cell as u32,
-                Scalar::Float => F::of_cell(cell).single().to_bits(),
+            *bits = if place.float {
+                F::of_cell(cell).single().to_bits()
+            } else {
+                cell as u32
             };
         }
         Ok(())
     }
 
-    fn beyond_buffer(&self, function: &Function, buffer: usize) -> TraceError {
+    fn beyond_buffer(&self, function: &Function, buffer: usize) -> KernelError {
         let name = self.code.buffers.get(buffer).map_or("", String::as_str);
         beyond(function, &format!("the buffer `{name}`"))
     }
 }
 
-fn beyond(function: &Function, what: &str) -> TraceError {
-    TraceError::Bounds {
+/// The cells of values.
+fn cells<F: Float>(values: &[Scalar]) -> Vec<u64> {
+    let cell = |value: &Scalar| match *value {
+        Scalar::Float(x) => F::of_single(x).cell(),
+        Scalar::Word(x) => x.into(),
+        Scalar::Bool(x) => x.into(),
+    };
+    values.iter().map(cell).collect()
+}
+
+/// What an operation does in a precision; `None` if it is not known.
+fn meaning<F: Float>(op: Op) -> Option<Meaning> {
+    let one = |f: Option<Fn1>| f.map(Meaning::One);
+    let two = |f: Option<Fn2>| f.map(Meaning::Two);
+    let three = |f: Option<Fn3>| f.map(Meaning::Three);
+    match op {
+        Op::Unary(op, kind) => one(components::unary::<F>(op, kind)),
+        Op::Binary(op, kind) => two(components::binary::<F>(op, kind)),
+        Op::Convert(from, to) => one(components::convert::<F>(from, to)),
+        Op::Bitcast(from, to) => one(components::bitcast::<F>(from, to)),
+        Op::Math(function, kind) => one(components::math1::<F>(function, kind))
+            .or_else(|| two(components::math2::<F>(function, kind)))
+            .or_else(|| three(components::math3::<F>(function, kind))),
+        Op::Select => Some(Meaning::Three(components::select())),
+        Op::Vector(function, kind) => vectors::math::<F>(function, kind).map(Meaning::Vectors),
+        Op::All => Some(Meaning::Vectors(vectors::all)),
+        Op::Any => Some(Meaning::Vectors(vectors::any)),
+        Op::Product => Some(Meaning::Vectors(vectors::product::<F>)),
+    }
+}
+
+fn misused(function: &Function) -> KernelError {
+    KernelError::unsupported("operation of so many operands", &function.name)
+}
+
+fn beyond(function: &Function, what: &str) -> KernelError {
+    KernelError::Bounds {
         what: what.to_owned(),
         function: function.name.clone(),
     }

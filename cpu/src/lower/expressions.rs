@@ -1,23 +1,21 @@
-//! From naga's expressions to instructions of the interpreter.
+//! From naga's expressions to instructions.
 
 use naga::{
     BinaryOperator, Expression, Handle, MathFunction, RelationalFunction, TypeInner, VectorSize,
 };
 
-use crate::code::{Block, First, Ins, Node, Pointer, Slot};
-use crate::error::TraceError;
-use crate::float::Float;
-use crate::lower::{Lowering, word};
+use super::{Lowering, word};
+use crate::code::{self, Block, First, Ins, Node, Op, Pointer, Slot};
+use crate::error::KernelError;
 use crate::shape::{Length, count};
-use crate::{geometry, ops};
 
-impl<F: Float> Lowering<'_, '_, F> {
+impl Lowering<'_, '_> {
     /// Evaluates an expression where it is emitted.
     pub(super) fn emit(
         &mut self,
         expression: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let slot = match &self.source.expressions[expression] {
             Expression::Access { base, index } => {
                 if self.is_pointer(*base) {
@@ -72,9 +70,8 @@ impl<F: Float> Lowering<'_, '_, F> {
                 to
             }
             Expression::Unary { op, expr } => {
-                let f = ops::unary::<F>(*op, self.kind(*expr)?);
-                let f = f.ok_or_else(|| self.unsupported(&word(op)))?;
-                self.map1(expression, f, *expr, out)?
+                let op = Op::Unary(*op, self.kind(*expr)?);
+                self.map1(expression, op, *expr, out)?
             }
             Expression::As {
                 expr,
@@ -82,13 +79,12 @@ impl<F: Float> Lowering<'_, '_, F> {
                 convert,
             } => {
                 let from = self.kind(*expr)?;
-                let f = match convert {
-                    Some(4) | Some(1) => ops::convert::<F>(from, *kind),
-                    Some(_) => None,
-                    None => ops::bitcast::<F>(from, *kind),
+                let op = match convert {
+                    Some(4) | Some(1) => Op::Convert(from, *kind),
+                    Some(_) => return Err(self.unsupported("conversion between these types")),
+                    None => Op::Bitcast(from, *kind),
                 };
-                let f = f.ok_or_else(|| self.unsupported("conversion between these types"))?;
-                self.map1(expression, f, *expr, out)?
+                self.map1(expression, op, *expr, out)?
             }
             Expression::Binary { op, left, right } => {
                 self.binary(expression, *op, *left, *right, out)?
@@ -99,25 +95,19 @@ impl<F: Float> Lowering<'_, '_, F> {
                 reject,
             } => self.map3(
                 expression,
-                ops::select(),
+                Op::Select,
                 [*condition, *accept, *reject],
                 out,
             )?,
             Expression::Relational { fun, argument } => {
-                let f = match fun {
-                    RelationalFunction::All => geometry::all,
-                    RelationalFunction::Any => geometry::any,
+                let op = match fun {
+                    RelationalFunction::All => Op::All,
+                    RelationalFunction::Any => Op::Any,
                     other => return Err(self.unsupported(&word(other))),
                 };
                 let width = self.cells(self.ty(*argument))?;
-                let (from, to) = (self.slot(*argument)?, self.result(expression)?);
-                out.push(Node::Ins(Ins::Geometry {
-                    f,
-                    from: [from, 0, 0],
-                    width,
-                    to,
-                }));
-                to
+                let from = [self.slot(*argument)?, 0, 0];
+                self.vectors(expression, op, from, width, out)?
             }
             Expression::Math {
                 fun,
@@ -147,9 +137,8 @@ impl<F: Float> Lowering<'_, '_, F> {
     }
 
     /// Room for the value of an expression.
-    fn result(&mut self, expression: Handle<Expression>) -> Result<Slot, TraceError> {
-        let cells = self.cells(self.ty(expression))?;
-        Ok(self.room(cells))
+    fn result(&mut self, expression: Handle<Expression>) -> Result<Slot, KernelError> {
+        self.room(self.ty(expression))
     }
 
     /// A pointer to an element whose index is known when running.
@@ -158,12 +147,12 @@ impl<F: Float> Lowering<'_, '_, F> {
         base: Handle<Expression>,
         index: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<Pointer, TraceError> {
+    ) -> Result<Pointer, KernelError> {
         let pointer = self.pointer(base)?;
         let ty = self.shapes.behind(self.ty(base));
         let elements = self.shapes.elements(&ty);
         let elements = elements.ok_or_else(|| self.unsupported("index into this type"))?;
-        let (index, to) = (self.slot(index)?, self.room(1));
+        let (index, to) = (self.slot(index)?, self.word());
         let (first, stride, found) = match pointer {
             Pointer::Frame(slot) => (First::Frame(slot), elements.cells, cell(to, 0)),
             Pointer::Private(at) => (First::Private(at), elements.cells, cell(to, 0)),
@@ -196,7 +185,7 @@ impl<F: Float> Lowering<'_, '_, F> {
     }
 
     /// A pointer to a member or element that is known beforehand.
-    fn member(&self, base: Handle<Expression>, index: u32) -> Result<Pointer, TraceError> {
+    fn member(&self, base: Handle<Expression>, index: u32) -> Result<Pointer, KernelError> {
         let part = self.shapes.part(&self.shapes.behind(self.ty(base)), index);
         let part = part.ok_or_else(|| self.unsupported("part of this type"))?;
         Ok(match self.pointer(base)? {
@@ -221,14 +210,14 @@ impl<F: Float> Lowering<'_, '_, F> {
         base: Handle<Expression>,
         index: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let elements = self.shapes.elements(self.ty(base));
         let elements = elements.ok_or_else(|| self.unsupported("index into this type"))?;
         let Length::Fixed(length) = elements.length else {
             return Err(self.unsupported("value of open length"));
         };
         let (from, index) = (self.slot(base)?, self.slot(index)?);
-        let (count, to) = (elements.cells, self.room(elements.cells));
+        let (count, to) = (elements.cells, self.room(&elements.ty)?);
         out.push(Node::Ins(Ins::Element {
             from,
             index,
@@ -247,7 +236,7 @@ impl<F: Float> Lowering<'_, '_, F> {
         vector: Handle<Expression>,
         pattern: &[naga::SwizzleComponent; 4],
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let from = self.slot(vector)?;
         let components = pattern[..count(size) as usize].iter().map(|c| *c as u32);
         let first = pattern[0] as u32;
@@ -262,18 +251,19 @@ impl<F: Float> Lowering<'_, '_, F> {
     fn map1(
         &mut self,
         expression: Handle<Expression>,
-        f: ops::Fn1,
+        op: Op,
         argument: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let (from, to) = (self.slot(argument)?, self.result(expression)?);
         let count = self.cells(self.ty(expression))?;
-        out.push(Node::Ins(Ins::Map1 { f, from, to, count }));
+        let op = self.op(op);
+        out.push(Node::Ins(Ins::Map1 { op, from, to, count }));
         Ok(to)
     }
 
     /// 0 if one scalar goes with each of `count` components, else 1.
-    fn stride(&self, expression: Handle<Expression>, count: u32) -> Result<u32, TraceError> {
+    fn stride(&self, expression: Handle<Expression>, count: u32) -> Result<u32, KernelError> {
         match self.cells(self.ty(expression))? {
             1 => Ok(0),
             cells if cells == count => Ok(1),
@@ -284,16 +274,17 @@ impl<F: Float> Lowering<'_, '_, F> {
     fn map2(
         &mut self,
         expression: Handle<Expression>,
-        f: ops::Fn2,
+        op: Op,
         [a, b]: [Handle<Expression>; 2],
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let count = self.cells(self.ty(expression))?;
         let step = [self.stride(a, count)?, self.stride(b, count)?];
         let from = [self.slot(a)?, self.slot(b)?];
-        let to = self.room(count);
+        let to = self.result(expression)?;
+        let op = self.op(op);
         out.push(Node::Ins(Ins::Map2 {
-            f,
+            op,
             from,
             step,
             to,
@@ -305,19 +296,20 @@ impl<F: Float> Lowering<'_, '_, F> {
     fn map3(
         &mut self,
         expression: Handle<Expression>,
-        f: ops::Fn3,
+        op: Op,
         arguments: [Handle<Expression>; 3],
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let count = self.cells(self.ty(expression))?;
         let (mut step, mut from) = ([0; 3], [0; 3]);
         for (i, argument) in arguments.into_iter().enumerate() {
             step[i] = self.stride(argument, count)?;
             from[i] = self.slot(argument)?;
         }
-        let to = self.room(count);
+        let to = self.result(expression)?;
+        let op = self.op(op);
         out.push(Node::Ins(Ins::Map3 {
-            f,
+            op,
             from,
             step,
             to,
@@ -333,19 +325,15 @@ impl<F: Float> Lowering<'_, '_, F> {
         left: Handle<Expression>,
         right: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         if op == BinaryOperator::Multiply
             && let Some(width) = product_width(self.ty(left), self.ty(right))
         {
             let from = [self.slot(left)?, self.slot(right)?, 0];
-            let to = self.result(expression)?;
-            let f = geometry::product::<F>;
-            out.push(Node::Ins(Ins::Geometry { f, from, width, to }));
-            return Ok(to);
+            return self.vectors(expression, Op::Product, from, width, out);
         }
-        let f = ops::binary::<F>(op, self.kind(left)?);
-        let f = f.ok_or_else(|| self.unsupported(&format!("{op:?} of these types")))?;
-        self.map2(expression, f, [left, right], out)
+        let op = Op::Binary(op, self.kind(left)?);
+        self.map2(expression, op, [left, right], out)
     }
 
     fn math(
@@ -355,34 +343,45 @@ impl<F: Float> Lowering<'_, '_, F> {
         first: Handle<Expression>,
         others: [Option<Handle<Expression>>; 2],
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let (kind, width) = (self.kind(first)?, self.cells(self.ty(first))?);
-        if let Some((f, count)) = geometry::math::<F>(function, kind, width) {
+        if code::is_of_vectors(function) {
             let mut from = [self.slot(first)?, 0, 0];
             for (slot, other) in from[1..].iter_mut().zip(others) {
                 if let Some(other) = other {
                     *slot = self.slot(other)?;
                 }
             }
-            let to = self.room(count.max(self.cells(self.ty(expression))?));
-            out.push(Node::Ins(Ins::Geometry { f, from, width, to }));
-            return Ok(to);
+            return self.vectors(expression, Op::Vector(function, kind), from, width, out);
         }
-        let unknown = || self.unsupported(&format!("function {function:?} of these types"));
+        let op = Op::Math(function, kind);
         match others {
-            [None, _] => {
-                let f = ops::math1::<F>(function, kind).ok_or_else(unknown)?;
-                self.map1(expression, f, first, out)
-            }
-            [Some(second), None] => {
-                let f = ops::math2::<F>(function, kind).ok_or_else(unknown)?;
-                self.map2(expression, f, [first, second], out)
-            }
+            [None, _] => self.map1(expression, op, first, out),
+            [Some(second), None] => self.map2(expression, op, [first, second], out),
             [Some(second), Some(third)] => {
-                let f = ops::math3::<F>(function, kind).ok_or_else(unknown)?;
-                self.map3(expression, f, [first, second, third], out)
+                self.map3(expression, op, [first, second, third], out)
             }
         }
+    }
+
+    fn vectors(
+        &mut self,
+        expression: Handle<Expression>,
+        op: Op,
+        from: [Slot; 3],
+        width: u32,
+        out: &mut Block,
+    ) -> Result<Slot, KernelError> {
+        let count = self.cells(self.ty(expression))?;
+        let (to, op) = (self.result(expression)?, self.op(op));
+        out.push(Node::Ins(Ins::Vectors {
+            op,
+            from,
+            width,
+            to,
+            count,
+        }));
+        Ok(to)
     }
 
     fn array_length(
@@ -390,7 +389,7 @@ impl<F: Float> Lowering<'_, '_, F> {
         expression: Handle<Expression>,
         array: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<Slot, TraceError> {
+    ) -> Result<Slot, KernelError> {
         let elements = self.shapes.elements(&self.shapes.behind(self.ty(array)));
         let pointer = self.pointer(array)?;
         let (Some(elements), Pointer::Buffer { buffer, offset, .. }) = (elements, pointer) else {
@@ -426,5 +425,5 @@ fn product_width(left: &TypeInner, right: &TypeInner) -> Option<u32> {
         }
         _ => return None,
     };
-    Some(geometry::product_width(rows, inner, columns))
+    Some(code::product_width(rows, inner, columns))
 }

@@ -2,8 +2,8 @@
 
 use naga::{MathFunction as Math, ScalarKind as Kind};
 
-use crate::code::{Geometry, Slot};
-use crate::float::{Float, signed};
+use crate::code::{Slot, product_sizes};
+use super::float::{Float, signed};
 
 fn at<F: Float>(cells: &[u64], slot: Slot, component: u32) -> F {
     F::of_cell(cells[(slot + component) as usize])
@@ -17,46 +17,40 @@ fn zero<F: Float>() -> F {
     F::of(0.0)
 }
 
-/// A function of the components of its arguments, with the cells of its result for vectors of a width.
-pub(super) fn math<F: Float>(function: Math, kind: Kind, width: u32) -> Option<(Geometry, u32)> {
-    let found: (Geometry, u32) = match function {
+/// A function of several components at once: the cells it reads begin at the slots given, vectors are
+/// so many cells wide, and the result begins at the last slot.
+pub(super) type Vectors = fn(cells: &mut [u64], from: [Slot; 3], width: u32, to: Slot);
+
+/// A function of the components of its arguments.
+pub(super) fn math<F: Float>(function: Math, kind: Kind) -> Option<Vectors> {
+    let found: Vectors = match function {
         Math::Dot if kind == Kind::Float => {
-            (|c, [a, b, _], n, to| put(c, to, 0, dot::<F>(c, a, b, n)), 1)
+            |c, [a, b, _], n, to| put(c, to, 0, dot::<F>(c, a, b, n))
         }
-        Math::Dot => (dot_of_words, 1),
-        Math::Cross => (cross::<F>, 3),
-        Math::Length => (|c, [a, ..], n, to| put(c, to, 0, length::<F>(c, a, n)), 1),
-        Math::Distance => (distance::<F>, 1),
-        Math::Normalize => (normalize::<F>, width),
-        Math::Reflect => (reflect::<F>, width),
-        Math::Refract => (refract::<F>, width),
-        Math::FaceForward => (face_forward::<F>, width),
-        Math::Unpack2x16float => (unpack_halves::<F>, 2),
-        Math::Pack2x16float => (pack_halves::<F>, 1),
-        Math::Unpack2x16snorm => (unpack_shorts::<F>, 2),
-        Math::Unpack2x16unorm => (
-            |c, [a, ..], _, to| {
-                let word = c[a as usize] as u32;
-                for (i, bits) in [word & 0xffff, word >> 16].into_iter().enumerate() {
-                    put(c, to, i as u32, F::of(f64::from(bits) / 65535.0));
-                }
-            },
-            2,
-        ),
-        Math::Unpack4xU8 => (
-            |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| byte.into()),
-            4,
-        ),
-        Math::Unpack4xI8 => (
-            |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| signed((byte as i8).into())),
-            4,
-        ),
-        Math::Unpack4x8unorm => (
-            |c, [a, ..], _, to| {
-                unpack_bytes(c, a, to, |byte| F::of(f64::from(byte) / 255.0).cell())
-            },
-            4,
-        ),
+        Math::Dot => dot_of_words,
+        Math::Cross => cross::<F>,
+        Math::Length => |c, [a, ..], n, to| put(c, to, 0, length::<F>(c, a, n)),
+        Math::Distance => distance::<F>,
+        Math::Normalize => normalize::<F>,
+        Math::Reflect => reflect::<F>,
+        Math::Refract => refract::<F>,
+        Math::FaceForward => face_forward::<F>,
+        Math::Unpack2x16float => unpack_halves::<F>,
+        Math::Pack2x16float => pack_halves::<F>,
+        Math::Unpack2x16snorm => unpack_shorts::<F>,
+        Math::Unpack2x16unorm => |c, [a, ..], _, to| {
+            let word = c[a as usize] as u32;
+            for (i, bits) in [word & 0xffff, word >> 16].into_iter().enumerate() {
+                put(c, to, i as u32, F::of(f64::from(bits) / 65535.0));
+            }
+        },
+        Math::Unpack4xU8 => |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| byte.into()),
+        Math::Unpack4xI8 => {
+            |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| signed((byte as i8).into()))
+        }
+        Math::Unpack4x8unorm => |c, [a, ..], _, to| {
+            unpack_bytes(c, a, to, |byte| F::of(f64::from(byte) / 255.0).cell())
+        },
         _ => return None,
     };
     Some(found)
@@ -172,15 +166,9 @@ pub(super) fn any(cells: &mut [u64], [a, ..]: [Slot; 3], width: u32, to: Slot) {
     cells[to as usize] = cells[a..a + width].iter().any(|cell| *cell != 0).into();
 }
 
-/// The sizes of a matrix product as the width of a [`Geometry`]: rows of the result, what is summed
-/// over, columns of the result.
-pub(super) fn product_width(rows: u32, inner: u32, columns: u32) -> u32 {
-    rows | inner << 4 | columns << 8
-}
-
 /// The product of two matrices, of which one may be a vector: column by column.
 pub(super) fn product<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], width: u32, to: Slot) {
-    let (rows, inner, columns) = (width & 15, width >> 4 & 15, width >> 8);
+    let [rows, inner, columns] = product_sizes(width);
     for column in 0..columns {
         for row in 0..rows {
             let sum = (0..inner).fold(zero::<F>(), |sum, i| {
@@ -194,6 +182,7 @@ pub(super) fn product<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], width: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::code::product_width;
 
     /// Cells of floats; the result of a function is appended to them.
     fn run(function: Math, arguments: [&[f64]; 3]) -> Vec<f64> {
@@ -204,9 +193,10 @@ mod tests {
             cells.extend(argument.iter().map(|x| x.cell()));
         }
         let width = arguments[0].len() as u32;
-        let (f, count) = math::<f64>(function, Kind::Float, width).expect("known");
+        let f = math::<f64>(function, Kind::Float).expect("known");
         let to = cells.len();
-        cells.resize(to + count as usize, 0);
+        let is_scalar = matches!(function, Math::Dot | Math::Length | Math::Distance);
+        cells.resize(to + if is_scalar { 1 } else { width as usize }, 0);
         f(&mut cells, from, width, to as Slot);
         cells[to..].iter().map(|c| f64::of_cell(*c)).collect()
     }
@@ -243,10 +233,10 @@ mod tests {
         let shorts = (f64::of_cell(cells[1]), f64::of_cell(cells[2]));
         assert_eq!(shorts, (f64::from(0x4000) / 32767.0, -1.0));
         cells[0] = 0x0403_02ff;
-        let (f, count) = math::<f32>(Math::Unpack4xI8, Kind::Uint, 1).expect("known");
+        let f = math::<f32>(Math::Unpack4xI8, Kind::Uint).expect("known");
         f(&mut cells, [0; 3], 1, 1);
-        assert_eq!((count, cells[1], cells[4]), (4, u64::from(u32::MAX), 4));
-        let (f, _) = math::<f32>(Math::Unpack4xU8, Kind::Uint, 1).expect("known");
+        assert_eq!((cells[1], cells[4]), (u64::from(u32::MAX), 4));
+        let f = math::<f32>(Math::Unpack4xU8, Kind::Uint).expect("known");
         f(&mut cells, [0; 3], 1, 1);
         assert_eq!(cells[1], 255);
     }

@@ -6,7 +6,7 @@
 
 use naga::{BinaryOperator as Bin, MathFunction as Math, ScalarKind as Kind, UnaryOperator as Un};
 
-use crate::float::{Float, as_signed, signed};
+use super::float::{Float, as_signed, signed};
 
 /// Functions of one to three components.
 pub(super) type Fn1 = fn(u64) -> u64;

@@ -1,45 +1,51 @@
-//! From naga's IR of a kernel to code that the interpreter runs: where everything lies, which
-//! functions are needed, and statements. Expressions are in `expressions`.
+//! From naga's IR of a kernel to code: where everything lies, which functions are needed, and statements.
+//! Expressions are in `expressions`.
 
 use naga::valid::{FunctionInfo, ModuleInfo};
+use std::collections::HashMap;
+
 use naga::{
-    AddressSpace, Arena, AtomicFunction, Expression, Handle, Literal, Module, ScalarKind,
+    AddressSpace, Arena, AtomicFunction, BinaryOperator, Expression, Handle, Literal, MathFunction, Module, ScalarKind,
     Statement, SwitchValue, TypeInner,
 };
 
-use crate::code::{Block, Case, Code, Function, Ins, Node, Pointer, Slot};
-use crate::error::TraceError;
-use crate::float::{Float, signed};
-use crate::ops::{self, Fn2};
+mod expressions;
+
+use crate::code::{
+    Atomic, Block, Case, Code, Function, Input, Ins, Node, Op, Pointer, Scalar, Slot,
+};
+use crate::error::KernelError;
 use crate::shape::{Place, Shapes, kind};
-use crate::signature::Signature;
 
 /// What the functions of a kernel share.
-pub(super) struct Shared<'m> {
+struct Shared<'m> {
     pub shapes: Shapes<'m>,
     /// Names of functions that the host looks at or answers.
     hooks: &'m [&'m str],
     /// By the index of a global variable: where it is.
     pub globals: Vec<Option<Pointer>>,
     pub layouts: Vec<Vec<Place>>,
+    /// Every operation so far, and where it is among those of the code.
+    ops: HashMap<Op, u32>,
 }
 
 /// Makes code of a validated kernel. Functions in `hooks` are known by their place there to the host,
 /// which answers those from `answered` on, so that their bodies are left out.
-pub(super) fn lower<F: Float>(
+pub fn lower(
     module: &Module,
     info: &ModuleInfo,
     hooks: &[&str],
     answered: &[usize],
-) -> Result<Code, TraceError> {
+) -> Result<Code, KernelError> {
     let shapes = Shapes(module);
     let mut shared = Shared {
         shapes,
         hooks,
         globals: Vec::new(),
         layouts: Vec::new(),
+        ops: HashMap::new(),
     };
-    let (private, buffers) = place_globals::<F>(&mut shared)?;
+    let (private, buffers) = place_globals(&mut shared)?;
     let entry = module.entry_points.first();
     let entry = entry.ok_or_else(|| unsupported("kernel without an entry point", "main"))?;
     let is_answered = |function: &naga::Function| {
@@ -54,29 +60,45 @@ pub(super) fn lower<F: Float>(
         }
     }
     let mut functions = Vec::new();
-    let mut signatures = vec![None; hooks.len()];
     for (handle, function) in module.functions.iter() {
-        if let Some(hook) = hook_of(function, hooks).filter(|_| reached[handle.index()]) {
-            signatures[hook] = Some(Signature::of(function, shapes));
-        }
         let lowered = if reached[handle.index()] {
-            let lowering = Lowering::<F>::new(&mut shared, function, &info[handle])?;
+            let lowering = Lowering::new(&mut shared, function, &info[handle])?;
             Some(lowering.function(is_answered(function))?)
         } else {
             None
         };
         functions.push(lowered);
     }
-    let main = Lowering::<F>::new(&mut shared, &entry.function, info.get_entry_point(0))?;
+    let main = Lowering::new(&mut shared, &entry.function, info.get_entry_point(0))?;
     let main = main.function(false)?;
+    let mut ops: Vec<(Op, u32)> = shared.ops.into_iter().collect();
+    ops.sort_by_key(|(_, index)| *index);
     Ok(Code {
         functions,
         main,
+        inputs: inputs(shapes, &entry.function),
+        workgroup: entry.workgroup_size.iter().product(),
         private,
         buffers,
         layouts: shared.layouts,
-        signatures,
+        ops: ops.into_iter().map(|(op, _)| op).collect(),
     })
+}
+
+/// What each cell of the entry point's arguments is.
+fn inputs(shapes: Shapes<'_>, function: &naga::Function) -> Vec<Input> {
+    let of = |argument: &naga::FunctionArgument| {
+        let built_in = match argument.binding {
+            Some(naga::Binding::BuiltIn(built_in)) => Some(built_in),
+            _ => None,
+        };
+        let cells = shapes.cells(shapes.inner(argument.ty)).unwrap_or(0);
+        (0..cells).map(move |component| Input {
+            built_in,
+            component,
+        })
+    };
+    function.arguments.iter().flat_map(of).collect()
 }
 
 fn hook_of(function: &naga::Function, hooks: &[&str]) -> Option<usize> {
@@ -84,16 +106,13 @@ fn hook_of(function: &naga::Function, hooks: &[&str]) -> Option<usize> {
     hooks.iter().position(|hook| *hook == name)
 }
 
-pub(super) fn unsupported(what: &str, function: &str) -> TraceError {
-    TraceError::Unsupported {
-        what: what.to_owned(),
-        function: function.to_owned(),
-    }
+fn unsupported(what: &str, function: &str) -> KernelError {
+    KernelError::unsupported(what, function)
 }
 
 /// Gives every module-scope variable a place: the first values of those of the invocation, and the
 /// names of buffers.
-fn place_globals<F: Float>(shared: &mut Shared<'_>) -> Result<(Vec<u64>, Vec<String>), TraceError> {
+fn place_globals(shared: &mut Shared<'_>) -> Result<(Vec<Scalar>, Vec<String>), KernelError> {
     let module = shared.shapes.0;
     let (mut private, mut buffers) = (Vec::new(), Vec::new());
     for (_, variable) in module.global_variables.iter() {
@@ -103,15 +122,17 @@ fn place_globals<F: Float>(shared: &mut Shared<'_>) -> Result<(Vec<u64>, Vec<Str
             // A workgroup of one thread has its memory for itself.
             AddressSpace::Private | AddressSpace::WorkGroup => {
                 let at = private.len() as u32;
-                let cells = shared.shapes.cells(ty);
-                let cells = cells.ok_or_else(|| unsupported("variable of this type", &name))?;
                 match variable.init {
                     Some(init) => {
-                        let value = constant::<F>(shared.shapes, &module.global_expressions, init);
+                        let value = constant(shared.shapes, &module.global_expressions, init);
                         let value = value.ok_or_else(|| unsupported("first value", &name))?;
                         private.extend(value);
                     }
-                    None => private.resize(private.len() + cells as usize, 0),
+                    None => {
+                        let zero = shared.shapes.zero(ty);
+                        let zero = zero.ok_or_else(|| unsupported("variable of this type", &name));
+                        private.extend(zero?);
+                    }
                 }
                 Some(Pointer::Private(at))
             }
@@ -130,37 +151,37 @@ fn place_globals<F: Float>(shared: &mut Shared<'_>) -> Result<(Vec<u64>, Vec<Str
 }
 
 /// The cells of a constant expression; `None` if it is none.
-pub(super) fn constant<F: Float>(
+fn constant(
     shapes: Shapes<'_>,
     arena: &Arena<Expression>,
     expression: Handle<Expression>,
-) -> Option<Vec<u64>> {
+) -> Option<Vec<Scalar>> {
     let module = shapes.0;
     match &arena[expression] {
-        Expression::Literal(literal) => Some(vec![self::literal::<F>(*literal)?]),
+        Expression::Literal(literal) => Some(vec![self::literal(*literal)?]),
         Expression::Constant(handle) => {
             let init = module.constants[*handle].init;
-            constant::<F>(shapes, &module.global_expressions, init)
+            constant(shapes, &module.global_expressions, init)
         }
-        Expression::ZeroValue(ty) => Some(vec![0; shapes.cells(shapes.inner(*ty))? as usize]),
+        Expression::ZeroValue(ty) => shapes.zero(shapes.inner(*ty)),
         Expression::Compose { components, .. } => {
-            let parts = components.iter().map(|c| constant::<F>(shapes, arena, *c));
+            let parts = components.iter().map(|c| constant(shapes, arena, *c));
             Some(parts.collect::<Option<Vec<_>>>()?.concat())
         }
         Expression::Splat { size, value } => {
-            let value = constant::<F>(shapes, arena, *value)?;
+            let value = constant(shapes, arena, *value)?;
             Some(vec![*value.first()?; *size as usize])
         }
         _ => None,
     }
 }
 
-fn literal<F: Float>(literal: Literal) -> Option<u64> {
+fn literal(literal: Literal) -> Option<Scalar> {
     match literal {
-        Literal::F32(x) => Some(F::of_single(x).cell()),
-        Literal::U32(x) => Some(x.into()),
-        Literal::I32(x) => Some(signed(x)),
-        Literal::Bool(x) => Some(x.into()),
+        Literal::F32(x) => Some(Scalar::Float(x)),
+        Literal::U32(x) => Some(Scalar::Word(x)),
+        Literal::I32(x) => Some(Scalar::Word(x as u32)),
+        Literal::Bool(x) => Some(Scalar::Bool(x)),
         _ => None,
     }
 }
@@ -192,29 +213,30 @@ fn mark_calls(block: &naga::Block, reached: &mut [bool]) {
 }
 
 /// The lowering of one function.
-pub(super) struct Lowering<'s, 'm, F> {
+struct Lowering<'s, 'm> {
     pub shared: &'s mut Shared<'m>,
     pub shapes: Shapes<'m>,
     pub source: &'m naga::Function,
     pub info: &'m FunctionInfo,
     pub name: String,
     /// The frame as it is when a call begins.
-    pub image: Vec<u64>,
+    pub image: Vec<Scalar>,
     /// Where the values of expressions are.
     pub slots: Vec<Option<Slot>>,
     /// Where those point to that are pointers.
     pub pointers: Vec<Option<Pointer>>,
     arguments: Vec<Slot>,
     locals: Vec<Slot>,
-    floats: std::marker::PhantomData<F>,
+    /// Where variables are, and how many cells each has.
+    variables: Vec<(Slot, u32)>,
 }
 
-impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
+impl<'s, 'm> Lowering<'s, 'm> {
     fn new(
         shared: &'s mut Shared<'m>,
         source: &'m naga::Function,
         info: &'m FunctionInfo,
-    ) -> Result<Self, TraceError> {
+    ) -> Result<Self, KernelError> {
         let expressions = source.expressions.len();
         let mut this = Self {
             shapes: shared.shapes,
@@ -227,47 +249,46 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
             pointers: vec![None; expressions],
             arguments: Vec::new(),
             locals: Vec::new(),
-            floats: std::marker::PhantomData,
+            variables: Vec::new(),
         };
         for argument in &source.arguments {
-            let cells = this.cells(this.shapes.inner(argument.ty))?;
-            let slot = this.room(cells);
+            let slot = this.room(this.shapes.inner(argument.ty))?;
             this.arguments.push(slot);
         }
         Ok(this)
     }
 
-    fn function(mut self, answered: bool) -> Result<Function, TraceError> {
+    fn function(mut self, answered: bool) -> Result<Function, KernelError> {
         let arguments = self.image.len() as u32;
         let result = self.source.result.as_ref();
-        let result = result.map(|result| self.cells(self.shapes.inner(result.ty)));
-        let result = result.transpose()?.unwrap_or(0);
+        let result = result.map(|result| self.zero(self.shapes.inner(result.ty)));
+        let result = result.transpose()?.unwrap_or_default();
         let body = if answered {
             Vec::new()
         } else {
             self.place_locals()?;
             self.block(&self.source.body)?
         };
-        // There must be room for a result even if the function does not end by a return.
-        let least = self.image.len().max(result as usize);
-        self.image.resize(least, 0);
         Ok(Function {
             hook: hook_of(self.source, self.shared.hooks),
+            answered,
             name: self.name,
             image: self.image,
             arguments,
             result,
+            variables: self.variables,
             body,
         })
     }
 
-    fn place_locals(&mut self) -> Result<(), TraceError> {
+    fn place_locals(&mut self) -> Result<(), KernelError> {
         for (_, variable) in self.source.local_variables.iter() {
-            let cells = self.cells(self.shapes.inner(variable.ty))?;
-            let slot = self.room(cells);
+            let slot = self.room(self.shapes.inner(variable.ty))?;
+            let cells = self.image.len() as Slot - slot;
             self.locals.push(slot);
+            self.variables.push((slot, cells));
             if let Some(init) = variable.init {
-                let value = constant::<F>(self.shapes, &self.source.expressions, init);
+                let value = constant(self.shapes, &self.source.expressions, init);
                 let value = value.ok_or_else(|| self.unsupported("first value of a variable"))?;
                 self.image[slot as usize..][..value.len()].copy_from_slice(&value);
             }
@@ -275,45 +296,65 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         Ok(())
     }
 
-    pub(super) fn unsupported(&self, what: &str) -> TraceError {
+    fn unsupported(&self, what: &str) -> KernelError {
         unsupported(what, &self.name)
     }
 
-    pub(super) fn cells(&self, ty: &TypeInner) -> Result<u32, TraceError> {
+    fn cells(&self, ty: &TypeInner) -> Result<u32, KernelError> {
         let cells = self.shapes.cells(ty);
         cells.ok_or_else(|| self.unsupported("value of this type"))
     }
 
-    /// New cells of the frame.
-    pub(super) fn room(&mut self, cells: u32) -> Slot {
+    fn zero(&self, ty: &TypeInner) -> Result<Vec<Scalar>, KernelError> {
+        let zero = self.shapes.zero(ty);
+        zero.ok_or_else(|| self.unsupported("value of this type"))
+    }
+
+    /// New cells of the frame, for a value of a type.
+    fn room(&mut self, ty: &TypeInner) -> Result<Slot, KernelError> {
+        let value = self.zero(ty)?;
+        Ok(self.append(&value))
+    }
+
+    /// A new cell of the frame for a word.
+    fn word(&mut self) -> Slot {
+        self.append(&[Scalar::Word(0)])
+    }
+
+    /// The place of a value that the frame begins with.
+    fn append(&mut self, value: &[Scalar]) -> Slot {
         let at = self.image.len();
-        self.image.resize(at + cells as usize, 0);
+        self.image.extend_from_slice(value);
         at as Slot
     }
 
-    pub(super) fn ty(&self, expression: Handle<Expression>) -> &'m TypeInner {
+    /// The place of an operation in the code.
+    fn op(&mut self, op: Op) -> u32 {
+        let next = self.shared.ops.len() as u32;
+        *self.shared.ops.entry(op).or_insert(next)
+    }
+
+    fn ty(&self, expression: Handle<Expression>) -> &'m TypeInner {
         self.info[expression].ty.inner_with(&self.shapes.0.types)
     }
 
     /// The kind of an expression's numbers.
-    pub(super) fn kind(&self, expression: Handle<Expression>) -> Result<ScalarKind, TraceError> {
+    fn kind(&self, expression: Handle<Expression>) -> Result<ScalarKind, KernelError> {
         let kind = kind(self.ty(expression));
         kind.ok_or_else(|| self.unsupported("number of this type"))
     }
 
     /// Where the value of an expression is. Constants get their place when they are first used.
-    pub(super) fn slot(&mut self, expression: Handle<Expression>) -> Result<Slot, TraceError> {
+    fn slot(&mut self, expression: Handle<Expression>) -> Result<Slot, KernelError> {
         if let Some(slot) = self.slots[expression.index()] {
             return Ok(slot);
         }
         let slot = match &self.source.expressions[expression] {
             Expression::FunctionArgument(index) => self.arguments[*index as usize],
             other => {
-                let value = constant::<F>(self.shapes, &self.source.expressions, expression);
+                let value = constant(self.shapes, &self.source.expressions, expression);
                 let value = value.ok_or_else(|| self.unsupported(&word(other)))?;
-                let slot = self.room(value.len() as u32);
-                self.image[slot as usize..][..value.len()].copy_from_slice(&value);
-                slot
+                self.append(&value)
             }
         };
         self.slots[expression.index()] = Some(slot);
@@ -321,7 +362,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
     }
 
     /// Where a pointer points to.
-    pub(super) fn pointer(&self, expression: Handle<Expression>) -> Result<Pointer, TraceError> {
+    fn pointer(&self, expression: Handle<Expression>) -> Result<Pointer, KernelError> {
         if let Some(pointer) = self.pointers[expression.index()] {
             return Ok(pointer);
         }
@@ -340,7 +381,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
     }
 
     /// The layout in buffers of the values of a type, if the pointer is into one.
-    pub(super) fn layout(&mut self, pointer: Pointer, ty: &TypeInner) -> Result<u32, TraceError> {
+    fn layout(&mut self, pointer: Pointer, ty: &TypeInner) -> Result<u32, KernelError> {
         if !matches!(pointer, Pointer::Buffer { .. }) {
             return Ok(0);
         }
@@ -350,7 +391,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         Ok(self.shared.layouts.len() as u32 - 1)
     }
 
-    fn block(&mut self, block: &naga::Block) -> Result<Block, TraceError> {
+    fn block(&mut self, block: &naga::Block) -> Result<Block, KernelError> {
         let mut out = Vec::new();
         for statement in block {
             self.statement(statement, &mut out)?;
@@ -358,7 +399,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         Ok(out)
     }
 
-    fn statement(&mut self, statement: &Statement, out: &mut Block) -> Result<(), TraceError> {
+    fn statement(&mut self, statement: &Statement, out: &mut Block) -> Result<(), KernelError> {
         match statement {
             Statement::Emit(range) => {
                 for expression in range.clone() {
@@ -388,7 +429,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
                         falls_through: case.fall_through,
                     })
                 });
-                let cases = cases.collect::<Result<_, TraceError>>()?;
+                let cases = cases.collect::<Result<_, KernelError>>()?;
                 out.push(Node::Switch { selector, cases });
             }
             Statement::Loop {
@@ -433,7 +474,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         pointer: Handle<Expression>,
         value: Handle<Expression>,
         out: &mut Block,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let (at, ty) = (self.pointer(pointer)?, self.shapes.behind(self.ty(pointer)));
         let ins = Ins::Store {
             pointer: at,
@@ -452,36 +493,38 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         value: Handle<Expression>,
         result: Option<Handle<Expression>>,
         out: &mut Block,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let kind = self.kind(value)?;
-        let f: Option<Fn2> = match function {
-            AtomicFunction::Add => ops::binary::<F>(naga::BinaryOperator::Add, kind),
-            AtomicFunction::Subtract => ops::binary::<F>(naga::BinaryOperator::Subtract, kind),
-            AtomicFunction::And => ops::binary::<F>(naga::BinaryOperator::And, kind),
-            AtomicFunction::ExclusiveOr => {
-                ops::binary::<F>(naga::BinaryOperator::ExclusiveOr, kind)
+        let binary = |op| Some(Op::Binary(op, kind));
+        let op = match function {
+            AtomicFunction::Add => binary(BinaryOperator::Add),
+            AtomicFunction::Subtract => binary(BinaryOperator::Subtract),
+            AtomicFunction::And => binary(BinaryOperator::And),
+            AtomicFunction::ExclusiveOr => binary(BinaryOperator::ExclusiveOr),
+            AtomicFunction::InclusiveOr => binary(BinaryOperator::InclusiveOr),
+            AtomicFunction::Min => Some(Op::Math(MathFunction::Min, kind)),
+            AtomicFunction::Max => Some(Op::Math(MathFunction::Max, kind)),
+            AtomicFunction::Exchange { compare: None } => None,
+            AtomicFunction::Exchange { .. } => {
+                return Err(self.unsupported("atomic exchange with a comparison"));
             }
-            AtomicFunction::InclusiveOr => {
-                ops::binary::<F>(naga::BinaryOperator::InclusiveOr, kind)
-            }
-            AtomicFunction::Min => ops::math2::<F>(naga::MathFunction::Min, kind),
-            AtomicFunction::Max => ops::math2::<F>(naga::MathFunction::Max, kind),
-            AtomicFunction::Exchange { compare: None } => Some(|_, new| new),
-            AtomicFunction::Exchange { .. } => None,
         };
-        let f = f.ok_or_else(|| self.unsupported(&format!("atomic {}", word(function))))?;
+        if kind == ScalarKind::Float {
+            return Err(self.unsupported("atomic float"));
+        }
         let pointer = self.pointer(pointer)?;
         if !matches!(pointer, Pointer::Buffer { .. }) {
             return Err(self.unsupported("atomic variable outside of buffers"));
         }
         let value = self.slot(value)?;
         let to = result.map(|result| {
-            let to = self.room(1);
+            let to = self.word();
             self.slots[result.index()] = Some(to);
             to
         });
+        let function = op.map_or(Atomic::Exchange, |op| Atomic::Op(self.op(op)));
         out.push(Node::Ins(Ins::Atomic {
-            f,
+            function,
             pointer,
             value,
             to,
@@ -495,7 +538,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         arguments: &[Handle<Expression>],
         result: Option<Handle<Expression>>,
         out: &mut Block,
-    ) -> Result<(), TraceError> {
+    ) -> Result<(), KernelError> {
         let mut given = Vec::new();
         for argument in arguments {
             let ty = self.ty(*argument);
@@ -505,7 +548,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
                 if matches!(pointer, Pointer::Buffer { .. }) {
                     return Err(self.unsupported("pointer into a buffer as an argument"));
                 }
-                let to = self.room(1);
+                let to = self.word();
                 out.push(Node::Ins(Ins::Address { pointer, to }));
                 (to, 1)
             } else {
@@ -515,7 +558,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
         }
         let to = match result {
             Some(result) => {
-                let to = self.room(self.cells(self.ty(result))?);
+                let to = self.room(self.ty(result))?;
                 self.slots[result.index()] = Some(to);
                 Some(to)
             }
@@ -531,7 +574,7 @@ impl<'s, 'm, F: Float> Lowering<'s, 'm, F> {
 }
 
 /// What naga calls something: the first word of how it would be printed.
-pub(super) fn word(thing: &impl std::fmt::Debug) -> String {
+fn word(thing: &impl std::fmt::Debug) -> String {
     let text = format!("{thing:?}");
     text.chars().take_while(|c| c.is_alphanumeric()).collect()
 }

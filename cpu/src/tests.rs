@@ -1,22 +1,25 @@
 //! Small kernels of which it is known what they do: statements, memory, and what is refused.
 
-use crate::error::TraceError;
-use crate::float::Float;
+use std::sync::atomic::AtomicBool;
+
+use crate::code::Code;
+use crate::error::KernelError;
+use crate::interpret::{Float, Host, Machine};
 use crate::lower;
-use crate::machine::{Host, Machine};
+use crate::native::{Buffer, Invocation, Kernel};
 
 /// A host that looks at nothing.
 struct Nobody;
 
 impl Host for Nobody {
-    fn enter(&mut self, _: usize, _: &[u64], _: &mut Vec<u64>) -> Result<(), TraceError> {
+    fn enter(&mut self, _: usize, _: &[u64], _: &mut Vec<u64>) -> Result<(), KernelError> {
         Ok(())
     }
     fn leave(&mut self, _: usize, _: &[u64], _: &[u64]) {}
 }
 
-/// Runs `body` with the buffers `input` (words) and `result` (8 atomic words); what that holds then.
-fn run<F: Float>(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, TraceError> {
+/// The code of a kernel with the buffers `input` (words) and `result` (8 atomic words).
+fn code(functions: &str, body: &str) -> Result<Code, KernelError> {
     let text = format!(
         "@group(0) @binding(0) var<storage, read> input: array<vec4<u32>>;
          @group(0) @binding(1) var<storage, read_write> result: array<atomic<u32>>;
@@ -27,15 +30,37 @@ fn run<F: Float>(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>,
     let flags = naga::valid::ValidationFlags::all();
     let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::all());
     let info = validator.validate(&module).expect("valid WGSL");
-    let code = lower::lower::<F>(&module, &info, &[], &[])?;
+    lower(&module, &info, &[], &[])
+}
+
+/// Runs `body`; what `result` holds then.
+fn run<F: Float>(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, KernelError> {
+    let code = code(functions, body)?;
     let buffers = code.buffers.iter().map(|name| match name.as_str() {
         "input" => input.to_vec(),
         _ => vec![0; 8],
     });
-    let mut machine = Machine::<F>::new(&code, buffers.collect(), 10_000);
+    let mut machine = Machine::<F>::new(&code, buffers.collect(), 10_000)?;
     machine.run(&mut Nobody)?;
     let at = code.buffers.iter().position(|name| name == "result");
     Ok(at.map_or_else(Vec::new, |at| machine.buffers[at].clone()))
+}
+
+/// The same as machine code.
+fn run_native(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, KernelError> {
+    let code = code(functions, body)?;
+    let kernel = Kernel::build(&code, &[])?;
+    let given = Buffer::new(input.len().max(4));
+    given.write(0, input);
+    let result = Buffer::new(8);
+    let buffers = code.buffers.iter().map(|name| match name.as_str() {
+        "input" => &given,
+        _ => &result,
+    });
+    let buffers: Vec<&Buffer> = buffers.collect();
+    let stop = AtomicBool::new(false);
+    Invocation::new(&kernel, &buffers, &stop)?.run([0; 3], 0);
+    Ok(result.read())
 }
 
 #[track_caller]
@@ -43,8 +68,10 @@ fn gives(functions: &str, body: &str, expected: &[u32]) {
     let input: Vec<u32> = (0..16).collect();
     let single = run::<f32>(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
     let double = run::<f64>(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
+    let native = run_native(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(single[..expected.len()], *expected);
     assert_eq!(double[..expected.len()], *expected);
+    assert_eq!(native[..expected.len()], *expected);
 }
 
 #[test]

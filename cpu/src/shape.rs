@@ -5,8 +5,11 @@
 
 use naga::{ArraySize, Module, ScalarKind, TypeInner, VectorSize};
 
+use crate::code::Scalar;
+
 /// Where a part of a value begins within the whole.
-pub(super) struct Part {
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
     /// In cells.
     pub cell: u32,
     /// In bytes of a buffer.
@@ -15,15 +18,19 @@ pub(super) struct Part {
 
 /// How many of something that is indexed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Length {
+pub enum Length {
+    /// So many.
     Fixed(u32),
     /// As many as the buffer has room for.
     Open,
 }
 
 /// The elements of what is indexed.
-pub(super) struct Elements {
+#[derive(Clone, Debug)]
+pub struct Elements {
+    /// What each is.
     pub ty: TypeInner,
+    /// How many.
     pub length: Length,
     /// In cells.
     pub cells: u32,
@@ -31,28 +38,22 @@ pub(super) struct Elements {
     pub bytes: u32,
 }
 
-/// Whether a scalar is a float, whose cell depends on the precision.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    Float,
-    Word,
-}
-
 /// A scalar of a value in a buffer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub struct Place {
     /// Words from the beginning of the value.
     pub word: u32,
-    pub scalar: Scalar,
+    /// Whether it is a float, whose cell depends on the precision.
+    pub float: bool,
 }
 
 /// The types of a module.
-#[derive(Clone, Copy)]
-pub(super) struct Shapes<'m>(pub &'m Module);
+#[derive(Clone, Copy, Debug)]
+pub struct Shapes<'m>(pub &'m Module);
 
-impl Shapes<'_> {
+impl<'m> Shapes<'m> {
     /// Cells that a value takes; `None` for what is no value, such as an array of open length.
-    pub(super) fn cells(self, ty: &TypeInner) -> Option<u32> {
+    pub fn cells(self, ty: &TypeInner) -> Option<u32> {
         match ty {
             TypeInner::Scalar(_) | TypeInner::Atomic(_) => Some(1),
             TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. } => Some(1),
@@ -72,12 +73,36 @@ impl Shapes<'_> {
         }
     }
 
-    pub(super) fn inner(&self, ty: naga::Handle<naga::Type>) -> &TypeInner {
+    /// The cells of a value of zeros; `None` as for [`Shapes::cells`]. A pointer is a word.
+    pub fn zero(self, ty: &TypeInner) -> Option<Vec<Scalar>> {
+        match ty {
+            TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. } => {
+                Some(vec![Scalar::Word(0)])
+            }
+            TypeInner::Struct { members, .. } => {
+                let members = members.iter().map(|m| self.zero(self.inner(m.ty)));
+                Some(members.collect::<Option<Vec<_>>>()?.concat())
+            }
+            TypeInner::Array { .. } => {
+                let elements = self.elements(ty)?;
+                match elements.length {
+                    Length::Fixed(length) => {
+                        Some(self.zero(&elements.ty)?.repeat(length as usize))
+                    }
+                    Length::Open => None,
+                }
+            }
+            _ => Some(vec![Scalar::zero(kind(ty)?)?; self.cells(ty)? as usize]),
+        }
+    }
+
+    /// The type that a handle names.
+    pub fn inner(self, ty: naga::Handle<naga::Type>) -> &'m TypeInner {
         &self.0.types[ty].inner
     }
 
     /// What a pointer points to; the type itself if it is none.
-    pub(super) fn behind(self, ty: &TypeInner) -> TypeInner {
+    pub fn behind(self, ty: &TypeInner) -> TypeInner {
         match *ty {
             TypeInner::Pointer { base, .. } => self.inner(base).clone(),
             TypeInner::ValuePointer {
@@ -91,7 +116,7 @@ impl Shapes<'_> {
     }
 
     /// The elements of a vector, matrix or array.
-    pub(super) fn elements(self, ty: &TypeInner) -> Option<Elements> {
+    pub fn elements(self, ty: &TypeInner) -> Option<Elements> {
         match *ty {
             TypeInner::Vector { size, scalar } => Some(Elements {
                 ty: TypeInner::Scalar(scalar),
@@ -124,7 +149,7 @@ impl Shapes<'_> {
     }
 
     /// A member of a struct, or an element.
-    pub(super) fn part(self, ty: &TypeInner, index: u32) -> Option<Part> {
+    pub fn part(self, ty: &TypeInner, index: u32) -> Option<Part> {
         let TypeInner::Struct { members, .. } = ty else {
             let elements = self.elements(ty)?;
             return Some(Part {
@@ -144,7 +169,7 @@ impl Shapes<'_> {
     }
 
     /// Where the scalars of a value lie in a buffer, in the order of its cells.
-    pub(super) fn places(self, ty: &TypeInner) -> Option<Vec<Place>> {
+    pub fn places(self, ty: &TypeInner) -> Option<Vec<Place>> {
         let mut out = Vec::new();
         self.add_places(ty, 0, &mut out)?;
         Some(out)
@@ -153,14 +178,14 @@ impl Shapes<'_> {
     fn add_places(self, ty: &TypeInner, byte: u32, out: &mut Vec<Place>) -> Option<()> {
         match ty {
             TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => {
-                let kind = match (scalar.kind, scalar.width) {
-                    (ScalarKind::Float, 4) => Scalar::Float,
-                    (ScalarKind::Uint | ScalarKind::Sint, 4) => Scalar::Word,
+                let float = match (scalar.kind, scalar.width) {
+                    (ScalarKind::Float, 4) => true,
+                    (ScalarKind::Uint | ScalarKind::Sint, 4) => false,
                     _ => return None,
                 };
                 out.push(Place {
                     word: byte / 4,
-                    scalar: kind,
+                    float,
                 });
                 Some(())
             }
@@ -180,7 +205,7 @@ impl Shapes<'_> {
 }
 
 /// The kind of a scalar's or vector's or matrix's numbers, and whether those are 32 bits (or bools).
-pub(super) fn kind(ty: &TypeInner) -> Option<ScalarKind> {
+pub fn kind(ty: &TypeInner) -> Option<ScalarKind> {
     match ty {
         TypeInner::Scalar(scalar)
         | TypeInner::Vector { scalar, .. }
@@ -193,6 +218,6 @@ pub(super) fn kind(ty: &TypeInner) -> Option<ScalarKind> {
 }
 
 /// The components of a vector.
-pub(super) fn count(size: VectorSize) -> u32 {
+pub fn count(size: VectorSize) -> u32 {
     size as u32
 }

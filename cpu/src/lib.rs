@@ -1,0 +1,25 @@
+//! Runs WGSL kernels on the processor.
+//!
+//! A kernel that naga validated is lowered once, to functions over frames of typed cells. The interpreter
+//! runs that code in single or double precision and lets a host look at calls; native code is made of the
+//! same code, for rendering.
+//!
+//! | file | does |
+//! |---|---|
+//! | `code` | what lowering makes of a kernel: functions, instructions, operations |
+//! | `shape` | how values lie in cells and in buffers |
+//! | `lower` | from naga's IR to code |
+//! | `interpret` | runs code for one invocation, in either precision |
+//! | `native` | makes machine code of code, and runs it for many invocations |
+
+pub mod code;
+mod error;
+pub mod interpret;
+mod lower;
+pub mod native;
+pub mod shape;
+#[cfg(test)]
+mod tests;
+
+pub use error::KernelError;
+pub use lower::lower;

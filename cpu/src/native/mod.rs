@@ -1,0 +1,22 @@
+//! Makes machine code of a kernel's code, and runs it for many invocations.
+//!
+//! | file | does |
+//! |---|---|
+//! | `plan` | which functions are compiled on their own |
+//! | `layout` | the memory that code finds through its first argument |
+//! | `emit` | from code to the compiler's intermediate representation |
+//! | `constants`, `host` | what code refers to: tables, and functions of the host |
+//! | `build` | compiles, on all cores |
+//! | `run` | buffers, and invocations of the entry point |
+
+mod build;
+mod constants;
+mod emit;
+mod host;
+mod layout;
+mod plan;
+mod run;
+
+pub use build::{Kernel, Statistics};
+pub use host::Answer;
+pub use run::{Buffer, Invocation};
