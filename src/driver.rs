@@ -7,7 +7,7 @@ use impasto_compiler::partition::{Plan, PlanError, PlanInputs, Strategy};
 use impasto_compiler::{Compilation, MaterialRequest, Parameters, Program};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::film::outputs;
-use impasto_runtime::gpu::{Gpu, GpuOptions};
+use impasto_runtime::device::{Device, DeviceOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::Scene;
@@ -91,7 +91,7 @@ pub fn plan(program: &Program, strategy: Strategy) -> Result<Plan, PlanError> {
     strategy.plan(&PlanInputs::of_names(&names))
 }
 
-/// Renders on the most capable GPU, without showing progress; [`Renderer`] shows it and can be
+/// Renders on the most capable device, without showing progress; [`Renderer`] shows it and can be
 /// stopped.
 pub fn render(
     scene: &Scene,
@@ -99,7 +99,7 @@ pub fn render(
     plan: &Plan,
     options: &RenderOptions,
 ) -> Result<Rendering, Error> {
-    let gpu = Gpu::new(&GpuOptions::default())?;
-    let mut renderer = Renderer::new(&gpu, scene, program, plan, options)?;
+    let device = Device::open(&DeviceOptions::default())?;
+    let mut renderer = Renderer::new(&device, scene, program, plan, options)?;
     Ok(renderer.render(&mut |_| ControlFlow::Continue(()))?)
 }

@@ -37,6 +37,8 @@ pub use files::FileLoader;
 pub use ir_text::ir_text;
 pub use runtime::error::RuntimeError;
 pub use runtime::error::SceneError;
+pub use runtime::cpu::{Cpu, CpuOptions};
+pub use runtime::device::{Choice, Device, DeviceOptions};
 pub use runtime::gpu::{Gpu, GpuOptions};
 pub use runtime::options::RenderOptions;
 pub use runtime::render::{Renderer, Rendering};

@@ -8,11 +8,14 @@
 //! | [`scene`] | files to a [`scene::Scene`] |
 //! | [`world`] | a scene as kernels read it: [`wgsl::ShaderPart`]s, which are WGSL text with the buffers that it reads |
 //! | `kernels` | the text of every kernel that a plan needs |
-//! | [`gpu`] | device, pipelines, buffers, dispatches |
+//! | [`gpu`], [`cpu`] | pipelines, buffers, dispatches; native code and the threads that run it |
+//! | [`device`] | either of them |
 //! | [`render`] | a [`render::Renderer`] dispatches kernels until every path is done, and gives a [`film::Film`] and a [`render::report::Report`] |
 //! | [`lab`], [`audit`] | experiments on top of all |
 
 pub mod audit;
+pub mod cpu;
+pub mod device;
 pub mod error;
 pub mod film;
 mod fingerprint;

@@ -12,10 +12,10 @@ use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
 use impasto::converge::{Progress, Settings, StudyError, Subject, page, study};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Choice, Sampler};
-use impasto::{Gpu, files};
+use impasto::{Device, files};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::info::GpuArgs;
+use super::info::DeviceArgs;
 use super::render::{parse_size, progress_bar};
 use super::{Failure, Global, Outcome, compiled_scene, interrupt, print};
 
@@ -64,7 +64,7 @@ pub(super) struct ConvergeArgs {
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     #[command(flatten)]
-    gpu: GpuArgs,
+    device: DeviceArgs,
 }
 
 fn parse_strategy(name: &str) -> Result<Strategy, String> {
@@ -93,16 +93,16 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     make_folder(&args.out)?;
     files::check_writable(&args.out.join("convergence.json"))?;
     interrupt::install()?;
-    let gpu = args.gpu.open()?;
+    let device = args.device.open()?;
     let mut convergence = Convergence {
         command: command(),
         version: env!("CARGO_PKG_VERSION").into(),
-        adapter: gpu.info().into(),
+        adapter: device.info().into(),
         scenes: Vec::new(),
     };
     let mut pictures = Pictures::default();
     for (path, name) in args.scenes.iter().zip(names) {
-        let (found, shown) = args.study(path, name, &gpu, &settings, global)?;
+        let (found, shown) = args.study(path, name, &device, &settings, global)?;
         summarise(&found, global);
         convergence.scenes.push(found);
         pictures.scenes.push(shown);
@@ -146,7 +146,7 @@ impl ConvergeArgs {
         &self,
         path: &Path,
         name: String,
-        gpu: &Gpu,
+        device: &Device,
         settings: &Settings,
         global: &Global,
     ) -> Result<Studied, Failure> {
@@ -178,7 +178,7 @@ impl ConvergeArgs {
                 ControlFlow::Continue(())
             }
         };
-        let found = study(gpu, &subject, &self.out, settings, &mut progress);
+        let found = study(device.into(), &subject, &self.out, settings, &mut progress);
         bar.finish_and_clear();
         found.map_err(|error| self.failure(error, global))
     }

@@ -106,7 +106,7 @@ enum Command {
     /// Merge parts of a render into one picture
     Merge(merge::MergeArgs),
     /// Show the GPU that renders would use, and its limits
-    Info(info::GpuArgs),
+    Info(info::DeviceArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
     Explain(explain::ExplainArgs),
     /// Print a completion script for a shell

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use impasto::compiler::partition::DeviceProfile;
-use impasto::runtime::gpu::GpuInfo;
+use impasto::runtime::gpu::DeviceInfo;
 
 use super::{Failure, read_text};
 
@@ -33,7 +33,7 @@ impl Profile {
     }
 
     /// The shipped profile that fits a GPU best.
-    pub(super) fn of(info: &GpuInfo) -> Result<Self, Failure> {
+    pub(super) fn of(info: &DeviceInfo) -> Result<Self, Failure> {
         let choice = DeviceProfile::shipped(&info.name, info.kind).map_err(|e| e.to_string())?;
         Ok(Self {
             name: choice.name.to_string(),

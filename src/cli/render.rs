@@ -20,14 +20,14 @@ use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
-    FileLoader, Gpu, Plan, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene,
+    Device, FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene,
     Strategy, files, plan,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::checkpoint::CheckpointArgs;
 use super::dropped;
-use super::info::GpuArgs;
+use super::info::DeviceArgs;
 use super::outputs::{Outputs, aov_help, parse_exposure};
 use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
@@ -77,7 +77,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     #[command(flatten)]
-    gpu: GpuArgs,
+    device: DeviceArgs,
     #[command(flatten)]
     technique: TechniqueArgs,
 }
@@ -114,14 +114,14 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let started = Instant::now();
     let program = Arc::new(compile(&scene, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
-    let planned = args.planned(&scene, &program)?;
+    let device = args.device.open()?;
+    let planned = args.planned(&scene, &program, &device)?;
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
-    let gpu = args.gpu.open()?;
     let options = args.options(planned.renewed_by.is_some(), goals.is_some());
-    let mut renderer = build(&gpu, &scene, &program, &planned.plan, &options, global)?;
+    let mut renderer = build(&device, &scene, &program, &planned.plan, &options, global)?;
     if let Some(strategy) = planned.renewed_by {
-        let profile = given.map_or_else(|| Profile::of(&gpu.info()), Ok)?;
+        let profile = given.map_or_else(|| Profile::of(&device.info()), Ok)?;
         if !profile.exact {
             global.detail("no profile is of this GPU; `impasto calibrate` makes one");
         }
@@ -167,15 +167,24 @@ struct Planned {
 
 impl RenderArgs {
     /// The plan that was asked for. A strategy that must know how paths hit materials begins with a kernel
-    /// a material, and plans when that is known.
-    fn planned(&self, scene: &Scene, program: &Program) -> Result<Planned, Failure> {
+    /// a material, and plans when that is known. The processor has one kernel whatever the materials.
+    fn planned(
+        &self,
+        scene: &Scene,
+        program: &Program,
+        device: &Device,
+    ) -> Result<Planned, Failure> {
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = plan::unused(scene, program);
         let fixed = |plan| Planned {
             plan,
             renewed_by: None,
         };
-        let strategy = match self.plan.source(&names, &unused, Strategy::AUTO)? {
+        let default = match device {
+            Device::Gpu(_) => Strategy::AUTO,
+            Device::Cpu(_) => Strategy::MEGA,
+        };
+        let strategy = match self.plan.source(&names, &unused, default)? {
             Source::Given(plan) => return Ok(fixed(plan)),
             Source::Strategy(strategy) => strategy,
         };
@@ -278,7 +287,7 @@ fn interrupted_early(global: &Global) -> Failure {
 
 /// Makes everything ready for sampling, and shows how far that is: very many materials take a while.
 fn build<'g>(
-    gpu: &'g Gpu,
+    device: &'g Device,
     scene: &Scene,
     program: &Program,
     plan: &Plan,
@@ -296,7 +305,7 @@ fn build<'g>(
             ControlFlow::Continue(())
         }
     };
-    let renderer = Renderer::new_watched(gpu, scene, program, plan, options, &watch);
+    let renderer = Renderer::new_watched(device, scene, program, plan, options, &watch);
     bar.finish_and_clear();
     renderer.map_err(|error| match error {
         RuntimeError::Interrupted => interrupted_early(global),

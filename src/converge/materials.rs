@@ -88,7 +88,7 @@ fn time(
         ..stage.options(sampler, 1 << 16)
     };
     let (world, program) = (&stage.world, stage.subject.program);
-    let mut renderer = Renderer::from_world(stage.gpu, world, program, plan, &options)?;
+    let mut renderer = Renderer::from_world(stage.device, world, program, plan, &options)?;
     let mut warm = false;
     for (material, some) in pixels {
         renderer.select_pixels(some.clone())?;

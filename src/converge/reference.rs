@@ -214,7 +214,7 @@ impl<'a> Maker<'a> {
                 // As many paths in flight as any render has.
                 let options = stage.options(Sampler::Owen, 1 << 16);
                 let (world, program) = (&stage.world, stage.subject.program);
-                Renderer::from_world(stage.gpu, world, program, self.plan, &options)?
+                Renderer::from_world(stage.device, world, program, self.plan, &options)?
             }
         };
         Ok(self.renderer.insert(renderer))

@@ -188,7 +188,7 @@ impl<'a> Bench<'a> {
         } = self.task;
         let options = stage.options(*sampler, samples);
         let (world, program) = (&stage.world, stage.subject.program);
-        let mut renderer = Renderer::from_world(stage.gpu, world, program, plan, &options)?;
+        let mut renderer = Renderer::from_world(stage.device, world, program, plan, &options)?;
         let warm_up = Samples {
             seed: self.task.seeds.start,
             first: 0,

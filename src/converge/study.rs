@@ -8,7 +8,7 @@ use std::time::Duration;
 use impasto_compiler::partition::{Plan, Strategy};
 use impasto_runtime::film::Film;
 use impasto_runtime::film::output;
-use impasto_runtime::gpu::Gpu;
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::technique::{Choice, Sampler};
 
 use super::data::{Errors, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series};
@@ -52,13 +52,13 @@ const TIME_OF_RENDERS: f64 = 0.5;
 /// If the scene cannot be rendered so, results cannot be kept, or `progress` asked for an end: what was
 /// done by then is kept.
 pub fn study(
-    gpu: &Gpu,
+    device: DeviceRef<'_>,
     subject: &Subject<'_>,
     folder: &Path,
     settings: &Settings,
     progress: OnProgress<'_>,
 ) -> Result<(SceneConvergence, ScenePictures), StudyError> {
-    let stage = Stage::new(gpu, subject, settings.pool)?;
+    let stage = Stage::new(device, subject, settings.pool)?;
     let given = settings.reference.as_deref();
     let given = given.map(|path| read_reference(path, &stage)).transpose()?;
     let folder = folder.join(&subject.name);

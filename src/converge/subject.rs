@@ -2,7 +2,7 @@
 
 use impasto_compiler::Program;
 use impasto_compiler::partition::{DeviceProfile, Plan, PlanInputs, Requires, Strategy};
-use impasto_runtime::gpu::Gpu;
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::identity;
 use impasto_runtime::scene::Scene;
@@ -31,7 +31,7 @@ pub struct Subject<'a> {
 
 /// A subject as the GPU will see it.
 pub(super) struct Stage<'a> {
-    pub gpu: &'a Gpu,
+    pub device: DeviceRef<'a>,
     pub subject: &'a Subject<'a>,
     pub world: World,
     pub pool: Option<u32>,
@@ -39,13 +39,13 @@ pub(super) struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     pub(super) fn new(
-        gpu: &'a Gpu,
+        device: DeviceRef<'a>,
         subject: &'a Subject<'a>,
         pool: Option<u32>,
     ) -> Result<Self, StudyError> {
         let technique = Technique::default();
         Ok(Self {
-            gpu,
+            device,
             subject,
             world: World::of_program(subject.scene, subject.program, &technique)?,
             pool,
@@ -73,10 +73,10 @@ impl<'a> Stage<'a> {
     /// one sampler stands for all.
     pub(super) fn key(&self) -> Result<Key, StudyError> {
         let options = self.options(Sampler::Owen, 1);
-        let identity = identity(self.gpu, &self.world, self.subject.program, &options)?;
+        let identity = identity(self.device, &self.world, self.subject.program, &options)?;
         Ok(Key {
             version: env!("CARGO_PKG_VERSION").into(),
-            adapter: self.gpu.info().into(),
+            adapter: self.device.info().into(),
             size: (self.world.width, self.world.height),
             pool: self.pool,
             scene: format!("{:016x}", identity.scene),
@@ -103,8 +103,11 @@ impl<'a> Stage<'a> {
         if requires == Requires::Costs {
             return strategy.plan(&inputs).map_err(error);
         }
-        let workload = plan::workload(self.gpu, scene, program, self.pool)?;
-        let info = self.gpu.info();
+        let DeviceRef::Gpu(gpu) = self.device else {
+            return Ok(Plan::mega(&names, &unused));
+        };
+        let workload = plan::workload(gpu, scene, program, self.pool)?;
+        let info = self.device.info();
         let profile = DeviceProfile::shipped(&info.name, info.kind)
             .map_err(|e| StudyError::Plan(e.to_string()))?
             .profile;

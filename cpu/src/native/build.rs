@@ -1,6 +1,5 @@
 //! Compiles the functions of a kernel, several at a time, and brings them to memory that may run.
 
-use std::ffi::c_void;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -19,6 +18,7 @@ use super::emit::{self, Emitter, Shared};
 use super::host::Answer;
 use super::layout::{self, Layout};
 use super::plan::Plan;
+use super::run::MOST_INPUTS;
 use crate::code::{Code, Function, Input, Scalar};
 use crate::error::KernelError;
 
@@ -39,7 +39,7 @@ pub struct Kernel {
     /// Tables that the code refers to.
     _constants: Arc<Constants>,
     /// The memory that the code is in.
-    memory: Option<Module_>,
+    memory: Option<Memory>,
 }
 
 /// What it took to build a kernel.
@@ -54,9 +54,9 @@ pub struct Statistics {
 }
 
 /// Code in memory, which is given back when nothing can run it any more.
-struct Module_(JITModule);
+struct Memory(JITModule);
 
-impl std::fmt::Debug for Module_ {
+impl std::fmt::Debug for Memory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("code")
     }
@@ -88,21 +88,23 @@ struct Compiled {
 }
 
 impl Kernel {
-    /// Compiles `code`. By hook, `answers` are what is called in place of functions that the host answers, and
-    /// what each is given along: whoever runs the kernel says by that that both are what they seem.
+    /// Compiles `code`. By hook, `answers` are called in place of functions that the host answers.
     ///
     /// # Errors
     /// If the code has what is not known here, the processor is none that code can be made for, or there is no
     /// memory for code.
     pub fn build(
         code: &Code,
-        answers: &[Option<(Answer, *const c_void)>],
+        answers: &[Option<Answer>],
     ) -> Result<Self, KernelError> {
         let begin = Instant::now();
+        if code.inputs.len() > MOST_INPUTS {
+            return Err(KernelError::unsupported("entry point of so many arguments", "main"));
+        }
         let isa = isa()?;
         let constants = Arc::new(Constants::default());
         let plan = Plan::new(code);
-        let layout = Layout::of(code);
+        let layout = Layout::of(code, answers.len());
         let shared = Shared {
             code,
             plan: &plan,
@@ -122,9 +124,8 @@ impl Kernel {
             let id = id.map_err(|e| memory(&e))?;
             debug_assert_eq!(id.as_u32() as usize, index);
         }
-        let shared = Synchronous(&shared);
         let compiled = own.par_iter().map(|(index, function)| {
-            compile(shared.get(), isa.as_ref(), *index, function)
+            compile(&shared, isa.as_ref(), *index, function)
         });
         let compiled: Vec<Compiled> = compiled.collect::<Result<_, _>>()?;
         let main = FuncId::from_u32(code.functions.len() as u32);
@@ -154,21 +155,15 @@ impl Kernel {
             buffers: code.buffers.iter().cloned().zip(least).collect(),
             statistics,
             _constants: constants,
-            memory: Some(Module_(module)),
+            memory: Some(Memory(module)),
         })
     }
 }
 
-/// What several threads read while they compile.
-struct Synchronous<'a>(&'a Shared<'a>);
-
-// SAFETY: the addresses that are given along are not looked at, but become numbers of the code.
-#[allow(unsafe_code)]
-unsafe impl Sync for Synchronous<'_> {}
-
-impl<'a> Synchronous<'a> {
-    fn get(&self) -> &'a Shared<'a> {
-        self.0
+impl Kernel {
+    /// The names of the buffers that it binds, in the order in which they are given.
+    pub fn buffers(&self) -> impl Iterator<Item = &str> {
+        self.buffers.iter().map(|(name, _)| name.as_str())
     }
 }
 
@@ -183,7 +178,7 @@ fn own_functions<'c>(code: &'c Code, plan: &Plan) -> Vec<(usize, &'c Function)> 
 }
 
 /// This machine's processor, with all that it can do.
-fn isa() -> Result<OwnedTargetIsa, KernelError> {
+pub(super) fn isa() -> Result<OwnedTargetIsa, KernelError> {
     let processor = |e: &dyn std::fmt::Display| KernelError::Processor(e.to_string());
     let mut flags = settings::builder();
     for (name, value) in [

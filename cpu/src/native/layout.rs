@@ -13,6 +13,8 @@ const EXCHANGE: u32 = 256;
 pub(super) struct Layout {
     /// Buffers that the code binds.
     pub buffers: u32,
+    /// Functions that the host may answer.
+    pub hooks: u32,
     /// Cells of the module's variables.
     pub private: u32,
 }
@@ -21,9 +23,10 @@ pub(super) struct Layout {
 pub(super) const STOP: i32 = 0;
 
 impl Layout {
-    pub(super) fn of(code: &Code) -> Self {
+    pub(super) fn of(code: &Code, hooks: usize) -> Self {
         Self {
             buffers: code.buffers.len() as u32,
+            hooks: hooks as u32,
             private: code.private.len() as u32,
         }
     }
@@ -33,9 +36,14 @@ impl Layout {
         (8 + 16 * index) as i32
     }
 
+    /// What a function of the host is given along.
+    pub(super) fn data(self, hook: u32) -> i32 {
+        self.buffer(self.buffers) + 8 * hook as i32
+    }
+
     /// Where words go from and to a function of the host.
     pub(super) fn exchange(self) -> i32 {
-        self.buffer(self.buffers)
+        self.data(self.hooks)
     }
 
     /// How many words fit there.

@@ -7,6 +7,7 @@
 //! | `emit` | from code to the compiler's intermediate representation |
 //! | `constants`, `host` | what code refers to: tables, and functions of the host |
 //! | `build` | compiles, on all cores |
+//! | `processor` | what this machine has |
 //! | `run` | buffers, and invocations of the entry point |
 
 mod build;
@@ -15,8 +16,10 @@ mod emit;
 mod host;
 mod layout;
 mod plan;
+mod processor;
 mod run;
 
 pub use build::{Kernel, Statistics};
 pub use host::Answer;
+pub use processor::{check, compiler, features, processor};
 pub use run::{Buffer, Invocation};

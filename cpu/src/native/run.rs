@@ -1,5 +1,6 @@
 //! Buffers of kernels, and invocations of their entry points.
 
+use std::ffi::c_void;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use naga::BuiltIn;
@@ -31,6 +32,11 @@ impl Buffer {
         }
     }
 
+    /// Puts zeros in place of all words.
+    pub fn clear(&self) {
+        self.0.iter().for_each(|word| word.store(0, Ordering::Relaxed));
+    }
+
     /// A copy of its words.
     pub fn read(&self) -> Vec<u32> {
         self.0.iter().map(|word| word.load(Ordering::Relaxed)).collect()
@@ -45,14 +51,20 @@ pub struct Invocation<'k> {
 }
 
 impl<'k> Invocation<'k> {
-    /// Prepares to run `kernel` with its buffers, in the order that it names them. What is no number of turns
-    /// ends when `stop` is set, with whatever results.
+    /// Prepares to run `kernel` with its buffers, in the order that it names them. All loops end when `stop`
+    /// is set, with whatever results.
+    ///
+    /// # Safety
+    /// By hook, `data` is what the answers that the kernel was built with are given along: for as long as
+    /// the invocation lives, it must be what each expects.
     ///
     /// # Errors
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
-    pub fn new(
+    #[allow(unsafe_code)]
+    pub unsafe fn new(
         kernel: &'k Kernel,
         buffers: &[&'k Buffer],
+        data: &[*const c_void],
         stop: &'k AtomicBool,
     ) -> Result<Self, KernelError> {
         let layout = kernel.layout;
@@ -70,6 +82,9 @@ impl<'k> Invocation<'k> {
             let at = layout.buffer(index as u32) as usize / 8;
             context[at] = buffer.0.as_ptr() as u64;
             context[at + 1] = bytes;
+        }
+        for (hook, data) in (0..layout.hooks).zip(data) {
+            context[layout.data(hook) as usize / 8] = *data as u64;
         }
         Ok(Self { kernel, context })
     }
@@ -96,9 +111,8 @@ impl<'k> Invocation<'k> {
         }
         let context = self.context.as_mut_ptr();
         // SAFETY: `Kernel::build` made the entry point with one parameter for the context and one word for
-        // each of its inputs, of which it refuses more than these; words behind those that it has are not looked at by the callee,
-        // since the caller removes them. The context is as the kernel's layout says, and what it points to
-        // is borrowed.
+        // each of its inputs, of which there are no more than these; registers of others are not looked at.
+        // The context is as the kernel's layout says, and what it points to is borrowed.
         unsafe {
             type Main = unsafe extern "C" fn(*mut u64, u32, u32, u32, u32, u32);
             let main: Main = std::mem::transmute(kernel.main);

@@ -9,10 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use impasto_compiler::abi::MaterialInfo;
 use serde::Serialize;
-use wgpu::naga::{Expression, Function, Module};
+use naga::{Expression, Function, Module};
 
 use crate::error::RuntimeError;
-use crate::gpu::shader::validate;
+use crate::kernels::validate::validate;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Kernel, Sizes};
 use crate::kernels::stages::STAGES;

@@ -2,13 +2,13 @@
 //! another by other means, and must run what GPUs run.
 
 use impasto_compiler::partition::Plan;
-use wgpu::naga::Module;
-use wgpu::naga::valid::ModuleInfo;
+use naga::Module;
+use naga::valid::ModuleInfo;
 
 use crate::error::RuntimeError;
 use crate::film::layers::Layers;
 use crate::film::{self, Sums};
-use crate::gpu::shader::validate;
+use crate::kernels::validate::validate;
 use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::{dropped, run};

@@ -80,6 +80,24 @@ pub enum RuntimeError {
         /// Iterations that the longest path takes.
         expected: u64,
     },
+    /// No native code can be made or run here.
+    #[error(
+        "the processor cannot render by its own code: {0}\n  hint: render on a GPU (`--device gpu`); Mesa's software driver is one (Debian and Ubuntu: `apt install mesa-vulkan-drivers libvulkan1`)"
+    )]
+    NoNativeCode(String),
+    /// The system does not start so many threads.
+    #[error("{threads} threads could not be started: {reason}\n  hint: ask for fewer (`--threads`)")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// Why not.
+        reason: String,
+    },
+    /// What only GPUs do is asked of the processor.
+    #[error(
+        "{0} needs a GPU, which the processor is not\n  hint: choose a GPU (`--device gpu`, `--gpu NAME`)"
+    )]
+    NeedsGpu(&'static str),
     /// Whoever watched the building of a renderer broke it off.
     #[error("interrupted while kernels were built")]
     Interrupted,

@@ -1,19 +1,19 @@
-//! What a GPU is and can do, for `impasto info` and for reports.
+//! What a device is and can do, for `impasto info` and for reports.
 
 use serde::Serialize;
 
 use super::{Gpu, USED_FEATURES};
 
-/// A GPU's identity and what Impasto uses of it. Sizes are in bytes.
+/// A device's identity and what Impasto uses of it. Sizes are in bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct GpuInfo {
-    /// The adapter's name, such as `NVIDIA H200`.
+pub struct DeviceInfo {
+    /// The name of the adapter or processor, such as `NVIDIA H200`.
     pub name: String,
-    /// The interface it is reached through: vulkan, metal, dx12.
+    /// The interface it is reached through: vulkan, metal, dx12, or native.
     pub backend: String,
-    /// The driver's name and version.
+    /// The driver's name and version, or what makes native code.
     pub driver: String,
-    /// Discrete, integrated, virtual, software or other.
+    /// Discrete, integrated, virtual, software, processor or other.
     pub kind: &'static str,
     /// The limits that bound pictures and scenes, by their WebGPU names.
     pub limits: Vec<(&'static str, u64)>,
@@ -23,7 +23,7 @@ pub struct GpuInfo {
     pub features_missing: Vec<String>,
 }
 
-impl GpuInfo {
+impl DeviceInfo {
     pub(super) fn new(gpu: &Gpu) -> Self {
         let info = gpu.adapter.get_info();
         let limits = gpu.device.limits();
@@ -71,7 +71,7 @@ fn names(features: wgpu::Features) -> Vec<String> {
         .collect()
 }
 
-impl std::fmt::Display for GpuInfo {
+impl std::fmt::Display for DeviceInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let list = |names: &[String]| match names {
             [] => "none".to_string(),

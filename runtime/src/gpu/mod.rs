@@ -12,9 +12,11 @@ pub(crate) mod resources;
 pub(crate) mod schedule;
 pub(crate) mod shader;
 pub(crate) mod statistics;
+pub(crate) mod submission;
 mod timing;
+pub(crate) mod work;
 
-pub use info::GpuInfo;
+pub use info::DeviceInfo;
 pub use statistics::KernelStatistics;
 pub use timing::Timing;
 
@@ -32,8 +34,8 @@ pub struct GpuOptions {
     pub timing: Timing,
 }
 
-/// An open GPU.
-#[derive(Debug)]
+/// An open GPU; copies are of the same.
+#[derive(Clone, Debug)]
 pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -85,19 +87,6 @@ impl Gpu {
         })
     }
 
-    /// The same GPU, for another thread.
-    pub(crate) fn share(&self) -> Self {
-        Self {
-            device: self.device.clone(),
-            queue: self.queue.clone(),
-            adapter: self.adapter.clone(),
-            checked: self.checked,
-            timing: self.timing,
-            failure: self.failure.clone(),
-            pipelines: self.pipelines.clone(),
-        }
-    }
-
     /// What wgpu has to say against what `work` does on this thread, which nobody else then hears of.
     pub(crate) fn guarded<T>(
         &self,
@@ -124,9 +113,16 @@ impl Gpu {
         adapters.iter().map(|a| a.get_info().name).collect()
     }
 
+    /// Whether there is a GPU that is no software.
+    pub fn has_hardware() -> bool {
+        let adapters = adapters(false);
+        let first = adapters.first();
+        first.is_some_and(|a| a.get_info().device_type != wgpu::DeviceType::Cpu)
+    }
+
     /// What the GPU is and can do.
-    pub fn info(&self) -> GpuInfo {
-        GpuInfo::new(self)
+    pub fn info(&self) -> DeviceInfo {
+        DeviceInfo::new(self)
     }
 
     /// Whether the "GPU" is the processor: smaller portions of work keep it responsive.

@@ -1,5 +1,4 @@
-//! From WGSL text to a pipeline: validation first, so that a defect of code generation is
-//! reported with the line it concerns and never reaches a driver.
+//! From WGSL text to a pipeline: validation first, so that no defect of code generation reaches a driver.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -9,29 +8,8 @@ use wgpu::naga;
 
 use super::Gpu;
 use crate::error::RuntimeError;
+use crate::kernels::validate::validate;
 use crate::world::bvh;
-
-/// Parses and validates `wgsl`, the text of the kernel called `kernel`.
-pub(crate) fn validate(
-    kernel: &str,
-    wgsl: &str,
-) -> Result<(naga::Module, naga::valid::ModuleInfo), RuntimeError> {
-    let failure = |message| RuntimeError::Shader {
-        kernel: kernel.to_string(),
-        message,
-    };
-    let module = naga::front::wgsl::parse_str(wgsl)
-        .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
-    let flags = naga::valid::ValidationFlags::all();
-    // `unpack2x16float` is plain WGSL; naga asks for a capability for the sake of one driver.
-    let capabilities = naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32
-        | naga::valid::Capabilities::SUBGROUP
-        | naga::valid::Capabilities::SUBGROUP_BARRIER;
-    let info = naga::valid::Validator::new(flags, capabilities)
-        .validate(&module)
-        .map_err(|e| failure(e.emit_to_string_with_path(wgsl, kernel)))?;
-    Ok((module, info))
-}
 
 /// Pipelines of kernels that were built before, by their text, which also says what they bind: what is
 /// rendered again with another seed or number of samples is not compiled again.

@@ -12,7 +12,7 @@ use crate::gpu::resources::Resources;
 use crate::gpu::schedule::Schedule;
 use crate::kernels::buffers::BufferId;
 use crate::kernels::queues::Counters;
-use crate::render::status::{Status, Submission};
+use crate::gpu::submission::Submission;
 
 /// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
 const WARM_UP: Duration = Duration::from_millis(200);
@@ -138,12 +138,11 @@ impl<'r> Lane<'r> {
     }
 
     fn wait(&mut self, gpu: &Gpu) -> Result<Sample, RuntimeError> {
-        let mut status = Status::new(self.run.schedule.steps.len());
-        self.submission.wait(gpu, &self.run.schedule, &mut status)?;
+        let done = self.submission.wait(gpu, &self.run.schedule)?;
         Ok(Sample {
-            steps: status.step_seconds,
-            total: status.gpu_seconds,
-            counters: status.counters,
+            steps: done.step_seconds,
+            total: done.seconds,
+            counters: done.counters,
         })
     }
 }

@@ -146,7 +146,7 @@ impl<'a> Lab<'a> {
         layout.counters.binned = true;
         render.technique = layout.technique(render.technique);
         inputs.technique = render.technique;
-        let sizes = pool::sizes(gpu, world, &layout, &render)?;
+        let sizes = pool::sizes(gpu.into(), world, &layout, &render)?;
         let composer = Composer {
             queue_table: true,
             ..inputs.composer(&own, layout, sizes)

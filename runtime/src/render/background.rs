@@ -10,9 +10,11 @@ use impasto_compiler::partition::{Organisation, Plan, Workload};
 
 use super::Planner;
 use super::build::{BuiltPlan, CompositionInputs, build_all, build_step};
+use crate::device::Work;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
-use crate::gpu::schedule::{Schedule, Step};
+use crate::gpu::schedule::Step;
+use crate::gpu::work;
 use crate::kernels::modules::Kernel;
 use crate::technique::Technique;
 use crate::world::needs::Need;
@@ -30,6 +32,8 @@ pub(super) struct Job {
     pub technique: Technique,
     /// The plan that runs meanwhile.
     pub present: BuiltPlan,
+    /// Its buffers and dispatches.
+    pub present_work: work::Work,
     /// Set when nobody waits for it any more.
     pub cancelled: Arc<AtomicBool>,
 }
@@ -96,9 +100,9 @@ impl Job {
         // Without other queues nothing differs but the logic kernel, which counted hits.
         let same = does_the_same(plan, &present.plan);
         let resources = if same {
-            present.resources.clone()
+            self.present_work.resources.clone()
         } else {
-            present.resources.for_plan(gpu, &composer)
+            self.present_work.resources.for_plan(gpu, &composer)
         };
         let build = |kernel: &Kernel| {
             let built = self.built(kernel).filter(|_| same);
@@ -116,19 +120,14 @@ impl Job {
             layout: composer.layout,
             sizes,
             kernels,
-            schedule: Schedule {
-                steps,
-                arguments: resources.arguments().clone(),
-                timing: gpu.timing,
-            },
-            resources,
+            work: Work::Gpu(work::Work::new(gpu, resources, steps)),
         })
     }
 
     /// The dispatch of the present plan's kernel with the same text.
     fn built(&self, kernel: &Kernel) -> Option<Step> {
         let kernels = self.present.kernels.iter();
-        let mut built = kernels.zip(&self.present.schedule.steps);
+        let mut built = kernels.zip(&self.present_work.schedule.steps);
         let found = built.find(|(present, _)| present.wgsl == kernel.wgsl);
         found.map(|(_, step)| step.clone())
     }

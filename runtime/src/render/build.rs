@@ -12,9 +12,11 @@ use impasto_compiler::partition::workload::BLOCK;
 use super::{RenderOptions, Renderer, ReportInputs};
 use crate::error::RuntimeError;
 use crate::film::file::Identity;
-use crate::gpu::Gpu;
+use crate::cpu;
+use crate::device::{DeviceRef, Work};
 use crate::gpu::resources::Resources;
-use crate::gpu::schedule::{Schedule, Size, Step};
+use crate::gpu::schedule::{Size, Step};
+use crate::gpu::{self, Gpu};
 use crate::kernels::buffers::ARGUMENT_BYTES;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Composer, DispatchSource, Kernel, Sizes};
@@ -37,8 +39,17 @@ pub(super) struct BuiltPlan {
     pub layout: PlanLayout,
     pub sizes: Sizes,
     pub kernels: Vec<Kernel>,
-    pub resources: Resources,
-    pub schedule: Schedule,
+    pub work: Work,
+}
+
+impl BuiltPlan {
+    /// Whether what one counts the other does.
+    pub(super) fn shares_counters(&self, other: &Self) -> bool {
+        match (&self.work, &other.work) {
+            (Work::Gpu(a), Work::Gpu(b)) => a.resources.counters() == b.resources.counters(),
+            _ => true,
+        }
+    }
 }
 
 /// What the kernels of every plan for a world are made of.
@@ -94,13 +105,13 @@ impl<'w> Building<'w> {
 impl<'g> Renderer<'g> {
     /// Prepares to render `scene`, whose materials compiled to `program`.
     pub fn new(
-        gpu: &'g Gpu,
+        device: impl Into<DeviceRef<'g>>,
         scene: &Scene,
         program: &Program,
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
-        Self::new_watched(gpu, scene, program, plan, options, NOBODY)
+        Self::new_watched(device, scene, program, plan, options, NOBODY)
     }
 
     /// The same under the eyes of `watch`, which can break it off.
@@ -108,7 +119,7 @@ impl<'g> Renderer<'g> {
     /// # Errors
     /// Also [`RuntimeError::Interrupted`] if `watch` did.
     pub fn new_watched(
-        gpu: &'g Gpu,
+        device: impl Into<DeviceRef<'g>>,
         scene: &Scene,
         program: &Program,
         plan: &Plan,
@@ -116,24 +127,24 @@ impl<'g> Renderer<'g> {
         watch: Watch<'_>,
     ) -> Result<Self, RuntimeError> {
         let world = World::of_render(scene, program, &options.technique, &options.outputs)?;
-        let mut renderer = Self::build(gpu, &world, program, plan, options, watch)?;
+        let mut renderer = Self::build(device.into(), &world, program, plan, options, watch)?;
         renderer.facts.name.clone_from(&scene.name);
         Ok(renderer)
     }
 
     /// Composes and builds the kernels of `plan` and uploads the world's buffers.
     pub fn from_world(
-        gpu: &'g Gpu,
+        device: impl Into<DeviceRef<'g>>,
         world: &World,
         source: &dyn MaterialSource,
         plan: &Plan,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
-        Self::build(gpu, world, source, plan, options, NOBODY)
+        Self::build(device.into(), world, source, plan, options, NOBODY)
     }
 
     fn build(
-        gpu: &'g Gpu,
+        device: DeviceRef<'g>,
         world: &World,
         source: &dyn MaterialSource,
         plan: &Plan,
@@ -141,34 +152,42 @@ impl<'g> Renderer<'g> {
         watch: Watch<'_>,
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
+        let plan = &device.plan(plan, world, source);
         let mut options = options.clone();
-        options.technique = options.technique.within(gpu.has_subgroups());
+        options.technique = device.technique(options.technique);
         settings::check(world, &options)?;
         let mut inputs =
-            CompositionInputs::new(gpu.subgroup_size(), world, source, options.technique)?;
+            CompositionInputs::new(device.subgroup_size(), world, source, options.technique)?;
         inputs.some_pixels = options.pixels.is_some();
         let layout = inputs.layout(plan)?;
         options.technique = layout.technique(options.technique);
         inputs.technique = options.technique;
-        let sizes = pool::sizes(gpu, world, &layout, &options)?;
+        let sizes = pool::sizes(device, world, &layout, &options)?;
         let mut composer = inputs.composer(plan, layout, sizes);
         if options.count_hits {
-            composer.layout.counters.hits = counted_materials(gpu, &composer);
+            composer.layout.counters.hits = counted_materials(device, &composer);
         }
         let facts = ReportInputs::of(&composer, &options);
-        let resources = Resources::new(gpu, &composer, &options)?;
         let building = Building::of(composer.descs().len(), watch);
-        let build = |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
-        let (kernels, steps) = build_all(&composer, build)?;
-        gpu.check()?;
-        let schedule = Schedule {
-            steps,
-            arguments: resources.arguments().clone(),
-            timing: gpu.timing,
+        let (kernels, work) = match device {
+            DeviceRef::Gpu(gpu) => {
+                let resources = Resources::new(gpu, &composer, &options)?;
+                let build =
+                    |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
+                let (kernels, steps) = build_all(&composer, build)?;
+                gpu.check()?;
+                (kernels, Work::Gpu(gpu::work::Work::new(gpu, resources, steps)))
+            }
+            DeviceRef::Cpu(cpu) => {
+                let build = |kernel: &Kernel| building.next(|| cpu.build(kernel, sizes));
+                let (kernels, steps) = build_all(&composer, build)?;
+                let work = cpu::Work::new(cpu, &composer, steps, &options)?;
+                (kernels, Work::Cpu(work))
+            }
         };
-        warm_up(gpu, &resources, &schedule, &options, &building)?;
+        warm_up(&work, &options, &building)?;
         Ok(Self {
-            gpu,
+            device,
             texts: options.count_hits.then(|| world.without_contents()),
             options,
             built: BuiltPlan {
@@ -176,8 +195,7 @@ impl<'g> Renderer<'g> {
                 layout: composer.layout,
                 sizes,
                 kernels,
-                resources,
-                schedule,
+                work,
             },
             facts: ReportInputs {
                 compile_seconds: begin.elapsed().as_secs_f64(),
@@ -194,22 +212,19 @@ impl<'g> Renderer<'g> {
 ///
 /// # Errors
 /// If the world cannot be rendered so.
-pub fn identity(
-    gpu: &Gpu,
+pub fn identity<'d>(
+    device: impl Into<DeviceRef<'d>>,
     world: &World,
     source: &dyn MaterialSource,
     options: &RenderOptions,
 ) -> Result<Identity, RuntimeError> {
+    let device = device.into();
     settings::check(world, options)?;
-    let inputs = CompositionInputs::new(
-        gpu.subgroup_size(),
-        world,
-        source,
-        options.technique.within(gpu.has_subgroups()),
-    )?;
+    let technique = device.technique(options.technique);
+    let inputs = CompositionInputs::new(device.subgroup_size(), world, source, technique)?;
     let plan = world.own_plan(&inputs.materials);
     let layout = inputs.layout(&plan)?;
-    let sizes = pool::sizes(gpu, world, &layout, options)?;
+    let sizes = pool::sizes(device, world, &layout, options)?;
     let composer = inputs.composer(&plan, layout, sizes);
     Ok(ReportInputs::of(&composer, options).identity)
 }
@@ -333,12 +348,12 @@ impl ReportInputs {
 
 /// How many materials hits are counted of: all, or none where there is no logic kernel, blocks of slots
 /// do not fill workgroups, or a workgroup's memory is too small.
-fn counted_materials(gpu: &Gpu, composer: &Composer<'_>) -> usize {
+fn counted_materials(device: DeviceRef<'_>, composer: &Composer<'_>) -> usize {
     let (materials, workgroup) = (composer.materials.len() as u64, composer.sizes.workgroup);
     let blocks = u64::from(workgroup / BLOCK);
     let appending = 2 * composer.layout.queues.count() as u64;
     let words = materials + blocks * materials.div_ceil(32) + appending;
-    let room = gpu.device.limits().max_compute_workgroup_storage_size;
+    let room = device.limits().workgroup_bytes;
     let possible =
         composer.layout.wavefront && workgroup % BLOCK == 0 && 4 * words <= u64::from(room);
     if possible {
@@ -351,9 +366,7 @@ fn counted_materials(gpu: &Gpu, composer: &Composer<'_>) -> usize {
 /// Runs an iteration without any work: some drivers finish building a kernel when it first
 /// runs, which would count as rendering.
 fn warm_up(
-    gpu: &Gpu,
-    resources: &Resources,
-    schedule: &Schedule,
+    work: &Work,
     options: &RenderOptions,
     building: &Building<'_>,
 ) -> Result<(), RuntimeError> {
@@ -361,34 +374,24 @@ fn warm_up(
         samples: 0,
         ..options.clone()
     };
-    resources.set_run(gpu, &no_work);
-    resources.clear(gpu);
+    work.set_run(&no_work);
+    work.clear();
     // One by one, so that it can be broken off between any two.
-    for step in &schedule.steps {
-        building.next(|| {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let only = Schedule {
-                steps: vec![step.clone()],
-                arguments: schedule.arguments.clone(),
-                timing: schedule.timing,
-            };
-            only.record(&mut encoder, 1, None);
-            let index = gpu.queue.submit([encoder.finish()]);
-            gpu.wait(index)
-        })?;
+    for step in 0..work.steps() {
+        building.next(|| work.run_once(step))?;
     }
-    resources.set_run(gpu, options);
+    work.set_run(options);
     Ok(())
 }
 
 /// The kernels of a plan, and the dispatches that `build` makes of them, several at a time.
-pub(super) fn build_all(
+pub(super) fn build_all<S: Send>(
     composer: &Composer<'_>,
-    build: impl Fn(&Kernel) -> Result<Step, RuntimeError> + Sync,
-) -> Result<(Vec<Kernel>, Vec<Step>), RuntimeError> {
+    build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Sync,
+) -> Result<(Vec<Kernel>, Vec<S>), RuntimeError> {
     let kernels = composer.kernels();
     let steps = crate::parallel::map(&kernels, build);
-    let steps: Result<Vec<Step>, RuntimeError> = steps.into_iter().collect();
+    let steps: Result<Vec<S>, RuntimeError> = steps.into_iter().collect();
     Ok((kernels, steps?))
 }
 

@@ -8,11 +8,12 @@ use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
 use super::{Progress, Renderer};
+use crate::device::Submission;
 use crate::error::RuntimeError;
 use crate::kernels::queues::Scalar;
 use crate::render::passes::Pass;
 use crate::render::pool::{self, Pace};
-use crate::render::status::{Status, Submission};
+use crate::render::status::Status;
 
 /// Submissions in flight.
 const IN_FLIGHT: usize = 2;
@@ -48,13 +49,11 @@ impl Renderer<'_> {
         }
         let built = &self.built;
         let options = pass.options(&self.options);
-        built
-            .resources
-            .begin_pass(self.gpu, &options, &built.layout);
+        built.work.begin_pass(&options, &built.layout);
         let mut run = Run {
             now: self.progress(None, pass),
             finished_at: status.iterations,
-            pace: Pace::new(self.max_iterations()),
+            pace: Pace::new(self.built.work.max_iterations()),
             in_flight: VecDeque::new(),
             spare: Vec::new(),
             going: true,
@@ -76,17 +75,11 @@ impl Renderer<'_> {
             } else if changes {
                 self.change_plan(run.status, run.now.elapsed);
                 run.spare.clear();
-                run.pace.limit(self.max_iterations());
+                run.pace.limit(self.built.work.max_iterations());
             } else if !run.goes_on_after_cut(self) {
                 return Ok(());
             }
         }
-    }
-
-    /// The most iterations whose timestamps a submission has room for.
-    fn max_iterations(&self) -> u32 {
-        let schedule = &self.built.schedule;
-        schedule.timing.max_dispatches() / schedule.steps.len() as u32
     }
 
     /// Ends a pass with the sample whose paths were begun last.
@@ -95,9 +88,7 @@ impl Renderer<'_> {
         let scalar = |s| built.layout.counters.scalar(&status.counters, s);
         let begun = u32::from(scalar(Scalar::NextPixel) > 0);
         pass.samples = pass.samples.min(scalar(Scalar::NextSample) + begun);
-        built
-            .resources
-            .set_run(self.gpu, &pass.options(&self.options));
+        built.work.set_run(&pass.options(&self.options));
     }
 
     /// Fails if `iterations` in a row finished no path, which would go on for ever. A path takes
@@ -112,27 +103,6 @@ impl Renderer<'_> {
             iterations,
             expected,
         })
-    }
-
-    pub(super) fn new_submission(&self, max_iterations: u32) -> Result<Submission, RuntimeError> {
-        let (schedule, counters) = (&self.built.schedule, self.built.layout.counters);
-        let dispatches = max_iterations * schedule.steps.len() as u32;
-        Submission::new(
-            self.gpu,
-            counters.len(),
-            schedule.timing.queries(dispatches),
-        )
-    }
-
-    pub(super) fn submit(&self, mut submission: Submission, iterations: u32) -> Submission {
-        let schedule = &self.built.schedule;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        schedule.record(&mut encoder, iterations, submission.queries());
-        let dispatches = iterations * schedule.steps.len() as u32;
-        let queries = schedule.timing.queries(dispatches);
-        submission.copy(&mut encoder, self.built.resources.counters(), queries);
-        submission.submit(self.gpu, encoder, iterations);
-        submission
     }
 
     /// How many paths of this run the counters say are finished, of those until the end of the
@@ -187,9 +157,11 @@ impl Run<'_> {
             let ahead = self.in_flight.iter().map(Submission::iterations).sum();
             let iterations = self.pace.next(&self.now, self.status.iterations, ahead);
             let spare = self.spare.pop();
-            let submission = spare.map_or_else(|| renderer.new_submission(self.pace.max), Ok)?;
+            let (work, layout) = (&renderer.built.work, &renderer.built.layout);
+            let room = || work.new_submission(layout.counters.len(), self.pace.max);
+            let submission = spare.map_or_else(room, Ok)?;
             self.in_flight
-                .push_back(renderer.submit(submission, iterations));
+                .push_back(work.submit(submission, iterations));
         }
         Ok(())
     }
@@ -200,7 +172,7 @@ impl Run<'_> {
         renderer: &mut Renderer<'_>,
         mut submission: Submission,
     ) -> Result<(), RuntimeError> {
-        submission.wait(renderer.gpu, &renderer.built.schedule, self.status)?;
+        self.status.add(renderer.built.work.wait(&mut submission)?);
         self.pace.adapt();
         self.spare.push(submission);
         let before = self.now.paths;

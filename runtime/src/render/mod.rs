@@ -27,11 +27,11 @@ use std::time::{Duration, Instant};
 
 use impasto_compiler::partition::Workload;
 
+use crate::device::DeviceRef;
 use crate::error::RuntimeError;
 use crate::film::file::{FilmFile, Identity, Range};
 use crate::film::layers::Layers;
 use crate::film::{Film, Sums};
-use crate::gpu::{Gpu, Timing};
 use crate::kernels::dropped::Dropped;
 use crate::kernels::queues::Scalar;
 use crate::options::{Progress, RenderOptions};
@@ -58,7 +58,7 @@ pub struct Rendering {
 /// Everything that is needed to render a world by a plan, as often as wanted.
 #[derive(Debug)]
 pub struct Renderer<'g> {
-    gpu: &'g Gpu,
+    device: DeviceRef<'g>,
     options: RenderOptions,
     built: BuiltPlan,
     facts: ReportInputs,
@@ -137,7 +137,7 @@ impl<'g> Renderer<'g> {
         let start = keeping.as_mut().and_then(|k| k.start.take());
         let resumed = self.take_up(start.as_ref())?;
         drop(start);
-        let mut status = Status::new(self.built.schedule.steps.len());
+        let mut status = Status::new(self.built.work.steps());
         let mut pass = Pass::new(begin, resumed.samples);
         let every = keeping.as_ref().map(|k| k.every);
         let mut passes = Passes::new(self.options.samples - resumed.samples, every);
@@ -171,7 +171,7 @@ impl<'g> Renderer<'g> {
 
     /// Empties everything, then fills the film with the sums that are gone on from.
     fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
-        self.built.resources.clear(self.gpu);
+        self.built.work.clear();
         let Some(start) = start else {
             return Ok(Resumed::default());
         };
@@ -179,9 +179,7 @@ impl<'g> Renderer<'g> {
         let (first, samples) = (options.first_sample, options.samples);
         let done = start.done_of_all(identity, &self.facts.layers, first, samples);
         let samples = done.map_err(RuntimeError::OtherRender)?;
-        self.built
-            .resources
-            .write_film(self.gpu, start.sums.words());
+        self.built.work.write_film(start.sums.words());
         Ok(Resumed {
             samples,
             nonfinite: start.nonfinite,
@@ -197,7 +195,7 @@ impl<'g> Renderer<'g> {
         done: u32,
     ) -> Result<FilmFile, RuntimeError> {
         let (width, height) = (self.facts.width, self.facts.height);
-        let words = self.built.resources.read_film(self.gpu)?;
+        let words = self.built.work.read_film()?;
         let sums = Sums::new(width, height, self.facts.layers.clone(), words);
         let lost = || RuntimeError::Validation("the film lost its size".into());
         let mut sums = sums.ok_or_else(lost)?;
@@ -241,11 +239,11 @@ impl<'g> Renderer<'g> {
     ) -> Report {
         crate::render::report::Inputs {
             resumed,
-            gpu: self.gpu.info(),
+            device: self.device.info(),
             options: &self.options,
             layout: &self.built.layout,
             kernels: &self.built.kernels,
-            timed: self.built.schedule.timing != Timing::None,
+            timed: self.built.work.is_timed(),
             strategy: &self.facts.strategy,
             plan: &self.built.plan,
             replanned: self.replan_report(status),

@@ -7,7 +7,7 @@ use super::Renderer;
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::options::{ENDLESS, RenderOptions};
-use crate::render::status::{Status, Submission};
+use crate::render::status::Status;
 use crate::render::workload::Mark;
 use crate::technique::Technique;
 use crate::world::{MaterialSource, World};
@@ -45,11 +45,10 @@ impl Renderer<'_> {
     /// The workload of `iterations` iterations after `warm` others, from empty slots on. The film is
     /// left with what they added.
     fn observe(&self, warm: u32, iterations: u32) -> Result<Workload, RuntimeError> {
-        self.built.resources.clear(self.gpu);
-        self.built
-            .resources
-            .begin_pass(self.gpu, &self.options, &self.built.layout);
-        let mut status = Status::new(self.built.schedule.steps.len());
+        let (work, layout) = (&self.built.work, &self.built.layout);
+        work.clear();
+        work.begin_pass(&self.options, layout);
+        let mut status = Status::new(work.steps());
         self.advance(warm, &mut status)?;
         let mark = Mark::of(&status);
         self.advance(iterations, &mut status)?;
@@ -68,10 +67,11 @@ impl Renderer<'_> {
 
     /// Runs iterations one by one, so that no submission takes long.
     fn advance(&self, iterations: u32, status: &mut Status) -> Result<(), RuntimeError> {
-        let mut submission: Submission = self.new_submission(1)?;
+        let (work, layout) = (&self.built.work, &self.built.layout);
+        let mut submission = work.new_submission(layout.counters.len(), 1)?;
         for _ in 0..iterations {
-            submission = self.submit(submission, 1);
-            submission.wait(self.gpu, &self.built.schedule, status)?;
+            submission = work.submit(submission, 1);
+            status.add(work.wait(&mut submission)?);
         }
         Ok(())
     }

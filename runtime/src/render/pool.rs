@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::device::DeviceRef;
 use crate::error::RuntimeError;
-use crate::gpu::Gpu;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
 use crate::options::{Progress, RenderOptions};
@@ -31,6 +31,11 @@ const FETCH_LIMIT: u32 = 64;
 /// The same for GPUs in software: Mesa's ends all loops of a thread after 65,535 turns in sum.
 const SOFTWARE_FETCH_LIMIT: u32 = 2;
 
+/// Paths that a thread of the processor takes at a time.
+const PORTION: u32 = 16;
+/// Paths of a dispatch there, for each thread: they take some milliseconds.
+const PATHS_OF_THREAD: u32 = 4096;
+
 /// A submission is made longer below the first and shorter above the second.
 const SHORT: Duration = Duration::from_millis(20);
 const LONG: Duration = Duration::from_millis(100);
@@ -40,29 +45,26 @@ const LAST_ITERATIONS: u64 = 8;
 
 /// Chooses the pool, within what the GPU can bind.
 pub(crate) fn sizes(
-    gpu: &Gpu,
+    device: DeviceRef<'_>,
     world: &World,
     layout: &PlanLayout,
     options: &RenderOptions,
 ) -> Result<Sizes, RuntimeError> {
-    let limits = gpu.device.limits();
     let pixels = u64::from(world.width) * u64::from(world.height);
     let film = pixels * world.outputs.layers.planes() as u64 * 4;
-    gpu.check_binding_size("the film", film)?;
+    device.check_binding_size("the film", film)?;
     // State and queues are one buffer each.
     let state_bytes = layout.path_bytes();
     let queue_bytes = 4 * layout.queue_words();
     let slot_bytes = state_bytes.max(queue_bytes).max(1);
     if let Some(pool) = options.pool {
         let bytes = u64::from(pool) * slot_bytes;
-        gpu.check_binding_size("a pool of that size", bytes)
+        device.check_binding_size("a pool of that size", bytes)
             .map_err(|error| error.with_hint("use a smaller pool (`--pool`)"))?;
     }
-    let most = limits
-        .max_buffer_size
-        .min(limits.max_storage_buffer_binding_size);
+    let most = device.limits().buffer_bytes;
     let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
-    let default = default_pool(gpu, layout, state_bytes + queue_bytes);
+    let default = default_pool(device, layout, state_bytes + queue_bytes);
     let rendered = options.pixel_count(world.width, world.height);
     let paths = rendered.saturating_mul(u64::from(options.samples));
     let enough = u32::try_from(paths).unwrap_or(u32::MAX);
@@ -72,39 +74,41 @@ pub(crate) fn sizes(
         .min(enough)
         .min(fits)
         .clamp(1, 1 << 30);
-    dispatch_sizes(gpu, pool, &options.technique)
+    dispatch_sizes(device, pool, &options.technique)
 }
 
 /// The sizes of dispatches over `items` slots.
 pub(crate) fn dispatch_sizes(
-    gpu: &Gpu,
+    device: DeviceRef<'_>,
     items: u32,
     technique: &Technique,
 ) -> Result<Sizes, RuntimeError> {
-    let limits = gpu.device.limits();
-    let fetch_limit = if gpu.is_software() {
+    let limits = device.limits();
+    let fetch_limit = if matches!(device, DeviceRef::Gpu(gpu) if gpu.is_software()) {
         SOFTWARE_FETCH_LIMIT
     } else {
         FETCH_LIMIT
     };
     Ok(Sizes {
         pool: items,
-        workgroup: workgroup_size(&limits, technique.workgroup)?,
+        workgroup: workgroup_size(device, technique.workgroup)?,
         threads: technique
             .threads
             .unwrap_or(THREADS)
             .min(items)
             .max(items.div_ceil(fetch_limit)),
         fetch_limit,
-        row_groups: limits.max_compute_workgroups_per_dimension.min(65_535),
+        row_groups: limits.row_groups,
     })
 }
 
 /// Threads of a workgroup, within the GPU's limits.
-fn workgroup_size(limits: &wgpu::Limits, wanted: Option<u32>) -> Result<u32, RuntimeError> {
-    let most = limits
-        .max_compute_invocations_per_workgroup
-        .min(limits.max_compute_workgroup_size_x);
+fn workgroup_size(device: DeviceRef<'_>, wanted: Option<u32>) -> Result<u32, RuntimeError> {
+    let most = device.limits().workgroup_threads;
+    let default = match device {
+        DeviceRef::Gpu(_) => WORKGROUP,
+        DeviceRef::Cpu(_) => PORTION,
+    };
     match wanted {
         Some(threads) if threads == 0 || threads > most => Err(RuntimeError::Setting {
             setting: "workgroup",
@@ -112,11 +116,18 @@ fn workgroup_size(limits: &wgpu::Limits, wanted: Option<u32>) -> Result<u32, Run
             expected: format!("1 to {most} threads"),
         }),
         Some(threads) => Ok(threads),
-        None => Ok(WORKGROUP.min(most)),
+        None => Ok(default.min(most)),
     }
 }
 
-fn default_pool(gpu: &Gpu, layout: &PlanLayout, slot_bytes: u64) -> u32 {
+fn default_pool(device: DeviceRef<'_>, layout: &PlanLayout, slot_bytes: u64) -> u32 {
+    let gpu = match device {
+        DeviceRef::Gpu(gpu) => gpu,
+        DeviceRef::Cpu(cpu) => {
+            let threads = u32::try_from(cpu.threads()).unwrap_or(u32::MAX);
+            return threads.saturating_mul(PATHS_OF_THREAD);
+        }
+    };
     if gpu.is_software() {
         return SOFTWARE_POOL;
     }

@@ -14,8 +14,8 @@ use impasto_compiler::partition::{Form, Plan, Workload};
 use super::Renderer;
 use super::background::{Job, Made};
 use super::build::BuiltPlan;
+use crate::device::{DeviceRef, Work};
 use crate::kernels::dropped::Dropped;
-use crate::kernels::queues::Counters;
 use crate::render::report::{Ran, ReplanReport, partition};
 use crate::render::status::{Before, Status};
 use crate::render::workload::Mark;
@@ -164,7 +164,7 @@ impl Renderer<'_> {
         };
         let mut change = self.change(&made, status, elapsed);
         let old = std::mem::replace(&mut self.built, built);
-        if self.built.resources.counters() != old.resources.counters() {
+        if !self.built.shares_counters(&old) {
             change.report.kernels = self.ran(&old).report(status, 0);
             change.logic_before = 0.0;
             self.take_over(&old, status);
@@ -217,12 +217,10 @@ impl Renderer<'_> {
             asked: status.before.asked + counters.items_of(words, old.layout.queues.new_paths()),
             dropped,
         };
-        let (from, to) = (old.resources.counters(), self.built.resources.counters());
-        let bytes = 4 * Counters::SCALARS as u64;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
-        self.gpu.queue.submit([encoder.finish()]);
-        let steps = self.built.schedule.steps.len();
+        if let (Work::Gpu(old), Work::Gpu(new)) = (&old.work, &self.built.work) {
+            new.take_over(old);
+        }
+        let steps = self.built.work.steps();
         status.go_on(before, steps, self.built.layout.counters.len());
     }
 
@@ -294,15 +292,22 @@ impl Replan {
 
     /// Begins to plan.
     fn begin(&mut self, renderer: &Renderer<'_>, workload: Workload) -> Stage {
-        let (Some(planner), Some(texts)) = (self.planner.take(), &renderer.texts) else {
+        // The processor has one plan for every workload.
+        let (Some(planner), Some(texts), DeviceRef::Gpu(gpu), Work::Gpu(work)) = (
+            self.planner.take(),
+            &renderer.texts,
+            renderer.device,
+            &renderer.built.work,
+        ) else {
             return Stage::Done;
         };
         let job = Job {
-            gpu: renderer.gpu.share(),
+            gpu: gpu.clone(),
             world: texts.clone(),
             source: self.source.clone(),
             technique: renderer.options.technique,
             present: renderer.built.clone(),
+            present_work: work.clone(),
             cancelled: self.cancelled.clone(),
         };
         match job.spawn(planner, workload) {

@@ -7,7 +7,7 @@ use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
 
 use crate::film::{Film, Sums};
-use crate::gpu::GpuInfo;
+use crate::gpu::DeviceInfo;
 use crate::kernels::dropped::Dropped;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{DispatchSource, Kernel, KernelDesc};
@@ -174,8 +174,8 @@ pub struct AdapterReport {
     pub driver: String,
 }
 
-impl From<GpuInfo> for AdapterReport {
-    fn from(info: GpuInfo) -> Self {
+impl From<DeviceInfo> for AdapterReport {
+    fn from(info: DeviceInfo) -> Self {
         Self {
             name: info.name,
             backend: info.backend,
@@ -254,7 +254,7 @@ pub(crate) struct Resumed {
 /// What a report is made of.
 pub(crate) struct Inputs<'a> {
     pub resumed: Resumed,
-    pub gpu: GpuInfo,
+    pub device: DeviceInfo,
     pub options: &'a RenderOptions,
     pub layout: &'a PlanLayout,
     pub kernels: &'a [Kernel],
@@ -338,7 +338,7 @@ impl Inputs<'_> {
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),
             lost_paths: scalar(Scalar::LostPaths),
-            adapter: self.gpu.into(),
+            adapter: self.device.into(),
         }
     }
 }

@@ -71,7 +71,7 @@ impl Renderer<'_> {
                 expected: "a renderer that was built with `RenderOptions::pixels`".into(),
             });
         }
-        self.built.resources.set_pixels(self.gpu, &pixels);
+        self.built.work.set_pixels(&pixels);
         self.options.pixels = Some(pixels);
         self.facts.identity.scene = self.options.fingerprint(self.facts.scene);
         Ok(())

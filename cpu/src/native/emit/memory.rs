@@ -7,7 +7,7 @@ use cranelift_codegen::ir::{
 };
 use naga::{BinaryOperator, MathFunction, ScalarKind};
 
-use super::{Emitter, Place, Target};
+use super::{CONSTANT, Emitter, Place, Target};
 use crate::native::layout::bytes_of;
 use crate::code::{Atomic, First, Ins, Op, Pointer, Scalar, Slot};
 use crate::error::KernelError;
@@ -277,9 +277,8 @@ impl<'a> Emitter<'a, '_> {
 
     /// The address or length of a buffer, which do not change while the code runs.
     fn buffer_word(&mut self, buffer: u32, offset: i32) -> Value {
-        let flags = TRUSTED.with_readonly().with_can_move();
         let at = self.shared.layout.buffer(buffer) + offset;
-        self.builder.ins().load(types::I64, flags, self.context, at)
+        self.builder.ins().load(types::I64, CONSTANT, self.context, at)
     }
 
     /// An address in a buffer, and bytes from there to a value of so many bytes.

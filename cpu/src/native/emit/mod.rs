@@ -7,8 +7,6 @@ mod components;
 mod memory;
 mod vectors;
 
-use std::ffi::c_void;
-
 use cranelift_codegen::ir::{
     self, AbiParam, Block as Label, ExtFuncData, ExternalName, InstBuilder, MemFlagsData,
     Signature, StackSlot, Type, UserExternalName, Value, types,
@@ -29,8 +27,8 @@ pub(super) struct Shared<'a> {
     pub plan: &'a Plan,
     pub layout: Layout,
     pub constants: &'a Constants,
-    /// By hook: who answers, and what is given along.
-    pub answers: &'a [Option<(Answer, *const c_void)>],
+    /// By hook: who answers.
+    pub answers: &'a [Option<Answer>],
     /// How functions of the host are called.
     pub host: CallConv,
 }
@@ -88,6 +86,9 @@ struct Around {
     end: Label,
     turn: Option<Label>,
 }
+
+/// Memory that does not change while the code runs.
+const CONSTANT: MemFlagsData = MemFlagsData::trusted().with_readonly().with_can_move();
 
 /// Whether statements that follow are reached.
 type Reached = bool;
@@ -342,8 +343,7 @@ impl<'a, 'b> Emitter<'a, 'b> {
         let [head, first, turn, end] = [(); 4].map(|()| self.builder.create_block());
         self.builder.ins().jump(head, &[]);
         self.builder.switch_to_block(head);
-        let constant = MemFlagsData::trusted().with_readonly().with_can_move();
-        let flag = self.builder.ins().load(types::I64, constant, self.context, STOP);
+        let flag = self.builder.ins().load(types::I64, CONSTANT, self.context, STOP);
         let stop = self.builder.ins().load(types::I8, MemFlagsData::trusted(), flag, 0);
         self.builder.ins().brif(stop, end, &[], first, &[]);
         self.go_on_at(first);
@@ -504,8 +504,9 @@ impl<'a, 'b> Emitter<'a, 'b> {
         function: &Function,
         values: &[Option<Value>],
     ) -> Result<Vec<Value>, KernelError> {
-        let answer = function.hook.and_then(|hook| self.shared.answers[hook]);
-        let (answer, data) = answer.ok_or_else(|| self.unsupported("answer to a call"))?;
+        let known = |hook| Some((hook as u32, (*self.shared.answers.get(hook)?)?));
+        let answer = function.hook.and_then(known);
+        let (hook, answer) = answer.ok_or_else(|| self.unsupported("answer to a call"))?;
         let room = self.shared.layout.exchange_words();
         if values.len() + function.result.len() > room {
             return Err(self.unsupported("answer of so many numbers"));
@@ -518,7 +519,8 @@ impl<'a, 'b> Emitter<'a, 'b> {
         let mut signature = Signature::new(self.shared.host);
         signature.params = vec![AbiParam::new(types::I64); 3];
         let signature = self.builder.import_signature(signature);
-        let data = self.builder.ins().iconst(types::I64, data as i64);
+        let at = self.shared.layout.data(hook);
+        let data = self.builder.ins().load(types::I64, CONSTANT, self.context, at);
         let answer = self.builder.ins().iconst(types::I64, answer as usize as i64);
         let first = i64::from(exchange);
         let arguments = self.builder.ins().iadd_imm_s(self.context, first);

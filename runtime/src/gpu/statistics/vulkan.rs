@@ -10,7 +10,7 @@ use wgpu::hal::api::Vulkan;
 use wgpu::naga::back::spv;
 
 use super::KernelStatistics;
-use crate::gpu::{Gpu, shader};
+use crate::gpu::Gpu;
 use crate::kernels::buffers::Access;
 use crate::kernels::compose::Binding;
 
@@ -137,7 +137,7 @@ impl Drop for Statistics<'_> {
 
 /// The same code that wgpu gives the driver for trusted modules.
 fn spirv(name: &str, wgsl: &str) -> Option<Vec<u32>> {
-    let (module, info) = shader::validate(name, wgsl).ok()?;
+    let (module, info) = crate::kernels::validate::validate(name, wgsl).ok()?;
     let unchecked = wgpu::naga::proc::BoundsCheckPolicies {
         index: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,
         buffer: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,

@@ -8,7 +8,7 @@ use crate::gpu::schedule::{Schedule, Size, Step};
 use crate::gpu::{Gpu, Timing};
 use crate::kernels::shells::{EntryPoint, FetchShell};
 use crate::render::pool;
-use crate::render::status::{Status, Submission};
+use crate::gpu::submission::Submission;
 use crate::scene::Scene;
 use crate::technique::{Leaves, RayFetch, Technique};
 use crate::wgsl;
@@ -130,21 +130,20 @@ impl<'g> Caster<'g> {
     fn run(&self, schedule: &Schedule, counters: &wgpu::Buffer) -> Result<f64, RuntimeError> {
         let queries = schedule.timing.queries(1);
         let mut submission = Submission::new(self.gpu, COUNTERS as usize, queries)?;
-        let mut status = Status::new(1);
         let begin = Instant::now();
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         schedule.record(&mut encoder, 1, submission.queries());
         submission.copy(&mut encoder, counters, queries);
         submission.submit(self.gpu, encoder, 1);
-        submission.wait(self.gpu, schedule, &mut status)?;
+        let done = submission.wait(self.gpu, schedule)?;
         Ok(match schedule.timing {
             Timing::None => begin.elapsed().as_secs_f64(),
-            _ => status.gpu_seconds,
+            _ => done.seconds,
         })
     }
 
     fn step(&self, own: &[wgpu::Buffer], count: u32, any_hit: bool) -> Result<Step, RuntimeError> {
-        let sizes = pool::dispatch_sizes(self.gpu, count, &self.technique)?;
+        let sizes = pool::dispatch_sizes(self.gpu.into(), count, &self.technique)?;
         let persistent = self.technique.ray_fetch == RayFetch::Persistent;
         let mut text = self.declarations();
         text += &wgsl::constants_u32(&[

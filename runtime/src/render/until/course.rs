@@ -71,7 +71,7 @@ impl Renderer<'_> {
         let resumed = self.take_up(None)?;
         let limit = self.options.samples;
         let seeds = [self.options.seed, second_seed(self.options.seed)];
-        let status = Status::new(self.built.schedule.steps.len());
+        let status = Status::new(self.built.work.steps());
         let mut course = Course {
             halves: Halves::new(&self.sums(&status, &resumed, 0)?.sums),
             pass: Pass::new(begin, 0),

@@ -1,0 +1,143 @@
+//! The processor as a device: the megakernel's own text as machine code, on all cores.
+//!
+//! There is one kernel, whatever the materials: to branch costs a processor nothing that a kernel more
+//! would save, and between kernels paths would go through memory.
+
+mod work;
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use impasto_cpu::KernelError;
+use impasto_cpu::native;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::RuntimeError;
+use crate::gpu::DeviceInfo;
+use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
+use crate::kernels::validate::validate;
+
+pub(crate) use work::{Step, Work};
+
+/// How to use the processor.
+#[derive(Clone, Debug, Default)]
+pub struct CpuOptions {
+    /// Threads that render; one for each core if `None`.
+    pub threads: Option<usize>,
+}
+
+/// The most threads that may be asked for.
+const MOST_THREADS: usize = 1024;
+/// Bytes of the stack of a thread.
+const STACK_BYTES: usize = 16 << 20;
+/// Most kernels that are kept; beyond it all are forgotten.
+const MOST_KEPT: usize = 64;
+
+/// The processor.
+#[derive(Debug)]
+pub struct Cpu {
+    threads: Arc<ThreadPool>,
+    /// Kernels that were built before, by their text.
+    kernels: Mutex<HashMap<String, Arc<native::Kernel>>>,
+}
+
+impl Cpu {
+    /// Starts its threads.
+    ///
+    /// # Errors
+    /// If no code can be made for it or run, or it has not so many threads.
+    pub fn new(options: &CpuOptions) -> Result<Self, RuntimeError> {
+        native::check().map_err(|why| RuntimeError::NoNativeCode(why.to_string()))?;
+        let threads = options.threads.unwrap_or_else(cores);
+        if threads == 0 || threads > MOST_THREADS {
+            return Err(RuntimeError::Setting {
+                setting: "threads",
+                value: threads.to_string(),
+                expected: format!("1 to {MOST_THREADS}"),
+            });
+        }
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .stack_size(STACK_BYTES)
+            .thread_name(|index| format!("render {index}"))
+            .build();
+        let pool = pool.map_err(|e| RuntimeError::Threads {
+            threads,
+            reason: e.to_string(),
+        })?;
+        Ok(Self {
+            threads: Arc::new(pool),
+            kernels: Mutex::default(),
+        })
+    }
+
+    /// Threads that render.
+    pub fn threads(&self) -> usize {
+        self.threads.current_num_threads()
+    }
+
+    /// What the processor is and can do.
+    pub fn info(&self) -> DeviceInfo {
+        let cores = cores();
+        DeviceInfo {
+            name: native::processor(),
+            backend: "native".into(),
+            driver: native::compiler(),
+            kind: "processor",
+            limits: vec![
+                ("threads", self.threads() as u64),
+                ("cores", cores as u64),
+            ],
+            features_used: native::features(),
+            features_missing: Vec::new(),
+        }
+    }
+
+    /// The machine code of a kernel, unless it was built before.
+    pub(crate) fn build(&self, kernel: &Kernel, sizes: Sizes) -> Result<Step, RuntimeError> {
+        let (groups, lanes) = match kernel.desc.source {
+            // What a workgroup does together one thread does alone.
+            DispatchSource::Once => (1, 1),
+            DispatchSource::Groups(groups) => (groups, sizes.workgroup),
+            _ => (sizes.pool.div_ceil(sizes.workgroup), sizes.workgroup),
+        };
+        Ok(Step {
+            name: kernel.desc.name.clone(),
+            kernel: self.compiled(kernel)?,
+            groups,
+            lanes,
+        })
+    }
+
+    fn compiled(&self, kernel: &Kernel) -> Result<Arc<native::Kernel>, RuntimeError> {
+        let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = kept().get(&kernel.wgsl) {
+            return Ok(known.clone());
+        }
+        let name = &kernel.desc.name;
+        let refused = |error: KernelError| match error {
+            KernelError::Memory(_) | KernelError::Processor(_) => {
+                RuntimeError::NoNativeCode(error.to_string())
+            }
+            other => RuntimeError::Shader {
+                kernel: name.clone(),
+                message: other.to_string(),
+            },
+        };
+        let (module, info) = validate(name, &kernel.wgsl)?;
+        let code = impasto_cpu::lower(&module, &info, &[], &[]).map_err(refused)?;
+        let build = || native::Kernel::build(&code, &[]);
+        let built = Arc::new(self.threads.install(build).map_err(refused)?);
+        let mut kept = kept();
+        if kept.len() >= MOST_KEPT {
+            kept.clear();
+        }
+        kept.insert(kernel.wgsl.clone(), built.clone());
+        Ok(built)
+    }
+}
+
+/// How many threads run at once.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
