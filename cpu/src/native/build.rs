@@ -118,7 +118,9 @@ impl Kernel {
         let own = own_functions(code, &plan);
         // The numbers that calls name functions by are their indices, with the entry point behind them.
         for index in 0..=code.functions.len() {
-            let name = format!("f{index}");
+            // Profilers show these names.
+            let function = code.functions.get(index).and_then(Option::as_ref);
+            let name = format!("{} {index}", function.unwrap_or(&code.main).name);
             let signature = cranelift_codegen::ir::Signature::new(isa.default_call_conv());
             let id = module.declare_function(&name, Linkage::Local, &signature);
             let id = id.map_err(|e| memory(&e))?;
