@@ -1,5 +1,7 @@
 //! Small kernels of which it is known what they do: statements, memory, and what is refused.
 
+mod casts;
+
 use crate::error::TraceError;
 use crate::float::Float;
 use crate::lower;
