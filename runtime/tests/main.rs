@@ -5,6 +5,7 @@ mod environment;
 mod gpu;
 mod lights;
 mod materials;
+mod native;
 mod placed;
 mod placements;
 mod scene;

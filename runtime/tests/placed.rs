@@ -65,7 +65,7 @@ fn transform(random: &mut Random, size: f32, spread: f32) -> Transform {
 }
 
 /// Balls and soups at random places, and some triangles in the world.
-fn crowd(random: &mut Random, scale: f32, world: bool) -> Scene {
+pub(crate) fn crowd(random: &mut Random, scale: f32, world: bool) -> Scene {
     let mut scene = dark_scene();
     scene.mesh = Mesh::default();
     if world {
@@ -125,7 +125,7 @@ fn parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
 }
 
 /// The same of a scene with its objects placed.
-fn placed_parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
+pub(crate) fn placed_parts(scene: &Scene, technique: &Technique) -> [ShaderPart; 3] {
     let split = Split::new(scene, &instances(), Copies::Shared).expect("it fits");
     assert_eq!(split.placements.len(), scene.placements.len());
     let technique = Technique {

@@ -3,6 +3,7 @@
 //! There is one kernel, whatever the materials: to branch costs a processor nothing that a kernel more
 //! would save, and between kernels paths would go through memory.
 
+mod casts;
 mod work;
 
 use std::collections::HashMap;
@@ -17,6 +18,7 @@ use crate::gpu::DeviceInfo;
 use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
 
+pub(crate) use casts::Casts;
 pub(crate) use work::{Step, Work};
 
 /// How to use the processor.
@@ -37,8 +39,8 @@ const MOST_KEPT: usize = 64;
 #[derive(Debug)]
 pub struct Cpu {
     threads: Arc<ThreadPool>,
-    /// Kernels that were built before, by their text.
-    kernels: Mutex<HashMap<String, Arc<native::Kernel>>>,
+    /// Kernels that were built before, by their text and whether their ray casts are answered.
+    kernels: Mutex<HashMap<(String, bool), Arc<native::Kernel>>>,
 }
 
 impl Cpu {
@@ -93,8 +95,13 @@ impl Cpu {
         }
     }
 
-    /// The machine code of a kernel, unless it was built before.
-    pub(crate) fn build(&self, kernel: &Kernel, sizes: Sizes) -> Result<Step, RuntimeError> {
+    /// A kernel ready to run, whose ray casts `casts` answers if there are any.
+    pub(crate) fn build(
+        &self,
+        kernel: &Kernel,
+        sizes: Sizes,
+        casts: Option<&Casts>,
+    ) -> Result<Step, RuntimeError> {
         let (groups, lanes) = match kernel.desc.source {
             // What a workgroup does together one thread does alone.
             DispatchSource::Once => (1, 1),
@@ -103,15 +110,21 @@ impl Cpu {
         };
         Ok(Step {
             name: kernel.desc.name.clone(),
-            kernel: self.compiled(kernel)?,
+            kernel: self.compiled(kernel, casts.is_some())?,
             groups,
             lanes,
         })
     }
 
-    fn compiled(&self, kernel: &Kernel) -> Result<Arc<native::Kernel>, RuntimeError> {
+    /// The machine code of a kernel, unless it was built before.
+    fn compiled(
+        &self,
+        kernel: &Kernel,
+        casts: bool,
+    ) -> Result<Arc<native::Kernel>, RuntimeError> {
+        let key = (kernel.wgsl.clone(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = kept().get(&kernel.wgsl) {
+        if let Some(known) = kept().get(&key) {
             return Ok(known.clone());
         }
         let name = &kernel.desc.name;
@@ -125,14 +138,18 @@ impl Cpu {
             },
         };
         let (module, info) = validate(name, &kernel.wgsl)?;
-        let code = impasto_cpu::lower(&module, &info, &[], &[]).map_err(refused)?;
-        let build = || native::Kernel::build(&code, &[]);
+        let answered = if casts { &casts::ANSWERED[..] } else { &[] };
+        let names: Vec<&str> = answered.iter().map(|(name, _)| *name).collect();
+        let hooks: Vec<usize> = (0..names.len()).collect();
+        let code = impasto_cpu::lower(&module, &info, &names, &hooks).map_err(refused)?;
+        let answers: Vec<_> = answered.iter().map(|(_, answer)| Some(*answer)).collect();
+        let build = || native::Kernel::build(&code, &answers);
         let built = Arc::new(self.threads.install(build).map_err(refused)?);
         let mut kept = kept();
         if kept.len() >= MOST_KEPT {
             kept.clear();
         }
-        kept.insert(kernel.wgsl.clone(), built.clone());
+        kept.insert(key, built.clone());
         Ok(built)
     }
 }

@@ -9,6 +9,7 @@ use impasto_cpu::native::{Buffer, Invocation, Kernel};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::casts::{ANSWERED, Casts};
 use super::Cpu;
 use crate::error::RuntimeError;
 use crate::gpu::submission::Done;
@@ -37,6 +38,8 @@ pub(crate) struct Work {
     steps: Vec<Step>,
     /// Each with its WGSL variable: those of the runtime, then those of the scene.
     buffers: Vec<(&'static str, Arc<Buffer>)>,
+    /// Answers the ray casts of kernels, unless they cast rays themselves.
+    casts: Option<Casts>,
     /// Ends all loops of kernels when set.
     stop: Arc<AtomicBool>,
 }
@@ -47,6 +50,7 @@ impl Work {
         cpu: &Cpu,
         composer: &Composer<'_>,
         steps: Vec<Step>,
+        casts: Option<Casts>,
         options: &RenderOptions,
     ) -> Result<Self, RuntimeError> {
         let own = BUFFERS.iter().map(|row| {
@@ -63,6 +67,7 @@ impl Work {
             threads: cpu.threads.clone(),
             steps,
             buffers: own.chain(scene).collect(),
+            casts,
             stop: Arc::default(),
         };
         work.set_run(options);
@@ -122,8 +127,9 @@ impl Work {
         step: &'w Step,
         bound: &[&'w Buffer],
     ) -> Result<Invocation<'w>, RuntimeError> {
-        let data: [*const c_void; 0] = [];
-        // SAFETY: nobody answers.
+        let data = self.casts.as_ref().map(Casts::data);
+        let data: Vec<*const c_void> = data.map_or_else(Vec::new, |d| vec![d; ANSWERED.len()]);
+        // SAFETY: kernels are built with answers only if there are casts, which they are given along.
         let invocation = unsafe { Invocation::new(&step.kernel, bound, &data, &self.stop) };
         invocation.map_err(|error| RuntimeError::Shader {
             kernel: step.name.clone(),

@@ -179,9 +179,12 @@ impl<'g> Renderer<'g> {
                 (kernels, Work::Gpu(gpu::work::Work::new(gpu, resources, steps)))
             }
             DeviceRef::Cpu(cpu) => {
-                let build = |kernel: &Kernel| building.next(|| cpu.build(kernel, sizes));
+                let casts = cpu::Casts::new(composer.parts);
+                let build = |kernel: &Kernel| {
+                    building.next(|| cpu.build(kernel, sizes, casts.as_ref()))
+                };
                 let (kernels, steps) = build_all(&composer, build)?;
-                let work = cpu::Work::new(cpu, &composer, steps, &options)?;
+                let work = cpu::Work::new(cpu, &composer, steps, casts, &options)?;
                 (kernels, Work::Cpu(work))
             }
         };

@@ -1,13 +1,14 @@
 //! The acceleration structures of ray casts, which are all made of one binary tree.
 //!
 //! `build` makes it, of what `cluster` and `reinsert` do; `wide` and `binary` lay it out for kernels, and
-//! `text` puts the WGSL of a cast together. Triangles are stored in the order of the leaves, so that a leaf is a
+//! `text` puts the WGSL of a cast together; `native` casts rays by the processor. Triangles are stored in the order of the leaves, so that a leaf is a
 //! contiguous range and a *primitive* is an index in that order.
 
 mod binary;
 mod build;
 mod cluster;
 mod levels;
+mod native;
 mod reinsert;
 mod text;
 mod wide;
@@ -21,6 +22,7 @@ use crate::wgsl::{BufferData, ShaderPart};
 
 pub(crate) use build::binary_tree;
 pub use levels::{Levels, ObjectTree};
+pub use native::{Caster, Hit, Instructions, NO_PRIMITIVE};
 pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
 
 /// The parent of the root, which nobody asks for.

@@ -10,7 +10,7 @@ use crate::wgsl::text::mentions;
 
 /// How much slabs are widened, relative to the terms of a plane's distance: 16 units in the last
 /// place. The builder rounds exponents by up to 11 of them (through `log2`), the kernel by 2.
-const SLACK: f32 = 1.0 / (1 << 20) as f32;
+pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
 
 /// Bytes of a thread's stack that lie in workgroup memory: twelve entries of the wide BVH, as
 /// in Ylitie et al. 2017, which is deeper than most rays get.
@@ -55,6 +55,11 @@ pub(super) fn casts(
 /// Whether a part has the steps of a cast, so that kernels may take up rays in its midst.
 pub(crate) fn provides_steps(part: &ShaderPart) -> bool {
     mentions(&part.wgsl, "begin_walk")
+}
+
+/// Whether a part casts rays through a wide tree.
+pub(super) fn is_wide(part: &ShaderPart) -> bool {
+    mentions(&part.wgsl, "traversal_octant")
 }
 
 /// Whether a part must be told the thread's index in its workgroup.

@@ -1,0 +1,67 @@
+//! Answers the ray casts of kernels by the caster of the host.
+
+use std::ffi::c_void;
+use std::sync::Arc;
+
+use impasto_cpu::native::Answer;
+
+use crate::world::KernelParts;
+use crate::world::bvh::Caster;
+
+/// The functions of kernels that are answered, and who answers them.
+pub(super) const ANSWERED: [(&str, Answer); 2] =
+    [("trace_closest", closest), ("trace_any", any)];
+
+/// What answers are given along.
+#[derive(Clone)]
+pub(crate) struct Casts(Arc<Caster>);
+
+impl std::fmt::Debug for Casts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("casts")
+    }
+}
+
+impl Casts {
+    /// Into a world; `None` where casts are left to kernels.
+    pub(crate) fn new(parts: &KernelParts) -> Option<Self> {
+        Some(Self(Arc::new(Caster::new(&parts.geometry, &parts.bvh)?)))
+    }
+
+    /// The same as an address.
+    pub(super) fn data(&self) -> *const c_void {
+        Arc::as_ptr(&self.0).cast()
+    }
+}
+
+/// A ray as the words of the arguments: origin, direction, limit, and what is skipped.
+type Words = [u32; 8];
+
+fn ray(words: &Words) -> ([f32; 3], [f32; 3], f32, u32) {
+    let at = |i: usize| f32::from_bits(words[i]);
+    ([at(0), at(1), at(2)], [at(3), at(4), at(5)], at(6), words[7])
+}
+
+/// # Safety
+/// `data` is a caster, and there are words for the arguments and for a hit.
+#[allow(unsafe_code)]
+unsafe extern "C" fn closest(data: *const c_void, arguments: *const u32, result: *mut u32) {
+    // SAFETY: as above.
+    let (caster, words) = unsafe { (&*data.cast::<Caster>(), &*arguments.cast::<Words>()) };
+    let (origin, direction, t_max, skip) = ray(words);
+    let hit = caster.closest(origin, direction, t_max, skip);
+    let found = [hit.t, hit.u, hit.v].map(f32::to_bits);
+    // SAFETY: as above.
+    unsafe { *result.cast::<[u32; 4]>() = [found[0], found[1], found[2], hit.primitive] };
+}
+
+/// # Safety
+/// `data` is a caster, and there are words for the arguments and for a bool.
+#[allow(unsafe_code)]
+unsafe extern "C" fn any(data: *const c_void, arguments: *const u32, result: *mut u32) {
+    // SAFETY: as above.
+    let (caster, words) = unsafe { (&*data.cast::<Caster>(), &*arguments.cast::<Words>()) };
+    let (origin, direction, t_max, skip) = ray(words);
+    // SAFETY: as above.
+    unsafe { *result = u32::from(caster.any(origin, direction, t_max, skip)) };
+}

@@ -1,0 +1,120 @@
+//! Ray casts by the processor: what `trace_closest` and `trace_any` of the WGSL find, found by native code.
+//!
+//! It reads the buffers that kernels bind, walks the same wide tree in the same order, and rounds as the text says,
+//! without fused operations: its hits have the bits of a kernel that does the same. obvhs can walk such a tree, too,
+//! a triangle at a time; for rays that are scattered that is about half as fast (tests/native/speed.rs measures both).
+//!
+//! `tree` holds what is walked, `walk` walks it, `slabs` and `triangles` are the tests of nodes and triangles,
+//! written in the `lanes` of an instruction set.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod lanes;
+mod slabs;
+mod tree;
+mod triangles;
+mod walk;
+
+use crate::wgsl::ShaderPart;
+
+/// Stands for no primitive: in a hit, and for a ray that skips none.
+pub const NO_PRIMITIVE: u32 = u32::MAX;
+
+/// What a ray hits, as the `Hit` of the WGSL.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Hit {
+    /// How far along the ray; `t_max` on a miss.
+    pub t: f32,
+    /// The barycentric coordinate of corner b.
+    pub u: f32,
+    /// The barycentric coordinate of corner c.
+    pub v: f32,
+    /// [`NO_PRIMITIVE`] on a miss.
+    pub primitive: u32,
+}
+
+/// The instructions that rays are cast with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// Those that every processor has.
+    Portable,
+    /// AVX2 of x86.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+/// Casts rays into a world on the processor that it was made on.
+pub struct Caster {
+    trees: tree::Trees,
+    instructions: Instructions,
+}
+
+impl Caster {
+    /// Of a scene's parts `geometry` and `bvh`. None if their tree is not the wide one, since casts through others
+    /// are left to kernels.
+    pub fn new(geometry: &ShaderPart, bvh: &ShaderPart) -> Option<Self> {
+        let instructions = Instructions::Portable;
+        #[cfg(target_arch = "x86_64")]
+        let instructions = if avx2::is_there() {
+            Instructions::Avx2
+        } else {
+            instructions
+        };
+        Some(Self {
+            trees: tree::Trees::new(geometry, bvh)?,
+            instructions,
+        })
+    }
+
+    /// The same with the instructions that every processor has.
+    pub fn portable(self) -> Self {
+        Self {
+            instructions: Instructions::Portable,
+            ..self
+        }
+    }
+
+    /// The instructions that it casts with.
+    pub fn instructions(&self) -> Instructions {
+        self.instructions
+    }
+
+    /// The nearest hit with 0 < t < `t_max` on another primitive than `skip`; `direction` is a unit vector. Rays
+    /// that are no rays hit nothing.
+    pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> Hit {
+        let ray = walk::Ray {
+            origin,
+            direction,
+            t_max,
+            skip,
+        };
+        self.cast::<false>(&ray)
+    }
+
+    /// Is there any such hit?
+    pub fn any(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> bool {
+        let ray = walk::Ray {
+            origin,
+            direction,
+            t_max,
+            skip,
+        };
+        self.cast::<true>(&ray).primitive != NO_PRIMITIVE
+    }
+
+    #[inline(always)]
+    fn cast<const ANY: bool>(&self, ray: &walk::Ray) -> Hit {
+        match self.instructions {
+            Instructions::Portable => portable::<ANY>(&self.trees, ray),
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            // SAFETY: it is chosen where these instructions are.
+            Instructions::Avx2 => unsafe { avx2::cast::<ANY>(&self.trees, ray) },
+        }
+    }
+}
+
+fn portable<const ANY: bool>(trees: &tree::Trees, ray: &walk::Ray) -> Hit {
+    walk::cast::<lanes::Portable, ANY>(trees, ray)
+}

@@ -1,0 +1,198 @@
+//! A tree as the processor walks it: the nodes that kernels bind, and triangles in packets of eight, coordinate by
+//! coordinate, so that one load brings a coordinate of all of them.
+//!
+//! All that a walk will follow is followed once here, so that it needs no limits of its own.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::lanes::WIDTH;
+use crate::wgsl::ShaderPart;
+use crate::world::bvh::text;
+
+/// Words of a placement; see `geometry_placed.wgsl`.
+const PLACEMENT_WORDS: usize = 7;
+
+/// A node of `wide.wgsl`, except that its triangles are those of packets: bit b of its leaves stands for lane
+/// b % 8 of packet b / 8 of its own.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(super) struct Node {
+    pub origin: [f32; 3],
+    pub exponents: [u8; 3],
+    /// Which children are inner ones.
+    pub inner: u8,
+    pub first_child: u32,
+    /// The first of its packets, or of its placements.
+    pub first_leaf: u32,
+    pub meta: [u8; WIDTH],
+    /// The lower and the upper planes of each axis.
+    pub planes: [[[u8; WIDTH]; 2]; 3],
+}
+
+/// Eight triangles, those that are missing all at the origin.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Packet {
+    /// `corners[c][axis]` of all.
+    pub corners: [[[f32; WIDTH]; 3]; 3],
+    /// The index of the first one.
+    pub first: u32,
+}
+
+/// A placement's words, as floats.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub(super) struct Placement {
+    pub rows: [[f32; 4]; PLACEMENT_WORDS],
+}
+
+/// Everything that casts read.
+pub(super) struct Trees {
+    pub nodes: Vec<Node>,
+    pub packets: Vec<Packet>,
+    /// None if there is one level.
+    pub placements: Option<Vec<Placement>>,
+    /// Nodes on the longest path, through both levels.
+    pub depth: usize,
+}
+
+impl Trees {
+    /// Of the parts that kernels include; none if these do not have a wide tree, or one that cannot be walked.
+    pub(super) fn new(geometry: &ShaderPart, bvh: &ShaderPart) -> Option<Self> {
+        if !text::is_wide(bvh) {
+            return None;
+        }
+        let corners: Vec<[[u32; 4]; 3]> = values(geometry, "triangles")?;
+        let mut reader = Reader {
+            nodes: values(bvh, "bvh_nodes")?,
+            corners: &corners,
+            seen: Vec::new(),
+            packets: Vec::new(),
+        };
+        reader.seen = vec![false; reader.nodes.len()];
+        let Some(placements) = values::<Placement>(geometry, "placements") else {
+            let depth = reader.read(0, Leaves::Triangles)?;
+            return Some(reader.trees(None, depth));
+        };
+        let upper = reader.read(0, Leaves::Placements(placements.len()))?;
+        let mut roots: Vec<u32> = placements.iter().map(Placement::root).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        let depths = roots
+            .iter()
+            .map(|&root| reader.read(root, Leaves::Triangles));
+        let below = depths.collect::<Option<Vec<_>>>()?.into_iter().max();
+        Some(reader.trees(Some(placements), upper + below.unwrap_or(0)))
+    }
+}
+
+impl Placement {
+    pub(super) fn root(&self) -> u32 {
+        self.rows[4][3].to_bits()
+    }
+
+    /// What primitives exceed their triangles by, modulo 2^32.
+    pub(super) fn shift(&self) -> u32 {
+        self.rows[3][3].to_bits()
+    }
+
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.rows[6][3] < 0.0
+    }
+}
+
+/// The values of a buffer.
+fn values<T: Pod>(part: &ShaderPart, name: &str) -> Option<Vec<T>> {
+    let buffer = part.buffers.iter().find(|b| b.name == name)?;
+    let whole = buffer.bytes.len() / size_of::<T>() * size_of::<T>();
+    (whole > 0).then(|| bytemuck::pod_collect_to_vec(&buffer.bytes[..whole]))
+}
+
+/// What the leaves of a tree are.
+#[derive(Clone, Copy)]
+enum Leaves {
+    Triangles,
+    /// So many of them.
+    Placements(usize),
+}
+
+/// Follows trees from their roots.
+struct Reader<'c> {
+    nodes: Vec<Node>,
+    corners: &'c [[[u32; 4]; 3]],
+    seen: Vec<bool>,
+    packets: Vec<Packet>,
+}
+
+impl Reader<'_> {
+    /// Nodes on the longest path from `root`; none if a node is out of range or has two parents.
+    fn read(&mut self, root: u32, leaves: Leaves) -> Option<usize> {
+        let mut deepest = 0;
+        let mut waiting = vec![(root, 1)];
+        while let Some((index, depth)) = waiting.pop() {
+            let seen = self.seen.get_mut(index as usize)?;
+            if std::mem::replace(seen, true) {
+                return None;
+            }
+            deepest = deepest.max(depth);
+            let node = self.nodes[index as usize];
+            self.nodes[index as usize].first_leaf = self.leaves(&node, leaves)?;
+            for child in (0..u32::from(node.inner).count_ones()).rev() {
+                waiting.push((node.first_child.checked_add(child)?, depth + 1));
+            }
+        }
+        Some(deepest)
+    }
+
+    /// Where the leaves of a node are now.
+    fn leaves(&mut self, node: &Node, leaves: Leaves) -> Option<u32> {
+        let mut bits = 0;
+        for (child, meta) in node.meta.iter().enumerate() {
+            let (count, shift) = (u32::from(meta >> 5), u32::from(meta & 31));
+            let is_inner = node.inner >> child & 1 == 1;
+            // A child that is marked as an inner one has the bit of its slot.
+            let is_marked = count == 1 && shift == 24 + child as u32;
+            if is_inner != is_marked || !is_inner && count != 0 && shift > 21 {
+                return None;
+            }
+            bits |= if is_inner { 0 } else { count << shift };
+        }
+        let count = 32 - (bits & 0x00ff_ffff).leading_zeros();
+        let first = node.first_leaf;
+        let end = first.checked_add(count)? as usize;
+        match leaves {
+            Leaves::Placements(all) => (end <= all).then_some(first),
+            Leaves::Triangles if count == 0 => Some(0),
+            Leaves::Triangles => {
+                let triangles = self.corners.get(first as usize..end)?;
+                let packet = self.packets.len() as u32;
+                let starts = (first..).step_by(WIDTH);
+                let packets = starts.zip(triangles.chunks(WIDTH));
+                self.packets
+                    .extend(packets.map(|(first, t)| packet_of(first, t)));
+                Some(packet)
+            }
+        }
+    }
+
+    fn trees(self, placements: Option<Vec<Placement>>, depth: usize) -> Trees {
+        Trees {
+            nodes: self.nodes,
+            packets: self.packets,
+            placements,
+            depth,
+        }
+    }
+}
+
+fn packet_of(first: u32, triangles: &[[[u32; 4]; 3]]) -> Packet {
+    let mut corners = [[[0.0; WIDTH]; 3]; 3];
+    for (lane, triangle) in triangles.iter().enumerate() {
+        for (to, from) in corners.iter_mut().zip(triangle) {
+            for (to, from) in to.iter_mut().zip(from) {
+                to[lane] = f32::from_bits(*from);
+            }
+        }
+    }
+    Packet { corners, first }
+}

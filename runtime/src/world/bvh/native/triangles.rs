@@ -1,0 +1,178 @@
+//! The triangle test of `triangle.wgsl`, of a packet at once.
+
+use super::Hit;
+use super::lanes::{Lanes, WIDTH};
+use super::tree::{Packet, Placement};
+
+type Vector<L> = [L; 3];
+
+/// The frame of a ray, in every lane the same.
+#[derive(Clone, Copy)]
+pub(super) struct Frame<L> {
+    origin: Vector<L>,
+    x: Vector<L>,
+    y: Vector<L>,
+    z: Vector<L>,
+}
+
+impl<L: Lanes> Frame<L> {
+    #[inline(always)]
+    pub(super) fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
+        let [x, y, z] = direction;
+        let side = if z >= 0.0 { 1.0 } else { -1.0 };
+        let a = -1.0 / (side + z);
+        let b = x * y * a;
+        Self {
+            origin: splat(origin),
+            x: splat([1.0 + side * x * x * a, side * b, -side * x]),
+            y: splat([b, side + y * y * a, -y]),
+            z: splat(direction),
+        }
+    }
+
+    /// Where points, given from the ray's origin, lie across the ray.
+    #[inline(always)]
+    fn project(&self, point: Vector<L>) -> [L; 2] {
+        [dot(self.x, point), dot(self.y, point)]
+    }
+}
+
+/// A placement's matrix, in every lane the same.
+pub(super) struct Place<L> {
+    rows: [[L; 4]; 3],
+    is_mirrored: bool,
+}
+
+impl<L: Lanes> Place<L> {
+    #[inline(always)]
+    pub(super) fn new(placement: &Placement) -> Self {
+        let [x, y, z, ..] = placement.rows;
+        Self {
+            rows: [row(x), row(y), row(z)],
+            is_mirrored: placement.is_mirrored(),
+        }
+    }
+
+    #[inline(always)]
+    fn triangles(&self, [a, b, c]: [Vector<L>; 3]) -> [Vector<L>; 3] {
+        let (b, c) = if self.is_mirrored { (c, b) } else { (b, c) };
+        [self.point(a), self.point(b), self.point(c)]
+    }
+
+    #[inline(always)]
+    fn point(&self, p: Vector<L>) -> Vector<L> {
+        let [x, y, z] = self.rows;
+        [plane(x, p), plane(y, p), plane(z, p)]
+    }
+}
+
+/// Tests the triangles of a packet that have a bit in `lanes`, the last first, and keeps the nearest hit.
+/// Primitives are `shift` more than triangles. Is there a hit that is nearer than before?
+#[inline(always)]
+pub(super) fn intersect<L: Lanes>(
+    packet: &Packet,
+    place: Option<&Place<L>>,
+    shift: u32,
+    lanes: u32,
+    frame: &Frame<L>,
+    skip: u32,
+    hit: &mut Hit,
+) -> bool {
+    let [a, b, c] = &packet.corners;
+    let corners = [load(a), load(b), load(c)];
+    let corners = match place {
+        Some(place) => place.triangles(corners),
+        None => corners,
+    };
+    let [a, b, c] = corners;
+    let from_a = subtract(a, frame.origin);
+    let from_b = subtract(b, frame.origin);
+    let from_c = subtract(c, frame.origin);
+    let a = frame.project(from_a);
+    let b = frame.project(from_b);
+    let c = frame.project(from_c);
+    let weights = [edge_side(b, c), edge_side(c, a), edge_side(a, b)];
+    let zero = L::splat(0.0);
+    let [x, y, z] = weights;
+    let left = L::and(L::and(x.at_least(zero), y.at_least(zero)), z.at_least(zero));
+    let right = L::and(L::and(x.at_most(zero), y.at_most(zero)), z.at_most(zero));
+    let sum = x.add(y).add(z);
+    let inside = L::and(L::or(left, right), sum.abs().above(L::splat(1e-37)));
+    let first = packet.first.wrapping_add(shift);
+    let skipped = skip.wrapping_sub(first);
+    let skipped = if skipped < WIDTH as u32 {
+        1 << skipped
+    } else {
+        0
+    };
+    let lanes = L::bits(inside) & lanes & !skipped;
+    if lanes == 0 {
+        return false;
+    }
+    let barycentric = [x.div(sum), y.div(sum), z.div(sum)];
+    let depths = [
+        dot(frame.z, from_a),
+        dot(frame.z, from_b),
+        dot(frame.z, from_c),
+    ];
+    let t = dot(barycentric, depths);
+    let nearer = L::and(t.above(zero), t.below(L::splat(hit.t)));
+    let mut lanes = L::bits(nearer) & lanes;
+    if lanes == 0 {
+        return false;
+    }
+    let (t, u, v) = (t.values(), barycentric[1].values(), barycentric[2].values());
+    while lanes != 0 {
+        let lane = (31 - lanes.leading_zeros()) as usize % WIDTH;
+        lanes &= !(1 << lane);
+        if t[lane] < hit.t {
+            *hit = Hit {
+                t: t[lane],
+                u: u[lane],
+                v: v[lane],
+                primitive: first.wrapping_add(lane as u32),
+            };
+        }
+    }
+    true
+}
+
+/// See `edge_side` of the WGSL, whose order of operations this has.
+#[inline(always)]
+fn edge_side<L: Lanes>(p: [L; 2], q: [L; 2]) -> L {
+    let middle = [p[0].add(q[0]), p[1].add(q[1])];
+    let edge = [q[0].sub(p[0]), q[1].sub(p[1])];
+    middle[0].mul(edge[1]).sub(middle[1].mul(edge[0]))
+}
+
+/// A row of a matrix, splat.
+#[inline(always)]
+fn row<L: Lanes>([x, y, z, w]: [f32; 4]) -> [L; 4] {
+    [L::splat(x), L::splat(y), L::splat(z), L::splat(w)]
+}
+
+/// A row of a matrix times points.
+#[inline(always)]
+fn plane<L: Lanes>([x, y, z, w]: [L; 4], p: Vector<L>) -> L {
+    dot([x, y, z], p).add(w)
+}
+
+#[inline(always)]
+fn splat<L: Lanes>([x, y, z]: [f32; 3]) -> Vector<L> {
+    [L::splat(x), L::splat(y), L::splat(z)]
+}
+
+#[inline(always)]
+fn load<L: Lanes>([x, y, z]: &[[f32; WIDTH]; 3]) -> Vector<L> {
+    [L::load(x), L::load(y), L::load(z)]
+}
+
+#[inline(always)]
+fn subtract<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+
+#[inline(always)]
+fn dot<L: Lanes>(a: Vector<L>, b: Vector<L>) -> L {
+    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
