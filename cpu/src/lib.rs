@@ -9,14 +9,18 @@
 //! | `code` | what lowering makes of a kernel: functions, instructions, operations |
 //! | `shape` | how values lie in cells and in buffers |
 //! | `lower` | from naga's IR to code |
+//! | `arithmetic` | what operations are made of |
+//! | `plan` | which functions are compiled on their own |
 //! | `interpret` | runs code for one invocation, in either precision |
 //! | `native` | makes machine code of code, and runs it for many invocations |
 
+mod arithmetic;
 pub mod code;
 mod error;
 pub mod interpret;
 mod lower;
 pub mod native;
+mod plan;
 pub mod shape;
 #[cfg(test)]
 mod tests;

@@ -17,10 +17,10 @@ use super::constants::Constants;
 use super::emit::{self, Emitter, Shared};
 use super::host::Answer;
 use super::layout::{self, Layout};
-use super::plan::Plan;
 use super::run::MOST_INPUTS;
 use crate::code::{Code, Function, Input, Scalar};
 use crate::error::KernelError;
+use crate::plan::Plan;
 
 /// A kernel as machine code.
 #[derive(Debug)]

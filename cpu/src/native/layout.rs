@@ -2,7 +2,7 @@
 //! variables of one invocation.
 
 use crate::code::{Code, Ins, Node, Pointer};
-use crate::native::plan::walk;
+use crate::plan::walk;
 use crate::shape;
 
 /// Bytes of a place where a function of the host finds its arguments, and leaves its result.

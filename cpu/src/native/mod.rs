@@ -2,7 +2,6 @@
 //!
 //! | file | does |
 //! |---|---|
-//! | `plan` | which functions are compiled on their own |
 //! | `layout` | the memory that code finds through its first argument |
 //! | `emit` | from code to the compiler's intermediate representation |
 //! | `constants`, `host` | what code refers to: tables, and functions of the host |
@@ -15,7 +14,6 @@ mod constants;
 mod emit;
 mod host;
 mod layout;
-mod plan;
 mod processor;
 mod run;
 

@@ -13,7 +13,7 @@ const LONE: usize = 1200;
 
 /// What is known of the functions of a kernel, by their index.
 #[derive(Debug)]
-pub(super) struct Plan {
+pub(crate) struct Plan {
     /// Whether a function is compiled where it is called.
     pub inline: Vec<bool>,
     /// Whether it indexes what its arguments point to.
@@ -21,7 +21,7 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub(super) fn new(code: &Code) -> Self {
+    pub(crate) fn new(code: &Code) -> Self {
         let count = code.functions.len();
         let mut sites = vec![0usize; count];
         let all = code.functions.iter().flatten().chain([&code.main]);
@@ -95,7 +95,7 @@ fn takes_pointers(ins: &Ins, arguments: u32) -> bool {
 }
 
 /// Visits every node of a block and of the blocks within.
-pub(super) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
+pub(crate) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
     for node in block {
         visit(node);
         match node {
@@ -118,7 +118,7 @@ pub(super) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
 
 /// By variable of a function: whether it must lie in memory, because it is indexed by what is known only
 /// when running.
-pub(super) fn in_memory(function: &Function, plan: &Plan) -> Vec<bool> {
+pub(crate) fn in_memory(function: &Function, plan: &Plan) -> Vec<bool> {
     let mut found = vec![false; function.variables.len()];
     let mut mark = |cell: u32| {
         let within = |(first, cells): &(u32, u32)| (*first..first + cells).contains(&cell);
