@@ -18,6 +18,8 @@ pub(crate) struct Plan {
     pub inline: Vec<bool>,
     /// Whether it indexes what its arguments point to.
     pub indexes_arguments: Vec<bool>,
+    /// About how many operations it is.
+    pub sizes: Vec<usize>,
 }
 
 impl Plan {
@@ -35,9 +37,9 @@ impl Plan {
         let mut plan = Self {
             inline: vec![false; count],
             indexes_arguments: vec![false; count],
+            sizes: vec![0; count],
         };
         // Callees come before their callers.
-        let mut sizes = vec![0usize; count];
         for (index, function) in code.functions.iter().enumerate() {
             let Some(function) = function else { continue };
             let (mut size, mut pointers) = (0, false);
@@ -52,13 +54,13 @@ impl Plan {
                     let callee = *function as usize;
                     size += 4;
                     if plan.inline[callee] {
-                        size += sizes[callee];
+                        size += plan.sizes[callee];
                         indexes |= plan.indexes_arguments[callee];
                     }
                 }
                 _ => size += 1,
             });
-            sizes[index] = size;
+            plan.sizes[index] = size;
             plan.indexes_arguments[index] = indexes;
             plan.inline[index] = !function.answered
                 && (pointers || size <= SMALL || sites[index] == 1 && size <= LONE);
@@ -68,7 +70,7 @@ impl Plan {
 }
 
 /// About how many operations an instruction is.
-fn weight(ins: &Ins) -> usize {
+pub(crate) fn weight(ins: &Ins) -> usize {
     match ins {
         Ins::Copy { .. } | Ins::Address { .. } => 0,
         Ins::Map1 { count, .. } | Ins::Map2 { count, .. } | Ins::Map3 { count, .. } => {

@@ -6,6 +6,8 @@ use crate::code::Code;
 use crate::error::KernelError;
 use crate::interpret::{Float, Host, Machine};
 use crate::lower;
+#[cfg(all(target_arch = "x86_64", unix))]
+use crate::wide;
 use crate::native::{Buffer, Invocation, Kernel};
 
 /// A host that looks at nothing.
@@ -66,6 +68,27 @@ fn run_native(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, Ke
     Ok(result.read())
 }
 
+/// The same in the first of eight lanes.
+#[cfg(all(target_arch = "x86_64", unix))]
+fn run_wide(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, KernelError> {
+    let code = code(functions, body)?;
+    let kernel = wide::Kernel::build(&code, &[])?;
+    let given = Buffer::new(input.len().max(4));
+    given.write(0, input);
+    let result = Buffer::new(8);
+    let buffers = code.buffers.iter().map(|name| match name.as_str() {
+        "input" => &given,
+        _ => &result,
+    });
+    let buffers: Vec<&Buffer> = buffers.collect();
+    let stop = AtomicBool::new(false);
+    // SAFETY: nobody answers.
+    #[allow(unsafe_code)]
+    let invocation = unsafe { wide::Invocation::new(&kernel, &buffers, &[], &stop) };
+    invocation?.run([0; 3], 0, 1);
+    Ok(result.read())
+}
+
 #[track_caller]
 fn gives(functions: &str, body: &str, expected: &[u32]) {
     let input: Vec<u32> = (0..16).collect();
@@ -75,6 +98,11 @@ fn gives(functions: &str, body: &str, expected: &[u32]) {
     assert_eq!(single[..expected.len()], *expected);
     assert_eq!(double[..expected.len()], *expected);
     assert_eq!(native[..expected.len()], *expected);
+    #[cfg(all(target_arch = "x86_64", unix))]
+    if wide::is_possible() {
+        let wide = run_wide(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(wide[..expected.len()], *expected);
+    }
 }
 
 #[test]

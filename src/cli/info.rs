@@ -52,6 +52,7 @@ impl DeviceArgs {
             gpu: self.gpu.options(),
             cpu: CpuOptions {
                 threads: self.threads,
+                ..CpuOptions::default()
             },
         };
         Device::open(&options).map_err(|error| Failure::Error(error.to_string()))

@@ -24,7 +24,7 @@ use crate::plan::Plan;
 
 /// A kernel as machine code.
 #[derive(Debug)]
-pub struct Kernel {
+pub(crate) struct Kernel {
     pub(super) main: *const u8,
     pub(super) layout: Layout,
     /// Module-scope variables at the beginning of an invocation.
@@ -35,7 +35,7 @@ pub struct Kernel {
     /// By buffer: its name, and the bytes it must have at least.
     pub(super) buffers: Vec<(String, u64)>,
     /// What building took.
-    pub statistics: Statistics,
+    pub(crate) statistics: Statistics,
     /// Tables that the code refers to.
     _constants: Arc<Constants>,
     /// The memory that the code is in.
@@ -93,7 +93,7 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, the processor is none that code can be made for, or there is no
     /// memory for code.
-    pub fn build(
+    pub(crate) fn build(
         code: &Code,
         answers: &[Option<Answer>],
     ) -> Result<Self, KernelError> {
@@ -164,7 +164,7 @@ impl Kernel {
 
 impl Kernel {
     /// The names of the buffers that it binds, in the order in which they are given.
-    pub fn buffers(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn buffers(&self) -> impl Iterator<Item = &str> {
         self.buffers.iter().map(|(name, _)| name.as_str())
     }
 }

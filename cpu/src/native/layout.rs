@@ -63,12 +63,12 @@ impl Layout {
 }
 
 /// Bytes of a value in a buffer.
-pub(super) fn bytes_of(places: &[shape::Place]) -> u32 {
+pub(crate) fn bytes_of(places: &[shape::Place]) -> u32 {
     places.iter().map(|place| 4 * (place.word + 1)).max().unwrap_or(0)
 }
 
 /// By buffer: the bytes that it must have at least, so that every access can be moved within it.
-pub(super) fn least_bytes(code: &Code) -> Vec<u64> {
+pub(crate) fn least_bytes(code: &Code) -> Vec<u64> {
     let mut least = vec![4; code.buffers.len()];
     let mut need = |buffer: u32, bytes: u64| {
         let all = &mut least[buffer as usize];

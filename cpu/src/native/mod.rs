@@ -13,11 +13,13 @@ mod build;
 mod constants;
 mod emit;
 mod host;
-mod layout;
+pub(crate) mod layout;
 mod processor;
 mod run;
 
-pub use build::{Kernel, Statistics};
-pub use host::Answer;
+pub use build::Statistics;
 pub use processor::{check, compiler, features, processor};
-pub use run::{Buffer, Invocation};
+pub use run::Buffer;
+
+pub(crate) use build::Kernel;
+pub(crate) use run::Invocation;

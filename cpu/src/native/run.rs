@@ -45,7 +45,7 @@ impl Buffer {
 
 /// What one thread needs to run a kernel.
 #[derive(Debug)]
-pub struct Invocation<'k> {
+pub(crate) struct Invocation<'k> {
     kernel: &'k Kernel,
     context: Box<[u64]>,
 }
@@ -61,7 +61,7 @@ impl<'k> Invocation<'k> {
     /// # Errors
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
     #[allow(unsafe_code)]
-    pub unsafe fn new(
+    pub(crate) unsafe fn new(
         kernel: &'k Kernel,
         buffers: &[&'k Buffer],
         data: &[*const c_void],
@@ -91,7 +91,7 @@ impl<'k> Invocation<'k> {
 
     /// Runs the entry point for a thread of a workgroup.
     #[allow(unsafe_code)]
-    pub fn run(&mut self, group: [u32; 3], lane: u32) {
+    pub(crate) fn run(&mut self, group: [u32; 3], lane: u32) {
         let kernel = self.kernel;
         let first = kernel.layout.private(0) as usize;
         let cells: &mut [u32] = bytemuck::cast_slice_mut(&mut self.context);

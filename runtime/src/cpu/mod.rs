@@ -9,8 +9,8 @@ mod work;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use impasto_cpu::KernelError;
 use impasto_cpu::native;
+use impasto_cpu::{KernelError, Width};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;
@@ -26,6 +26,8 @@ pub(crate) use work::{Step, Work};
 pub struct CpuOptions {
     /// Threads that render; one for each core if `None`.
     pub threads: Option<usize>,
+    /// Paths that a thread takes at a time.
+    pub width: Width,
 }
 
 /// The most threads that may be asked for.
@@ -39,8 +41,9 @@ const MOST_KEPT: usize = 64;
 #[derive(Debug)]
 pub struct Cpu {
     threads: Arc<ThreadPool>,
+    width: Width,
     /// Kernels that were built before, by their text and whether their ray casts are answered.
-    kernels: Mutex<HashMap<(String, bool), Arc<native::Kernel>>>,
+    kernels: Mutex<HashMap<(String, bool), Arc<impasto_cpu::Kernel>>>,
 }
 
 impl Cpu {
@@ -69,6 +72,7 @@ impl Cpu {
         })?;
         Ok(Self {
             threads: Arc::new(pool),
+            width: options.width,
             kernels: Mutex::default(),
         })
     }
@@ -121,7 +125,7 @@ impl Cpu {
         &self,
         kernel: &Kernel,
         casts: bool,
-    ) -> Result<Arc<native::Kernel>, RuntimeError> {
+    ) -> Result<Arc<impasto_cpu::Kernel>, RuntimeError> {
         let key = (kernel.wgsl.clone(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept().get(&key) {
@@ -142,8 +146,8 @@ impl Cpu {
         let names: Vec<&str> = answered.iter().map(|(name, _)| *name).collect();
         let hooks: Vec<usize> = (0..names.len()).collect();
         let code = impasto_cpu::lower(&module, &info, &names, &hooks).map_err(refused)?;
-        let answers: Vec<_> = answered.iter().map(|(_, answer)| Some(*answer)).collect();
-        let build = || native::Kernel::build(&code, &answers);
+        let answers: Vec<_> = answered.iter().map(|(_, answer)| *answer).collect();
+        let build = || impasto_cpu::Kernel::build(&code, &answers, self.width);
         let built = Arc::new(self.threads.install(build).map_err(refused)?);
         let mut kept = kept();
         if kept.len() >= MOST_KEPT {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use impasto_cpu::native::{Buffer, Invocation, Kernel};
+use impasto_cpu::native::Buffer;
+use impasto_cpu::{Kernel, Thread};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -102,16 +103,16 @@ impl Work {
     }
 
     fn dispatch(&self, step: &Step) -> Result<(), RuntimeError> {
-        let bound: Vec<&Buffer> = step.kernel.buffers().map(|name| self.named(name)).collect();
+        let bound: Vec<&Buffer> = step.kernel.buffers().into_iter().map(|name| self.named(name)).collect();
         let prepare = || self.invocation(step, &bound);
         if step.groups == 1 {
             let mut invocation = prepare()?;
-            (0..step.lanes).for_each(|lane| invocation.run([0; 3], lane));
+            invocation.run([0; 3], 0..step.lanes);
             return Ok(());
         }
-        let run = |invocation: &mut Result<Invocation<'_>, RuntimeError>, group: u32| {
+        let run = |invocation: &mut Result<Thread<'_>, RuntimeError>, group: u32| {
             if let Ok(invocation) = invocation {
-                (0..step.lanes).for_each(|lane| invocation.run([group, 0, 0], lane));
+                invocation.run([group, 0, 0], 0..step.lanes);
             }
         };
         // What one thread cannot prepare, none can.
@@ -126,11 +127,11 @@ impl Work {
         &'w self,
         step: &'w Step,
         bound: &[&'w Buffer],
-    ) -> Result<Invocation<'w>, RuntimeError> {
+    ) -> Result<Thread<'w>, RuntimeError> {
         let data = self.casts.as_ref().map(Casts::data);
         let data: Vec<*const c_void> = data.map_or_else(Vec::new, |d| vec![d; ANSWERED.len()]);
         // SAFETY: kernels are built with answers only if there are casts, which they are given along.
-        let invocation = unsafe { Invocation::new(&step.kernel, bound, &data, &self.stop) };
+        let invocation = unsafe { Thread::new(&step.kernel, bound, &data, &self.stop) };
         invocation.map_err(|error| RuntimeError::Shader {
             kernel: step.name.clone(),
             message: error.to_string(),
