@@ -115,6 +115,7 @@ impl Cpu {
         Ok(Step {
             name: kernel.desc.name.clone(),
             kernel: self.compiled(kernel, casts.is_some())?,
+            hands_out: kernel.wgsl.contains("fn hand_out_work"),
             groups: match kernel.desc.source {
                 DispatchSource::Once => Groups::Known(1),
                 DispatchSource::Groups(groups) => Groups::Known(groups),
