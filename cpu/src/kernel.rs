@@ -78,6 +78,10 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, or there is no memory for code.
     pub fn build(code: &Code, answers: &[Answer], width: Width) -> Result<Self, KernelError> {
+        if code.has_barriers && code.workgroup > 1 {
+            let what = "workgroup whose threads wait for each other";
+            return Err(KernelError::unsupported(what, &code.main.name));
+        }
         #[cfg(all(target_arch = "x86_64", unix))]
         if width == Width::Best && wide::is_possible() {
             let answers: Vec<_> = answers.iter().map(|answer| Some(answer.eight)).collect();

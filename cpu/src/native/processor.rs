@@ -31,7 +31,9 @@ pub fn check() -> Result<(), KernelError> {
     }
     match buffer.read()[0] {
         1 => Ok(()),
-        _ => Err(KernelError::Processor("code does not do what it says".into())),
+        _ => Err(KernelError::Processor(
+            "code does not do what it says".into(),
+        )),
     }
 }
 

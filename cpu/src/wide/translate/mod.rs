@@ -80,8 +80,13 @@ struct Frame<'a> {
 /// What a pointer to cells points to.
 #[derive(Clone, Copy, Debug)]
 enum Target {
-    Cell { frame: usize, slot: Slot },
-    Private { cell: u32 },
+    Cell {
+        frame: usize,
+        slot: Slot,
+    },
+    Private {
+        cell: u32,
+    },
     /// A cell of an element of an array in memory.
     Array {
         from: i32,
@@ -160,7 +165,10 @@ fn escapes(node: &Node) -> Escapes {
 }
 
 fn escapes_of(block: &[Node]) -> Escapes {
-    block.iter().map(escapes).fold(Escapes::default(), Escapes::with)
+    block
+        .iter()
+        .map(escapes)
+        .fold(Escapes::default(), Escapes::with)
 }
 
 /// About how many instructions a block takes; `None` if it has loops or calls.
@@ -295,7 +303,12 @@ impl<'a> Translator<'a> {
         {
             key.swap(0, 1);
         }
-        if let Some(value) = self.known.iter().rev().find_map(|known| known.get(&(op, key))) {
+        if let Some(value) = self
+            .known
+            .iter()
+            .rev()
+            .find_map(|known| known.get(&(op, key)))
+        {
             return *value;
         }
         let to = self.new_value();
@@ -315,7 +328,9 @@ impl<'a> Translator<'a> {
         let (x, y) = (self.bits_of(a), self.bits_of(b));
         match (two, x, y) {
             (Two::And, Some(u32::MAX), _) => return b,
-            (Two::And, _, Some(u32::MAX)) | (Two::Or | Two::Xor | Two::Add, _, Some(0)) => return a,
+            (Two::And, _, Some(u32::MAX)) | (Two::Or | Two::Xor | Two::Add, _, Some(0)) => {
+                return a;
+            }
             (Two::Or | Two::Xor | Two::Add, Some(0), _) => return b,
             (Two::And, _, Some(0)) | (Two::AndNot, _, Some(0)) => return self.bits(0),
             (Two::AndNot, Some(0), _) => return b,
@@ -465,7 +480,13 @@ impl<'a> Translator<'a> {
             left.extend(frame.around.last().and_then(|around| around.broken));
         }
         if escapes.continues {
-            left.extend(frame.around.iter().rev().find_map(|around| around.continued));
+            left.extend(
+                frame
+                    .around
+                    .iter()
+                    .rev()
+                    .find_map(|around| around.continued),
+            );
         }
         let mut mask = mask;
         for variable in left {
@@ -701,7 +722,10 @@ impl<'a> Translator<'a> {
         self.block(&function.body)?;
         self.mask = mask;
         self.frames.pop();
-        let results = result.into_iter().map(|variable| self.get(variable)).collect();
+        let results = result
+            .into_iter()
+            .map(|variable| self.get(variable))
+            .collect();
         self.variables.end(first);
         Ok(results)
     }
@@ -725,7 +749,9 @@ impl<'a> Translator<'a> {
             self.variables.renew(variable);
         }
         let results = 0..function.result.len() as i32;
-        Ok(results.map(|at| self.load(interface.result + CELL * at)).collect())
+        Ok(results
+            .map(|at| self.load(interface.result + CELL * at))
+            .collect())
     }
 
     /// Calls the host, which answers in place of a function.
@@ -844,7 +870,9 @@ impl<'a> Translator<'a> {
                 count,
             } => {
                 let of = |this: &mut Self, at: usize, width: u32| {
-                    (from[at]..from[at] + width).map(|slot| this.value(slot)).collect()
+                    (from[at]..from[at] + width)
+                        .map(|slot| this.value(slot))
+                        .collect()
                 };
                 let op = self.shared.code.ops[*op as usize];
                 let values = crate::arithmetic::vectors(self, op, *width, of);
