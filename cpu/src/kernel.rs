@@ -85,7 +85,11 @@ impl Kernel {
         #[cfg(all(target_arch = "x86_64", unix))]
         if width == Width::Best && wide::is_possible() {
             let answers: Vec<_> = answers.iter().map(|answer| Some(answer.eight)).collect();
-            return Ok(Self(Made::Eight(wide::Kernel::build(code, &answers)?)));
+            match wide::Kernel::build(code, &answers) {
+                // The other back end knows more, such as arrays of any length.
+                Err(KernelError::Unsupported { .. }) => {}
+                built => return Ok(Self(Made::Eight(built?))),
+            }
         }
         let _ = width;
         let answers: Vec<_> = answers.iter().map(|answer| Some(answer.one)).collect();

@@ -182,7 +182,7 @@ impl RenderArgs {
         };
         let default = match device {
             Device::Gpu(_) => Strategy::AUTO,
-            Device::Cpu(_) => Strategy::MEGA,
+            Device::Cpu(cpu) => cpu.strategy(),
         };
         let strategy = match self.plan.source(&names, &unused, default)? {
             Source::Given(plan) => return Ok(fixed(plan)),

@@ -1,7 +1,7 @@
-//! The processor as a device: the megakernel's own text as machine code, on all cores.
+//! The processor as a device: the kernels that GPUs run as machine code, on all cores.
 //!
-//! There is one kernel, whatever the materials: to branch costs a processor nothing that a kernel more
-//! would save, and between kernels paths would go through memory.
+//! Where eight paths run at a time, paths that hit the same material should do so together: each material has
+//! a kernel, as on GPUs. Where one runs, there is one kernel, since queues would only take time.
 
 mod casts;
 mod work;
@@ -9,6 +9,7 @@ mod work;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use impasto_compiler::partition::{Form, Organisation, Plan, Strategy};
 use impasto_cpu::native;
 use impasto_cpu::{KernelError, Width};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -17,6 +18,7 @@ use crate::error::RuntimeError;
 use crate::gpu::DeviceInfo;
 use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
+use crate::world::{MaterialSource, World};
 
 pub(crate) use casts::Casts;
 pub(crate) use work::{Groups, Step, Work};
@@ -82,9 +84,34 @@ impl Cpu {
         self.threads.current_num_threads()
     }
 
-    /// Whether paths in step with each other are so much faster that each material has its kernel.
-    pub(crate) fn is_wide(&self) -> bool {
+    /// Whether eight paths run at a time, so that paths that do the same should do it together.
+    pub fn is_wide(&self) -> bool {
         self.width == Width::Best && impasto_cpu::is_wide()
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(&self) -> Strategy {
+        if self.is_wide() {
+            Strategy::OWN
+        } else {
+            Strategy::MEGA
+        }
+    }
+
+    /// The plan that takes the place of one that cannot run here: threads of a workgroup come one after
+    /// another, and a kernel of several queues lets them wait for each other. One path at a time gains
+    /// nothing by queues.
+    pub(crate) fn plan(&self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
+        let is_mega = wanted.organisation == Organisation::Mega;
+        let is_binned = wanted.kernels.iter().any(|kernel| kernel.form == Form::Binned);
+        if is_mega || self.is_wide() && !is_binned {
+            return wanted.clone();
+        }
+        if self.is_wide() {
+            return world.own_plan(&source.infos());
+        }
+        let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
+        Plan::mega(&names, &world.parts.unbound)
     }
 
     /// What the processor is and can do.

@@ -5,7 +5,7 @@ mod work;
 
 use std::fmt;
 
-use impasto_compiler::partition::{Organisation, Plan};
+use impasto_compiler::partition::Plan;
 
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
@@ -165,11 +165,8 @@ impl DeviceRef<'_> {
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
         match self {
-            DeviceRef::Cpu(cpu) if !cpu.is_wide() && wanted.organisation != Organisation::Mega => {
-                let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
-                Plan::mega(&names, &world.parts.unbound)
-            }
-            _ => wanted.clone(),
+            DeviceRef::Gpu(_) => wanted.clone(),
+            DeviceRef::Cpu(cpu) => cpu.plan(wanted, world, source),
         }
     }
 
