@@ -42,9 +42,9 @@ pub struct Kernel(Made);
 
 #[derive(Debug)]
 enum Made {
-    One(native::Kernel),
+    One(Box<native::Kernel>),
     #[cfg(all(target_arch = "x86_64", unix))]
-    Eight(wide::Kernel),
+    Eight(Box<wide::Kernel>),
 }
 
 /// What one thread needs to run a kernel.
@@ -88,12 +88,13 @@ impl Kernel {
             match wide::Kernel::build(code, &answers) {
                 // The other back end knows more, such as arrays of any length.
                 Err(KernelError::Unsupported { .. }) => {}
-                built => return Ok(Self(Made::Eight(built?))),
+                built => return Ok(Self(Made::Eight(Box::new(built?)))),
             }
         }
         let _ = width;
         let answers: Vec<_> = answers.iter().map(|answer| Some(answer.one)).collect();
-        Ok(Self(Made::One(native::Kernel::build(code, &answers)?)))
+        let kernel = native::Kernel::build(code, &answers)?;
+        Ok(Self(Made::One(Box::new(kernel))))
     }
 
     /// The names of the buffers that it binds, in the order in which they are given.

@@ -213,9 +213,10 @@ fn compile(
     let mut context = FunctionBuilderContext::new();
     let is_main = index == shared.code.functions.len();
     let none = vec![false; function.arguments as usize];
-    let convention = match is_main {
-        true => shared.host,
-        false => cranelift_codegen::isa::CallConv::Fast,
+    let convention = if is_main {
+        shared.host
+    } else {
+        cranelift_codegen::isa::CallConv::Fast
     };
     let signature = emit::signature(function, &none, convention);
     let mut text = Text::with_name_signature(emit::name(index), signature);

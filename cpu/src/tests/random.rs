@@ -464,7 +464,7 @@ fn plain(word: u32) -> u32 {
 
 fn check(seed: u64) {
     let mut random = Random(seed);
-    let wild = seed % 3 == 0;
+    let wild = seed.is_multiple_of(3);
     let text = kernel(&mut random, wild);
     let input: Vec<u32> = (0..WORDS)
         .map(|_| match random.below(4) {

@@ -260,10 +260,9 @@ impl Assigner<'_> {
     /// Brings all values that are still needed to memory.
     fn spill_all(&mut self) {
         for register in 0..REGISTERS as Register {
-            if let Some(value) = self.registers[register as usize] {
-                if self.is_needed(value) {
-                    self.spill(register);
-                }
+            let held = self.registers[register as usize];
+            if held.is_some_and(|value| self.is_needed(value)) {
+                self.spill(register);
             }
         }
     }

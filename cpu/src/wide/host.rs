@@ -20,8 +20,8 @@ macro_rules! floats {
             // SAFETY: the code that calls leaves one cell and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 2]>() };
             let [Cell(x), Cell(y)] = cells;
+            let function: fn(f32) -> f32 = $function;
             for (y, x) in y.iter_mut().zip(x) {
-                let function: fn(f32) -> f32 = $function;
                 *y = function(f32::from_bits(*x)).to_bits();
             }
         })+
@@ -42,8 +42,8 @@ macro_rules! words {
             // SAFETY: the code that calls leaves one cell and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 2]>() };
             let [Cell(x), Cell(y)] = cells;
+            let function: fn(u32) -> u32 = $function;
             for (y, x) in y.iter_mut().zip(x) {
-                let function: fn(u32) -> u32 = $function;
                 *y = function(*x);
             }
         })+
@@ -64,8 +64,8 @@ macro_rules! pairs {
             // SAFETY: the code that calls leaves two cells and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 3]>() };
             let [Cell(a), Cell(b), Cell(y)] = cells;
+            let function: fn(u32, u32) -> u32 = $function;
             for (y, (a, b)) in y.iter_mut().zip(a.iter().zip(b)) {
-                let function: fn(u32, u32) -> u32 = $function;
                 *y = function(*a, *b);
             }
         })+

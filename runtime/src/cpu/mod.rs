@@ -103,7 +103,10 @@ impl Cpu {
     /// nothing by queues.
     pub(crate) fn plan(&self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
         let is_mega = wanted.organisation == Organisation::Mega;
-        let is_binned = wanted.kernels.iter().any(|kernel| kernel.form == Form::Binned);
+        let is_binned = wanted
+            .kernels
+            .iter()
+            .any(|kernel| kernel.form == Form::Binned);
         if is_mega || self.is_wide() && !is_binned {
             return wanted.clone();
         }
@@ -122,10 +125,7 @@ impl Cpu {
             backend: "native".into(),
             driver: native::compiler(),
             kind: "processor",
-            limits: vec![
-                ("threads", self.threads() as u64),
-                ("cores", cores as u64),
-            ],
+            limits: vec![("threads", self.threads() as u64), ("cores", cores as u64)],
             features_used: native::features(),
             features_missing: Vec::new(),
         }

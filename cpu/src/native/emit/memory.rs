@@ -198,9 +198,10 @@ impl<'a> Emitter<'a, '_> {
             let places = &code.layouts[layout as usize];
             let (address, first) = self.place(pointer, bytes_of(places))?;
             for (i, place) in places.iter().enumerate() {
-                let like = match place.float {
-                    true => Scalar::Float(0.0),
-                    false => Scalar::Word(0),
+                let like = if place.float {
+                    Scalar::Float(0.0)
+                } else {
+                    Scalar::Word(0)
                 };
                 let value = self.get(address, first + 4 * place.word as i32, like);
                 self.set(to + i as Slot, value);

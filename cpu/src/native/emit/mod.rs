@@ -295,9 +295,10 @@ impl<'a, 'b> Emitter<'a, 'b> {
     ) -> Result<Reached, KernelError> {
         let condition = self.value(condition);
         let (first, end) = (self.builder.create_block(), self.builder.create_block());
-        let second = match reject.is_empty() {
-            true => end,
-            false => self.builder.create_block(),
+        let second = if reject.is_empty() {
+            end
+        } else {
+            self.builder.create_block()
         };
         self.builder.ins().brif(condition, first, &[], second, &[]);
         let mut reached = reject.is_empty();

@@ -218,9 +218,10 @@ pub(super) fn translate<'a>(
         let at = shared.private + CELL * cell as i32;
         // Other lanes have such variables as well, but for those that never began.
         let mask = if is_main { this.mask } else { Value(u32::MAX) };
-        let variable = match shared.indexed[cell] {
-            true => this.variables.of_array(at, mask),
-            false => this.variables.in_memory(at, mask),
+        let variable = if shared.indexed[cell] {
+            this.variables.of_array(at, mask)
+        } else {
+            this.variables.in_memory(at, mask)
         };
         this.private.push(variable);
     }
@@ -402,9 +403,10 @@ impl<'a> Translator<'a> {
             }
         }
         let tail = matches!(function.body.last(), Some(Node::Return(_)));
-        let before = match tail {
-            true => &function.body[..function.body.len() - 1],
-            false => &function.body[..],
+        let before = if tail {
+            &function.body[..function.body.len() - 1]
+        } else {
+            &function.body[..]
         };
         let returned = escapes_of(before).returns.then(|| {
             let none = self.bits(0);
