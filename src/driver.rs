@@ -5,9 +5,9 @@ use std::path::Path;
 
 use impasto_compiler::partition::{Plan, PlanError, PlanInputs, Strategy};
 use impasto_compiler::{Compilation, MaterialRequest, Parameters, Program};
+use impasto_runtime::device::{Device, DeviceOptions};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::film::outputs;
-use impasto_runtime::device::{Device, DeviceOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::Scene;

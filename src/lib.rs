@@ -35,10 +35,10 @@ pub use driver::{compile, compile_for, file_requests, load, plan, render, reques
 pub use error::Error;
 pub use files::FileLoader;
 pub use ir_text::ir_text;
-pub use runtime::error::RuntimeError;
-pub use runtime::error::SceneError;
 pub use runtime::cpu::{Cpu, CpuOptions};
 pub use runtime::device::{Choice, Device, DeviceOptions};
+pub use runtime::error::RuntimeError;
+pub use runtime::error::SceneError;
 pub use runtime::gpu::{Gpu, GpuOptions};
 pub use runtime::options::RenderOptions;
 pub use runtime::render::{Renderer, Rendering};

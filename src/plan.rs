@@ -17,14 +17,17 @@
 //! # }
 //! ```
 
+use std::fmt;
 use std::sync::Arc;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::{DeviceProfile, PlanInputs, Strategy, Workload};
+use impasto_compiler::partition::{DeviceProfile, Plan, PlanInputs, Strategy, Workload};
+use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
+use serde::Serialize;
 
 use crate::{Gpu, RuntimeError, Scene};
 
@@ -108,4 +111,68 @@ pub fn workload(
     let technique = Technique::default();
     let world = World::of_program(scene, program, &technique)?;
     profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
+}
+
+/// What there is to say of a plan on the processor, which has one kernel whatever the materials.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct OnProcessor {
+    /// The strategy.
+    pub strategy: String,
+    /// The processor.
+    pub device: String,
+    /// The strategy that was asked for, if it was another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replaced_strategy: Option<String>,
+    /// The materials that the kernel evaluates.
+    pub materials: Vec<String>,
+    /// Materials that no surface binds.
+    pub unused: Vec<String>,
+    /// Why there is one kernel.
+    pub why: String,
+}
+
+/// Why the processor has one kernel.
+const WHY: &str = "between kernels paths would go through memory, and a branch costs a processor \
+                   nothing that one more kernel would save";
+
+impl OnProcessor {
+    /// Of the megakernel of materials called `names`, in place of the strategy that was `asked` for.
+    pub fn new(plan: &Plan, names: &[String], device: &DeviceInfo, asked: Option<String>) -> Self {
+        let name = |at: &usize| names[*at].clone();
+        let used = (0..names.len()).filter(|at| !plan.unused.contains(at));
+        Self {
+            strategy: plan.strategy.clone(),
+            device: device.name.clone(),
+            replaced_strategy: asked,
+            materials: used.map(|at| name(&at)).collect(),
+            unused: plan.unused.iter().map(name).collect(),
+            why: WHY.into(),
+        }
+    }
+}
+
+impl fmt::Display for OnProcessor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |names: &[String]| names.join(", ");
+        let count = self.materials.len();
+        let plural = if count == 1 { "" } else { "s" };
+        writeln!(
+            f,
+            "plan `{}`: one kernel of {count} material{plural}",
+            self.strategy
+        )?;
+        writeln!(f, "device: {}, the processor", self.device)?;
+        writeln!(f, "materials: {}", list(&self.materials))?;
+        if !self.unused.is_empty() {
+            writeln!(f, "on no surface: {}", list(&self.unused))?;
+        }
+        writeln!(f, "\nwhy: {}", self.why)?;
+        if let Some(asked) = &self.replaced_strategy {
+            writeln!(f, "`{asked}` was asked for: only GPUs run its kernels")?;
+        }
+        writeln!(
+            f,
+            "for a GPU: `--device gpu`, or `--profile` and `--workload` where there is none"
+        )
+    }
 }

@@ -88,12 +88,16 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
-    let settings = args.settings()?;
+    args.device.check()?;
+    let mut settings = args.settings()?;
     let names = names(&args.scenes);
     make_folder(&args.out)?;
     files::check_writable(&args.out.join("convergence.json"))?;
     interrupt::install()?;
-    let device = args.device.open()?;
+    let device = args.device.open(global)?;
+    if let Device::Cpu(_) = device {
+        one_kernel(&mut settings.strategies, global);
+    }
     let mut convergence = Convergence {
         command: command(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -113,6 +117,17 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     }
     global.note(&format!("wrote {}", args.out.join("index.html").display()));
     Ok(())
+}
+
+/// Leaves the strategy that the processor has.
+fn one_kernel(strategies: &mut Vec<Strategy>, global: &Global) {
+    let lost = strategies.iter().copied();
+    let lost = lost.filter(|s| ![Strategy::AUTO, Strategy::MEGA].contains(s));
+    let lost: Vec<String> = lost.map(|s| format!("`{s}`")).collect();
+    if !lost.is_empty() {
+        global.note(&super::strategy::replaced(&lost.join(", ")));
+    }
+    *strategies = vec![Strategy::MEGA];
 }
 
 impl ConvergeArgs {

@@ -32,6 +32,11 @@ pub(super) enum Source {
 }
 
 impl PlanArgs {
+    /// Is the plan found by measuring kernels?
+    pub(super) fn measures(&self) -> bool {
+        self.strategy == Some(Strategy::EXHAUSTIVE)
+    }
+
     /// What was asked for, of materials called `names` of which no surface binds `unused`; `default` if
     /// nothing was.
     pub(super) fn source(
@@ -53,6 +58,13 @@ impl PlanArgs {
         }
         Ok(Source::Strategy(self.strategy.unwrap_or(default)))
     }
+}
+
+/// What is said where the processor has one kernel in place of what was asked for.
+pub(super) fn replaced(asked: &str) -> String {
+    format!(
+        "note: the processor has one kernel, whatever the materials: `mega` in place of {asked}"
+    )
 }
 
 fn parse(name: &str) -> Result<Strategy, String> {

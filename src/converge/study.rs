@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use impasto_compiler::partition::{Plan, Strategy};
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::film::Film;
 use impasto_runtime::film::output;
-use impasto_runtime::device::DeviceRef;
 use impasto_runtime::technique::{Choice, Sampler};
 
 use super::data::{Errors, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series};

@@ -188,7 +188,13 @@ impl<F: Float> Session<'_, F> {
         }
         let pixel = (y * width + x) as usize;
         let prepared = kernel.sample(pixel, sample, seed)?;
-        for (name, words) in self.kernel.code.buffers.iter().zip(&mut self.machine.buffers) {
+        for (name, words) in self
+            .kernel
+            .code
+            .buffers
+            .iter()
+            .zip(&mut self.machine.buffers)
+        {
             prepared.prepare(name, words);
         }
         let names = &self.replayer.names;

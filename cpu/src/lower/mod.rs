@@ -5,8 +5,8 @@ use naga::valid::{FunctionInfo, ModuleInfo};
 use std::collections::HashMap;
 
 use naga::{
-    AddressSpace, Arena, AtomicFunction, BinaryOperator, Expression, Handle, Literal, MathFunction, Module, ScalarKind,
-    Statement, SwitchValue, TypeInner,
+    AddressSpace, Arena, AtomicFunction, BinaryOperator, Expression, Handle, Literal, MathFunction,
+    Module, ScalarKind, Statement, SwitchValue, TypeInner,
 };
 
 mod expressions;

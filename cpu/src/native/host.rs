@@ -7,7 +7,8 @@ use naga::MathFunction as Math;
 
 /// Answers a call in place of the kernel's function: the words of its arguments are given, those of its
 /// result are left.
-pub type Answer = unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
+pub type Answer =
+    unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
 
 /// A function of one float.
 pub(super) type One = extern "C" fn(f32) -> f32;

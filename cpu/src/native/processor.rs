@@ -28,7 +28,9 @@ pub fn check() -> Result<(), KernelError> {
     invocation?.run([0; 3], 0);
     match buffer.read()[0] {
         1 => Ok(()),
-        _ => Err(KernelError::Processor("code does not do what it says".into())),
+        _ => Err(KernelError::Processor(
+            "code does not do what it says".into(),
+        )),
     }
 }
 

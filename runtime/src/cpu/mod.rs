@@ -29,7 +29,7 @@ pub struct CpuOptions {
 }
 
 /// The most threads that may be asked for.
-const MOST_THREADS: usize = 1024;
+pub const MOST_THREADS: usize = 1024;
 /// Bytes of the stack of a thread.
 const STACK_BYTES: usize = 16 << 20;
 /// Most kernels that are kept; beyond it all are forgotten.
@@ -86,10 +86,7 @@ impl Cpu {
             backend: "native".into(),
             driver: native::compiler(),
             kind: "processor",
-            limits: vec![
-                ("threads", self.threads() as u64),
-                ("cores", cores as u64),
-            ],
+            limits: vec![("threads", self.threads() as u64), ("cores", cores as u64)],
             features_used: native::features(),
             features_missing: Vec::new(),
         }
@@ -117,11 +114,7 @@ impl Cpu {
     }
 
     /// The machine code of a kernel, unless it was built before.
-    fn compiled(
-        &self,
-        kernel: &Kernel,
-        casts: bool,
-    ) -> Result<Arc<native::Kernel>, RuntimeError> {
+    fn compiled(&self, kernel: &Kernel, casts: bool) -> Result<Arc<native::Kernel>, RuntimeError> {
         let key = (kernel.wgsl.clone(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept().get(&key) {

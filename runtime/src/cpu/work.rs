@@ -9,8 +9,8 @@ use impasto_cpu::native::{Buffer, Invocation, Kernel};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::casts::{ANSWERED, Casts};
 use super::Cpu;
+use super::casts::{ANSWERED, Casts};
 use crate::error::RuntimeError;
 use crate::gpu::submission::Done;
 use crate::kernels::buffers::{BUFFERS, BufferId, Cleared};

@@ -86,6 +86,13 @@ impl Device {
         }
     }
 
+    /// All devices that there are: GPUs, best first, and the processor where it can render.
+    pub fn found() -> Vec<DeviceInfo> {
+        let cpu = Cpu::new(&CpuOptions::default());
+        let cpu = cpu.ok().map(|cpu| cpu.info());
+        Gpu::found().into_iter().chain(cpu).collect()
+    }
+
     /// What the device is and can do.
     pub fn info(&self) -> DeviceInfo {
         DeviceRef::from(self).info()

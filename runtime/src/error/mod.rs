@@ -86,7 +86,9 @@ pub enum RuntimeError {
     )]
     NoNativeCode(String),
     /// The system does not start so many threads.
-    #[error("{threads} threads could not be started: {reason}\n  hint: ask for fewer (`--threads`)")]
+    #[error(
+        "{threads} threads could not be started: {reason}\n  hint: ask for fewer (`--threads`)"
+    )]
     Threads {
         /// How many.
         threads: usize,

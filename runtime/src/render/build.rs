@@ -10,10 +10,10 @@ use impasto_compiler::partition::Plan;
 use impasto_compiler::partition::workload::BLOCK;
 
 use super::{RenderOptions, Renderer, ReportInputs};
-use crate::error::RuntimeError;
-use crate::film::file::Identity;
 use crate::cpu;
 use crate::device::{DeviceRef, Work};
+use crate::error::RuntimeError;
+use crate::film::file::Identity;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::{Size, Step};
 use crate::gpu::{self, Gpu};
@@ -152,7 +152,9 @@ impl<'g> Renderer<'g> {
         watch: Watch<'_>,
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
-        let plan = &device.plan(plan, world, source);
+        let asked = plan;
+        let plan = &device.plan(asked, world, source);
+        let replaced = plan.organisation != asked.organisation;
         let mut options = options.clone();
         options.technique = device.technique(options.technique);
         settings::check(world, &options)?;
@@ -176,13 +178,15 @@ impl<'g> Renderer<'g> {
                     |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
                 let (kernels, steps) = build_all(&composer, build)?;
                 gpu.check()?;
-                (kernels, Work::Gpu(gpu::work::Work::new(gpu, resources, steps)))
+                (
+                    kernels,
+                    Work::Gpu(gpu::work::Work::new(gpu, resources, steps)),
+                )
             }
             DeviceRef::Cpu(cpu) => {
                 let casts = cpu::Casts::new(composer.parts);
-                let build = |kernel: &Kernel| {
-                    building.next(|| cpu.build(kernel, sizes, casts.as_ref()))
-                };
+                let build =
+                    |kernel: &Kernel| building.next(|| cpu.build(kernel, sizes, casts.as_ref()));
                 let (kernels, steps) = build_all(&composer, build)?;
                 let work = cpu::Work::new(cpu, &composer, steps, casts, &options)?;
                 (kernels, Work::Cpu(work))
@@ -201,6 +205,7 @@ impl<'g> Renderer<'g> {
                 work,
             },
             facts: ReportInputs {
+                replaced_strategy: replaced.then(|| asked.strategy.clone()),
                 compile_seconds: begin.elapsed().as_secs_f64(),
                 ..facts
             },
@@ -322,6 +327,7 @@ impl ReportInputs {
         let (width, height) = (world.width, world.height);
         Self {
             strategy: composer.plan.strategy.clone(),
+            replaced_strategy: None,
             width,
             height,
             geometry: world.parts.counts,

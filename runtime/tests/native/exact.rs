@@ -12,7 +12,6 @@ use impasto_runtime::world::bvh::{Bvh, Caster, Hit};
 use impasto_runtime::world::surface::geometry_part;
 use impasto_runtime::world::{Placed, Split};
 
-
 /// A host that looks at nothing.
 struct Nobody;
 
@@ -173,7 +172,8 @@ fn interpret(parts: &[ShaderPart; 2], rays: &[Ray]) -> Vec<[u32; 5]> {
                 .collect()
         }
     };
-    let mut machine = Machine::<f32>::new(&code, code.buffers.iter().map(words).collect(), 1 << 32).expect("it is known");
+    let mut machine = Machine::<f32>::new(&code, code.buffers.iter().map(words).collect(), 1 << 32)
+        .expect("it is known");
     machine.run(&mut Nobody).expect("it ends");
     let at = code.buffers.iter().position(|name| name == "result");
     let result = &machine.buffers[at.expect("results")];

@@ -51,6 +51,16 @@ const CRATES: &[Crate] = &[
         ],
     },
     Crate {
+        name: "impasto-cpu",
+        folder: "cpu/src",
+        layers: &[
+            &["error", "shape"],
+            &["code"],
+            &["interpret", "lower"],
+            &["native"],
+        ],
+    },
+    Crate {
         name: "impasto-runtime",
         folder: "runtime/src",
         layers: &[
@@ -67,6 +77,8 @@ const CRATES: &[Crate] = &[
             &["world"],
             &["kernels"],
             &["gpu"],
+            &["cpu"],
+            &["device"],
             &["render"],
             &["lab", "audit"],
         ],

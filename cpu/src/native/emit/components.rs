@@ -50,7 +50,11 @@ impl Emitter<'_, '_> {
 
     fn of_floats(&mut self, op: Bin, a: Value, b: Value) -> Option<Value> {
         if op == Bin::Modulo {
-            return Some(self.call_host(host::remainder as *const () as usize, &[a, b], types::F32));
+            return Some(self.call_host(
+                host::remainder as *const () as usize,
+                &[a, b],
+                types::F32,
+            ));
         }
         let ins = self.builder.ins();
         Some(match op {
@@ -136,7 +140,10 @@ impl Emitter<'_, '_> {
         if !signed {
             return divisor;
         }
-        let least = self.builder.ins().icmp_imm_s(IntCC::Equal, a, i64::from(i32::MIN));
+        let least = self
+            .builder
+            .ins()
+            .icmp_imm_s(IntCC::Equal, a, i64::from(i32::MIN));
         let minus = self.builder.ins().icmp_imm_s(IntCC::Equal, b, -1);
         let beyond = self.builder.ins().band(least, minus);
         self.builder.ins().select(beyond, one, divisor)
@@ -167,7 +174,13 @@ impl Emitter<'_, '_> {
     }
 
     fn bitcast(&mut self, from: Kind, to: Kind, a: Value) -> Value {
-        let of = |kind| if kind == Kind::Float { types::F32 } else { types::I32 };
+        let of = |kind| {
+            if kind == Kind::Float {
+                types::F32
+            } else {
+                types::I32
+            }
+        };
         if of(from) == of(to) {
             return a;
         }

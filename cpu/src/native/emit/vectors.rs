@@ -74,8 +74,9 @@ impl Emitter<'_, '_> {
                 vec![self.of_half(low), self.of_half(high)]
             }
             Op::Vector(Math::Pack2x16float, _) => {
-                let [low, high] = [x[0], x[1]]
-                    .map(|x| self.call_host(host::half_bits as *const () as usize, &[x], types::I32));
+                let [low, high] = [x[0], x[1]].map(|x| {
+                    self.call_host(host::half_bits as *const () as usize, &[x], types::I32)
+                });
                 let high = self.builder.ins().ishl_imm_s(high, 16);
                 vec![self.builder.ins().bor(low, high)]
             }
@@ -105,14 +106,19 @@ impl Emitter<'_, '_> {
             }
             Op::Vector(Math::Unpack4x8unorm, _) => {
                 let bytes = self.bytes(x[0]);
-                bytes.into_iter().map(|byte| self.share(byte, 255.0)).collect()
+                bytes
+                    .into_iter()
+                    .map(|byte| self.share(byte, 255.0))
+                    .collect()
             }
             _ => return Err(self.unsupported(&format!("{op:?}"))),
         })
     }
 
     fn values(&mut self, first: Slot, width: u32) -> Vec<Value> {
-        (first..first + width).map(|slot| self.value(slot)).collect()
+        (first..first + width)
+            .map(|slot| self.value(slot))
+            .collect()
     }
 
     fn fold(&mut self, x: &[Value], f: impl Fn(&mut Self, Value, Value) -> Value) -> Value {
@@ -145,7 +151,9 @@ impl Emitter<'_, '_> {
     }
 
     fn scaled(&mut self, x: &[Value], scale: Value) -> Vec<Value> {
-        x.iter().map(|x| self.builder.ins().fmul(*x, scale)).collect()
+        x.iter()
+            .map(|x| self.builder.ins().fmul(*x, scale))
+            .collect()
     }
 
     fn cross(&mut self, x: &[Value], y: &[Value]) -> Vec<Value> {
@@ -174,13 +182,17 @@ impl Emitter<'_, '_> {
         let (v, normal) = (self.scaled(v, eta), self.scaled(normal, along));
         let refracted = self.zip(&v, &normal, |this, p, q| this.builder.ins().fsub(p, q));
         let each = refracted.into_iter();
-        each.map(|x| self.builder.ins().select(beyond, zero, x)).collect()
+        each.map(|x| self.builder.ins().select(beyond, zero, x))
+            .collect()
     }
 
     /// A matrix product, column by column.
     fn product(&mut self, a: Slot, b: Slot, width: u32) -> Vec<Value> {
         let [rows, inner, columns] = product_sizes(width);
-        let (a, b) = (self.values(a, rows * inner), self.values(b, inner * columns));
+        let (a, b) = (
+            self.values(a, rows * inner),
+            self.values(b, inner * columns),
+        );
         let mut cells = Vec::new();
         for column in b.chunks(inner as usize) {
             for row in 0..rows as usize {
@@ -216,11 +228,10 @@ impl Emitter<'_, '_> {
         let scale = self.float(f32::from_bits((127 + 112) << 23));
         let scaled = self.builder.ins().fmul(small, scale);
         let scaled = self.same_bits(types::I32, scaled);
-        let unbounded = self.builder.ins().icmp_imm_s(
-            IntCC::UnsignedGreaterThanOrEqual,
-            magnitude,
-            0x7c00,
-        );
+        let unbounded =
+            self.builder
+                .ins()
+                .icmp_imm_s(IntCC::UnsignedGreaterThanOrEqual, magnitude, 0x7c00);
         let exponent = self.word(0x7f80_0000);
         let beyond = self.builder.ins().bor(bits, exponent);
         let bits = self.builder.ins().select(unbounded, beyond, scaled);
