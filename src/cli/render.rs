@@ -197,7 +197,8 @@ impl RenderArgs {
             strategy: strategy.to_string(),
             ..Plan::few_kernels(&names, &unused)
         };
-        if matches!(device, Device::Cpu(_)) && strategy != Strategy::MEGA {
+        let is_one_kernel = matches!(device, Device::Cpu(_)) && strategy != Strategy::MEGA;
+        if is_one_kernel && strategy.requires() != Requires::Measurements {
             return Ok(fixed(begun()));
         }
         let inputs = PlanInputs {
