@@ -1,6 +1,7 @@
 //! What renders: a GPU by wgpu, or the processor by its own code. The renderer asks a device and what is
 //! built for it by the same calls; `gpu` and `cpu` answer.
 
+mod memory;
 mod work;
 
 use std::fmt;
@@ -188,7 +189,7 @@ impl DeviceRef<'_> {
                 }
             }
             DeviceRef::Cpu(_) => Limits {
-                buffer_bytes: 1 << 40,
+                buffer_bytes: memory::bytes(),
                 workgroup_threads: 1024,
                 workgroup_bytes: 0,
                 row_groups: u32::MAX,
@@ -200,7 +201,14 @@ impl DeviceRef<'_> {
     pub(crate) fn check_binding_size(self, what: &str, bytes: u64) -> Result<(), RuntimeError> {
         match self {
             DeviceRef::Gpu(gpu) => gpu.check_binding_size(what, bytes),
-            DeviceRef::Cpu(_) => Ok(()),
+            DeviceRef::Cpu(_) if bytes <= memory::bytes() => Ok(()),
+            DeviceRef::Cpu(_) => Err(RuntimeError::LimitTooSmall {
+                limit: "memory",
+                has: memory::bytes(),
+                needs: bytes,
+                what: format!("{what} (in bytes)"),
+                hint: "use a smaller scene or picture",
+            }),
         }
     }
 }

@@ -7,6 +7,8 @@ use std::sync::OnceLock;
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
+use impasto_runtime::cpu::{Cpu, CpuOptions};
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
@@ -26,6 +28,40 @@ pub fn gpu() -> &'static Gpu {
         Ok(gpu) => gpu,
         Err(error) => panic!("these tests need a GPU: {error}"),
     })
+}
+
+pub fn cpu() -> &'static Cpu {
+    static CPU: OnceLock<Cpu> = OnceLock::new();
+    CPU.get_or_init(|| Cpu::new(&CpuOptions::default()).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// A device, and how it divides materials into kernels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// A GPU with a kernel a material.
+    Wavefront,
+    /// A GPU with one kernel for whole paths.
+    Megakernel,
+    /// The processor, which has one kernel.
+    Processor,
+}
+
+impl Way {
+    pub const ALL: [Self; 3] = [Self::Wavefront, Self::Megakernel, Self::Processor];
+
+    pub fn device(self) -> DeviceRef<'static> {
+        match self {
+            Self::Wavefront | Self::Megakernel => gpu().into(),
+            Self::Processor => cpu().into(),
+        }
+    }
+
+    pub fn strategy(self) -> Strategy {
+        match self {
+            Self::Wavefront => Strategy::OWN,
+            Self::Megakernel | Self::Processor => Strategy::MEGA,
+        }
+    }
 }
 
 /// What a stub material does.
