@@ -156,7 +156,13 @@ fn a_render_does_not_go_on_from_another() {
 
 #[test]
 fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
-    let reference = whole(Way::Wavefront, &samples(9));
+    for way in [Way::Wavefront, Way::Processor] {
+        merge_ranges(way);
+    }
+}
+
+fn merge_ranges(way: Way) {
+    let reference = whole(way, &samples(9));
     // In other pools, and one of them in the other organisation of the same kernels.
     let part = |first_sample, count, pool| {
         let options = RenderOptions {
@@ -164,7 +170,7 @@ fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
             pool: Some(pool),
             ..samples(count)
         };
-        whole(Way::Wavefront, &options).sums
+        whole(way, &options).sums
     };
     let parts = [part(0, 4, 77), part(4, 1, 1), part(5, 4, 1000)];
     for order in [[0, 1, 2], [2, 0, 1]] {
@@ -188,7 +194,9 @@ fn only_what_changes_the_picture_changes_its_identity() {
         pool: Some(99),
         ..samples(7)
     };
-    assert_eq!(identity(room(), Way::Megakernel, pool), base);
+    for way in Way::ALL {
+        assert_eq!(identity(room(), way, pool.clone()), base, "{way:?}");
+    }
     let deeper = Room {
         max_depth: 6,
         ..room()
@@ -249,14 +257,16 @@ fn a_render_in_two_halves_merges_with_no_other() {
         first_sample: 16,
         ..samples(16)
     };
-    let rest = whole(Way::Wavefront, &rest).sums;
-    let mut plain = whole(Way::Wavefront, &options).sums;
-    plain.merge(&rest).expect("parts of one render");
-    let mut go_on = |_: &Progress| ControlFlow::Continue(());
-    let mut halves = renderer(Way::Wavefront, &room(), &options)
-        .render_until(&Goals::default(), &mut |_| (), &mut go_on)
-        .unwrap_or_else(|e| panic!("{e}"))
-        .sums;
-    let refusal = halves.merge(&rest).expect_err("it is of another render");
-    assert!(refusal.contains("different renders"), "{refusal}");
+    for way in [Way::Wavefront, Way::Processor] {
+        let rest = whole(way, &rest).sums;
+        let mut plain = whole(way, &options).sums;
+        plain.merge(&rest).expect("parts of one render");
+        let mut go_on = |_: &Progress| ControlFlow::Continue(());
+        let mut halves = renderer(way, &room(), &options)
+            .render_until(&Goals::default(), &mut |_| (), &mut go_on)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .sums;
+        let refusal = halves.merge(&rest).expect_err("it is of another render");
+        assert!(refusal.contains("different renders"), "{refusal}");
+    }
 }

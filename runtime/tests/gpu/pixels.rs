@@ -83,14 +83,18 @@ fn some_pixels_have_the_bits_of_the_whole_and_others_no_samples() {
 
 #[test]
 fn other_pixels_are_chosen_without_building_kernels_anew() {
+    Way::ALL.into_iter().for_each(choose_others);
+}
+
+fn choose_others(way: Way) {
     let all: Vec<u32> = (0..SIZE.0 * SIZE.1).collect();
     let options = RenderOptions {
         pixels: Some(all.clone().into()),
         ..samples(5)
     };
-    let mut whole = renderer(Way::Wavefront, &samples(5));
+    let mut whole = renderer(way, &samples(5));
     let whole = rendering(&mut whole);
-    let mut some = renderer(Way::Wavefront, &options);
+    let mut some = renderer(way, &options);
     check(&rendering(&mut some), &all, &whole, 5);
     let last: Vec<u32> = (100..128).collect();
     some.select_pixels(last.clone().into()).expect("they exist");
@@ -124,8 +128,8 @@ fn pixels_that_are_none_are_refused() {
             ..samples(1)
         };
         let (world, surfaces) = (world(), surfaces());
-        let plan = plan(Way::Wavefront, &surfaces);
-        let built = Renderer::from_world(way.device(), &world, &surfaces, &plan, &options);
+        let plan = plan(Way::Wavefront.strategy(), &surfaces);
+        let built = Renderer::from_world(Way::Wavefront.device(), &world, &surfaces, &plan, &options);
         built.map(|_| ()).expect_err("refused").to_string()
     };
     for (pixels, says) in [
