@@ -9,17 +9,27 @@
 //! | `code` | what lowering makes of a kernel: functions, instructions, operations |
 //! | `shape` | how values lie in cells and in buffers |
 //! | `lower` | from naga's IR to code |
+//! | `arithmetic` | what operations are made of |
+//! | `plan` | which functions are compiled on their own |
 //! | `interpret` | runs code for one invocation, in either precision |
-//! | `native` | makes machine code of code, and runs it for many invocations |
+//! | `native` | makes machine code of code for one invocation at a time |
+//! | `wide` | the same for eight, where the processor can |
+//! | `kernel` | either of these |
 
+mod arithmetic;
 pub mod code;
 mod error;
 pub mod interpret;
 mod lower;
+mod kernel;
 pub mod native;
+mod plan;
 pub mod shape;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "x86_64", unix))]
+mod wide;
 
 pub use error::KernelError;
+pub use kernel::{Answer, Cell, Kernel, Thread, Width, is_wide};
 pub use lower::lower;

@@ -78,6 +78,7 @@ impl DeviceArgs {
             gpu: self.gpu.options(),
             cpu: CpuOptions {
                 threads: self.threads.map(|threads| threads as usize),
+                ..CpuOptions::default()
             },
         };
         let device = Device::open(&options).map_err(super::runtime)?;

@@ -17,25 +17,25 @@ use super::constants::Constants;
 use super::emit::{self, Emitter, Shared};
 use super::host::Answer;
 use super::layout::{self, Layout};
-use super::plan::Plan;
 use super::run::MOST_INPUTS;
 use crate::code::{Code, Function, Input, Scalar};
 use crate::error::KernelError;
+use crate::plan::Plan;
 
 /// A kernel as machine code.
 #[derive(Debug)]
-pub struct Kernel {
+pub(crate) struct Kernel {
     pub(super) main: *const u8,
     pub(super) layout: Layout,
     /// Module-scope variables at the beginning of an invocation.
     pub(super) private: Vec<u32>,
     /// What the entry point is given.
     pub(super) inputs: Vec<Input>,
-    pub(super) workgroup: u32,
+    pub(crate) workgroup: u32,
     /// By buffer: its name, and the bytes it must have at least.
     pub(super) buffers: Vec<(String, u64)>,
     /// What building took.
-    pub statistics: Statistics,
+    pub(crate) statistics: Statistics,
     /// Tables that the code refers to.
     _constants: Arc<Constants>,
     /// The memory that the code is in.
@@ -93,7 +93,14 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, the processor is none that code can be made for, or there is no
     /// memory for code.
+<<<<<<< HEAD
     pub fn build(code: &Code, answers: &[Option<Answer>]) -> Result<Self, KernelError> {
+=======
+    pub(crate) fn build(
+        code: &Code,
+        answers: &[Option<Answer>],
+    ) -> Result<Self, KernelError> {
+>>>>>>> main
         let begin = Instant::now();
         if code.inputs.len() > MOST_INPUTS {
             return Err(KernelError::unsupported(
@@ -164,7 +171,7 @@ impl Kernel {
 
 impl Kernel {
     /// The names of the buffers that it binds, in the order in which they are given.
-    pub fn buffers(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn buffers(&self) -> impl Iterator<Item = &str> {
         self.buffers.iter().map(|(name, _)| name.as_str())
     }
 }

@@ -5,15 +5,19 @@ use std::ffi::c_void;
 
 use naga::MathFunction as Math;
 
+use crate::arithmetic::Called;
+
 /// Answers a call in place of the kernel's function: the words of its arguments are given, those of its
 /// result are left.
+<<<<<<< HEAD
 pub type Answer =
     unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
+=======
+pub(super) type Answer = unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
+>>>>>>> main
 
 /// A function of one float.
-pub(super) type One = extern "C" fn(f32) -> f32;
-/// A function of two floats.
-pub(super) type Two = extern "C" fn(f32, f32) -> f32;
+type One = extern "C" fn(f32) -> f32;
 
 macro_rules! functions {
     ($($name:ident: $function:path),+ $(,)?) => {
@@ -41,43 +45,38 @@ extern "C" fn pow(x: f32, y: f32) -> f32 {
     x.powf(y)
 }
 
-pub(super) extern "C" fn remainder(x: f32, y: f32) -> f32 {
+extern "C" fn remainder(x: f32, y: f32) -> f32 {
     x % y
 }
 
-pub(super) extern "C" fn half_bits(x: f32) -> u32 {
+extern "C" fn half_bits(x: f32) -> u32 {
     half::f16::from_f32(x).to_bits().into()
 }
 
-/// The function of one float that is called for a function of WGSL.
-pub(super) fn one(function: Math) -> Option<One> {
-    Some(match function {
-        Math::Cos => cos,
-        Math::Cosh => cosh,
-        Math::Sin => sin,
-        Math::Sinh => sinh,
-        Math::Tan => tan,
-        Math::Tanh => tanh,
-        Math::Acos => acos,
-        Math::Asin => asin,
-        Math::Atan => atan,
-        Math::Asinh => asinh,
-        Math::Acosh => acosh,
-        Math::Atanh => atanh,
-        Math::Exp => exp,
-        Math::Exp2 => exp2,
-        Math::Log => log,
-        Math::Log2 => log2,
-        Math::QuantizeToF16 => to_half_and_back,
-        _ => return None,
-    })
-}
-
-/// The same of two.
-pub(super) fn two(function: Math) -> Option<Two> {
-    Some(match function {
-        Math::Atan2 => atan2,
-        Math::Pow => pow,
-        _ => return None,
-    })
+/// The address of a function that is called.
+pub(super) fn address(function: Called) -> usize {
+    let one: One = match function {
+        Called::Remainder => return remainder as *const () as usize,
+        Called::HalfBits => return half_bits as *const () as usize,
+        Called::Two(Math::Pow) => return pow as *const () as usize,
+        Called::Two(_) => return atan2 as *const () as usize,
+        Called::One(Math::Cos) => cos,
+        Called::One(Math::Cosh) => cosh,
+        Called::One(Math::Sin) => sin,
+        Called::One(Math::Sinh) => sinh,
+        Called::One(Math::Tan) => tan,
+        Called::One(Math::Tanh) => tanh,
+        Called::One(Math::Acos) => acos,
+        Called::One(Math::Asin) => asin,
+        Called::One(Math::Atan) => atan,
+        Called::One(Math::Asinh) => asinh,
+        Called::One(Math::Acosh) => acosh,
+        Called::One(Math::Atanh) => atanh,
+        Called::One(Math::Exp) => exp,
+        Called::One(Math::Exp2) => exp2,
+        Called::One(Math::Log) => log,
+        Called::One(Math::Log2) => log2,
+        Called::One(_) => to_half_and_back,
+    };
+    one as usize
 }

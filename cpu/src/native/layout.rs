@@ -2,7 +2,7 @@
 //! variables of one invocation.
 
 use crate::code::{Code, Ins, Node, Pointer};
-use crate::native::plan::walk;
+use crate::plan::walk;
 use crate::shape;
 
 /// Bytes of a place where a function of the host finds its arguments, and leaves its result.
@@ -63,16 +63,21 @@ impl Layout {
 }
 
 /// Bytes of a value in a buffer.
+<<<<<<< HEAD
 pub(super) fn bytes_of(places: &[shape::Place]) -> u32 {
     places
         .iter()
         .map(|place| 4 * (place.word + 1))
         .max()
         .unwrap_or(0)
+=======
+pub(crate) fn bytes_of(places: &[shape::Place]) -> u32 {
+    places.iter().map(|place| 4 * (place.word + 1)).max().unwrap_or(0)
+>>>>>>> main
 }
 
 /// By buffer: the bytes that it must have at least, so that every access can be moved within it.
-pub(super) fn least_bytes(code: &Code) -> Vec<u64> {
+pub(crate) fn least_bytes(code: &Code) -> Vec<u64> {
     let mut least = vec![4; code.buffers.len()];
     let mut need = |buffer: u32, bytes: u64| {
         let all = &mut least[buffer as usize];

@@ -2,7 +2,6 @@
 //!
 //! | file | does |
 //! |---|---|
-//! | `plan` | which functions are compiled on their own |
 //! | `layout` | the memory that code finds through its first argument |
 //! | `emit` | from code to the compiler's intermediate representation |
 //! | `constants`, `host` | what code refers to: tables, and functions of the host |
@@ -14,12 +13,13 @@ mod build;
 mod constants;
 mod emit;
 mod host;
-mod layout;
-mod plan;
+pub(crate) mod layout;
 mod processor;
 mod run;
 
-pub use build::{Kernel, Statistics};
-pub use host::Answer;
+pub use build::Statistics;
 pub use processor::{check, compiler, features, processor};
-pub use run::{Buffer, Invocation};
+pub use run::Buffer;
+
+pub(crate) use build::Kernel;
+pub(crate) use run::Invocation;

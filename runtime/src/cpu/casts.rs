@@ -3,13 +3,32 @@
 use std::ffi::c_void;
 use std::sync::Arc;
 
-use impasto_cpu::native::Answer;
+use impasto_cpu::{Answer, Cell};
 
 use crate::world::KernelParts;
 use crate::world::bvh::Caster;
 
 /// The functions of kernels that are answered, and who answers them.
+<<<<<<< HEAD
 pub(super) const ANSWERED: [(&str, Answer); 2] = [("trace_closest", closest), ("trace_any", any)];
+=======
+pub(super) const ANSWERED: [(&str, Answer); 2] = [
+    (
+        "trace_closest",
+        Answer {
+            one: closest,
+            eight: closest_of_eight,
+        },
+    ),
+    (
+        "trace_any",
+        Answer {
+            one: any,
+            eight: any_of_eight,
+        },
+    ),
+];
+>>>>>>> main
 
 /// What answers are given along.
 #[derive(Clone)]
@@ -68,4 +87,41 @@ unsafe extern "C" fn any(data: *const c_void, arguments: *const u32, result: *mu
     let (origin, direction, t_max, skip) = ray(words);
     // SAFETY: as above.
     unsafe { *result = u32::from(caster.any(origin, direction, t_max, skip)) };
+}
+
+/// The ray of a lane, of cells as those of the arguments.
+fn ray_of(cells: &[Cell; 8], lane: usize) -> ([f32; 3], [f32; 3], f32, u32) {
+    ray(&cells.map(|Cell(words)| words[lane]))
+}
+
+/// # Safety
+/// `data` is a caster, and there are cells for a mask, the arguments and a hit.
+#[allow(unsafe_code)]
+unsafe extern "C" fn closest_of_eight(data: *const c_void, cells: *mut Cell) {
+    // SAFETY: as above.
+    let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 13]>()) };
+    let [mask, arguments @ .., t, u, v, primitive] = cells;
+    let arguments: &[Cell; 8] = arguments;
+    for lane in (0..8).filter(|lane| mask.0[*lane] != 0) {
+        let (origin, direction, t_max, skip) = ray_of(arguments, lane);
+        let hit = caster.closest(origin, direction, t_max, skip);
+        t.0[lane] = hit.t.to_bits();
+        u.0[lane] = hit.u.to_bits();
+        v.0[lane] = hit.v.to_bits();
+        primitive.0[lane] = hit.primitive;
+    }
+}
+
+/// # Safety
+/// `data` is a caster, and there are cells for a mask, the arguments and a bool.
+#[allow(unsafe_code)]
+unsafe extern "C" fn any_of_eight(data: *const c_void, cells: *mut Cell) {
+    // SAFETY: as above.
+    let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 10]>()) };
+    let [mask, arguments @ .., found] = cells;
+    let arguments: &[Cell; 8] = arguments;
+    for lane in (0..8).filter(|lane| mask.0[*lane] != 0) {
+        let (origin, direction, t_max, skip) = ray_of(arguments, lane);
+        found.0[lane] = u32::from(caster.any(origin, direction, t_max, skip));
+    }
 }

@@ -9,8 +9,8 @@ mod work;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use impasto_cpu::KernelError;
 use impasto_cpu::native;
+use impasto_cpu::{KernelError, Width};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;
@@ -19,13 +19,15 @@ use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
 
 pub(crate) use casts::Casts;
-pub(crate) use work::{Step, Work};
+pub(crate) use work::{Groups, Step, Work};
 
 /// How to use the processor.
 #[derive(Clone, Debug, Default)]
 pub struct CpuOptions {
     /// Threads that render; one for each core if `None`.
     pub threads: Option<usize>,
+    /// Paths that a thread takes at a time.
+    pub width: Width,
 }
 
 /// The most threads that may be asked for.
@@ -39,8 +41,9 @@ const MOST_KEPT: usize = 64;
 #[derive(Debug)]
 pub struct Cpu {
     threads: Arc<ThreadPool>,
+    width: Width,
     /// Kernels that were built before, by their text and whether their ray casts are answered.
-    kernels: Mutex<HashMap<(String, bool), Arc<native::Kernel>>>,
+    kernels: Mutex<HashMap<(String, bool), Arc<impasto_cpu::Kernel>>>,
 }
 
 impl Cpu {
@@ -69,6 +72,7 @@ impl Cpu {
         })?;
         Ok(Self {
             threads: Arc::new(pool),
+            width: options.width,
             kernels: Mutex::default(),
         })
     }
@@ -76,6 +80,11 @@ impl Cpu {
     /// Threads that render.
     pub fn threads(&self) -> usize {
         self.threads.current_num_threads()
+    }
+
+    /// Whether paths in step with each other are so much faster that each material has its kernel.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.width == Width::Best && impasto_cpu::is_wide()
     }
 
     /// What the processor is and can do.
@@ -99,22 +108,32 @@ impl Cpu {
         sizes: Sizes,
         casts: Option<&Casts>,
     ) -> Result<Step, RuntimeError> {
-        let (groups, lanes) = match kernel.desc.source {
-            // What a workgroup does together one thread does alone.
-            DispatchSource::Once => (1, 1),
-            DispatchSource::Groups(groups) => (groups, sizes.workgroup),
-            _ => (sizes.pool.div_ceil(sizes.workgroup), sizes.workgroup),
-        };
+        let groups = |items: u32| Groups::Known(items.div_ceil(sizes.workgroup));
         Ok(Step {
             name: kernel.desc.name.clone(),
             kernel: self.compiled(kernel, casts.is_some())?,
-            groups,
-            lanes,
+            groups: match kernel.desc.source {
+                DispatchSource::Once => Groups::Known(1),
+                DispatchSource::Groups(groups) => Groups::Known(groups),
+                DispatchSource::Pool => groups(sizes.pool),
+                DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => groups(sizes.threads),
+                DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
+                    Groups::OfQueue(queue)
+                }
+            },
         })
     }
 
     /// The machine code of a kernel, unless it was built before.
+<<<<<<< HEAD
     fn compiled(&self, kernel: &Kernel, casts: bool) -> Result<Arc<native::Kernel>, RuntimeError> {
+=======
+    fn compiled(
+        &self,
+        kernel: &Kernel,
+        casts: bool,
+    ) -> Result<Arc<impasto_cpu::Kernel>, RuntimeError> {
+>>>>>>> main
         let key = (kernel.wgsl.clone(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept().get(&key) {
@@ -135,8 +154,8 @@ impl Cpu {
         let names: Vec<&str> = answered.iter().map(|(name, _)| *name).collect();
         let hooks: Vec<usize> = (0..names.len()).collect();
         let code = impasto_cpu::lower(&module, &info, &names, &hooks).map_err(refused)?;
-        let answers: Vec<_> = answered.iter().map(|(_, answer)| Some(*answer)).collect();
-        let build = || native::Kernel::build(&code, &answers);
+        let answers: Vec<_> = answered.iter().map(|(_, answer)| *answer).collect();
+        let build = || impasto_cpu::Kernel::build(&code, &answers, self.width);
         let built = Arc::new(self.threads.install(build).map_err(refused)?);
         let mut kept = kept();
         if kept.len() >= MOST_KEPT {

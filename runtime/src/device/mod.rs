@@ -11,7 +11,7 @@ use impasto_compiler::partition::{Organisation, Plan};
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
 use crate::gpu::{DeviceInfo, Gpu, GpuOptions};
-use crate::technique::Technique;
+use crate::technique::{Append, Technique};
 use crate::world::{MaterialSource, World};
 
 pub(crate) use work::{Submission, Work};
@@ -159,13 +159,21 @@ impl DeviceRef<'_> {
 
     /// What this device can do of a technique.
     pub(crate) fn technique(self, wanted: Technique) -> Technique {
-        wanted.within(self.has_subgroups())
+        let possible = wanted.within(self.has_subgroups());
+        match self {
+            DeviceRef::Gpu(_) => possible,
+            // Threads of a workgroup come one after another, and wait for nobody.
+            DeviceRef::Cpu(_) => Technique {
+                append: Append::Thread,
+                ..possible
+            },
+        }
     }
 
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
         match self {
-            DeviceRef::Cpu(_) if wanted.organisation != Organisation::Mega => {
+            DeviceRef::Cpu(cpu) if !cpu.is_wide() && wanted.organisation != Organisation::Mega => {
                 let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
                 Plan::mega(&names, &world.parts.unbound)
             }

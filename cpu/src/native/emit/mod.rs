@@ -3,9 +3,8 @@
 //! Each cell of a frame is a value, or a variable of which the compiler makes values; only what is indexed
 //! by numbers that are known when running lies in memory.
 
-mod components;
 mod memory;
-mod vectors;
+mod primitives;
 
 use cranelift_codegen::ir::{
     self, AbiParam, Block as Label, ExtFuncData, ExternalName, InstBuilder, MemFlagsData,
@@ -17,9 +16,10 @@ use cranelift_frontend::{FunctionBuilder, Switch, Variable};
 use super::constants::Constants;
 use super::host::Answer;
 use super::layout::{Layout, STOP};
-use super::plan::{self, Plan};
+
 use crate::code::{Block, Case, Code, Function, Ins, Node, Scalar, Slot};
 use crate::error::KernelError;
+use crate::plan::{self, Plan};
 
 /// What all functions of a kernel are compiled with.
 pub(super) struct Shared<'a> {
@@ -582,6 +582,12 @@ impl<'a, 'b> Emitter<'a, 'b> {
         self.builder.inst_results(call)[0]
     }
 
+    fn component(&mut self, op: u32, x: &[Value]) -> Result<Value, KernelError> {
+        let op = self.shared.code.ops[op as usize];
+        let value = crate::arithmetic::component(self, op, x);
+        value.ok_or_else(|| self.unsupported(&format!("{op:?}")))
+    }
+
     fn instruction(&mut self, ins: &'a Ins) -> Result<(), KernelError> {
         match ins {
             Ins::Copy { from, to, count } => {
@@ -645,7 +651,12 @@ impl<'a, 'b> Emitter<'a, 'b> {
                 to,
                 count,
             } => {
-                let values = self.vectors(*op, *from, *width)?;
+                let of = |this: &mut Self, at: usize, width: u32| {
+                    (from[at]..from[at] + width).map(|slot| this.value(slot)).collect()
+                };
+                let op = self.shared.code.ops[*op as usize];
+                let values = crate::arithmetic::vectors(self, op, *width, of);
+                let values = values.ok_or_else(|| self.unsupported(&format!("{op:?}")))?;
                 if values.len() < *count as usize {
                     return Err(self.unsupported("result of so many components"));
                 }

@@ -13,15 +13,17 @@ const LONE: usize = 1200;
 
 /// What is known of the functions of a kernel, by their index.
 #[derive(Debug)]
-pub(super) struct Plan {
+pub(crate) struct Plan {
     /// Whether a function is compiled where it is called.
     pub inline: Vec<bool>,
     /// Whether it indexes what its arguments point to.
     pub indexes_arguments: Vec<bool>,
+    /// About how many operations it is.
+    pub sizes: Vec<usize>,
 }
 
 impl Plan {
-    pub(super) fn new(code: &Code) -> Self {
+    pub(crate) fn new(code: &Code) -> Self {
         let count = code.functions.len();
         let mut sites = vec![0usize; count];
         let all = code.functions.iter().flatten().chain([&code.main]);
@@ -35,9 +37,9 @@ impl Plan {
         let mut plan = Self {
             inline: vec![false; count],
             indexes_arguments: vec![false; count],
+            sizes: vec![0; count],
         };
         // Callees come before their callers.
-        let mut sizes = vec![0usize; count];
         for (index, function) in code.functions.iter().enumerate() {
             let Some(function) = function else { continue };
             let (mut size, mut pointers) = (0, false);
@@ -58,13 +60,13 @@ impl Plan {
                     let callee = *function as usize;
                     size += 4;
                     if plan.inline[callee] {
-                        size += sizes[callee];
+                        size += plan.sizes[callee];
                         indexes |= plan.indexes_arguments[callee];
                     }
                 }
                 _ => size += 1,
             });
-            sizes[index] = size;
+            plan.sizes[index] = size;
             plan.indexes_arguments[index] = indexes;
             plan.inline[index] = !function.answered
                 && (pointers || size <= SMALL || sites[index] == 1 && size <= LONE);
@@ -74,7 +76,7 @@ impl Plan {
 }
 
 /// About how many operations an instruction is.
-fn weight(ins: &Ins) -> usize {
+pub(crate) fn weight(ins: &Ins) -> usize {
     match ins {
         Ins::Copy { .. } | Ins::Address { .. } => 0,
         Ins::Map1 { count, .. } | Ins::Map2 { count, .. } | Ins::Map3 { count, .. } => {
@@ -101,7 +103,7 @@ fn takes_pointers(ins: &Ins, arguments: u32) -> bool {
 }
 
 /// Visits every node of a block and of the blocks within.
-pub(super) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
+pub(crate) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
     for node in block {
         visit(node);
         match node {
@@ -124,7 +126,7 @@ pub(super) fn walk<'a>(block: &'a Block, visit: &mut impl FnMut(&'a Node)) {
 
 /// By variable of a function: whether it must lie in memory, because it is indexed by what is known only
 /// when running.
-pub(super) fn in_memory(function: &Function, plan: &Plan) -> Vec<bool> {
+pub(crate) fn in_memory(function: &Function, plan: &Plan) -> Vec<bool> {
     let mut found = vec![false; function.variables.len()];
     let mut mark = |cell: u32| {
         let within = |(first, cells): &(u32, u32)| (*first..first + cells).contains(&cell);
