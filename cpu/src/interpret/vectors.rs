@@ -2,8 +2,8 @@
 
 use naga::{MathFunction as Math, ScalarKind as Kind};
 
-use super::float::{Float, signed};
 use crate::code::{Slot, product_sizes};
+use super::float::{Float, signed};
 
 fn at<F: Float>(cells: &[u64], slot: Slot, component: u32) -> F {
     F::of_cell(cells[(slot + component) as usize])
@@ -48,9 +48,9 @@ pub(super) fn math<F: Float>(function: Math, kind: Kind) -> Option<Vectors> {
         Math::Unpack4xI8 => {
             |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| signed((byte as i8).into()))
         }
-        Math::Unpack4x8unorm => {
-            |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| F::of(f64::from(byte) / 255.0).cell())
-        }
+        Math::Unpack4x8unorm => |c, [a, ..], _, to| {
+            unpack_bytes(c, a, to, |byte| F::of(f64::from(byte) / 255.0).cell())
+        },
         _ => return None,
     };
     Some(found)

@@ -31,7 +31,7 @@ pub(crate) struct Kernel {
     pub(super) private: Vec<u32>,
     /// What the entry point is given.
     pub(super) inputs: Vec<Input>,
-    pub(crate) workgroup: u32,
+    pub(super) workgroup: u32,
     /// By buffer: its name, and the bytes it must have at least.
     pub(super) buffers: Vec<(String, u64)>,
     /// What building took.
@@ -93,20 +93,13 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, the processor is none that code can be made for, or there is no
     /// memory for code.
-<<<<<<< HEAD
-    pub fn build(code: &Code, answers: &[Option<Answer>]) -> Result<Self, KernelError> {
-=======
     pub(crate) fn build(
         code: &Code,
         answers: &[Option<Answer>],
     ) -> Result<Self, KernelError> {
->>>>>>> main
         let begin = Instant::now();
         if code.inputs.len() > MOST_INPUTS {
-            return Err(KernelError::unsupported(
-                "entry point of so many arguments",
-                "main",
-            ));
+            return Err(KernelError::unsupported("entry point of so many arguments", "main"));
         }
         let isa = isa()?;
         let constants = Arc::new(Constants::default());
@@ -133,9 +126,9 @@ impl Kernel {
             let id = id.map_err(|e| memory(&e))?;
             debug_assert_eq!(id.as_u32() as usize, index);
         }
-        let compiled = own
-            .par_iter()
-            .map(|(index, function)| compile(&shared, isa.as_ref(), *index, function));
+        let compiled = own.par_iter().map(|(index, function)| {
+            compile(&shared, isa.as_ref(), *index, function)
+        });
         let compiled: Vec<Compiled> = compiled.collect::<Result<_, _>>()?;
         let main = FuncId::from_u32(code.functions.len() as u32);
         let mut statistics = Statistics::default();
@@ -194,14 +187,7 @@ pub(super) fn isa() -> Result<OwnedTargetIsa, KernelError> {
         ("opt_level", "speed"),
         ("use_colocated_libcalls", "false"),
         ("is_pic", "false"),
-        (
-            "enable_verifier",
-            if cfg!(debug_assertions) {
-                "true"
-            } else {
-                "false"
-            },
-        ),
+        ("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }),
         ("unwind_info", "false"),
     ] {
         flags.set(name, value).map_err(|e| processor(&e))?;

@@ -1,7 +1,6 @@
 //! Buffers of kernels, and invocations of their entry points.
 
 use std::ffi::c_void;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use naga::BuiltIn;
@@ -35,37 +34,38 @@ impl Buffer {
 
     /// Puts zeros in place of all words.
     pub fn clear(&self) {
-        self.0
-            .iter()
-            .for_each(|word| word.store(0, Ordering::Relaxed));
+        self.0.iter().for_each(|word| word.store(0, Ordering::Relaxed));
     }
 
     /// A copy of its words.
     pub fn read(&self) -> Vec<u32> {
-        self.0
-            .iter()
-            .map(|word| word.load(Ordering::Relaxed))
-            .collect()
+        self.0.iter().map(|word| word.load(Ordering::Relaxed)).collect()
     }
 }
 
 /// What one thread needs to run a kernel.
 #[derive(Debug)]
-pub(crate) struct Invocation {
+pub(crate) struct Invocation<'k> {
+    kernel: &'k Kernel,
     context: Box<[u64]>,
 }
 
-impl Invocation {
+impl<'k> Invocation<'k> {
     /// Prepares to run `kernel` with its buffers, in the order that it names them. All loops end when `stop`
     /// is set, with whatever results.
     ///
+    /// # Safety
+    /// By hook, `data` is what the answers that the kernel was built with are given along: for as long as
+    /// the invocation lives, it must be what each expects.
+    ///
     /// # Errors
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
-    pub(crate) fn new(
-        kernel: &Kernel,
-        buffers: &[Arc<Buffer>],
+    #[allow(unsafe_code)]
+    pub(crate) unsafe fn new(
+        kernel: &'k Kernel,
+        buffers: &[&'k Buffer],
         data: &[*const c_void],
-        stop: &AtomicBool,
+        stop: &'k AtomicBool,
     ) -> Result<Self, KernelError> {
         let layout = kernel.layout;
         let mut context = vec![0u64; layout.words()].into_boxed_slice();
@@ -86,16 +86,13 @@ impl Invocation {
         for (hook, data) in (0..layout.hooks).zip(data) {
             context[layout.data(hook) as usize / 8] = *data as u64;
         }
-        Ok(Self { context })
+        Ok(Self { kernel, context })
     }
 
     /// Runs the entry point for a thread of a workgroup.
-    ///
-    /// # Safety
-    /// It was prepared for this kernel, what it was prepared with is still there, and what answers are given
-    /// along is what they expect.
     #[allow(unsafe_code)]
-    pub(crate) unsafe fn run(&mut self, kernel: &Kernel, group: [u32; 3], lane: u32) {
+    pub(crate) fn run(&mut self, group: [u32; 3], lane: u32) {
+        let kernel = self.kernel;
         let first = kernel.layout.private(0) as usize;
         let cells: &mut [u32] = bytemuck::cast_slice_mut(&mut self.context);
         cells[first / 4..][..kernel.private.len()].copy_from_slice(&kernel.private);
@@ -115,13 +112,11 @@ impl Invocation {
         let context = self.context.as_mut_ptr();
         // SAFETY: `Kernel::build` made the entry point with one parameter for the context and one word for
         // each of its inputs, of which there are no more than these; registers of others are not looked at.
-        // The context is as the kernel's layout says, and what it points to is there.
+        // The context is as the kernel's layout says, and what it points to is borrowed.
         unsafe {
             type Main = unsafe extern "C" fn(*mut u64, u32, u32, u32, u32, u32);
             let main: Main = std::mem::transmute(kernel.main);
-            main(
-                context, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4],
-            );
+            main(context, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4]);
         }
     }
 }

@@ -9,9 +9,6 @@ use crate::world::KernelParts;
 use crate::world::bvh::Caster;
 
 /// The functions of kernels that are answered, and who answers them.
-<<<<<<< HEAD
-pub(super) const ANSWERED: [(&str, Answer); 2] = [("trace_closest", closest), ("trace_any", any)];
-=======
 pub(super) const ANSWERED: [(&str, Answer); 2] = [
     (
         "trace_closest",
@@ -28,7 +25,6 @@ pub(super) const ANSWERED: [(&str, Answer); 2] = [
         },
     ),
 ];
->>>>>>> main
 
 /// What answers are given along.
 #[derive(Clone)]
@@ -57,12 +53,7 @@ type Words = [u32; 8];
 
 fn ray(words: &Words) -> ([f32; 3], [f32; 3], f32, u32) {
     let at = |i: usize| f32::from_bits(words[i]);
-    (
-        [at(0), at(1), at(2)],
-        [at(3), at(4), at(5)],
-        at(6),
-        words[7],
-    )
+    ([at(0), at(1), at(2)], [at(3), at(4), at(5)], at(6), words[7])
 }
 
 /// # Safety

@@ -19,7 +19,7 @@ use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
 
 pub(crate) use casts::Casts;
-pub(crate) use work::{Groups, Step, Work};
+pub(crate) use work::{Step, Work};
 
 /// How to use the processor.
 #[derive(Clone, Debug, Default)]
@@ -82,11 +82,6 @@ impl Cpu {
         self.threads.current_num_threads()
     }
 
-    /// Whether paths in step with each other are so much faster that each material has its kernel.
-    pub(crate) fn is_wide(&self) -> bool {
-        self.width == Width::Best && impasto_cpu::is_wide()
-    }
-
     /// What the processor is and can do.
     pub fn info(&self) -> DeviceInfo {
         let cores = cores();
@@ -95,7 +90,10 @@ impl Cpu {
             backend: "native".into(),
             driver: native::compiler(),
             kind: "processor",
-            limits: vec![("threads", self.threads() as u64), ("cores", cores as u64)],
+            limits: vec![
+                ("threads", self.threads() as u64),
+                ("cores", cores as u64),
+            ],
             features_used: native::features(),
             features_missing: Vec::new(),
         }
@@ -108,32 +106,26 @@ impl Cpu {
         sizes: Sizes,
         casts: Option<&Casts>,
     ) -> Result<Step, RuntimeError> {
-        let groups = |items: u32| Groups::Known(items.div_ceil(sizes.workgroup));
+        let (groups, lanes) = match kernel.desc.source {
+            // What a workgroup does together one thread does alone.
+            DispatchSource::Once => (1, 1),
+            DispatchSource::Groups(groups) => (groups, sizes.workgroup),
+            _ => (sizes.pool.div_ceil(sizes.workgroup), sizes.workgroup),
+        };
         Ok(Step {
             name: kernel.desc.name.clone(),
             kernel: self.compiled(kernel, casts.is_some())?,
-            groups: match kernel.desc.source {
-                DispatchSource::Once => Groups::Known(1),
-                DispatchSource::Groups(groups) => Groups::Known(groups),
-                DispatchSource::Pool => groups(sizes.pool),
-                DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => groups(sizes.threads),
-                DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
-                    Groups::OfQueue(queue)
-                }
-            },
+            groups,
+            lanes,
         })
     }
 
     /// The machine code of a kernel, unless it was built before.
-<<<<<<< HEAD
-    fn compiled(&self, kernel: &Kernel, casts: bool) -> Result<Arc<native::Kernel>, RuntimeError> {
-=======
     fn compiled(
         &self,
         kernel: &Kernel,
         casts: bool,
     ) -> Result<Arc<impasto_cpu::Kernel>, RuntimeError> {
->>>>>>> main
         let key = (kernel.wgsl.clone(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept().get(&key) {

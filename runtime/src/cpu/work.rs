@@ -1,18 +1,20 @@
 //! A plan that is ready to run on the processor: its buffers, kernels and threads.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::ffi::c_void;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use impasto_cpu::native::Buffer;
 use impasto_cpu::{Kernel, Thread};
 use rayon::ThreadPool;
+use rayon::prelude::*;
 
-use super::Cpu;
 use super::casts::{ANSWERED, Casts};
+use super::Cpu;
 use crate::error::RuntimeError;
 use crate::gpu::submission::Done;
-use crate::kernels::buffers::{ARGUMENT_BYTES, BUFFERS, BufferId, Cleared};
+use crate::kernels::buffers::{BUFFERS, BufferId, Cleared};
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Composer;
 use crate::kernels::queues::Scalar;
@@ -25,33 +27,22 @@ pub(crate) struct Step {
     pub name: String,
     pub kernel: Arc<Kernel>,
     /// Workgroups, which threads take one after another.
-    pub groups: Groups,
-}
-
-/// How many workgroups a dispatch has.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Groups {
-    Known(u32),
-    /// As many as the prepare kernel finds in a queue.
-    OfQueue(usize),
+    pub groups: u32,
+    /// Threads of a workgroup, which here come one after the other.
+    pub lanes: u32,
 }
 
 /// The buffers and kernels of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Work {
-    pool: Arc<ThreadPool>,
-    steps: Vec<Prepared>,
-    /// Those of the runtime, by their ids.
-    buffers: Vec<Arc<Buffer>>,
+    threads: Arc<ThreadPool>,
+    steps: Vec<Step>,
+    /// Each with its WGSL variable: those of the runtime, then those of the scene.
+    buffers: Vec<(&'static str, Arc<Buffer>)>,
     /// Answers the ray casts of kernels, unless they cast rays themselves.
-    _casts: Option<Casts>,
-}
-
-/// A dispatch with what each thread needs for it.
-#[derive(Clone, Debug)]
-struct Prepared {
-    step: Step,
-    threads: Arc<[Mutex<Thread>]>,
+    casts: Option<Casts>,
+    /// Ends all loops of kernels when set.
+    stop: Arc<AtomicBool>,
 }
 
 impl Work {
@@ -73,22 +64,12 @@ impl Work {
             buffer.write(0, &words);
             (data.name, Arc::new(buffer))
         });
-        let named: Vec<(&str, Arc<Buffer>)> = own.chain(scene).collect();
-        let prepare = |step: Step| {
-            let thread = |_| Ok(Mutex::new(prepared(&step, &named, casts.as_ref())?));
-            let threads = (0..cpu.threads()).map(thread);
-            let threads: Result<Arc<[_]>, RuntimeError> = threads.collect();
-            Ok(Prepared {
-                threads: threads?,
-                step,
-            })
-        };
-        let steps: Result<Vec<Prepared>, RuntimeError> = steps.into_iter().map(prepare).collect();
         let work = Self {
-            pool: cpu.threads.clone(),
-            steps: steps?,
-            buffers: named.into_iter().map(|(_, buffer)| buffer).collect(),
-            _casts: casts,
+            threads: cpu.threads.clone(),
+            steps,
+            buffers: own.chain(scene).collect(),
+            casts,
+            stop: Arc::default(),
         };
         work.set_run(options);
         if let Some(pixels) = &options.pixels {
@@ -109,7 +90,7 @@ impl Work {
         for _ in 0..iterations {
             for (step, seconds) in self.steps.iter().zip(&mut step_seconds) {
                 let begin = Instant::now();
-                self.dispatch(step);
+                self.dispatch(step)?;
                 *seconds += begin.elapsed().as_secs_f64();
             }
         }
@@ -121,40 +102,50 @@ impl Work {
         })
     }
 
-    fn dispatch(&self, prepared: &Prepared) {
-        let Prepared { step, threads } = prepared;
-        let groups = self.groups(step.groups);
-        let next = AtomicU32::new(0);
-        let run = |thread: &Mutex<Thread>| {
-            let mut thread = thread.lock().unwrap_or_else(PoisonError::into_inner);
-            loop {
-                let group = next.fetch_add(1, Ordering::Relaxed);
-                if group >= groups {
-                    return;
-                }
-                thread.run([group, 0, 0], 0..step.kernel.workgroup());
+    fn dispatch(&self, step: &Step) -> Result<(), RuntimeError> {
+        let bound: Vec<&Buffer> = step.kernel.buffers().into_iter().map(|name| self.named(name)).collect();
+        let prepare = || self.invocation(step, &bound);
+        if step.groups == 1 {
+            let mut invocation = prepare()?;
+            invocation.run([0; 3], 0..step.lanes);
+            return Ok(());
+        }
+        let run = |invocation: &mut Result<Thread<'_>, RuntimeError>, group: u32| {
+            if let Ok(invocation) = invocation {
+                invocation.run([group, 0, 0], 0..step.lanes);
             }
         };
-        if groups <= 1 {
-            run(&threads[0]);
-        } else {
-            self.pool.broadcast(|context| run(&threads[context.index()]));
-        }
+        // What one thread cannot prepare, none can.
+        drop(prepare()?);
+        let groups = (0..step.groups).into_par_iter().with_max_len(1);
+        self.threads.install(|| groups.for_each_init(prepare, run));
+        Ok(())
     }
 
-    fn groups(&self, groups: Groups) -> u32 {
-        match groups {
-            Groups::Known(groups) => groups,
-            Groups::OfQueue(queue) => {
-                let words = self.buffer(BufferId::Arguments).words();
-                let first = ARGUMENT_BYTES as usize / 4 * queue;
-                words.get(first).map_or(0, |word| word.load(Ordering::Relaxed))
-            }
-        }
+    #[allow(unsafe_code)]
+    fn invocation<'w>(
+        &'w self,
+        step: &'w Step,
+        bound: &[&'w Buffer],
+    ) -> Result<Thread<'w>, RuntimeError> {
+        let data = self.casts.as_ref().map(Casts::data);
+        let data: Vec<*const c_void> = data.map_or_else(Vec::new, |d| vec![d; ANSWERED.len()]);
+        // SAFETY: kernels are built with answers only if there are casts, which they are given along.
+        let invocation = unsafe { Thread::new(&step.kernel, bound, &data, &self.stop) };
+        invocation.map_err(|error| RuntimeError::Shader {
+            kernel: step.name.clone(),
+            message: error.to_string(),
+        })
+    }
+
+    /// The buffer of a WGSL variable.
+    fn named(&self, name: &str) -> &Buffer {
+        let found = self.buffers.iter().find(|(known, _)| *known == name);
+        found.map_or(&self.buffers[0].1, |(_, buffer)| buffer)
     }
 
     fn buffer(&self, id: BufferId) -> &Buffer {
-        &self.buffers[id.index()]
+        &self.buffers[id.index()].1
     }
 
     /// Writes the settings that kernels read.
@@ -198,30 +189,4 @@ impl Work {
     pub(crate) fn read_film(&self) -> Vec<u32> {
         self.buffer(BufferId::Film).read()
     }
-}
-
-/// A thread that is ready for a dispatch.
-#[allow(unsafe_code)]
-fn prepared(
-    step: &Step,
-    named: &[(&str, Arc<Buffer>)],
-    casts: Option<&Casts>,
-) -> Result<Thread, RuntimeError> {
-    let missing = |name: &str| RuntimeError::Shader {
-        kernel: step.name.clone(),
-        message: format!("it binds the buffer `{name}`, which there is not"),
-    };
-    let buffer = |name: &str| {
-        let found = named.iter().find(|(known, _)| *known == name);
-        found.map(|(_, buffer)| buffer.clone()).ok_or_else(|| missing(name))
-    };
-    let buffers: Result<_, RuntimeError> = step.kernel.buffers().into_iter().map(buffer).collect();
-    let data = casts.map_or_else(Vec::new, |casts| vec![casts.data(); ANSWERED.len()]);
-    // SAFETY: kernels are built with answers only if there are casts, which they are given along, and which
-    // live as long as the work that runs them.
-    let thread = unsafe { Thread::new(&step.kernel, buffers?, &data, &Arc::default()) };
-    thread.map_err(|error| RuntimeError::Shader {
-        kernel: step.name.clone(),
-        message: error.to_string(),
-    })
 }

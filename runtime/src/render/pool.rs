@@ -32,7 +32,7 @@ const FETCH_LIMIT: u32 = 64;
 const SOFTWARE_FETCH_LIMIT: u32 = 2;
 
 /// Paths that a thread of the processor takes at a time.
-const PORTION: u32 = 64;
+const PORTION: u32 = 16;
 /// Paths of a dispatch there, for each thread: they take some milliseconds.
 const PATHS_OF_THREAD: u32 = 4096;
 
@@ -59,8 +59,7 @@ pub(crate) fn sizes(
     let slot_bytes = state_bytes.max(queue_bytes).max(1);
     if let Some(pool) = options.pool {
         let bytes = u64::from(pool) * slot_bytes;
-        device
-            .check_binding_size("a pool of that size", bytes)
+        device.check_binding_size("a pool of that size", bytes)
             .map_err(|error| error.with_hint("use a smaller pool (`--pool`)"))?;
     }
     let most = device.limits().buffer_bytes;

@@ -8,9 +8,9 @@ use cranelift_codegen::ir::{
 use naga::{BinaryOperator, MathFunction, ScalarKind};
 
 use super::{CONSTANT, Emitter, Place, Target};
+use crate::native::layout::bytes_of;
 use crate::code::{Atomic, First, Ins, Op, Pointer, Scalar, Slot};
 use crate::error::KernelError;
-use crate::native::layout::bytes_of;
 
 /// Memory that is there and aligned.
 const TRUSTED: MemFlagsData = MemFlagsData::trusted();
@@ -28,9 +28,7 @@ impl<'a> Emitter<'a, '_> {
         for (at, cell) in image.iter().enumerate() {
             let value = self.constant(*cell);
             let value = self.widened(value);
-            self.builder
-                .ins()
-                .stack_store(types::I64, value, slot, 4 * at as i32);
+            self.builder.ins().stack_store(types::I64, value, slot, 4 * at as i32);
         }
         Place::Memory(slot)
     }
@@ -174,10 +172,7 @@ impl<'a> Emitter<'a, '_> {
             } => {
                 let bytes = self.buffer_word(*buffer, 8);
                 let bytes = self.builder.ins().iadd_imm_s(bytes, -i64::from(*offset));
-                let length = self
-                    .builder
-                    .ins()
-                    .udiv_imm_u(bytes, i64::from((*stride).max(1)));
+                let length = self.builder.ins().udiv_imm_u(bytes, i64::from((*stride).max(1)));
                 let length = self.builder.ins().ireduce(types::I32, length);
                 self.set(*to, length);
                 Ok(())
@@ -266,12 +261,7 @@ impl<'a> Emitter<'a, '_> {
                         Place::Memory(stack) => {
                             let stack = *stack;
                             let value = self.widened(value);
-                            self.builder.ins().stack_store(
-                                types::I64,
-                                value,
-                                stack,
-                                4 * cell as i32,
-                            );
+                            self.builder.ins().stack_store(types::I64, value, stack, 4 * cell as i32);
                         }
                     }
                 }
@@ -288,9 +278,7 @@ impl<'a> Emitter<'a, '_> {
     /// The address or length of a buffer, which do not change while the code runs.
     fn buffer_word(&mut self, buffer: u32, offset: i32) -> Value {
         let at = self.shared.layout.buffer(buffer) + offset;
-        self.builder
-            .ins()
-            .load(types::I64, CONSTANT, self.context, at)
+        self.builder.ins().load(types::I64, CONSTANT, self.context, at)
     }
 
     /// An address in a buffer, and bytes from there to a value of so many bytes.
@@ -309,10 +297,7 @@ impl<'a> Emitter<'a, '_> {
             return Ok((base, offset as i32));
         };
         let length = self.buffer_word(buffer, 8);
-        let last = self
-            .builder
-            .ins()
-            .iadd_imm_s(length, -i64::from(offset + bytes));
+        let last = self.builder.ins().iadd_imm_s(length, -i64::from(offset + bytes));
         let index = self.value(index);
         let index = self.builder.ins().umin(index, last);
         Ok((self.builder.ins().iadd(base, index), offset as i32))
@@ -365,10 +350,7 @@ impl<'a> Emitter<'a, '_> {
         if !known && length <= 4 {
             let mut chosen: Vec<Value> = (from..from + count).map(|s| self.value(s)).collect();
             for element in 1..length {
-                let is_it = self
-                    .builder
-                    .ins()
-                    .icmp_imm_s(IntCC::Equal, index, i64::from(element));
+                let is_it = self.builder.ins().icmp_imm_s(IntCC::Equal, index, i64::from(element));
                 for (i, value) in (0..count).zip(&mut chosen) {
                     let other = self.value(from + element * count + i);
                     *value = self.builder.ins().select(is_it, other, *value);
@@ -388,9 +370,7 @@ impl<'a> Emitter<'a, '_> {
             for i in 0..cells {
                 let value = self.value(from + i);
                 let value = self.widened(value);
-                self.builder
-                    .ins()
-                    .stack_store(types::I64, value, stack, 4 * i as i32);
+                self.builder.ins().stack_store(types::I64, value, stack, 4 * i as i32);
             }
             self.builder.ins().stack_addr(types::I64, stack, 0)
         };
@@ -415,7 +395,6 @@ impl<'a> Emitter<'a, '_> {
     ) -> Result<(), KernelError> {
         let op = match function {
             Atomic::Exchange => Some(AtomicRmwOp::Xchg),
-            Atomic::Claim => None,
             Atomic::Op(op) => match self.shared.code.ops[op as usize] {
                 Op::Binary(BinaryOperator::Add, _) => Some(AtomicRmwOp::Add),
                 Op::Binary(BinaryOperator::Subtract, _) => Some(AtomicRmwOp::Sub),
@@ -429,22 +408,11 @@ impl<'a> Emitter<'a, '_> {
                 _ => None,
             },
         };
-        if op.is_none() && function != Atomic::Claim {
-            return Err(self.unsupported("atomic operation"));
-        }
+        let op = op.ok_or_else(|| self.unsupported("atomic operation"))?;
         let (address, offset) = self.place(pointer, 4)?;
         let address = self.builder.ins().iadd_imm_s(address, i64::from(offset));
         let value = self.value(value);
-        let old = match op {
-            Some(op) => {
-                let ins = self.builder.ins();
-                ins.atomic_rmw(types::I32, TRUSTED, op, address, value)
-            }
-            None => {
-                let free = self.builder.ins().iconst(types::I32, 0);
-                self.builder.ins().atomic_cas(TRUSTED, address, free, value)
-            }
-        };
+        let old = self.builder.ins().atomic_rmw(types::I32, TRUSTED, op, address, value);
         if let Some(to) = to {
             self.set(to, old);
         }
