@@ -293,6 +293,8 @@ pub enum Atomic {
     Op(u32),
     /// The value given.
     Exchange,
+    /// The value given where the word was 0, and else the word.
+    Claim,
 }
 
 /// What an index counts from.

@@ -2,6 +2,7 @@
 
 use std::ffi::c_void;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::code::Code;
@@ -48,13 +49,19 @@ enum Made {
 
 /// What one thread needs to run a kernel.
 #[derive(Debug)]
-pub struct Thread<'k>(Running<'k>);
+pub struct Thread {
+    running: Running,
+    /// What the code that runs refers to.
+    kernel: Arc<Kernel>,
+    _buffers: Vec<Arc<Buffer>>,
+    _stop: Arc<AtomicBool>,
+}
 
 #[derive(Debug)]
-enum Running<'k> {
-    One(native::Invocation<'k>),
+enum Running {
+    One(native::Invocation),
     #[cfg(all(target_arch = "x86_64", unix))]
-    Eight(wide::Invocation<'k>),
+    Eight(wide::Invocation),
 }
 
 /// Whether eight invocations run at a time here.
@@ -90,6 +97,15 @@ impl Kernel {
         }
     }
 
+    /// Threads of a workgroup.
+    pub fn workgroup(&self) -> u32 {
+        match &self.0 {
+            Made::One(kernel) => kernel.workgroup,
+            #[cfg(all(target_arch = "x86_64", unix))]
+            Made::Eight(kernel) => kernel.workgroup,
+        }
+    }
+
     /// What building took.
     pub fn statistics(&self) -> Statistics {
         match &self.0 {
@@ -100,7 +116,7 @@ impl Kernel {
     }
 }
 
-impl<'k> Thread<'k> {
+impl Thread {
     /// Prepares to run `kernel` with its buffers, in the order that it names them. All loops end when `stop`
     /// is set, with whatever results.
     ///
@@ -112,34 +128,50 @@ impl<'k> Thread<'k> {
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
     #[allow(unsafe_code)]
     pub unsafe fn new(
-        kernel: &'k Kernel,
-        buffers: &[&'k Buffer],
+        kernel: &Arc<Kernel>,
+        buffers: Vec<Arc<Buffer>>,
         data: &[*const c_void],
-        stop: &'k AtomicBool,
+        stop: &Arc<AtomicBool>,
     ) -> Result<Self, KernelError> {
-        // SAFETY: as above.
-        Ok(Self(match &kernel.0 {
+        let running = match &kernel.0 {
             Made::One(kernel) => {
-                Running::One(unsafe { native::Invocation::new(kernel, buffers, data, stop)? })
+                Running::One(native::Invocation::new(kernel, &buffers, data, stop)?)
             }
             #[cfg(all(target_arch = "x86_64", unix))]
             Made::Eight(kernel) => {
-                Running::Eight(unsafe { wide::Invocation::new(kernel, buffers, data, stop)? })
+                Running::Eight(wide::Invocation::new(kernel, &buffers, data, stop)?)
             }
-        }))
+        };
+        Ok(Self {
+            running,
+            kernel: kernel.clone(),
+            _buffers: buffers,
+            _stop: stop.clone(),
+        })
     }
 
     /// Runs the entry point for some threads of a workgroup.
+    #[allow(unsafe_code)]
     pub fn run(&mut self, group: [u32; 3], threads: Range<u32>) {
-        match &mut self.0 {
-            Running::One(invocation) => threads.for_each(|thread| invocation.run(group, thread)),
+        match (&mut self.running, &self.kernel.0) {
+            (Running::One(invocation), Made::One(kernel)) => {
+                // SAFETY: it was prepared for this kernel, and all that it refers to is here.
+                threads.for_each(|thread| unsafe { invocation.run(kernel, group, thread) });
+            }
             #[cfg(all(target_arch = "x86_64", unix))]
-            Running::Eight(invocation) => {
-                let firsts = threads.clone().step_by(wide::LANES as usize);
-                for first in firsts {
-                    invocation.run(group, first, wide::LANES.min(threads.end - first));
+            (Running::Eight(invocation), Made::Eight(kernel)) => {
+                for first in threads.clone().step_by(wide::LANES as usize) {
+                    let count = wide::LANES.min(threads.end - first);
+                    // SAFETY: as above.
+                    unsafe { invocation.run(kernel, group, first, count) };
                 }
             }
+            #[cfg(all(target_arch = "x86_64", unix))]
+            _ => {}
         }
     }
 }
+
+// SAFETY: the addresses that it holds are of what it shares with other threads.
+#[allow(unsafe_code)]
+unsafe impl Send for Thread {}

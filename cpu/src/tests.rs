@@ -1,14 +1,12 @@
 //! Small kernels of which it is known what they do: statements, memory, and what is refused.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
 
 use crate::code::Code;
 use crate::error::KernelError;
 use crate::interpret::{Float, Host, Machine};
-use crate::lower;
-#[cfg(all(target_arch = "x86_64", unix))]
-use crate::wide;
-use crate::native::{Buffer, Invocation, Kernel};
+use crate::native::Buffer;
+use crate::{Kernel, Thread, Width, lower};
 
 /// A host that looks at nothing.
 struct Nobody;
@@ -49,43 +47,25 @@ fn run<F: Float>(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>,
 }
 
 /// The same as machine code.
-fn run_native(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, KernelError> {
+fn run_native(
+    functions: &str,
+    body: &str,
+    input: &[u32],
+    width: Width,
+) -> Result<Vec<u32>, KernelError> {
     let code = code(functions, body)?;
-    let kernel = Kernel::build(&code, &[])?;
-    let given = Buffer::new(input.len().max(4));
+    let kernel = Arc::new(Kernel::build(&code, &[], width)?);
+    let (given, result) = (Buffer::new(input.len().max(4)), Buffer::new(8));
     given.write(0, input);
-    let result = Buffer::new(8);
+    let (given, result) = (Arc::new(given), Arc::new(result));
     let buffers = code.buffers.iter().map(|name| match name.as_str() {
-        "input" => &given,
-        _ => &result,
+        "input" => given.clone(),
+        _ => result.clone(),
     });
-    let buffers: Vec<&Buffer> = buffers.collect();
-    let stop = AtomicBool::new(false);
     // SAFETY: nobody answers.
     #[allow(unsafe_code)]
-    let invocation = unsafe { Invocation::new(&kernel, &buffers, &[], &stop) };
-    invocation?.run([0; 3], 0);
-    Ok(result.read())
-}
-
-/// The same in the first of eight lanes.
-#[cfg(all(target_arch = "x86_64", unix))]
-fn run_wide(functions: &str, body: &str, input: &[u32]) -> Result<Vec<u32>, KernelError> {
-    let code = code(functions, body)?;
-    let kernel = wide::Kernel::build(&code, &[])?;
-    let given = Buffer::new(input.len().max(4));
-    given.write(0, input);
-    let result = Buffer::new(8);
-    let buffers = code.buffers.iter().map(|name| match name.as_str() {
-        "input" => &given,
-        _ => &result,
-    });
-    let buffers: Vec<&Buffer> = buffers.collect();
-    let stop = AtomicBool::new(false);
-    // SAFETY: nobody answers.
-    #[allow(unsafe_code)]
-    let invocation = unsafe { wide::Invocation::new(&kernel, &buffers, &[], &stop) };
-    invocation?.run([0; 3], 0, 1);
+    let thread = unsafe { Thread::new(&kernel, buffers.collect(), &[], &Arc::default()) };
+    thread?.run([0; 3], 0..1);
     Ok(result.read())
 }
 
@@ -94,14 +74,11 @@ fn gives(functions: &str, body: &str, expected: &[u32]) {
     let input: Vec<u32> = (0..16).collect();
     let single = run::<f32>(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
     let double = run::<f64>(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
-    let native = run_native(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(single[..expected.len()], *expected);
     assert_eq!(double[..expected.len()], *expected);
-    assert_eq!(native[..expected.len()], *expected);
-    #[cfg(all(target_arch = "x86_64", unix))]
-    if wide::is_possible() {
-        let wide = run_wide(functions, body, &input).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(wide[..expected.len()], *expected);
+    for width in [Width::One, Width::Best] {
+        let native = run_native(functions, body, &input, width).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(native[..expected.len()], *expected, "{width:?}");
     }
 }
 
@@ -210,6 +187,20 @@ fn vectors_and_matrices_work_by_component() {
         atomicStore(&result[6], (vec3<u32>(1u) << vec3<u32>(0u, 4u, 8u)).y);";
     let minus = (-1f32).to_bits();
     gives("", body, &[20, 2334, 2, 1, 391, minus, 16]);
+}
+
+#[test]
+fn a_word_is_claimed_once() {
+    let body = "
+        let first = atomicCompareExchangeWeak(&result[0], 0u, 7u);
+        let second = atomicCompareExchangeWeak(&result[0], 0u, 9u);
+        atomicStore(&result[1], first.old_value);
+        atomicStore(&result[2], select(5u, 6u, first.exchanged));
+        atomicStore(&result[3], second.old_value);
+        atomicStore(&result[4], select(5u, 6u, second.exchanged));";
+    gives("", body, &[7, 0, 6, 7, 5]);
+    let other = code("", "let x = atomicCompareExchangeWeak(&result[0], 1u, 7u);");
+    assert!(other.is_err_and(|error| error.to_string().contains("but with 0")));
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub(crate) struct Kernel {
     pub(super) private: Vec<u32>,
     /// What the entry point is given.
     pub(super) inputs: Vec<Input>,
-    pub(super) workgroup: u32,
+    pub(crate) workgroup: u32,
     /// By buffer: its name, and the bytes it must have at least.
     pub(super) buffers: Vec<(String, u64)>,
     /// What building took.

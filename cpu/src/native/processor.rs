@@ -1,5 +1,6 @@
 //! What this machine's processor is, and whether code can be made for it and run.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::build::{Kernel, isa};
@@ -21,11 +22,13 @@ pub fn check() -> Result<(), KernelError> {
     let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty());
     let info = validator.validate(&module).map_err(|e| defect(&e))?;
     let kernel = Kernel::build(&lower(&module, &info, &[], &[])?, &[])?;
-    let (buffer, stop) = (Buffer::new(4), AtomicBool::new(false));
-    // SAFETY: nobody answers.
+    let (buffer, stop) = (Arc::new(Buffer::new(4)), AtomicBool::new(false));
+    let mut invocation = Invocation::new(&kernel, &[buffer.clone()], &[], &stop)?;
+    // SAFETY: all of it is here, and nobody answers.
     #[allow(unsafe_code)]
-    let invocation = unsafe { Invocation::new(&kernel, &[&buffer], &[], &stop) };
-    invocation?.run([0; 3], 0);
+    unsafe {
+        invocation.run(&kernel, [0; 3], 0);
+    }
     match buffer.read()[0] {
         1 => Ok(()),
         _ => Err(KernelError::Processor("code does not do what it says".into())),

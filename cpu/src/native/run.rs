@@ -1,6 +1,7 @@
 //! Buffers of kernels, and invocations of their entry points.
 
 use std::ffi::c_void;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use naga::BuiltIn;
@@ -45,27 +46,21 @@ impl Buffer {
 
 /// What one thread needs to run a kernel.
 #[derive(Debug)]
-pub(crate) struct Invocation<'k> {
-    kernel: &'k Kernel,
+pub(crate) struct Invocation {
     context: Box<[u64]>,
 }
 
-impl<'k> Invocation<'k> {
+impl Invocation {
     /// Prepares to run `kernel` with its buffers, in the order that it names them. All loops end when `stop`
     /// is set, with whatever results.
     ///
-    /// # Safety
-    /// By hook, `data` is what the answers that the kernel was built with are given along: for as long as
-    /// the invocation lives, it must be what each expects.
-    ///
     /// # Errors
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
-    #[allow(unsafe_code)]
-    pub(crate) unsafe fn new(
-        kernel: &'k Kernel,
-        buffers: &[&'k Buffer],
+    pub(crate) fn new(
+        kernel: &Kernel,
+        buffers: &[Arc<Buffer>],
         data: &[*const c_void],
-        stop: &'k AtomicBool,
+        stop: &AtomicBool,
     ) -> Result<Self, KernelError> {
         let layout = kernel.layout;
         let mut context = vec![0u64; layout.words()].into_boxed_slice();
@@ -86,13 +81,16 @@ impl<'k> Invocation<'k> {
         for (hook, data) in (0..layout.hooks).zip(data) {
             context[layout.data(hook) as usize / 8] = *data as u64;
         }
-        Ok(Self { kernel, context })
+        Ok(Self { context })
     }
 
     /// Runs the entry point for a thread of a workgroup.
+    ///
+    /// # Safety
+    /// It was prepared for this kernel, what it was prepared with is still there, and what answers are given
+    /// along is what they expect.
     #[allow(unsafe_code)]
-    pub(crate) fn run(&mut self, group: [u32; 3], lane: u32) {
-        let kernel = self.kernel;
+    pub(crate) unsafe fn run(&mut self, kernel: &Kernel, group: [u32; 3], lane: u32) {
         let first = kernel.layout.private(0) as usize;
         let cells: &mut [u32] = bytemuck::cast_slice_mut(&mut self.context);
         cells[first / 4..][..kernel.private.len()].copy_from_slice(&kernel.private);
@@ -112,7 +110,7 @@ impl<'k> Invocation<'k> {
         let context = self.context.as_mut_ptr();
         // SAFETY: `Kernel::build` made the entry point with one parameter for the context and one word for
         // each of its inputs, of which there are no more than these; registers of others are not looked at.
-        // The context is as the kernel's layout says, and what it points to is borrowed.
+        // The context is as the kernel's layout says, and what it points to is there.
         unsafe {
             type Main = unsafe extern "C" fn(*mut u64, u32, u32, u32, u32, u32);
             let main: Main = std::mem::transmute(kernel.main);

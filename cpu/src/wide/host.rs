@@ -150,6 +150,7 @@ pub(super) enum AtomicKind {
     Greatest,
     GreatestSigned,
     Exchange,
+    Claim,
 }
 
 impl AtomicKind {
@@ -165,6 +166,7 @@ impl AtomicKind {
             AtomicKind::Greatest => greatest,
             AtomicKind::GreatestSigned => greatest_signed,
             AtomicKind::Exchange => exchange,
+            AtomicKind::Claim => claim,
         };
         found as usize
     }
@@ -220,6 +222,7 @@ atomics! {
         word.fetch_update(ORDER, ORDER, greatest).unwrap_or_default()
     },
     exchange: |word, x| word.swap(x, ORDER),
+    claim: |word, x| word.compare_exchange(0, x, ORDER, ORDER).unwrap_or_else(|now| now),
 }
 
 /// Adds. Lanes that add to one word do so at once, as if one after the other.

@@ -1,6 +1,7 @@
 //! Builds kernels of eight lanes, and runs them.
 
 use std::ffi::c_void;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -31,7 +32,7 @@ pub(crate) struct Kernel {
     main: Interface,
     /// What the entry point is given.
     inputs: Vec<Input>,
-    workgroup: u32,
+    pub(crate) workgroup: u32,
     /// Module-scope variables at the beginning of an invocation, and where they lie.
     private: Vec<u32>,
     private_at: i32,
@@ -173,27 +174,21 @@ fn indexed(code: &Code) -> Vec<bool> {
 
 /// What one thread needs to run a kernel.
 #[derive(Debug)]
-pub(crate) struct Invocation<'k> {
-    kernel: &'k Kernel,
+pub(crate) struct Invocation {
     memory: Box<[Cell]>,
 }
 
-impl<'k> Invocation<'k> {
+impl Invocation {
     /// Prepares to run `kernel` with its buffers, in the order that it names them. All loops end when `stop`
     /// is set, with whatever results.
     ///
-    /// # Safety
-    /// By hook, `data` is what the answers that the kernel was built with are given along: for as long as
-    /// the invocation lives, it must be what each expects.
-    ///
     /// # Errors
     /// If a buffer is missing or smaller than what the kernel reads of it at known places.
-    #[allow(unsafe_code)]
-    pub(crate) unsafe fn new(
-        kernel: &'k Kernel,
-        buffers: &[&'k Buffer],
+    pub(crate) fn new(
+        kernel: &Kernel,
+        buffers: &[Arc<Buffer>],
         data: &[*const c_void],
-        stop: &'k AtomicBool,
+        stop: &AtomicBool,
     ) -> Result<Self, KernelError> {
         let cells = (kernel.memory.end / CELL) as usize + 1;
         let mut memory = vec![Cell::default(); cells].into_boxed_slice();
@@ -219,7 +214,7 @@ impl<'k> Invocation<'k> {
         for (hook, data) in (0..).zip(data) {
             address(kernel.memory.data(hook), *data as u64);
         }
-        let mut this = Self { kernel, memory };
+        let mut this = Self { memory };
         for (constant, at) in &kernel.memory.constants {
             let cell = match *constant {
                 Constant::Bits(bits) => [bits; 8],
@@ -244,9 +239,12 @@ impl<'k> Invocation<'k> {
     }
 
     /// Runs the entry point for some threads of a workgroup, from `first` on: at most [`LANES`].
+    ///
+    /// # Safety
+    /// It was prepared for this kernel, what it was prepared with is still there, and what answers are given
+    /// along is what they expect.
     #[allow(unsafe_code)]
-    pub(crate) fn run(&mut self, group: [u32; 3], first: u32, threads: u32) {
-        let kernel = self.kernel;
+    pub(crate) unsafe fn run(&mut self, kernel: &Kernel, group: [u32; 3], first: u32, threads: u32) {
         let lanes = [0, 1, 2, 3, 4, 5, 6, 7];
         let mask = lanes.map(|lane| 0u32.wrapping_sub((lane < threads).into()));
         self.put(kernel.main.mask, mask);
@@ -269,7 +267,7 @@ impl<'k> Invocation<'k> {
         }
         let memory = self.memory.as_mut_ptr();
         // SAFETY: the entry point has one parameter, the memory of a thread, which is as the kernel's
-        // `Memory` says; what it points to is borrowed.
+        // `Memory` says; what it points to is there.
         unsafe {
             let main = kernel.code.as_ptr().add(kernel.entry);
             let main: unsafe extern "C" fn(*mut Cell) = std::mem::transmute(main);

@@ -25,6 +25,7 @@ use crate::world::{MaterialSource, World};
 /// Sizes of a pool that kernels are written for; they are constants in the text.
 const SIZES: Sizes = Sizes {
     pool: 1 << 20,
+    pools: 1,
     workgroup: 128,
     threads: 1 << 16,
     fetch_limit: 64,

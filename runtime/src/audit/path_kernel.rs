@@ -21,6 +21,7 @@ use crate::world::{MaterialSource, World};
 /// One slot, one thread.
 const SIZES: Sizes = Sizes {
     pool: 1,
+    pools: 1,
     workgroup: 1,
     threads: 1,
     fetch_limit: 1,

@@ -19,7 +19,7 @@ use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
 
 pub(crate) use casts::Casts;
-pub(crate) use work::{Step, Work};
+pub(crate) use work::{Groups, Step, Work};
 
 /// How to use the processor.
 #[derive(Clone, Debug, Default)]
@@ -82,6 +82,11 @@ impl Cpu {
         self.threads.current_num_threads()
     }
 
+    /// Whether paths in step with each other are so much faster that each material has its kernel.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.width == Width::Best && impasto_cpu::is_wide()
+    }
+
     /// What the processor is and can do.
     pub fn info(&self) -> DeviceInfo {
         let cores = cores();
@@ -106,17 +111,20 @@ impl Cpu {
         sizes: Sizes,
         casts: Option<&Casts>,
     ) -> Result<Step, RuntimeError> {
-        let (groups, lanes) = match kernel.desc.source {
-            // What a workgroup does together one thread does alone.
-            DispatchSource::Once => (1, 1),
-            DispatchSource::Groups(groups) => (groups, sizes.workgroup),
-            _ => (sizes.pool.div_ceil(sizes.workgroup), sizes.workgroup),
-        };
+        let groups = |items: u32| Groups::Known(items.div_ceil(sizes.workgroup));
         Ok(Step {
             name: kernel.desc.name.clone(),
             kernel: self.compiled(kernel, casts.is_some())?,
-            groups,
-            lanes,
+            hands_out: kernel.wgsl.contains("fn hand_out_work"),
+            groups: match kernel.desc.source {
+                DispatchSource::Once => Groups::Known(1),
+                DispatchSource::Groups(groups) => Groups::Known(groups),
+                DispatchSource::Pool => groups(sizes.pool),
+                DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => groups(sizes.threads),
+                DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
+                    Groups::OfQueue(queue)
+                }
+            },
         })
     }
 

@@ -81,7 +81,7 @@ impl Work {
         submission.iterations = iterations;
         match (self, &mut submission.of) {
             (Work::Gpu(work), Submitted::Gpu(of)) => work.submit(of, iterations),
-            (Work::Cpu(work), of) => *of = Submitted::Cpu(work.run(iterations)),
+            (Work::Cpu(work), of) => *of = Submitted::Cpu(Ok(work.run())),
             // Made by other work; nothing is submitted, and nothing done.
             (Work::Gpu(_), Submitted::Cpu(_)) => {}
         }
@@ -133,7 +133,7 @@ impl Work {
     pub(crate) fn begin_pass(&self, options: &RenderOptions, layout: &PlanLayout) {
         match self {
             Work::Gpu(work) => work.begin_pass(options, layout),
-            Work::Cpu(work) => work.begin_pass(options, layout),
+            Work::Cpu(work) => work.begin_pass(options),
         }
     }
 

@@ -35,6 +35,9 @@ pub(crate) fn value_name(code: u32) -> &'static str {
     VALUES.get(code as usize).map_or("value", |(_, name)| name)
 }
 
+/// Words that count, before those of the example.
+pub(crate) const COUNTS: usize = 2;
+
 /// Words of each row.
 pub(crate) const ROW_WORDS: usize = ROW.len();
 

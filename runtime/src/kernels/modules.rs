@@ -111,8 +111,10 @@ pub(crate) struct Kernel {
 /// Sizes that the kernels of a plan share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sizes {
-    /// Slots in the pool.
+    /// Slots in a pool.
     pub pool: u32,
+    /// Pools: each thread of the processor has its own.
+    pub pools: u32,
     /// Threads of a workgroup.
     pub workgroup: u32,
     /// Threads that fill the GPU, for kernels whose threads fetch one item after another.
@@ -121,6 +123,13 @@ pub(crate) struct Sizes {
     pub fetch_limit: u32,
     /// Workgroups in the first dimension of a dispatch, before a second is opened.
     pub row_groups: u32,
+}
+
+impl Sizes {
+    /// Slots of all pools.
+    pub(crate) fn slots(self) -> u32 {
+        self.pool.saturating_mul(self.pools)
+    }
 }
 
 /// Composes the kernels of one plan.

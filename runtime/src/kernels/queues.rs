@@ -291,6 +291,38 @@ impl Counters {
         words.get(self.taken() + queue).copied().unwrap_or(0)
     }
 
+    /// The words with the lengths of queues when they were consumed last.
+    pub(crate) fn taken_words(self) -> Range<usize> {
+        self.taken()..self.taken() + self.queues
+    }
+
+    /// The counters of several pools as those of one: sums, and of examples the first.
+    pub(crate) fn merged(self, parts: &[Vec<u32>]) -> Vec<u32> {
+        let mut sums = vec![0u32; self.len()];
+        for part in parts {
+            for (sum, word) in sums.iter_mut().zip(part) {
+                *sum = sum.wrapping_add(*word);
+            }
+        }
+        let items = (0..self.queues).map(|queue| self.items() + 2 * queue);
+        let hits = (0..self.hits).map(|material| self.hits() + PUSHED_STRIDE * material);
+        let lanes = (0..self.profiled).flat_map(|kernel| [0, 2].map(|at| self.lanes(kernel) + at));
+        for at in items.chain(hits.flat_map(|at| [at, at + 2])).chain(lanes) {
+            let sum: u64 = parts.iter().map(|part| long(part, at)).sum();
+            sums[at] = sum as u32;
+            sums[at + 1] = (sum >> 32) as u32;
+        }
+        for row in 0..=self.film_row() {
+            let at = self.dropped() + dropped::ROW_WORDS * row;
+            let example = at + dropped::COUNTS..at + dropped::ROW_WORDS;
+            let claimed = parts.iter().find(|part| part.get(at + dropped::COUNTS).is_some_and(|c| *c > 0));
+            if let Some(part) = claimed {
+                sums[example.clone()].copy_from_slice(&part[example]);
+            }
+        }
+        sums
+    }
+
     /// How many items of `queue` were consumed, in the words read back.
     pub(crate) fn items_of(self, words: &[u32], queue: usize) -> u64 {
         long(words, self.items() + 2 * queue)

@@ -19,6 +19,9 @@ const MEMBERS: [Member; 5] = [
     ("none", |_| 0),
 ];
 
+/// The word that says how many samples of each pixel are taken.
+pub(crate) const SAMPLES: usize = 2;
+
 /// The words of the uniform.
 pub(crate) type Words = [u32; MEMBERS.len()];
 
@@ -50,6 +53,7 @@ mod tests {
             ..RenderOptions::default()
         };
         assert_eq!(words(&options), [random::hash_seed(4), 5, 6, 2, 0]);
+        assert_eq!(MEMBERS[SAMPLES].0, "samples");
         assert_eq!(
             declaration("Run"),
             "struct Run { seed: u32, first_sample: u32, samples: u32, pixels: u32, none: u32 }\n"

@@ -153,6 +153,7 @@ impl Room {
             layout,
             sizes: Sizes {
                 pool: 1 << 10,
+                pools: 1,
                 workgroup: 64,
                 threads: 1 << 8,
                 fetch_limit: 16,

@@ -117,7 +117,7 @@ impl Renderer<'_> {
             let scalar = |s| u64::from(layout.counters.scalar(words, s));
             if layout.wavefront {
                 let asked = layout.counters.items_of(words, layout.queues.new_paths());
-                let begun = u64::from(self.built.sizes.pool) * pass.number;
+                let begun = u64::from(self.built.sizes.slots()) * pass.number;
                 (status.before.asked + asked).saturating_sub(begun)
             } else {
                 before + scalar(Scalar::NextSample) * pixels + scalar(Scalar::NextPixel)

@@ -121,7 +121,7 @@ impl<'g> Renderer<'g> {
 
     /// Paths in flight.
     pub fn pool(&self) -> u32 {
-        self.built.sizes.pool
+        self.built.sizes.slots()
     }
 
     /// What the samples of this render must have in common with others to be merged with them.
@@ -251,7 +251,7 @@ impl<'g> Renderer<'g> {
             plan: &self.built.plan,
             replanned: self.replan_report(status),
             geometry: self.facts.geometry,
-            pool: self.built.sizes.pool,
+            pool: self.built.sizes.slots(),
             materials: &self.facts.materials,
             workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,

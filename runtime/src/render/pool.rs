@@ -89,8 +89,14 @@ pub(crate) fn dispatch_sizes(
     } else {
         FETCH_LIMIT
     };
+    let pools = match device {
+        DeviceRef::Gpu(_) => 1,
+        DeviceRef::Cpu(cpu) => u32::try_from(cpu.threads()).unwrap_or(u32::MAX),
+    };
+    let items = items.div_ceil(pools);
     Ok(Sizes {
         pool: items,
+        pools,
         workgroup: workgroup_size(device, technique.workgroup)?,
         threads: technique
             .threads

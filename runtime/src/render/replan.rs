@@ -177,7 +177,7 @@ impl Renderer<'_> {
             layout: &built.layout,
             kernels: &built.kernels,
             materials: &self.facts.materials,
-            pool: built.sizes.pool,
+            pool: built.sizes.slots(),
         }
     }
 
