@@ -24,6 +24,7 @@ static GPU: LazyLock<Gpu> =
 fn cpu(threads: usize) -> Cpu {
     let options = CpuOptions {
         threads: Some(threads),
+        ..CpuOptions::default()
     };
     Cpu::new(&options).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -112,18 +113,29 @@ fn scenes() -> Vec<String> {
     names
 }
 
+/// One path in a thousand may differ. Between curved mirrors each bounce makes a difference larger, until
+/// it is another path: there so many may that differ on the GPU alone when the camera moves by the last
+/// digit of its place.
 #[test]
 fn paths_are_those_of_a_gpu() {
     let processor = cpu(2);
     let mut wrong = Vec::new();
     for name in scenes() {
-        let subject = Subject::example(&name, [100, 100]);
+        let mut subject = Subject::example(&name, [100, 100]);
         let ours = subject.render(&processor, Strategy::MEGA, &samples(1));
         let theirs = subject.render(&*GPU, Strategy::OWN, &samples(1));
-        let share = equal(&ours.film, &theirs.film);
-        eprintln!("{name}: {:.3} % of the paths are equal", 100.0 * share);
-        if share < 0.999 {
-            wrong.push((name, share));
+        let astray = 1.0 - equal(&ours.film, &theirs.film);
+        eprintln!("{name}: {:.3} % of the paths differ", 100.0 * astray);
+        if astray <= 0.001 {
+            continue;
+        }
+        let place = &mut subject.scene.camera.position;
+        place.x = place.x.next_up();
+        let moved = subject.render(&*GPU, Strategy::OWN, &samples(1));
+        let allowed = 1.0 - equal(&moved.film, &theirs.film);
+        eprintln!("{name}: {:.3} % differ by a last digit", 100.0 * allowed);
+        if astray > allowed.min(0.03) {
+            wrong.push((name, astray, allowed));
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");

@@ -196,7 +196,9 @@ fn building_kernels_can_be_interrupted() {
         .expect("the folder can be written to");
     let out = folder.path().join("p.exr");
     let [path, out_text] = [&path, &out].map(|p| p.display().to_string());
-    let mut command = command(&["render", &path, "--spp", "1", "--out", &out_text]);
+    let mut command = command(&[
+        "render", &path, "--device", "gpu", "--spp", "1", "--out", &out_text,
+    ]);
     let child = command
         .stderr(std::process::Stdio::piped())
         .spawn()

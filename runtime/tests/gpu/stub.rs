@@ -493,7 +493,27 @@ pub fn render_plan(
     plan: &Plan,
     options: &RenderOptions,
 ) -> Rendering {
-    let mut renderer = Renderer::from_world(gpu(), world, materials, plan, options)
+    rendered(gpu().into(), world, materials, plan, options)
+}
+
+pub fn render_on(
+    way: Way,
+    world: &World,
+    materials: &Materials,
+    options: &RenderOptions,
+) -> Rendering {
+    let plan = plan(way.strategy(), materials);
+    rendered(way.device(), world, materials, &plan, options)
+}
+
+fn rendered(
+    device: DeviceRef<'static>,
+    world: &World,
+    materials: &Materials,
+    plan: &Plan,
+    options: &RenderOptions,
+) -> Rendering {
+    let mut renderer = Renderer::from_world(device, world, materials, plan, options)
         .unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer
         .render(&mut |_| ControlFlow::Continue(()))
@@ -503,6 +523,11 @@ pub fn render_plan(
     assert!(rendering.film.samples.iter().all(|n| *n == options.samples));
     assert_eq!(rendering.report.queue_overflow, 0);
     rendering
+}
+
+/// Renders on the processor.
+pub fn picture(world: &World, materials: &Materials, options: &RenderOptions) -> Rendering {
+    render_on(Way::Processor, world, materials, options)
 }
 
 /// Renders with one kernel a material.
