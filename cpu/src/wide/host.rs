@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use naga::MathFunction as Math;
 
 use crate::arithmetic::Called;
-use crate::kernel::Cell;
+use crate::cell::Cell;
 
 /// Answers a call in place of the kernel's function, in the lanes of the first cell that are not 0: the
 /// cells of its arguments follow, and then those of its result.
