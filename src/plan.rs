@@ -22,7 +22,9 @@ use std::sync::Arc;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::{DeviceProfile, Plan, PlanInputs, Strategy, Workload};
+use impasto_compiler::partition::{
+    DeviceProfile, Organisation, Plan, PlanInputs, PlanKernel, Strategy, Workload,
+};
 use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
@@ -113,62 +115,90 @@ pub fn workload(
     profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
 }
 
-/// What there is to say of a plan on the processor, which has one kernel whatever the materials.
+/// What there is to say of a plan on the processor, whose times no model predicts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct OnProcessor {
     /// The strategy.
     pub strategy: String,
     /// The processor.
     pub device: String,
-    /// The strategy that was asked for, if it was another.
+    /// The strategy that was asked for, if the processor replaces it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replaced_strategy: Option<String>,
-    /// The materials that the kernel evaluates.
-    pub materials: Vec<String>,
+    /// The kernels that evaluate materials.
+    pub kernels: Vec<KernelOfProcessor>,
     /// Materials that no surface binds.
     pub unused: Vec<String>,
-    /// Why there is one kernel.
+    /// Why the kernels are these.
     pub why: String,
 }
 
+/// A kernel of the processor.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct KernelOfProcessor {
+    /// Its name; `mega` if it runs whole paths.
+    pub name: String,
+    /// The materials that it evaluates.
+    pub materials: Vec<String>,
+}
+
 /// Why the processor has one kernel.
-const WHY: &str = "between kernels paths would go through memory, and a branch costs a processor \
-                   nothing that one more kernel would save";
+const WHY: &str = "one kernel takes a path from its beginning to its end: between kernels paths would go \
+                   through memory";
+/// Why it has others.
+const ASKED: &str = "they were asked for: no model predicts the times of processors";
 
 impl OnProcessor {
-    /// Of the megakernel of materials called `names`, in place of the strategy that was `asked` for.
-    pub fn new(plan: &Plan, names: &[String], device: &DeviceInfo, asked: Option<String>) -> Self {
+    /// Of a plan for materials called `names`, in place of the strategy that was `replaced`.
+    pub fn new(
+        plan: &Plan,
+        names: &[String],
+        device: &DeviceInfo,
+        replaced: Option<String>,
+    ) -> Self {
         let name = |at: &usize| names[*at].clone();
-        let used = (0..names.len()).filter(|at| !plan.unused.contains(at));
+        let is_mega = plan.organisation == Organisation::Mega;
+        let kernel = |kernel: &PlanKernel| KernelOfProcessor {
+            name: kernel.name.clone(),
+            materials: kernel.materials.iter().map(name).collect(),
+        };
+        let mega = || {
+            let used = (0..names.len()).filter(|at| !plan.unused.contains(at));
+            KernelOfProcessor {
+                name: "mega".into(),
+                materials: used.map(|at| name(&at)).collect(),
+            }
+        };
         Self {
             strategy: plan.strategy.clone(),
             device: device.name.clone(),
-            replaced_strategy: asked,
-            materials: used.map(|at| name(&at)).collect(),
+            replaced_strategy: replaced,
+            kernels: if is_mega {
+                vec![mega()]
+            } else {
+                plan.kernels.iter().map(kernel).collect()
+            },
             unused: plan.unused.iter().map(name).collect(),
-            why: WHY.into(),
+            why: if is_mega { WHY } else { ASKED }.into(),
         }
     }
 }
 
 impl fmt::Display for OnProcessor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |names: &[String]| names.join(", ");
-        let count = self.materials.len();
-        let plural = if count == 1 { "" } else { "s" };
-        writeln!(
-            f,
-            "plan `{}`: one kernel of {count} material{plural}",
-            self.strategy
-        )?;
-        writeln!(f, "device: {}, the processor", self.device)?;
-        writeln!(f, "materials: {}", list(&self.materials))?;
+        let (plan, kernels) = (&self.strategy, self.kernels.len());
+        let plural = if kernels == 1 { "" } else { "s" };
+        writeln!(f, "plan `{plan}`: {kernels} kernel{plural} of materials")?;
+        writeln!(f, "device: {}, the processor\n", self.device)?;
+        for kernel in &self.kernels {
+            writeln!(f, "`{}`: {}", kernel.name, kernel.materials.join(", "))?;
+        }
         if !self.unused.is_empty() {
-            writeln!(f, "on no surface: {}", list(&self.unused))?;
+            writeln!(f, "on no surface: {}", self.unused.join(", "))?;
         }
         writeln!(f, "\nwhy: {}", self.why)?;
         if let Some(asked) = &self.replaced_strategy {
-            writeln!(f, "`{asked}` was asked for: only GPUs run its kernels")?;
+            writeln!(f, "`{asked}` was asked for: here only GPUs run its kernels")?;
         }
         writeln!(
             f,

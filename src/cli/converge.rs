@@ -95,9 +95,7 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     files::check_writable(&args.out.join("convergence.json"))?;
     interrupt::install()?;
     let device = args.device.open(global)?;
-    if let Device::Cpu(_) = device {
-        one_kernel(&mut settings.strategies, global);
-    }
+    replace(&mut settings.strategies, &device, global);
     let mut convergence = Convergence {
         command: command(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -119,15 +117,19 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     Ok(())
 }
 
-/// Leaves the strategy that the processor has.
-fn one_kernel(strategies: &mut Vec<Strategy>, global: &Global) {
-    let lost = strategies.iter().copied();
-    let lost = lost.filter(|s| ![Strategy::AUTO, Strategy::MEGA].contains(s));
-    let lost: Vec<String> = lost.map(|s| format!("`{s}`")).collect();
-    if !lost.is_empty() {
-        global.note(&super::strategy::replaced(&lost.join(", ")));
+/// Puts the strategy that the device has in the place of those that it has not.
+fn replace(strategies: &mut Vec<Strategy>, device: &Device, global: &Global) {
+    let replaced = |strategy: &Strategy| device.replaces(&strategy.to_string());
+    for strategy in strategies
+        .iter()
+        .filter(|s| replaced(s) && **s != Strategy::AUTO)
+    {
+        global.note(&super::strategy::replaced(&strategy.to_string()));
     }
-    *strategies = vec![Strategy::MEGA];
+    let chosen = strategies
+        .iter()
+        .map(|s| if replaced(s) { Strategy::MEGA } else { *s });
+    *strategies = distinct(&chosen.collect::<Vec<_>>());
 }
 
 impl ConvergeArgs {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, Plan, Strategy, Workload, file, text};
+use impasto::compiler::partition::{Calibrated, Plan, PlanInputs, Strategy, Workload, file, text};
 use impasto::plan::{OnProcessor, SceneMaterials, unused};
 use impasto::{Device, Gpu, Program, Scene, files};
 use serde::Serialize;
@@ -148,13 +148,26 @@ impl PlanCommandArgs {
     ) -> Outcome {
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = unused(scene, program);
-        let asked = match self.wanted.source(&names, &unused, Strategy::MEGA)? {
-            Source::Given(plan) => plan.strategy,
+        let source = self.wanted.source(&names, &unused, Strategy::MEGA)?;
+        let asked = match &source {
+            Source::Given(plan) => plan.strategy.clone(),
             Source::Strategy(strategy) => strategy.to_string(),
         };
-        let plan = Plan::mega(&names, &unused);
-        let asked = (asked != plan.strategy).then_some(asked);
-        let said = OnProcessor::new(&plan, &names, &device.info(), asked);
+        let is_replaced = device.replaces(&asked);
+        let plan = match source {
+            _ if is_replaced => Plan::mega(&names, &unused),
+            Source::Given(plan) => plan,
+            Source::Strategy(strategy) => {
+                let materials = SceneMaterials::new(scene, program, self.samples as usize);
+                let inputs = PlanInputs {
+                    unused: &unused,
+                    costs: Some(&materials.costs),
+                    ..PlanInputs::of_names(&names)
+                };
+                strategy.plan(&inputs).map_err(|e| e.to_string())?
+            }
+        };
+        let said = OnProcessor::new(&plan, &names, &device.info(), is_replaced.then_some(asked));
         if let Some(path) = &self.save {
             files::write_whole(path, file::write(&plan, &names).as_bytes())?;
         }

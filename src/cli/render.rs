@@ -117,8 +117,8 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let material_seconds = started.elapsed().as_secs_f64();
     let device = args.device.open(global)?;
     let planned = args.planned(&scene, &program, &device)?;
-    if matches!(device, Device::Cpu(_)) && planned.plan.organisation != Organisation::Mega {
-        global.note(&replaced(&format!("`{}`", planned.plan.strategy)));
+    if planned.plan.organisation != Organisation::Mega && device.replaces(&planned.plan.strategy) {
+        global.note(&replaced(&planned.plan.strategy));
     }
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
@@ -171,8 +171,7 @@ struct Planned {
 
 impl RenderArgs {
     /// The plan that was asked for. A strategy that must know how paths hit materials begins with a kernel
-    /// a material, and plans when that is known. On the processor, which has one kernel whatever the
-    /// materials, it is not made: the renderer replaces it.
+    /// a material, and plans when that is known. What the device replaces is not made.
     fn planned(
         &self,
         scene: &Scene,
@@ -197,8 +196,8 @@ impl RenderArgs {
             strategy: strategy.to_string(),
             ..Plan::few_kernels(&names, &unused)
         };
-        let is_one_kernel = matches!(device, Device::Cpu(_)) && strategy != Strategy::MEGA;
-        if is_one_kernel && strategy.requires() != Requires::Measurements {
+        let is_replaced = device.replaces(&strategy.to_string());
+        if is_replaced && strategy.requires() != Requires::Measurements {
             return Ok(fixed(begun()));
         }
         let inputs = PlanInputs {

@@ -60,10 +60,10 @@ impl PlanArgs {
     }
 }
 
-/// What is said where the processor has one kernel in place of what was asked for.
+/// What is said where the device renders by one kernel in place of what was asked for.
 pub(super) fn replaced(asked: &str) -> String {
     format!(
-        "note: the processor has one kernel, whatever the materials: `mega` in place of {asked}"
+        "note: the processor renders by `mega` in place of `{asked}` (`impasto plan --device cpu` says why)"
     )
 }
 

@@ -10,7 +10,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use impasto_cpu::native;
-use impasto_cpu::{KernelError, Width};
+use impasto_cpu::KernelError;
+pub use impasto_cpu::Width;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;

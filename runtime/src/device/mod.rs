@@ -6,7 +6,7 @@ mod work;
 
 use std::fmt;
 
-use impasto_compiler::partition::{Organisation, Plan};
+use impasto_compiler::partition::{Organisation, Plan, Requires, Strategy};
 
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
@@ -99,6 +99,11 @@ impl Device {
         DeviceRef::from(self).info()
     }
 
+    /// Whether it renders by the megakernel in place of the plan of a strategy.
+    pub fn replaces(&self, strategy: &str) -> bool {
+        DeviceRef::from(self).replaces(strategy)
+    }
+
     /// The GPU, for what only GPUs do.
     ///
     /// # Errors
@@ -170,15 +175,24 @@ impl DeviceRef<'_> {
         }
     }
 
+    /// Whether it renders by the megakernel in place of the plan of a strategy. A processor does if it runs
+    /// one path at a time, and where the plan would follow a model of GPUs' times.
+    pub fn replaces(self, strategy: &str) -> bool {
+        let DeviceRef::Cpu(cpu) = self else {
+            return false;
+        };
+        let strategy = Strategy::parse(strategy).ok();
+        let is_of_gpus = strategy.is_some_and(|s| s.requires() == Requires::Workload);
+        strategy != Some(Strategy::MEGA) && (is_of_gpus || !cpu.is_wide())
+    }
+
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
-        match self {
-            DeviceRef::Cpu(cpu) if !cpu.is_wide() && wanted.organisation != Organisation::Mega => {
-                let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
-                Plan::mega(&names, &world.parts.unbound)
-            }
-            _ => wanted.clone(),
+        if wanted.organisation == Organisation::Mega || !self.replaces(&wanted.strategy) {
+            return wanted.clone();
         }
+        let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
+        Plan::mega(&names, &world.parts.unbound)
     }
 
     /// What bounds the sizes of buffers and dispatches.

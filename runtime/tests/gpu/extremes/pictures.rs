@@ -171,7 +171,7 @@ material glossy { param roughness: float = 0.1; surface = conductor(ior: color(0
         };
         let of = |sample, count| {
             let (scene, program) = load_with(&toml(sample), &[("glossy.impasto", GLOSSY)]);
-            render(&scene, &program, "processor", &samples(count))
+            render(&scene, &program, "wavefront", &samples(count))
         };
         let (both, found) = (of(true, spp(128, 4096)), of(false, spp(1024, 65_536)));
         assert!(both.report.kernels.iter().any(|k| k.name == "shadow"));
