@@ -17,14 +17,19 @@
 //! # }
 //! ```
 
+use std::fmt;
 use std::sync::Arc;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
-use impasto_compiler::partition::{DeviceProfile, PlanInputs, Strategy, Workload};
+use impasto_compiler::partition::{
+    DeviceProfile, Organisation, Plan, PlanInputs, PlanKernel, Strategy, Workload,
+};
+use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{Planner, profile_workload};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
+use serde::Serialize;
 
 use crate::{Gpu, RuntimeError, Scene};
 
@@ -108,4 +113,106 @@ pub fn workload(
     let technique = Technique::default();
     let world = World::of_program(scene, program, &technique)?;
     profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
+}
+
+/// What there is to say of a plan on the processor, whose times no model predicts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct OnProcessor {
+    /// The strategy.
+    pub strategy: String,
+    /// The processor.
+    pub device: String,
+    /// The strategy that was asked for, if the processor replaces it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replaced_strategy: Option<String>,
+    /// The kernels that evaluate materials.
+    pub kernels: Vec<KernelOfProcessor>,
+    /// Materials that no surface binds.
+    pub unused: Vec<String>,
+    /// Why the kernels are these.
+    pub why: String,
+}
+
+/// A kernel of the processor.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct KernelOfProcessor {
+    /// Its name; `mega` if it runs whole paths.
+    pub name: String,
+    /// The materials that it evaluates.
+    pub materials: Vec<String>,
+}
+
+/// Why the processor has one kernel.
+const ONE: &str = "one kernel takes a path from its beginning to its end: between kernels paths would go \
+                   through memory";
+/// Why it has a kernel a material.
+const EACH: &str = "eight paths run at a time, and those that hit the same material do the same: each material \
+                    has a kernel";
+/// Why it has others.
+const ASKED: &str = "they were asked for: no model predicts the times of processors";
+
+impl OnProcessor {
+    /// Of a plan for materials called `names`, in place of the strategy that was `replaced`.
+    pub fn new(
+        plan: &Plan,
+        names: &[String],
+        device: &DeviceInfo,
+        replaced: Option<String>,
+    ) -> Self {
+        let name = |at: &usize| names[*at].clone();
+        let is_mega = plan.organisation == Organisation::Mega;
+        let kernel = |kernel: &PlanKernel| KernelOfProcessor {
+            name: kernel.name.clone(),
+            materials: kernel.materials.iter().map(name).collect(),
+        };
+        let mega = || {
+            let used = (0..names.len()).filter(|at| !plan.unused.contains(at));
+            KernelOfProcessor {
+                name: "mega".into(),
+                materials: used.map(|at| name(&at)).collect(),
+            }
+        };
+        Self {
+            strategy: plan.strategy.clone(),
+            device: device.name.clone(),
+            replaced_strategy: replaced,
+            kernels: if is_mega {
+                vec![mega()]
+            } else {
+                plan.kernels.iter().map(kernel).collect()
+            },
+            unused: plan.unused.iter().map(name).collect(),
+            why: if is_mega {
+                ONE
+            } else if plan.strategy == Strategy::OWN.to_string() {
+                EACH
+            } else {
+                ASKED
+            }
+            .into(),
+        }
+    }
+}
+
+impl fmt::Display for OnProcessor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (plan, kernels) = (&self.strategy, self.kernels.len());
+        let plural = if kernels == 1 { "" } else { "s" };
+        writeln!(f, "plan `{plan}`: {kernels} kernel{plural} of materials")?;
+        writeln!(f, "device: {}, the processor\n", self.device)?;
+        for kernel in &self.kernels {
+            writeln!(f, "`{}`: {}", kernel.name, kernel.materials.join(", "))?;
+        }
+        if !self.unused.is_empty() {
+            writeln!(f, "on no surface: {}", self.unused.join(", "))?;
+        }
+        writeln!(f, "\nwhy: {}", self.why)?;
+        if let Some(asked) = &self.replaced_strategy {
+            writeln!(f, "`{asked}` was asked for: here only GPUs run its kernels")?;
+        }
+        writeln!(
+            f,
+            "for a GPU: `--device gpu`, or `--profile` and `--workload` where there is none"
+        )
+    }
 }

@@ -5,23 +5,30 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use impasto::runtime::device::DeviceRef;
 use impasto::runtime::scene::FilmSettings;
-use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Rendering, Scene, Strategy};
+use impasto::{
+    Cpu, CpuOptions, Gpu, GpuOptions, RenderOptions, Renderer, Rendering, Scene, Strategy,
+};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).to_path_buf()
 }
 
-fn render(mut scene: Scene, [width, height]: [u32; 2], samples: u32) -> Rendering {
+fn render<'d>(
+    device: impl Into<DeviceRef<'d>>,
+    mut scene: Scene,
+    [width, height]: [u32; 2],
+    samples: u32,
+) -> Rendering {
     scene.film = FilmSettings { width, height };
     let program = impasto::compile(&scene).unwrap_or_else(|error| panic!("{error}"));
     let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
-    let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let options = RenderOptions {
         samples,
         ..RenderOptions::default()
     };
-    let renderer = Renderer::new(&gpu, &scene, &program, &plan, &options);
+    let renderer = Renderer::new(device, &scene, &program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|error| panic!("{error}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     let rendering = rendering.unwrap_or_else(|error| panic!("{error}"));
@@ -33,7 +40,8 @@ fn render(mut scene: Scene, [width, height]: [u32; 2], samples: u32) -> Renderin
 fn a_thousand_instances_of_ten_materials_are_ten_shaders() {
     let scene = impasto::load(&root().join("examples/swatches/scene.toml"));
     let scene = scene.unwrap_or_else(|error| panic!("{error}"));
-    let rendering = render(scene, [40, 30], 1);
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let rendering = render(&gpu, scene, [40, 30], 1);
     let report = &rendering.report;
     // The stage is one more instance of what some of the balls are made of.
     assert_eq!((report.material_count, report.instance_count), (10, 1001));
@@ -98,8 +106,9 @@ fn balls(bake: bool) -> Scene {
 
 #[test]
 fn instances_look_as_if_each_were_compiled_alone() {
-    let shared = render(balls(false), [64, 48], 4);
-    let alone = render(balls(true), [64, 48], 4);
+    let cpu = Cpu::new(&CpuOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let shared = render(&cpu, balls(false), [64, 48], 4);
+    let alone = render(&cpu, balls(true), [64, 48], 4);
     let counts = |r: &Rendering| (r.report.material_count, r.report.instance_count);
     assert_eq!(counts(&shared), (4, 40));
     assert_eq!(counts(&alone), (40, 40));

@@ -9,6 +9,7 @@ mod instances;
 mod needs;
 mod plans;
 mod probe;
+mod processor;
 mod render;
 mod snapshots;
 mod textures;

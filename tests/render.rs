@@ -7,16 +7,17 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use impasto::compiler::partition::Form;
+use impasto::runtime::device::DeviceRef;
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Regeneration, Technique};
 use impasto::{
-    FileLoader, Gpu, GpuOptions, Plan, RenderOptions, Renderer, Rendering, Scene, Strategy,
-    compiler,
+    Cpu, CpuOptions, FileLoader, Gpu, GpuOptions, Plan, RenderOptions, Renderer, Rendering, Scene,
+    Strategy, compiler,
 };
 
 #[test]
 fn every_material_renders() {
-    let gpu = gpu();
+    let cpu = Cpu::new(&CpuOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let materials = materials();
     assert!(!materials.is_empty());
     for (file, name) in materials {
@@ -28,9 +29,9 @@ fn every_material_renders() {
         sample.params.clear();
 
         let rendering = render(
-            &gpu,
+            &cpu,
             &scene,
-            Strategy::OWN,
+            Strategy::MEGA,
             RenderOptions {
                 samples: 4,
                 ..Default::default()
@@ -252,10 +253,15 @@ fn scene(path: &str, side: u32) -> Scene {
     scene
 }
 
-fn render(gpu: &Gpu, scene: &Scene, strategy: Strategy, options: RenderOptions) -> Rendering {
+fn render<'d>(
+    device: impl Into<DeviceRef<'d>>,
+    scene: &Scene,
+    strategy: Strategy,
+    options: RenderOptions,
+) -> Rendering {
     let program = impasto::compile(scene).unwrap_or_else(|error| panic!("{error}"));
     let plan = impasto::plan(&program, strategy).expect("a plan");
-    let renderer = Renderer::new(gpu, scene, &program, &plan, &options);
+    let renderer = Renderer::new(device, scene, &program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|error| panic!("{error}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     rendering.unwrap_or_else(|error| panic!("{error}"))

@@ -86,7 +86,7 @@ fn render(scene: &Scene, program: &Program, samples: u32) -> Vec<[f32; 3]> {
         ..RenderOptions::default()
     };
     let plan = impasto::plan(program, Strategy::OWN).expect("a plan");
-    let renderer = Renderer::new(&GPU, scene, program, &plan, &options);
+    let renderer = Renderer::new(&*GPU, scene, program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));

@@ -9,7 +9,7 @@ use impasto::runtime::render::Samples;
 use impasto::runtime::render::until::{Ending, Goals, second_seed};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Sampler, Technique};
-use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Scene, Strategy};
+use impasto::{Cpu, CpuOptions, RenderOptions, Renderer, Scene, Strategy};
 
 /// The box without caustics and without the lamp in the picture, whose few pixels would need far more
 /// seeds.
@@ -33,17 +33,17 @@ fn scene(side: u32) -> Scene {
 /// A render in halves is the two renders that it says it is made of.
 #[test]
 fn the_picture_is_that_of_both_halves() {
-    let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
+    let cpu = Cpu::new(&CpuOptions::default()).expect("a processor");
     let scene = scene(8);
     let program = impasto::compile(&scene).expect("materials");
-    let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
+    let plan = impasto::plan(&program, Strategy::MEGA).expect("a plan");
     let options = RenderOptions {
         samples: 22,
         first_sample: 5,
         seed: 7,
         ..RenderOptions::default()
     };
-    let mut renderer = Renderer::new(&gpu, &scene, &program, &plan, &options).expect("a renderer");
+    let mut renderer = Renderer::new(&cpu, &scene, &program, &plan, &options).expect("a renderer");
     let mut go_on = |_: &_| ControlFlow::Continue(());
     let goals = Goals::default();
     let whole = renderer
@@ -89,7 +89,7 @@ fn the_picture_is_that_of_both_halves() {
 #[test]
 fn the_estimated_error_is_the_true_one() {
     const SEEDS: u32 = 16;
-    let gpu = Gpu::new(&GpuOptions::default()).expect("an adapter");
+    let cpu = Cpu::new(&CpuOptions::default()).expect("a processor");
     let scene = scene(12);
     let program = impasto::compile(&scene).expect("materials");
     let plan = impasto::plan(&program, Strategy::MEGA).expect("a plan");
@@ -104,7 +104,7 @@ fn the_estimated_error_is_the_true_one() {
             ..RenderOptions::default()
         };
         let mut renderer =
-            Renderer::new(&gpu, &scene, &program, &plan, &options).expect("a renderer");
+            Renderer::new(&cpu, &scene, &program, &plan, &options).expect("a renderer");
         let mut go_on = |_: &_| ControlFlow::Continue(());
         let reference = renderer.render(&mut go_on).expect("the reference").film;
         let (mut estimated, mut errors) = ([0.0; 2], [0.0; 2]);

@@ -7,32 +7,10 @@
 use naga::{BinaryOperator, BuiltIn, MathFunction, ScalarKind, UnaryOperator};
 
 use crate::shape;
+pub use crate::shape::Scalar;
 
 /// A cell, from the beginning of the frame.
 pub type Slot = u32;
-
-/// A scalar of 32 bits, or a bool.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scalar {
-    /// A float, whose precision is the interpreter's.
-    Float(f32),
-    /// An integer of either sign.
-    Word(u32),
-    /// A bool.
-    Bool(bool),
-}
-
-impl Scalar {
-    /// Zero of a kind; `None` for kinds that no kernel has when it runs.
-    pub fn zero(kind: ScalarKind) -> Option<Scalar> {
-        match kind {
-            ScalarKind::Float => Some(Scalar::Float(0.0)),
-            ScalarKind::Uint | ScalarKind::Sint => Some(Scalar::Word(0)),
-            ScalarKind::Bool => Some(Scalar::Bool(false)),
-            ScalarKind::AbstractInt | ScalarKind::AbstractFloat => None,
-        }
-    }
-}
 
 /// Everything that is needed to run a kernel.
 #[derive(Debug)]
@@ -295,6 +273,8 @@ pub enum Atomic {
     Op(u32),
     /// The value given.
     Exchange,
+    /// The value given where the word was 0, and else the word.
+    Claim,
 }
 
 /// What an index counts from.

@@ -5,16 +5,12 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::cell::Cell;
 use crate::code::Code;
 use crate::error::KernelError;
 use crate::native::{self, Buffer, Statistics};
 #[cfg(all(target_arch = "x86_64", unix))]
 use crate::wide;
-
-/// Eight words: one of each of eight invocations.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(32))]
-pub struct Cell(pub [u32; 8]);
 
 /// What the host does in place of a function of kernels.
 #[derive(Clone, Copy, Debug)]

@@ -14,9 +14,11 @@
 //! | `interpret` | runs code for one invocation, in either precision |
 //! | `native` | makes machine code of code for one invocation at a time |
 //! | `wide` | the same for eight, where the processor can |
+//! | `cell` | eight words at once, as wide code and its host share them |
 //! | `kernel` | either of these |
 
 mod arithmetic;
+mod cell;
 pub mod code;
 mod error;
 pub mod interpret;
@@ -30,6 +32,7 @@ mod tests;
 #[cfg(all(target_arch = "x86_64", unix))]
 mod wide;
 
+pub use cell::Cell;
 pub use error::KernelError;
-pub use kernel::{Answer, Cell, Kernel, Thread, Width, is_wide};
+pub use kernel::{Answer, Kernel, Thread, Width, is_wide};
 pub use lower::lower;

@@ -5,7 +5,28 @@
 
 use naga::{ArraySize, Module, ScalarKind, TypeInner, VectorSize};
 
-use crate::code::Scalar;
+/// A scalar of 32 bits, or a bool.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scalar {
+    /// A float, whose precision is the interpreter's.
+    Float(f32),
+    /// An integer of either sign.
+    Word(u32),
+    /// A bool.
+    Bool(bool),
+}
+
+impl Scalar {
+    /// Zero of a kind; `None` for kinds that no kernel has when it runs.
+    pub fn zero(kind: ScalarKind) -> Option<Scalar> {
+        match kind {
+            ScalarKind::Float => Some(Scalar::Float(0.0)),
+            ScalarKind::Uint | ScalarKind::Sint => Some(Scalar::Word(0)),
+            ScalarKind::Bool => Some(Scalar::Bool(false)),
+            ScalarKind::AbstractInt | ScalarKind::AbstractFloat => None,
+        }
+    }
+}
 
 /// Where a part of a value begins within the whole.
 #[derive(Clone, Copy, Debug)]

@@ -192,6 +192,20 @@ fn vectors_and_matrices_work_by_component() {
 }
 
 #[test]
+fn a_word_is_claimed_once() {
+    let body = "
+        let first = atomicCompareExchangeWeak(&result[0], 0u, 7u);
+        let second = atomicCompareExchangeWeak(&result[0], 0u, 9u);
+        atomicStore(&result[1], first.old_value);
+        atomicStore(&result[2], select(5u, 6u, first.exchanged));
+        atomicStore(&result[3], second.old_value);
+        atomicStore(&result[4], select(5u, 6u, second.exchanged));";
+    gives("", body, &[7, 0, 6, 7, 5]);
+    let other = code("", "let x = atomicCompareExchangeWeak(&result[0], 1u, 7u);");
+    assert!(other.is_err_and(|error| error.to_string().contains("but with 0")));
+}
+
+#[test]
 fn a_double_keeps_what_a_single_rounds_away() {
     let body = "
         let small = bitcast<f32>(input[0].x);

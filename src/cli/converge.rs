@@ -88,12 +88,14 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
-    let settings = args.settings()?;
+    args.device.check()?;
+    let mut settings = args.settings()?;
     let names = names(&args.scenes);
     make_folder(&args.out)?;
     files::check_writable(&args.out.join("convergence.json"))?;
     interrupt::install()?;
-    let device = args.device.open()?;
+    let device = args.device.open(global)?;
+    replace(&mut settings.strategies, &device, global);
     let mut convergence = Convergence {
         command: command(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -113,6 +115,24 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     }
     global.note(&format!("wrote {}", args.out.join("index.html").display()));
     Ok(())
+}
+
+/// Puts the strategy that the device has in the place of those that it has not.
+fn replace(strategies: &mut Vec<Strategy>, device: &Device, global: &Global) {
+    let replaced = |strategy: &Strategy| device.replaces(&strategy.to_string());
+    for strategy in strategies
+        .iter()
+        .filter(|s| replaced(s) && **s != Strategy::AUTO)
+    {
+        global.note(&super::strategy::replaced(
+            &strategy.to_string(),
+            device.strategy(),
+        ));
+    }
+    let chosen = strategies
+        .iter()
+        .map(|s| if replaced(s) { device.strategy() } else { *s });
+    *strategies = distinct(&chosen.collect::<Vec<_>>());
 }
 
 impl ConvergeArgs {

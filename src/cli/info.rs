@@ -1,7 +1,10 @@
-//! `impasto info`: the device that would render, and the choice of it for all commands.
+//! `impasto info`: the device that would render and the others, and the choice of it for all commands.
 
 use clap::{Args, ValueEnum};
+use impasto::runtime::cpu::MOST_THREADS;
+use impasto::runtime::gpu::DeviceInfo;
 use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions};
+use serde::Serialize;
 
 use super::{Failure, Global, Outcome, print};
 
@@ -11,15 +14,15 @@ pub(super) struct DeviceArgs {
     /// What renders; by default a GPU that is no software, or else the processor
     #[arg(long, value_enum, value_name = "KIND")]
     device: Option<Kind>,
-    /// Use as many threads of the processor; by default one for each core
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    /// Render by so many threads of the processor; by default one for each core
+    #[arg(long, value_name = "N", conflicts_with = "gpu", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS as i64))]
+    threads: Option<u32>,
     #[command(flatten)]
     gpu: GpuArgs,
 }
 
 /// A kind of device.
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Kind {
     /// A GPU, which may be a driver in software
     Gpu,
@@ -33,7 +36,7 @@ pub(super) struct GpuArgs {
     /// Use the GPU whose name contains this; by default the most capable one
     #[arg(long, value_name = "NAME")]
     gpu: Option<String>,
-    /// Keep the checks of array bounds and loops in all kernels (slower)
+    /// Keep the checks of array bounds and loops in all kernels (slower); the processor always keeps them
     #[arg(long)]
     checked: bool,
     /// Let wgpu check the arguments of indirect dispatches (slower)
@@ -42,7 +45,30 @@ pub(super) struct GpuArgs {
 }
 
 impl DeviceArgs {
-    pub(super) fn open(&self) -> Result<Device, Failure> {
+    /// Fails if the options contradict each other.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        let wrong = match (self.device, &self.gpu.gpu, self.threads) {
+            (Some(Kind::Cpu), Some(_), _) => {
+                "`--gpu` chooses a GPU, but `--device cpu` the processor"
+            }
+            (Some(Kind::Gpu), _, Some(_)) => {
+                "`--threads` are those of the processor, but `--device gpu` chooses a GPU"
+            }
+            _ => return Ok(()),
+        };
+        Err(Failure::Error(format!(
+            "{wrong}\n  hint: leave out one of the two"
+        )))
+    }
+
+    /// Was the processor asked for?
+    pub(super) fn is_cpu(&self) -> bool {
+        self.device == Some(Kind::Cpu)
+    }
+
+    /// The device that was asked for.
+    pub(super) fn open(&self, global: &Global) -> Result<Device, Failure> {
+        self.check()?;
         let options = DeviceOptions {
             choice: match self.device {
                 None => Choice::Best,
@@ -51,11 +77,27 @@ impl DeviceArgs {
             },
             gpu: self.gpu.options(),
             cpu: CpuOptions {
-                threads: self.threads,
+                threads: self.threads.map(|threads| threads as usize),
                 ..CpuOptions::default()
             },
         };
-        Device::open(&options).map_err(|error| Failure::Error(error.to_string()))
+        let device = Device::open(&options).map_err(super::runtime)?;
+        if let (Device::Gpu(gpu), Some(_)) = (&device, self.threads) {
+            let name = gpu.info().name;
+            global.note(&format!(
+                "note: `--threads` is for the processor, and {name} renders; `--device cpu` chooses the processor"
+            ));
+        }
+        Ok(device)
+    }
+
+    /// A GPU, software or not, for what needs one.
+    pub(super) fn open_gpu(&self, what: &'static str) -> Result<Gpu, Failure> {
+        self.check()?;
+        match self.device {
+            Some(Kind::Cpu) => Err(super::runtime(impasto::RuntimeError::NeedsGpu(what))),
+            _ => self.gpu.open(what),
+        }
     }
 }
 
@@ -69,16 +111,66 @@ impl GpuArgs {
         }
     }
 
-    pub(super) fn open(&self) -> Result<Gpu, Failure> {
-        Gpu::new(&self.options()).map_err(|error| Failure::Error(error.to_string()))
+    /// The GPU, for what needs one.
+    pub(super) fn open(&self, what: &'static str) -> Result<Gpu, Failure> {
+        let needed = |error| Failure::Error(format!("{what} needs a GPU: {error}"));
+        Gpu::new(&self.options()).map_err(needed)
     }
 }
 
+/// What is printed as JSON: the device that would render, and the others.
+#[derive(Serialize)]
+struct Devices {
+    #[serde(flatten)]
+    device: DeviceInfo,
+    others: Vec<Other>,
+}
+
+/// A device that would not render.
+#[derive(Serialize)]
+struct Other {
+    #[serde(flatten)]
+    device: DeviceInfo,
+    /// The options that choose it.
+    options: String,
+}
+
 pub(super) fn run(args: &DeviceArgs, global: &Global) -> Outcome {
-    let info = args.open()?.info();
-    if global.json() {
-        print(&format!("{:#}\n", serde_json::json!(info)))
-    } else {
-        print(&info.to_string())
+    let device = args.open(global)?.info();
+    let mut others = Device::found();
+    let same = |other: &DeviceInfo| (&other.name, other.kind) == (&device.name, device.kind);
+    if let Some(at) = others.iter().position(same) {
+        others.remove(at);
     }
+    let others = others.into_iter().map(|device| Other {
+        options: match device.kind {
+            "processor" => "--device cpu".into(),
+            _ => format!("--gpu \"{}\"", device.name),
+        },
+        device,
+    });
+    let devices = Devices {
+        others: others.collect(),
+        device,
+    };
+    if global.json() {
+        print(&format!("{:#}\n", serde_json::json!(devices)))
+    } else {
+        print(&text(&devices))
+    }
+}
+
+/// The device that would render with all that is known of it, and a line for each of the others.
+fn text(devices: &Devices) -> String {
+    let mut out = devices.device.to_string();
+    if !devices.others.is_empty() {
+        out += "other devices, and what chooses them\n";
+    }
+    for Other { device, options } in &devices.others {
+        out += &format!(
+            "  {} ({}, {}): {options}\n",
+            device.name, device.kind, device.backend
+        );
+    }
+    out
 }

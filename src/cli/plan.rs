@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, Plan, Strategy, Workload, file, text};
-use impasto::plan::SceneMaterials;
-use impasto::{Gpu, Program, Scene, files};
+use impasto::compiler::partition::{Calibrated, Plan, PlanInputs, Strategy, Workload, file, text};
+use impasto::plan::{OnProcessor, SceneMaterials, unused};
+use impasto::{Device, Gpu, Program, Scene, files};
 use serde::Serialize;
 
 use super::exhaustive::ExhaustiveArgs;
-use super::info::GpuArgs;
+use super::info::DeviceArgs;
 use super::profile::Profile;
 use super::strategy::{PlanArgs, Source};
 use super::{Failure, Global, Outcome, compiled_scene, print, read_text};
@@ -48,7 +48,15 @@ pub(super) struct PlanCommandArgs {
     #[command(flatten)]
     exhaustive: ExhaustiveArgs,
     #[command(flatten)]
-    gpu: GpuArgs,
+    device: DeviceArgs,
+}
+
+/// What is printed as JSON of the processor.
+#[derive(Serialize)]
+struct InScene<'a> {
+    scene: String,
+    #[serde(flatten)]
+    said: &'a OnProcessor,
 }
 
 /// What is printed as JSON.
@@ -64,9 +72,17 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     for path in args.save.iter().chain(&args.save_workload) {
         files::check_writable(path)?;
     }
+    args.check()?;
     let (scene, program) = compiled_scene(&args.scene, global)?;
     if args.needs {
         return super::needs::run(&args.scene, &scene, &program, global);
+    }
+    let mut gpu = None;
+    if !args.is_of_gpu() {
+        match args.device.open(global)? {
+            Device::Gpu(opened) => gpu = Some(*opened),
+            device @ Device::Cpu(_) => return args.processor(&device, &scene, &program, global),
+        }
     }
     let materials = SceneMaterials::new(&scene, &program, args.samples as usize);
     // What is wrong with the plan is said before anything is rendered.
@@ -76,7 +92,6 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     if matches!(source, Source::Strategy(strategy) if strategy == Strategy::EXHAUSTIVE) {
         return args.measure(&scene, &program, materials, global);
     }
-    let mut gpu = None;
     let workload = args.workload(&materials, &mut gpu, &scene, &program)?;
     let profile = args.profile(&mut gpu)?;
     let plan = match source {
@@ -106,6 +121,73 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
 }
 
 impl PlanCommandArgs {
+    /// Fails if the options contradict each other.
+    fn check(&self) -> Result<(), Failure> {
+        self.device.check()?;
+        if self.device.is_cpu() && self.is_of_gpu() && !self.needs {
+            return Err(super::runtime(impasto::RuntimeError::NeedsGpu(
+                "a plan by a profile, a workload or measurements",
+            )));
+        }
+        Ok(())
+    }
+
+    /// Is a plan for a GPU asked for, whatever would render here?
+    fn is_of_gpu(&self) -> bool {
+        let files = [&self.workload, &self.save_workload];
+        files.iter().any(|file| file.is_some()) || self.profile.is_some() || self.wanted.measures()
+    }
+
+    /// Says what the plan is on the processor.
+    fn processor(
+        &self,
+        device: &Device,
+        scene: &Scene,
+        program: &Program,
+        global: &Global,
+    ) -> Outcome {
+        let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
+        let unused = unused(scene, program);
+        let source = self.wanted.source(&names, &unused, device.strategy())?;
+        let asked = match &source {
+            Source::Given(plan) => plan.strategy.clone(),
+            Source::Strategy(strategy) => strategy.to_string(),
+        };
+        let is_replaced = device.replaces(&asked);
+        let plan = match source {
+            _ if is_replaced => device
+                .strategy()
+                .plan(&PlanInputs {
+                    unused: &unused,
+                    ..PlanInputs::of_names(&names)
+                })
+                .map_err(|e| e.to_string())?,
+            Source::Given(plan) => plan,
+            Source::Strategy(strategy) => {
+                let materials = SceneMaterials::new(scene, program, self.samples as usize);
+                let inputs = PlanInputs {
+                    unused: &unused,
+                    costs: Some(&materials.costs),
+                    ..PlanInputs::of_names(&names)
+                };
+                strategy.plan(&inputs).map_err(|e| e.to_string())?
+            }
+        };
+        let said = OnProcessor::new(&plan, &names, &device.info(), is_replaced.then_some(asked));
+        if let Some(path) = &self.save {
+            files::write_whole(path, file::write(&plan, &names).as_bytes())?;
+        }
+        if global.json() {
+            let scene = self.scene.display().to_string();
+            print(&format!(
+                "{:#}\n",
+                serde_json::json!(InScene { scene, said: &said })
+            ))
+        } else {
+            print(&said.to_string())
+        }
+    }
+
     /// Measures every kernel in the place of predicting it.
     fn measure(
         &self,
@@ -120,7 +202,7 @@ impl PlanCommandArgs {
                     .into(),
             ));
         }
-        let mut gpu = Some(self.gpu.open()?);
+        let mut gpu = Some(self.device.open_gpu("`--strategy exhaustive`")?);
         let profile = self.profile(&mut gpu)?;
         let gpu = self.opened(&mut gpu)?;
         let answer = self.exhaustive.measure(
@@ -170,7 +252,10 @@ impl PlanCommandArgs {
     fn opened<'g>(&self, gpu: &'g mut Option<Gpu>) -> Result<&'g Gpu, Failure> {
         match gpu {
             Some(gpu) => Ok(gpu),
-            none => Ok(none.insert(self.gpu.open()?)),
+            none => Ok(none.insert(
+                self.device
+                    .open_gpu("a plan by a GPU's profile and workload")?,
+            )),
         }
     }
 

@@ -25,7 +25,7 @@ pub(super) struct RaysArgs {
     workgroup: Option<u32>,
     /// Threads of kernels that fetch rays; by default as many as fill the GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
-    threads: Option<u32>,
+    fetch_threads: Option<u32>,
     /// Seed of scattered directions
     #[arg(long, default_value_t = 0)]
     seed: u32,
@@ -35,10 +35,10 @@ pub(super) struct RaysArgs {
 
 pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     let scene = impasto::load(&args.scene).map_err(|e| e.to_string())?;
-    let gpu = args.gpu.open()?;
+    let gpu = args.gpu.open("`impasto rays`")?;
     let set_sizes = |technique| Technique {
         workgroup: args.workgroup,
-        threads: args.threads,
+        threads: args.fetch_threads,
         ..technique
     };
     let options = RayOptions {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use impasto::compiler::partition::{PlanInputs, Requires};
+use impasto::compiler::partition::{Organisation, PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
@@ -30,7 +30,7 @@ use super::dropped;
 use super::info::DeviceArgs;
 use super::outputs::{Outputs, aov_help, parse_exposure};
 use super::profile::Profile;
-use super::strategy::{PlanArgs, Source};
+use super::strategy::{PlanArgs, Source, replaced};
 use super::technique::TechniqueArgs;
 use super::until::{self, UntilArgs};
 use super::{Failure, Global, Outcome, interrupt, print, runtime};
@@ -101,6 +101,7 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
 const MAX_SIDE: u32 = 65_536;
 
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
+    args.device.check()?;
     let outputs = Outputs::of(&args.out)?;
     outputs.check_aov(&args.aov)?;
     if let Some(report) = &args.report {
@@ -114,8 +115,11 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let started = Instant::now();
     let program = Arc::new(compile(&scene, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
-    let device = args.device.open()?;
+    let device = args.device.open(global)?;
     let planned = args.planned(&scene, &program, &device)?;
+    if planned.plan.organisation != Organisation::Mega && device.replaces(&planned.plan.strategy) {
+        global.note(&replaced(&planned.plan.strategy, device.strategy()));
+    }
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
     let options = args.options(planned.renewed_by.is_some(), goals.is_some());
@@ -167,7 +171,7 @@ struct Planned {
 
 impl RenderArgs {
     /// The plan that was asked for. A strategy that must know how paths hit materials begins with a kernel
-    /// a material, and plans when that is known. The processor has one kernel whatever the materials.
+    /// a material, and plans when that is known. What the device replaces is not made.
     fn planned(
         &self,
         scene: &Scene,
@@ -180,14 +184,18 @@ impl RenderArgs {
             plan,
             renewed_by: None,
         };
-        let default = match device {
-            Device::Gpu(_) => Strategy::AUTO,
-            Device::Cpu(cpu) => cpu.strategy(),
-        };
-        let strategy = match self.plan.source(&names, &unused, default)? {
+        let strategy = match self.plan.source(&names, &unused, device.strategy())? {
             Source::Given(plan) => return Ok(fixed(plan)),
             Source::Strategy(strategy) => strategy,
         };
+        let begun = || Plan {
+            strategy: strategy.to_string(),
+            ..Plan::few_kernels(&names, &unused)
+        };
+        let is_replaced = device.replaces(&strategy.to_string());
+        if is_replaced && strategy.requires() != Requires::Measurements {
+            return Ok(fixed(begun()));
+        }
         let inputs = PlanInputs {
             unused: &unused,
             ..PlanInputs::of_names(&names)
@@ -206,10 +214,7 @@ impl RenderArgs {
                 })
             }
             Requires::Workload => Ok(Planned {
-                plan: Plan {
-                    strategy: strategy.to_string(),
-                    ..Plan::few_kernels(&names, &unused)
-                },
+                plan: begun(),
                 renewed_by: (names.len() <= MOST_RENEWED).then_some(strategy),
             }),
         }

@@ -32,6 +32,11 @@ pub(super) enum Source {
 }
 
 impl PlanArgs {
+    /// Is the plan found by measuring kernels?
+    pub(super) fn measures(&self) -> bool {
+        self.strategy == Some(Strategy::EXHAUSTIVE)
+    }
+
     /// What was asked for, of materials called `names` of which no surface binds `unused`; `default` if
     /// nothing was.
     pub(super) fn source(
@@ -53,6 +58,13 @@ impl PlanArgs {
         }
         Ok(Source::Strategy(self.strategy.unwrap_or(default)))
     }
+}
+
+/// What is said where the device renders by a strategy in place of what was asked for.
+pub(super) fn replaced(asked: &str, chosen: Strategy) -> String {
+    format!(
+        "note: the processor renders by `{chosen}` in place of `{asked}` (`impasto plan --device cpu` says why)"
+    )
 }
 
 fn parse(name: &str) -> Result<Strategy, String> {

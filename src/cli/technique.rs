@@ -52,7 +52,7 @@ pub(super) struct TechniqueArgs {
     workgroup: Option<u32>,
     /// Threads of kernels that fetch one item after another; by default as many as fill the GPU
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
-    threads: Option<u32>,
+    fetch_threads: Option<u32>,
     /// Count the active lanes in every kernel (`utilisation` in the report; much slower)
     #[arg(long)]
     profile: bool,
@@ -67,7 +67,7 @@ impl TechniqueArgs {
             regeneration: self.regeneration,
             profile: self.profile,
             workgroup: self.workgroup,
-            threads: self.threads,
+            threads: self.fetch_threads,
             traversal: self.traversal,
             stack: self.stack,
             leaves: self.leaves,

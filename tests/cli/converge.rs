@@ -22,7 +22,8 @@ fn study(scene: &str, folder: &Path, arguments: &str) -> Run {
 
 fn words(scene: &str, folder: &Path, arguments: &str) -> Vec<String> {
     let at = folder.display().to_string();
-    let fixed = format!("converge {scene} --out {{}}/out --strategies own {arguments}");
+    let fixed =
+        format!("converge {scene} --out {{}}/out --device cpu --strategies mega {arguments}");
     let words = fixed.split_whitespace().map(|word| word.replace("{}", &at));
     words.collect()
 }
@@ -72,7 +73,7 @@ fn assert_same(at: &str, a: &Value, b: &Value) {
 }
 
 fn records(folder: &Path) -> Vec<PathBuf> {
-    let runs = folder.join("out/cornell/runs/own-sobol");
+    let runs = folder.join("out/cornell/runs/mega-sobol");
     let runs = names(&runs).into_iter().map(|name| runs.join(name));
     runs.filter(|path| path.extension().is_some_and(|e| e == "json"))
         .collect()
@@ -107,8 +108,8 @@ fn a_study_leaves_its_files_and_goes_on_where_it_was() {
     for picture in [
         "reference.exr",
         "reference.png",
-        "own-sobol-0000004.png",
-        "own-sobol-0000016-error.png",
+        "mega-sobol-0000004.png",
+        "mega-sobol-0000016-error.png",
     ] {
         assert!(
             at.join("out/cornell").join(picture).is_file(),
@@ -294,7 +295,7 @@ fn a_single_point_and_a_black_scene_have_pages() {
     study(&scene, at, "--max-spp 4 --seeds 2").exits(0);
     // As many paths are in flight as in any render of so few samples.
     for (samples, pool) in [(1, 144), (4, 576)] {
-        let record = format!("out/smooth/runs/own-sobol/{samples:07}-1.json");
+        let record = format!("out/smooth/runs/mega-sobol/{samples:07}-1.json");
         let text = std::fs::read_to_string(at.join(record)).expect("a record");
         let record: Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(record["pool"], pool, "{text}");
@@ -418,7 +419,7 @@ fn a_full_disk_leaves_nothing_half_written_and_the_study_goes_on() {
         .exits(2)
         .says("cannot write")
         .says("0000001-0.exr");
-    let runs = at.join("out/smooth/runs/own-sobol");
+    let runs = at.join("out/smooth/runs/mega-sobol");
     assert_eq!(names(&runs), [""; 0]);
     study(&scene, at, arguments).exits(0);
     assert_eq!(names(&runs).len(), 4);
@@ -443,7 +444,7 @@ fn ctrl_c_keeps_what_is_finished() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("it starts");
-    let runs = at.join("out/smooth/runs/own-sobol");
+    let runs = at.join("out/smooth/runs/mega-sobol");
     let began = Instant::now();
     let kept = || {
         if runs.is_dir() {
@@ -484,7 +485,7 @@ fn ctrl_c_keeps_what_is_finished() {
     let samples = last.split('-').next().expect("samples");
     let samples = samples.trim_start_matches('0');
     let whole = at.join("whole.exr").display().to_string();
-    let render = ["render", &scene, "--spp", samples, "--strategy", "own"];
+    let render = ["render", &scene, "--spp", samples, "--device", "cpu"];
     impasto(&[&render[..], &["--out", &whole]].concat()).exits(0);
     let pixels = |path: &Path| output::read(path, "picture").expect("a picture").pixels;
     let same = pixels(&runs.join(last)) == pixels(Path::new(&whole));

@@ -33,7 +33,7 @@ fn rendering(folder: &Path, arguments: &str) -> Vec<String> {
         );
         write(&scene, "scene.toml", SMALL);
     }
-    let all = format!("render {{}}/scene/scene.toml --size 4x4 --strategy own {arguments}");
+    let all = format!("render {{}}/scene/scene.toml --size 4x4 --device cpu {arguments}");
     let all = all.replace("{}", &folder.display().to_string());
     all.split_whitespace().map(str::to_owned).collect()
 }

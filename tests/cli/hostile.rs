@@ -157,7 +157,12 @@ fn more_code_than_can_be_compiled_is_refused() {
 fn many_codes_share_kernels() {
     let folder = folder();
     let picture = |strategy: &str| {
-        let (run, _) = rendered(scene("codes"), 66, folder.path(), &["--strategy", strategy]);
+        let (run, _) = rendered(
+            scene("codes"),
+            66,
+            folder.path(),
+            &["--device", "gpu", "--strategy", strategy],
+        );
         run.exits(0).says("66 materials for 66 instances");
         let kernels = report(folder.path()).matches("\"form\": \"mixed\"").count();
         let picture = std::fs::read(folder.path().join("p.exr")).expect("there is a picture");
@@ -191,7 +196,9 @@ fn building_kernels_can_be_interrupted() {
         .expect("the folder can be written to");
     let out = folder.path().join("p.exr");
     let [path, out_text] = [&path, &out].map(|p| p.display().to_string());
-    let mut command = command(&["render", &path, "--spp", "1", "--out", &out_text]);
+    let mut command = command(&[
+        "render", &path, "--device", "gpu", "--spp", "1", "--out", &out_text,
+    ]);
     let child = command
         .stderr(std::process::Stdio::piped())
         .spawn()

@@ -22,7 +22,7 @@ fn pictures_of_no_or_too_many_pixels() {
             .says("width and height from 1");
     }
     // More than any GPU binds at once.
-    render(SCENE, "--size 16384x16384 --spp 1")
+    render(SCENE, "--device gpu --size 16384x16384 --spp 1")
         .exits(2)
         .says("the film")
         .says("10737418240")
@@ -32,7 +32,7 @@ fn pictures_of_no_or_too_many_pixels() {
 #[test]
 fn pools_of_one_path_and_of_more_than_there_is_memory() {
     render(SCENE, "--size 3x2 --spp 1 --pool 1").exits(0);
-    render(SCENE, "--size 16x16 --spp 1 --pool 4294967295")
+    render(SCENE, "--device gpu --size 16x16 --spp 1 --pool 4294967295")
         .exits(2)
         .says("a pool of that size")
         .says("hint: use a smaller pool");

@@ -7,6 +7,7 @@ mod common;
 mod converge;
 mod cost;
 mod cost_lines;
+mod devices;
 mod emit_check;
 mod eval;
 mod explain;

@@ -17,7 +17,9 @@ fn sized_film(
     more: &[&str],
 ) -> (Vec<u8>, serde_json::Value, Run) {
     let [film, report] = ["p.film", "r.json"].map(|n| folder.join(n).display().to_string());
-    let mut args = vec!["render", SCENE, "--size", size, "--spp", spp];
+    let mut args = vec![
+        "render", SCENE, "--device", "gpu", "--size", size, "--spp", spp,
+    ];
     args.extend(["--out", &film, "--report", &report]);
     args.extend(more);
     let run = impasto(&args).exits(0);
@@ -29,7 +31,10 @@ fn sized_film(
 
 /// The same film, but for drivers that round another way in another kernel.
 fn is_exact() -> bool {
-    impasto(&["info", "--format", "json"]).exits(0).json()["kind"] == "software"
+    impasto(&["info", "--device", "gpu", "--format", "json"])
+        .exits(0)
+        .json()["kind"]
+        == "software"
 }
 
 #[test]
@@ -90,6 +95,8 @@ fn every_way_to_plan_renders_the_same_picture() {
     let kept = [
         "plan",
         SCENE,
+        "--device",
+        "gpu",
         "--pool",
         "1024",
         "--partition",
@@ -149,7 +156,9 @@ fn plans_that_cannot_be_are_refused() {
     let out = folder.path().join("p.exr").display().to_string();
     let broken = write(folder.path(), "broken.json", "{ \"kernels\": 3 }");
     let refused = |options: &[&str]| {
-        let mut args = vec!["render", SCENE, "--spp", "1", "--out", &out];
+        let mut args = vec![
+            "render", SCENE, "--device", "gpu", "--spp", "1", "--out", &out,
+        ];
         args.extend(options);
         let run = impasto(&args).exits(2).prints_nothing();
         assert!(!Path::new(&out).exists(), "{options:?}");
@@ -188,7 +197,7 @@ fn what_is_on_no_surface_has_no_kernel() {
     let scene = write(folder.path(), "scene.toml", scene);
     let [film, report] = ["p.film", "r.json"].map(|n| folder.path().join(n).display().to_string());
     let output = command(&[
-        "render", &scene, "--spp", "2", "--out", &film, "--report", &report,
+        "render", &scene, "--device", "gpu", "--spp", "2", "--out", &film, "--report", &report,
     ]);
     let mut output = output;
     Run::from(output.output().expect("the command starts")).exits(0);

@@ -1,4 +1,4 @@
-//! `render` and `info`: what they write, and that they write it whole or not at all.
+//! `render`: what it writes, and that it writes it whole or not at all.
 
 use std::path::Path;
 
@@ -12,20 +12,6 @@ fn render(out: &Path, more: &[&str]) -> crate::cli::common::Run {
     ];
     args.extend(more);
     impasto(&args)
-}
-
-#[test]
-fn info_names_the_adapter() {
-    let json = impasto(&["info", "--format", "json"]).exits(0).json();
-    assert!(
-        json["name"].as_str().is_some_and(|name| !name.is_empty()),
-        "{json}"
-    );
-    let text = impasto(&["info"]).exits(0).stdout;
-    assert!(
-        text.contains(json["name"].as_str().unwrap_or("?")),
-        "{text}"
-    );
 }
 
 #[test]
@@ -132,26 +118,6 @@ fn a_full_disk_leaves_no_half_a_picture() {
         "{:?}",
         names(folder.path())
     );
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn without_an_adapter_it_says_what_to_install() {
-    let folder = folder();
-    let out = folder.path().join("p.exr").display().to_string();
-    for args in [&["info"][..], &["render", SCENE, "--out", &out]] {
-        let output = command(args)
-            .env("VK_DRIVER_FILES", "/nonexistent")
-            .env("VK_ICD_FILENAMES", "/nonexistent")
-            .output()
-            .expect("the command starts");
-        crate::cli::common::Run::from(output)
-            .exits(2)
-            .prints_nothing()
-            .says("no GPU")
-            .says("mesa-vulkan-drivers");
-    }
-    assert!(names(folder.path()).is_empty());
 }
 
 #[test]

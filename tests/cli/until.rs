@@ -70,8 +70,8 @@ fn equal_samples_are_equal_bits() {
     let at = folder.path();
     for (name, arguments) in [
         ("a", "--until relmse=1e-9"),
-        ("b", "--until rmse=1e-9 --pool 50 --strategy mega"),
-        ("c", "--until rmse=1e-9 --until time=1h --strategy own"),
+        ("b", "--until rmse=1e-9 --pool 50 --threads 3"),
+        ("c", "--until rmse=1e-9 --until time=1h --threads 1"),
     ] {
         let files = "--spp 37 --out {}/NAME.exr --report {}/NAME.json".replace("NAME", name);
         render(at, &format!("{arguments} {files}"))

@@ -1,4 +1,5 @@
-//! Finding an adapter to render on, and installing a software one where there is none.
+//! Finding a GPU to run kernels on, and installing a software one where there is none. Tests of kernels
+//! want one; pictures do not, since the processor renders them.
 //!
 //! The verdict is always `impasto info`'s, run once it is built. Before that there is one cheap
 //! look: a Linux machine on which no Vulkan driver is registered at all cannot have an adapter,
@@ -28,7 +29,7 @@ pub fn prepare() -> Result {
 /// installs a driver and checks again. Prints which adapter it is.
 pub fn require(impasto: &Path) -> Result {
     shell::section("Looking for an adapter");
-    let info = || shell::capture(Command::new(impasto).arg("info"));
+    let info = || shell::capture(Command::new(impasto).args(["info", "--device", "gpu"]));
     let adapter = match info() {
         Ok(adapter) => adapter,
         Err(reason) => {
@@ -37,10 +38,19 @@ pub fn require(impasto: &Path) -> Result {
             info().map_err(|reason| format!("there is still no usable adapter\n{reason}"))?
         }
     };
-    for line in adapter.lines().take(4) {
-        eprintln!("{line}");
-    }
+    show(&adapter);
     Ok(())
+}
+
+/// Says what would render, which is the processor where there is no GPU.
+pub fn look(impasto: &Path) -> Result {
+    shell::section("Looking for a device");
+    show(&shell::capture(Command::new(impasto).arg("info"))?);
+    Ok(())
+}
+
+fn show(info: &str) {
+    info.lines().take(4).for_each(|line| eprintln!("{line}"));
 }
 
 /// Installs Mesa's software Vulkan through apt, or says what to install elsewhere.

@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: from a fresh checkout to a picture.
+//! `cargo xtask demo`: from a fresh checkout to a picture, on a GPU or else on the processor, without installing anything.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use clap::Args;
 use crate::adapter;
 use crate::shell::{self, Result, cargo};
 
-/// Several materials, small enough for a software adapter.
+/// Several materials, small enough for any device.
 const SCENE: &str = "examples/cornell/scene.toml";
 
 #[derive(Args)]
@@ -21,11 +21,10 @@ pub(crate) struct DemoArgs {
 }
 
 pub(crate) fn run(args: &DemoArgs) -> Result {
-    adapter::prepare()?;
     shell::section("Building impasto");
     shell::run(cargo().args(["build", "--release", "--package", "impasto"]))?;
     let impasto = shell::impasto("release")?;
-    adapter::require(&impasto)?;
+    adapter::look(&impasto)?;
 
     shell::section("Rendering");
     let folder = shell::root().join("out");

@@ -420,6 +420,7 @@ impl<'c, F: Float> Machine<'c, F> {
             } => {
                 let f = match atomic {
                     Atomic::Exchange => |_, new| new,
+                    Atomic::Claim => |old, new| if old == 0 { new } else { old },
                     Atomic::Op(op) => match self.ops[*op as usize] {
                         Meaning::Two(f) => f,
                         _ => return Err(misused(function)),

@@ -510,8 +510,10 @@ impl<'s, 'm> Lowering<'s, 'm> {
             AtomicFunction::Min => Some(Op::Math(MathFunction::Min, kind)),
             AtomicFunction::Max => Some(Op::Math(MathFunction::Max, kind)),
             AtomicFunction::Exchange { compare: None } => None,
-            AtomicFunction::Exchange { .. } => {
-                return Err(self.unsupported("atomic exchange with a comparison"));
+            AtomicFunction::Exchange {
+                compare: Some(free),
+            } => {
+                return self.claim(pointer, *free, value, result, out);
             }
         };
         if kind == ScalarKind::Float {
@@ -534,6 +536,49 @@ impl<'s, 'm> Lowering<'s, 'm> {
             value,
             to,
         }));
+        Ok(())
+    }
+
+    /// An exchange with a comparison, which is known with 0 alone: it gives the word before, and whether
+    /// that was 0.
+    fn claim(
+        &mut self,
+        pointer: Handle<Expression>,
+        free: Handle<Expression>,
+        value: Handle<Expression>,
+        result: Option<Handle<Expression>>,
+        out: &mut Block,
+    ) -> Result<(), KernelError> {
+        let known = constant(self.shapes, &self.source.expressions, free);
+        if known != Some(vec![Scalar::Word(0)]) {
+            return Err(self.unsupported("atomic exchange with a comparison but with 0"));
+        }
+        let pointer = self.pointer(pointer)?;
+        if !matches!(pointer, Pointer::Buffer { .. }) {
+            return Err(self.unsupported("atomic variable outside of buffers"));
+        }
+        let kind = self.kind(value)?;
+        let (value, free) = (self.slot(value)?, self.slot(free)?);
+        let to = match result {
+            Some(result) => self.room(self.ty(result))?,
+            None => self.word(),
+        };
+        out.push(Node::Ins(Ins::Atomic {
+            function: Atomic::Claim,
+            pointer,
+            value,
+            to: Some(to),
+        }));
+        if let Some(result) = result {
+            self.slots[result.index()] = Some(to);
+            out.push(Node::Ins(Ins::Map2 {
+                op: self.op(Op::Binary(BinaryOperator::Equal, kind)),
+                from: [to, free],
+                step: [0, 0],
+                to: to + 1,
+                count: 1,
+            }));
+        }
         Ok(())
     }
 

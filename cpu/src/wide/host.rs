@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use naga::MathFunction as Math;
 
 use crate::arithmetic::Called;
-use crate::kernel::Cell;
+use crate::cell::Cell;
 
 /// Answers a call in place of the kernel's function, in the lanes of the first cell that are not 0: the
 /// cells of its arguments follow, and then those of its result.
@@ -156,6 +156,7 @@ pub(super) enum AtomicKind {
     Greatest,
     GreatestSigned,
     Exchange,
+    Claim,
 }
 
 impl AtomicKind {
@@ -171,6 +172,7 @@ impl AtomicKind {
             AtomicKind::Greatest => greatest,
             AtomicKind::GreatestSigned => greatest_signed,
             AtomicKind::Exchange => exchange,
+            AtomicKind::Claim => claim,
         };
         found as usize
     }
@@ -227,6 +229,7 @@ atomics! {
         word.fetch_update(ORDER, ORDER, greatest).unwrap_or_default()
     },
     exchange: |word, x| word.swap(x, ORDER),
+    claim: |word, x| word.compare_exchange(0, x, ORDER, ORDER).unwrap_or_else(|now| now),
 }
 
 /// Adds. Lanes that add to one word do so at once, as if one after the other.

@@ -14,9 +14,9 @@ use super::host::Answer;
 use super::inst::Constant;
 use super::memory::{CELL, Memory};
 use super::translate::{self, Interface, Shared};
+use crate::cell::Cell;
 use crate::code::{Code, First, Function, Input, Ins, Node, Scalar};
 use crate::error::KernelError;
-use crate::kernel::Cell;
 use crate::native::{Buffer, Statistics, layout};
 use crate::plan::{Plan, walk};
 

@@ -125,10 +125,9 @@ fn command(args: &GalleryArgs) -> Result<PathBuf> {
         return fs::canonicalize(&path)
             .map_err(|e| format!("no command at {}: {e}", path.display()));
     }
-    adapter::prepare()?;
     shell::run(cargo().args(["build", "--package", "impasto"]))?;
     let impasto = shell::impasto("debug")?;
-    adapter::require(&impasto)?;
+    adapter::look(&impasto)?;
     Ok(impasto)
 }
 

@@ -9,9 +9,10 @@ mod work;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use impasto_compiler::partition::{Form, Organisation, Plan, Strategy};
+use impasto_compiler::partition::{Form, Organisation, Plan, Requires, Strategy};
+use impasto_cpu::KernelError;
+pub use impasto_cpu::Width;
 use impasto_cpu::native;
-use impasto_cpu::{KernelError, Width};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;
@@ -33,7 +34,7 @@ pub struct CpuOptions {
 }
 
 /// The most threads that may be asked for.
-const MOST_THREADS: usize = 1024;
+pub const MOST_THREADS: usize = 1024;
 /// Bytes of the stack of a thread.
 const STACK_BYTES: usize = 16 << 20;
 /// Most kernels that are kept; beyond it all are forgotten.
@@ -98,23 +99,31 @@ impl Cpu {
         }
     }
 
-    /// The plan that takes the place of one that cannot run here: threads of a workgroup come one after
-    /// another, and a kernel of several queues lets them wait for each other. One path at a time gains
-    /// nothing by queues.
+    /// Whether [`Cpu::strategy`] takes the place of another. The automatic one follows a model of GPUs' times;
+    /// threads of a workgroup, which come one after another, cannot wait for each other, as those of kernels
+    /// of several queues do; and one path at a time gains nothing by queues.
+    pub(crate) fn replaces(&self, strategy: Strategy) -> bool {
+        let is_of_gpus = strategy.requires() == Requires::Workload || strategy == Strategy::BINNED;
+        strategy != Strategy::MEGA && (is_of_gpus || !self.is_wide())
+    }
+
+    /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(&self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
         let is_mega = wanted.organisation == Organisation::Mega;
         let is_binned = wanted
             .kernels
             .iter()
             .any(|kernel| kernel.form == Form::Binned);
-        if is_mega || self.is_wide() && !is_binned {
+        let is_replaced = Strategy::parse(&wanted.strategy).is_ok_and(|s| self.replaces(s));
+        if is_mega || self.is_wide() && !is_binned && !is_replaced {
             return wanted.clone();
         }
-        if self.is_wide() {
-            return world.own_plan(&source.infos());
-        }
         let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
-        Plan::mega(&names, &world.parts.unbound)
+        if self.is_wide() {
+            Plan::own(&names, &world.parts.unbound)
+        } else {
+            Plan::mega(&names, &world.parts.unbound)
+        }
     }
 
     /// What the processor is and can do.

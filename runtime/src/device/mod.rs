@@ -1,11 +1,12 @@
 //! What renders: a GPU by wgpu, or the processor by its own code. The renderer asks a device and what is
 //! built for it by the same calls; `gpu` and `cpu` answer.
 
+mod memory;
 mod work;
 
 use std::fmt;
 
-use impasto_compiler::partition::Plan;
+use impasto_compiler::partition::{Plan, Strategy};
 
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
@@ -86,9 +87,26 @@ impl Device {
         }
     }
 
+    /// All devices that there are: GPUs, best first, and the processor where it can render.
+    pub fn found() -> Vec<DeviceInfo> {
+        let cpu = Cpu::new(&CpuOptions::default());
+        let cpu = cpu.ok().map(|cpu| cpu.info());
+        Gpu::found().into_iter().chain(cpu).collect()
+    }
+
     /// What the device is and can do.
     pub fn info(&self) -> DeviceInfo {
         DeviceRef::from(self).info()
+    }
+
+    /// Whether it renders by [`Device::strategy`] in place of another.
+    pub fn replaces(&self, strategy: &str) -> bool {
+        DeviceRef::from(self).replaces(strategy)
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(&self) -> Strategy {
+        DeviceRef::from(self).strategy()
     }
 
     /// The GPU, for what only GPUs do.
@@ -162,6 +180,23 @@ impl DeviceRef<'_> {
         }
     }
 
+    /// Whether it renders by [`Device::strategy`] in place of another, of which it cannot have the kernels, or
+    /// which follows a model of GPUs' times.
+    pub fn replaces(self, strategy: &str) -> bool {
+        match self {
+            DeviceRef::Gpu(_) => false,
+            DeviceRef::Cpu(cpu) => Strategy::parse(strategy).is_ok_and(|s| cpu.replaces(s)),
+        }
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(self) -> Strategy {
+        match self {
+            DeviceRef::Gpu(_) => Strategy::AUTO,
+            DeviceRef::Cpu(cpu) => cpu.strategy(),
+        }
+    }
+
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
         match self {
@@ -186,7 +221,7 @@ impl DeviceRef<'_> {
                 }
             }
             DeviceRef::Cpu(_) => Limits {
-                buffer_bytes: 1 << 40,
+                buffer_bytes: memory::bytes(),
                 workgroup_threads: 1024,
                 workgroup_bytes: 0,
                 row_groups: u32::MAX,
@@ -198,7 +233,14 @@ impl DeviceRef<'_> {
     pub(crate) fn check_binding_size(self, what: &str, bytes: u64) -> Result<(), RuntimeError> {
         match self {
             DeviceRef::Gpu(gpu) => gpu.check_binding_size(what, bytes),
-            DeviceRef::Cpu(_) => Ok(()),
+            DeviceRef::Cpu(_) if bytes <= memory::bytes() => Ok(()),
+            DeviceRef::Cpu(_) => Err(RuntimeError::LimitTooSmall {
+                limit: "memory",
+                has: memory::bytes(),
+                needs: bytes,
+                what: format!("{what} (in bytes)"),
+                hint: "use a smaller scene or picture",
+            }),
         }
     }
 }

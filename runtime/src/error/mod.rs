@@ -17,10 +17,10 @@ pub enum RuntimeError {
         /// The adapters there are.
         found: Vec<String>,
     },
-    /// A limit of the GPU is too small for what is asked of it.
-    #[error("{what} needs {needs}, but the GPU's limit `{limit}` is {has}\n  hint: {hint}")]
+    /// A limit of the device is too small for what is asked of it.
+    #[error("{what} needs {needs}, but the device's limit `{limit}` is {has}\n  hint: {hint}")]
     LimitTooSmall {
-        /// The limit's name in WebGPU.
+        /// The limit's name in WebGPU, or `memory`.
         limit: &'static str,
         /// Its value.
         has: u64,
@@ -32,7 +32,9 @@ pub enum RuntimeError {
         hint: &'static str,
     },
     /// The GPU refused to be opened.
-    #[error("the GPU `{adapter}` could not be opened: {reason}")]
+    #[error(
+        "the GPU `{adapter}` could not be opened: {reason}\n  hint: update its driver, or render on the processor (`--device cpu`)"
+    )]
     DeviceRequest {
         /// The adapter's name.
         adapter: String,
@@ -97,7 +99,7 @@ pub enum RuntimeError {
     },
     /// What only GPUs do is asked of the processor.
     #[error(
-        "{0} needs a GPU, which the processor is not\n  hint: choose a GPU (`--device gpu`, `--gpu NAME`)"
+        "{0} needs a GPU, which the processor is not\n  hint: choose a GPU (`--device gpu` or `--gpu NAME`)"
     )]
     NeedsGpu(&'static str),
     /// Whoever watched the building of a renderer broke it off.
@@ -174,9 +176,10 @@ fn no_adapter(wanted: Option<&str>, found: &[String]) -> String {
             "no GPU is called `{wanted}`\n  there are: {}\n  hint: part of a name is enough, in any case of letters",
             found.join(", ")
         ),
-        _ => "no GPU was found: Impasto needs a driver for Vulkan, Metal or Direct3D 12\n  \
-              hint: install your GPU's Vulkan driver, or Mesa's software driver \
-              (Debian and Ubuntu: `apt install mesa-vulkan-drivers libvulkan1`)"
+        _ => "no GPU was found: one needs a driver for Vulkan, Metal or Direct3D 12\n  \
+              hint: install your GPU's driver, or Mesa's software driver \
+              (Debian and Ubuntu: `apt install mesa-vulkan-drivers libvulkan1`); \
+              pictures need none (`impasto render --device cpu`)"
             .to_string(),
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Gpu, USED_FEATURES};
+use super::USED_FEATURES;
 
 /// A device's identity and what Impasto uses of it. Sizes are in bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -24,10 +24,11 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
-    pub(super) fn new(gpu: &Gpu) -> Self {
-        let info = gpu.adapter.get_info();
-        let limits = gpu.device.limits();
-        let used = gpu.device.features() & USED_FEATURES;
+    /// Of an adapter, which is opened with all limits and used features that it has.
+    pub(super) fn new(adapter: &wgpu::Adapter) -> Self {
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        let used = adapter.features() & USED_FEATURES;
         Self {
             name: info.name,
             backend: info.backend.to_string(),

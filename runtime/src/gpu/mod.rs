@@ -107,10 +107,9 @@ impl Gpu {
         result
     }
 
-    /// The names of all adapters, best first.
-    pub fn adapter_names() -> Vec<String> {
-        let adapters = adapters(false);
-        adapters.iter().map(|a| a.get_info().name).collect()
+    /// All GPUs that there are, best first.
+    pub fn found() -> Vec<DeviceInfo> {
+        adapters(false).iter().map(DeviceInfo::new).collect()
     }
 
     /// Whether there is a GPU that is no software.
@@ -122,7 +121,7 @@ impl Gpu {
 
     /// What the GPU is and can do.
     pub fn info(&self) -> DeviceInfo {
-        DeviceInfo::new(self)
+        DeviceInfo::new(&self.adapter)
     }
 
     /// Whether the "GPU" is the processor: smaller portions of work keep it responsive.

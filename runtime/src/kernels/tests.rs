@@ -166,7 +166,7 @@ impl Room {
         };
         let kernels = composer.kernels();
         for kernel in &kernels {
-            let valid = crate::gpu::shader::validate(&kernel.desc.name, &kernel.wgsl);
+            let valid = crate::kernels::validate::validate(&kernel.desc.name, &kernel.wgsl);
             valid.unwrap_or_else(|e| panic!("{e}"));
             check_sizes(&composer, kernel);
         }

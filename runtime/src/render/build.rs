@@ -152,7 +152,9 @@ impl<'g> Renderer<'g> {
         watch: Watch<'_>,
     ) -> Result<Self, RuntimeError> {
         let begin = Instant::now();
-        let plan = &device.plan(plan, world, source);
+        let asked = plan;
+        let plan = &device.plan(asked, world, source);
+        let replaced = plan.organisation != asked.organisation;
         let mut options = options.clone();
         options.technique = device.technique(options.technique);
         settings::check(world, &options)?;
@@ -203,6 +205,7 @@ impl<'g> Renderer<'g> {
                 work,
             },
             facts: ReportInputs {
+                replaced_strategy: replaced.then(|| asked.strategy.clone()),
                 compile_seconds: begin.elapsed().as_secs_f64(),
                 ..facts
             },
@@ -324,6 +327,7 @@ impl ReportInputs {
         let (width, height) = (world.width, world.height);
         Self {
             strategy: composer.plan.strategy.clone(),
+            replaced_strategy: None,
             width,
             height,
             geometry: world.parts.counts,

@@ -72,6 +72,8 @@ pub struct Renderer<'g> {
 #[derive(Debug)]
 struct ReportInputs {
     strategy: String,
+    /// The strategy of the plan that the device has another in place of.
+    replaced_strategy: Option<String>,
     width: u32,
     height: u32,
     geometry: GeometryCounts,
@@ -245,6 +247,7 @@ impl<'g> Renderer<'g> {
             kernels: &self.built.kernels,
             timed: self.built.work.is_timed(),
             strategy: &self.facts.strategy,
+            replaced_strategy: self.facts.replaced_strategy.as_deref(),
             plan: &self.built.plan,
             replanned: self.replan_report(status),
             geometry: self.facts.geometry,

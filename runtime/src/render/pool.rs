@@ -32,7 +32,7 @@ const FETCH_LIMIT: u32 = 64;
 const SOFTWARE_FETCH_LIMIT: u32 = 2;
 
 /// Paths that a thread of the processor takes at a time.
-const PORTION: u32 = 64;
+const PORTION: u32 = 16;
 /// Paths of a dispatch there, for each thread: they take some milliseconds.
 const PATHS_OF_THREAD: u32 = 4096;
 

@@ -29,6 +29,10 @@ pub struct Report {
     /// The plan: groups of materials with their forms, as `impasto render --partition` takes it;
     /// `mega` for a megakernel.
     pub plan: String,
+    /// The strategy of the plan that was asked for, if the device has another whatever is asked for;
+    /// absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replaced_strategy: Option<String>,
     /// How the plan was renewed while rendering; absent if it was not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replanned: Option<ReplanReport>,
@@ -260,6 +264,7 @@ pub(crate) struct Inputs<'a> {
     pub kernels: &'a [Kernel],
     pub timed: bool,
     pub strategy: &'a str,
+    pub replaced_strategy: Option<&'a str>,
     pub plan: &'a Plan,
     pub replanned: Option<ReplanReport>,
     pub geometry: GeometryCounts,
@@ -293,6 +298,7 @@ impl Inputs<'_> {
         let dropped = Dropped::merged(dropped);
         Report {
             strategy: self.strategy.to_string(),
+            replaced_strategy: self.replaced_strategy.map(str::to_string),
             plan: partition(self.plan, self.materials),
             replanned: self.replanned,
             technique: self.options.technique,

@@ -173,10 +173,8 @@ fn an_example_replays() {
             .collect();
         assert_eq!(examples.len(), WRONG.len());
         let replayer = Replayer::of_source(&world, &surfaces, sampler).expect("a kernel");
-        let code = replayer
-            .code::<f32>(MaterialCode::Wgsl)
-            .expect("known code");
-        let mut session = replayer.session(&code).expect("known buffers");
+        let code = replayer.code(MaterialCode::Wgsl).expect("known code");
+        let mut session = replayer.session::<f32>(&code).expect("known buffers");
         for example in examples {
             let path = session
                 .path(example.pixel, example.sample, example.seed)

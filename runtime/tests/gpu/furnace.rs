@@ -2,7 +2,7 @@
 //! at most D segments gathers E (1 + a + ... + a^(D-1)), whatever the camera sees.
 
 use crate::gpu::stub::{
-    Kind, Room, Strategies, assert_mean, materials, mean, red, render, samples,
+    Kind, Room, Strategies, assert_mean, materials, mean, picture, red, samples,
 };
 
 fn series(albedo: f64, depth: i32) -> f64 {
@@ -18,14 +18,14 @@ fn white_surface_under_a_uniform_sky_is_as_bright_as_the_sky() {
         ..Room::default()
     }
     .scattering();
-    let white = render(
+    let white = picture(
         &room.world(),
         &materials(&[Kind::Diffuse(1.0)]),
         &samples(4),
     );
     // Without light sampling every path carries exactly the sky's radiance.
     assert!(red(&white).all(|v| v == 2.0), "{:?}", mean(red(&white)));
-    let grey = render(
+    let grey = picture(
         &room.world(),
         &materials(&[Kind::Diffuse(0.5)]),
         &samples(4),
@@ -48,7 +48,7 @@ fn depth_counts_segments_with_either_strategy_and_with_both() {
                 ..Room::default()
             };
             let options = samples(if depth == 1 { 1 } else { 64 });
-            let rendering = render(&room.world(), &materials(&[Kind::Diffuse(0.7)]), &options);
+            let rendering = picture(&room.world(), &materials(&[Kind::Diffuse(0.7)]), &options);
             assert_mean(&rendering, series(0.7, depth as i32));
         }
     }
@@ -60,7 +60,7 @@ fn a_light_sample_counts_even_if_scattering_failed() {
         max_depth: 4,
         ..Room::default()
     };
-    let rendering = render(
+    let rendering = picture(
         &room.world(),
         &materials(&[Kind::Failing(0.7)]),
         &samples(256),
@@ -79,7 +79,7 @@ fn emission_that_varies_counts_to_the_same_length() {
         .scattering();
         let world = room.world();
         let glowing = materials(&[Kind::Glowing(0.7, 3.0)]);
-        let rendering = render(&world, &glowing, &samples(1));
+        let rendering = picture(&world, &glowing, &samples(1));
         let expected = 3.0 * series(0.7, depth as i32);
         assert!(
             red(&rendering).all(|v| (v - expected).abs() < 1e-6 * expected),
@@ -98,14 +98,14 @@ fn roulette_does_not_change_the_mean() {
         ..Room::default()
     };
     let white = materials(&[Kind::Diffuse(0.9)]);
-    let off = render(&room(1000).scattering().world(), &white, &samples(1));
+    let off = picture(&room(1000).scattering().world(), &white, &samples(1));
     assert!(red(&off).all(|v| (v - 10.0).abs() < 1e-4));
     for start in [1, 3, 8] {
-        let on = render(&room(start).world(), &white, &samples(64));
+        let on = picture(&room(start).world(), &white, &samples(64));
         let (_, error) = mean(red(&on));
         assert!(error > 1e-4, "roulette never ended a path");
         assert_mean(&on, 10.0);
-        let on = render(&room(start).scattering().world(), &white, &samples(64));
+        let on = picture(&room(start).scattering().world(), &white, &samples(64));
         assert_mean(&on, 10.0);
     }
 }
@@ -122,7 +122,7 @@ fn roulette_begins_after_the_segment_that_is_named() {
                 roulette_start: start,
                 ..Room::default()
             };
-            let rendering = render(&room.scattering().world(), &white, &samples(1));
+            let rendering = picture(&room.scattering().world(), &white, &samples(1));
             let (mean, error) = mean(red(&rendering));
             error / mean
         };
@@ -142,7 +142,7 @@ fn nearly_white_box_to_depth_1000_does_not_drift() {
         ..Room::default()
     }
     .scattering();
-    let rendering = render(
+    let rendering = picture(
         &room.world(),
         &materials(&[Kind::Diffuse(0.999)]),
         &samples(1),

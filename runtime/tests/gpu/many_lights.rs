@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use crate::gpu::stub::{assert_same_picture, gpu, samples};
+use crate::gpu::stub::{assert_same_picture, cpu, samples};
 use impasto_compiler::partition::Plan;
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile};
 use impasto_runtime::render::{Renderer, Rendering};
@@ -79,7 +79,7 @@ fn render(side: usize) -> Rendering {
     let program = compile(&requests, &mut files).program.expect("it compiles");
     let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
     let plan = Plan::own(&names, &[]);
-    let mut renderer = Renderer::new(gpu(), &scene, &program, &plan, &samples(64))
+    let mut renderer = Renderer::new(cpu(), &scene, &program, &plan, &samples(64))
         .unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     rendering.unwrap_or_else(|e| panic!("{e}"))

@@ -4,8 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
-use impasto_compiler::partition::Strategy;
+use crate::gpu::stub::{Kind, Materials, Room, Way, materials, plan, samples};
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::file::{FilmFile, Range};
 use impasto_runtime::options::{Progress, RenderOptions};
@@ -30,22 +29,22 @@ fn surfaces() -> Materials {
     materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror])
 }
 
-fn renderer(strategy: Strategy, room: &Room, options: &RenderOptions) -> Renderer<'static> {
+fn renderer(way: Way, room: &Room, options: &RenderOptions) -> Renderer<'static> {
     let surfaces = surfaces();
-    let plan = plan(strategy, &surfaces);
-    Renderer::from_world(gpu(), &room.world(), &surfaces, &plan, options)
+    let plan = plan(way.strategy(), &surfaces);
+    Renderer::from_world(way.device(), &room.world(), &surfaces, &plan, options)
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn whole(strategy: Strategy, options: &RenderOptions) -> Rendering {
-    renderer(strategy, &room(), options)
+fn whole(way: Way, options: &RenderOptions) -> Rendering {
+    renderer(way, &room(), options)
         .render(&mut |_| ControlFlow::Continue(()))
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Renders in passes of few samples; what was kept, and the end.
 fn in_passes(
-    strategy: Strategy,
+    way: Way,
     options: &RenderOptions,
     start: Option<FilmFile>,
 ) -> Result<(Vec<FilmFile>, Rendering), RuntimeError> {
@@ -67,31 +66,31 @@ fn in_passes(
         last = progress.paths;
         ControlFlow::Continue(())
     };
-    let rendering = renderer(strategy, &room(), options).render_keeping(keeping, progress)?;
+    let rendering = renderer(way, &room(), options).render_keeping(keeping, progress)?;
     Ok((kept, rendering))
 }
 
 #[test]
 fn passes_give_the_bits_of_the_whole() {
-    for strategy in [Strategy::OWN, Strategy::MEGA] {
+    for way in Way::ALL {
         let options = RenderOptions {
             first_sample: 3,
             ..samples(6)
         };
-        let reference = whole(strategy, &options);
-        let (kept, rendering) = in_passes(strategy, &options, None).expect("it renders");
-        assert_eq!(rendering.film, reference.film, "{strategy:?}");
-        assert_eq!(rendering.sums, reference.sums, "{strategy:?}");
+        let reference = whole(way, &options);
+        let (kept, rendering) = in_passes(way, &options, None).expect("it renders");
+        assert_eq!(rendering.film, reference.film, "{way:?}");
+        assert_eq!(rendering.sums, reference.sums, "{way:?}");
         assert_eq!(rendering.report.paths, reference.report.paths);
         assert_eq!(rendering.report.resumed_samples, 0);
         // A sample a pass, and what is kept of each is the render of so many samples.
-        assert_eq!(kept.len(), 6, "{strategy:?}");
+        assert_eq!(kept.len(), 6, "{way:?}");
         for (count, film) in (1..).zip(&kept) {
             let fewer = RenderOptions {
                 samples: count,
                 ..options.clone()
             };
-            assert_eq!(*film, whole(strategy, &fewer).sums, "{strategy:?}: {count}");
+            assert_eq!(*film, whole(way, &fewer).sums, "{way:?}: {count}");
         }
         let items = |r: &Rendering| {
             r.report
@@ -112,14 +111,14 @@ fn passes_give_the_bits_of_the_whole() {
 
 #[test]
 fn a_render_goes_on_from_what_was_kept() {
-    for strategy in [Strategy::OWN, Strategy::MEGA] {
+    for way in Way::ALL {
         let options = samples(5);
-        let reference = whole(strategy, &options);
-        let (kept, _) = in_passes(strategy, &options, None).expect("it renders");
+        let reference = whole(way, &options);
+        let (kept, _) = in_passes(way, &options, None).expect("it renders");
         for start in kept {
             let done = start.samples();
-            let (more, rendering) = in_passes(strategy, &options, Some(start)).expect("it goes on");
-            assert_eq!(rendering.sums, reference.sums, "{strategy:?} from {done}");
+            let (more, rendering) = in_passes(way, &options, Some(start)).expect("it goes on");
+            assert_eq!(rendering.sums, reference.sums, "{way:?} from {done}");
             assert_eq!(u64::from(rendering.report.resumed_samples), done);
             assert_eq!(rendering.report.paths, reference.report.paths);
             assert_eq!(more.last(), Some(&reference.sums));
@@ -129,16 +128,16 @@ fn a_render_goes_on_from_what_was_kept() {
             ..options
         };
         let start = Some(reference.sums);
-        let (_, rendering) = in_passes(strategy, &longer, start).expect("it goes on");
-        assert_eq!(rendering.sums, whole(strategy, &longer).sums);
+        let (_, rendering) = in_passes(way, &longer, start).expect("it goes on");
+        assert_eq!(rendering.sums, whole(way, &longer).sums);
     }
 }
 
 #[test]
 fn a_render_does_not_go_on_from_another() {
-    let film = whole(Strategy::OWN, &samples(4)).sums;
+    let film = whole(Way::Wavefront, &samples(4)).sums;
     let refused = |options: &RenderOptions, part: &str| {
-        let result = in_passes(Strategy::OWN, options, Some(film.clone()));
+        let result = in_passes(Way::Wavefront, options, Some(film.clone()));
         let error = result.expect_err("refused").to_string();
         assert!(error.contains(part), "{error}");
     };
@@ -157,7 +156,13 @@ fn a_render_does_not_go_on_from_another() {
 
 #[test]
 fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
-    let reference = whole(Strategy::OWN, &samples(9));
+    for way in [Way::Wavefront, Way::Processor] {
+        merge_ranges(way);
+    }
+}
+
+fn merge_ranges(way: Way) {
+    let reference = whole(way, &samples(9));
     // In other pools, and one of them in the other organisation of the same kernels.
     let part = |first_sample, count, pool| {
         let options = RenderOptions {
@@ -165,7 +170,7 @@ fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
             pool: Some(pool),
             ..samples(count)
         };
-        whole(Strategy::OWN, &options).sums
+        whole(way, &options).sums
     };
     let parts = [part(0, 4, 77), part(4, 1, 1), part(5, 4, 1000)];
     for order in [[0, 1, 2], [2, 0, 1]] {
@@ -182,15 +187,16 @@ fn ranges_rendered_apart_merge_to_the_bits_of_the_whole() {
 
 #[test]
 fn only_what_changes_the_picture_changes_its_identity() {
-    let identity = |room: Room, strategy, options: RenderOptions| {
-        *renderer(strategy, &room, &options).identity()
-    };
-    let base = identity(room(), Strategy::OWN, samples(1));
+    let identity =
+        |room: Room, way, options: RenderOptions| *renderer(way, &room, &options).identity();
+    let base = identity(room(), Way::Wavefront, samples(1));
     let pool = RenderOptions {
         pool: Some(99),
         ..samples(7)
     };
-    assert_eq!(identity(room(), Strategy::MEGA, pool), base);
+    for way in Way::ALL {
+        assert_eq!(identity(room(), way, pool.clone()), base, "{way:?}");
+    }
     let deeper = Room {
         max_depth: 6,
         ..room()
@@ -204,14 +210,17 @@ fn only_what_changes_the_picture_changes_its_identity() {
         ..room()
     };
     for other in [deeper, brighter, painted] {
-        assert_ne!(identity(other, Strategy::OWN, samples(1)).scene, base.scene);
+        assert_ne!(
+            identity(other, Way::Wavefront, samples(1)).scene,
+            base.scene
+        );
     }
 }
 
 /// A stopped render is the render of fewer samples, not a mean of the shorter paths.
 #[test]
 fn a_stopped_render_is_one_of_fewer_samples() {
-    for strategy in [Strategy::OWN, Strategy::MEGA] {
+    for way in Way::ALL {
         let mut options = samples(1 << 20);
         options.pool = Some(333);
         let mut after = 40;
@@ -224,7 +233,7 @@ fn a_stopped_render_is_one_of_fewer_samples() {
                 ControlFlow::Break(())
             }
         };
-        let stopped = renderer(strategy, &room(), &options).render(stop);
+        let stopped = renderer(way, &room(), &options).render(stop);
         let stopped = stopped.unwrap_or_else(|e| panic!("{e}"));
         let [Range { first: 0, count }] = stopped.sums.ranges[..] else {
             panic!("{:?}", stopped.sums.ranges);
@@ -234,8 +243,8 @@ fn a_stopped_render_is_one_of_fewer_samples() {
             samples: count as u32,
             ..options
         };
-        let reference = whole(strategy, &same);
-        assert_eq!(stopped.sums, reference.sums, "{strategy:?}");
+        let reference = whole(way, &same);
+        assert_eq!(stopped.sums, reference.sums, "{way:?}");
         assert_eq!(stopped.report.paths, reference.report.paths);
     }
 }
@@ -248,14 +257,16 @@ fn a_render_in_two_halves_merges_with_no_other() {
         first_sample: 16,
         ..samples(16)
     };
-    let rest = whole(Strategy::OWN, &rest).sums;
-    let mut plain = whole(Strategy::OWN, &options).sums;
-    plain.merge(&rest).expect("parts of one render");
-    let mut go_on = |_: &Progress| ControlFlow::Continue(());
-    let mut halves = renderer(Strategy::OWN, &room(), &options)
-        .render_until(&Goals::default(), &mut |_| (), &mut go_on)
-        .unwrap_or_else(|e| panic!("{e}"))
-        .sums;
-    let refusal = halves.merge(&rest).expect_err("it is of another render");
-    assert!(refusal.contains("different renders"), "{refusal}");
+    for way in [Way::Wavefront, Way::Processor] {
+        let rest = whole(way, &rest).sums;
+        let mut plain = whole(way, &options).sums;
+        plain.merge(&rest).expect("parts of one render");
+        let mut go_on = |_: &Progress| ControlFlow::Continue(());
+        let mut halves = renderer(way, &room(), &options)
+            .render_until(&Goals::default(), &mut |_| (), &mut go_on)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .sums;
+        let refusal = halves.merge(&rest).expect_err("it is of another render");
+        assert!(refusal.contains("different renders"), "{refusal}");
+    }
 }

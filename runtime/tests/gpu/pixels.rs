@@ -3,8 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
-use impasto_compiler::partition::Strategy;
+use crate::gpu::stub::{Kind, Materials, Room, Way, materials, plan, samples};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering, Samples};
 use impasto_runtime::world::World;
@@ -29,10 +28,10 @@ fn surfaces() -> Materials {
     materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror])
 }
 
-fn renderer(strategy: Strategy, options: &RenderOptions) -> Renderer<'static> {
+fn renderer(way: Way, options: &RenderOptions) -> Renderer<'static> {
     let surfaces = surfaces();
-    let plan = plan(strategy, &surfaces);
-    Renderer::from_world(gpu(), &world(), &surfaces, &plan, options)
+    let plan = plan(way.strategy(), &surfaces);
+    Renderer::from_world(way.device(), &world(), &surfaces, &plan, options)
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -62,8 +61,8 @@ fn check(some: &Rendering, chosen: &[u32], whole: &Rendering, samples: u32) {
 #[test]
 fn some_pixels_have_the_bits_of_the_whole_and_others_no_samples() {
     let odd: Vec<u32> = (0..SIZE.0 * SIZE.1).filter(|p| p % 3 == 1).collect();
-    for strategy in [Strategy::OWN, Strategy::MEGA] {
-        let whole = rendering(&mut renderer(strategy, &samples(6)));
+    for way in Way::ALL {
+        let whole = rendering(&mut renderer(way, &samples(6)));
         // Pools that hold all paths, part of a sample's, and one path.
         for (pool, chosen) in [
             (None, odd.clone()),
@@ -76,7 +75,7 @@ fn some_pixels_have_the_bits_of_the_whole_and_others_no_samples() {
                 pixels: Some(chosen.clone().into()),
                 ..samples(6)
             };
-            let some = rendering(&mut renderer(strategy, &options));
+            let some = rendering(&mut renderer(way, &options));
             check(&some, &chosen, &whole, 6);
         }
     }
@@ -84,14 +83,18 @@ fn some_pixels_have_the_bits_of_the_whole_and_others_no_samples() {
 
 #[test]
 fn other_pixels_are_chosen_without_building_kernels_anew() {
+    Way::ALL.into_iter().for_each(choose_others);
+}
+
+fn choose_others(way: Way) {
     let all: Vec<u32> = (0..SIZE.0 * SIZE.1).collect();
     let options = RenderOptions {
         pixels: Some(all.clone().into()),
         ..samples(5)
     };
-    let mut whole = renderer(Strategy::OWN, &samples(5));
+    let mut whole = renderer(way, &samples(5));
     let whole = rendering(&mut whole);
-    let mut some = renderer(Strategy::OWN, &options);
+    let mut some = renderer(way, &options);
     check(&rendering(&mut some), &all, &whole, 5);
     let last: Vec<u32> = (100..128).collect();
     some.select_pixels(last.clone().into()).expect("they exist");
@@ -125,8 +128,9 @@ fn pixels_that_are_none_are_refused() {
             ..samples(1)
         };
         let (world, surfaces) = (world(), surfaces());
-        let plan = plan(Strategy::OWN, &surfaces);
-        let built = Renderer::from_world(gpu(), &world, &surfaces, &plan, &options);
+        let plan = plan(Way::Wavefront.strategy(), &surfaces);
+        let built =
+            Renderer::from_world(Way::Wavefront.device(), &world, &surfaces, &plan, &options);
         built.map(|_| ()).expect_err("refused").to_string()
     };
     for (pixels, says) in [
@@ -141,13 +145,13 @@ fn pixels_that_are_none_are_refused() {
             "{error}"
         );
     }
-    let mut whole = renderer(Strategy::OWN, &samples(1));
+    let mut whole = renderer(Way::Wavefront, &samples(1));
     let error = whole.select_pixels([3].into()).expect_err("refused");
     assert!(
         error.to_string().contains("RenderOptions::pixels"),
         "{error}"
     );
-    let all = renderer(Strategy::OWN, &samples(1));
+    let all = renderer(Way::Wavefront, &samples(1));
     // Code and buffer exist only where some pixels are chosen.
     let text = |renderer: &Renderer<'_>| renderer.kernels().map(|(_, w)| w).collect::<String>();
     assert!(!text(&all).contains("pixel_list") && !text(&all).contains("run.pixels"));
@@ -155,5 +159,5 @@ fn pixels_that_are_none_are_refused() {
         pixels: Some([3].into()),
         ..samples(1)
     };
-    assert!(text(&renderer(Strategy::OWN, &options)).contains("pixel_list"));
+    assert!(text(&renderer(Way::Wavefront, &options)).contains("pixel_list"));
 }

@@ -4,6 +4,7 @@
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Medium, Table};
 use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::Camera;
@@ -17,7 +18,7 @@ use impasto_runtime::world::surface;
 use impasto_runtime::world::{MaterialSource, World};
 use std::ops::ControlFlow;
 
-use crate::gpu::stub::{IDENTITY, gpu};
+use crate::gpu::stub::{IDENTITY, cpu, gpu};
 
 /// What a solid's surface does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -388,13 +389,28 @@ pub fn planned(solids: &Solids, strategy: Strategy) -> Plan {
     plan.unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// A picture by the processor.
+pub fn picture(planes: &Planes, solids: &Solids, samples: u32) -> Rendering {
+    render_on(cpu().into(), planes, solids, Strategy::MEGA, samples)
+}
+
 pub fn render(planes: &Planes, solids: &Solids, strategy: Strategy, samples: u32) -> Rendering {
+    render_on(gpu().into(), planes, solids, strategy, samples)
+}
+
+fn render_on(
+    device: DeviceRef<'static>,
+    planes: &Planes,
+    solids: &Solids,
+    strategy: Strategy,
+    samples: u32,
+) -> Rendering {
     let options = RenderOptions {
         samples,
         ..RenderOptions::default()
     };
     let plan = planned(solids, strategy);
-    let mut renderer = Renderer::from_world(gpu(), &planes.world(solids), solids, &plan, &options)
+    let mut renderer = Renderer::from_world(device, &planes.world(solids), solids, &plan, &options)
         .unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
     let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));

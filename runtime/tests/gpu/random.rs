@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::gpu::stub::{Kind, Room, materials, red, render};
+use crate::gpu::stub::{Kind, Room, materials, picture, red};
 use crate::support::{Row, run};
 use impasto_runtime::kernels::random::{self, Demand, hash_seed};
 use impasto_runtime::options::RenderOptions;
@@ -331,7 +331,7 @@ fn pictures(sampler: Sampler, seeds: std::ops::Range<u32>, samples: u32) -> Vec<
             ..RenderOptions::default()
         };
         let surfaces = materials(&[Kind::Diffuse(0.5)]);
-        red(&render(&room.world(), &surfaces, &options)).collect()
+        red(&picture(&room.world(), &surfaces, &options)).collect()
     };
     seeds.map(picture).collect()
 }

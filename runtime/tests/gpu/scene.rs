@@ -7,6 +7,7 @@ use std::path::Path;
 use impasto_compiler::abi::InstanceInfo;
 use impasto_compiler::partition::{Form, PlanInputs, Strategy};
 use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile};
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
 use impasto_runtime::scene::{self, Scene};
@@ -14,7 +15,7 @@ use impasto_runtime::technique::Technique;
 use impasto_runtime::world::World;
 
 use crate::gpu::media::{Layer, assert_channel, stack};
-use crate::gpu::stub::{assert_mean, gpu, mean, red, samples};
+use crate::gpu::stub::{assert_mean, cpu, gpu, mean, red, samples};
 
 /// A cube from -1 to 1 whose faces look inwards.
 const ROOM: &str = "
@@ -127,7 +128,7 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     )
 }
 
-/// A renderer by a strategy of that name, or with all materials `inline`.
+/// A renderer by a strategy of that name, or with all materials `inline`, or on the processor.
 pub fn renderer(
     scene: &Scene,
     program: &Program,
@@ -136,7 +137,12 @@ pub fn renderer(
 ) -> Renderer<'static> {
     let names: Vec<String> = program.infos().into_iter().map(|m| m.name).collect();
     let inline = strategy == "inline";
-    let strategy = Strategy::parse(if inline { "shared" } else { strategy });
+    let (device, strategy) = match strategy {
+        "inline" => (gpu().into(), "shared"),
+        "processor" => (DeviceRef::from(cpu()), "mega"),
+        other => (gpu().into(), other),
+    };
+    let strategy = Strategy::parse(strategy);
     let plan = strategy.and_then(|strategy| strategy.plan(&PlanInputs::of_names(&names)));
     let mut plan = plan.unwrap_or_else(|e| panic!("{e}"));
     for kernel in &mut plan.kernels {
@@ -144,7 +150,7 @@ pub fn renderer(
             kernel.form = Form::Inline;
         }
     }
-    Renderer::new(gpu(), scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"))
+    Renderer::new(device, scene, program, &plan, options).unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub fn render(
@@ -388,9 +394,9 @@ fn every_organisation_renders_the_same_scene() {
         let (scene, program) = load(&toml);
         let reference = render(&scene, &program, "wavefront", &samples(8));
         assert!(red(&reference).all(|v| v >= 0.0) && red(&reference).any(|v| v > 0.1));
-        for strategy in ["shared", "inline", "mega"] {
+        for strategy in ["shared", "inline", "mega", "processor"] {
             let other = render(&scene, &program, strategy, &samples(8));
-            if gpu().info().kind == "software" {
+            if gpu().info().kind == "software" && strategy != "processor" {
                 assert!(other.film == reference.film, "{block}: {strategy} differs");
             }
             let (difference, error) = mean(red(&other).zip(red(&reference)).map(|(a, b)| a - b));

@@ -7,6 +7,8 @@ use std::sync::OnceLock;
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
+use impasto_runtime::cpu::{Cpu, CpuOptions};
+use impasto_runtime::device::DeviceRef;
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Rendering};
@@ -26,6 +28,40 @@ pub fn gpu() -> &'static Gpu {
         Ok(gpu) => gpu,
         Err(error) => panic!("these tests need a GPU: {error}"),
     })
+}
+
+pub fn cpu() -> &'static Cpu {
+    static CPU: OnceLock<Cpu> = OnceLock::new();
+    CPU.get_or_init(|| Cpu::new(&CpuOptions::default()).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// A device, and how it divides materials into kernels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// A GPU with a kernel a material.
+    Wavefront,
+    /// A GPU with one kernel for whole paths.
+    Megakernel,
+    /// The processor, which has one kernel.
+    Processor,
+}
+
+impl Way {
+    pub const ALL: [Self; 3] = [Self::Wavefront, Self::Megakernel, Self::Processor];
+
+    pub fn device(self) -> DeviceRef<'static> {
+        match self {
+            Self::Wavefront | Self::Megakernel => gpu().into(),
+            Self::Processor => cpu().into(),
+        }
+    }
+
+    pub fn strategy(self) -> Strategy {
+        match self {
+            Self::Wavefront => Strategy::OWN,
+            Self::Megakernel | Self::Processor => Strategy::MEGA,
+        }
+    }
 }
 
 /// What a stub material does.
@@ -457,7 +493,27 @@ pub fn render_plan(
     plan: &Plan,
     options: &RenderOptions,
 ) -> Rendering {
-    let mut renderer = Renderer::from_world(gpu(), world, materials, plan, options)
+    rendered(gpu().into(), world, materials, plan, options)
+}
+
+pub fn render_on(
+    way: Way,
+    world: &World,
+    materials: &Materials,
+    options: &RenderOptions,
+) -> Rendering {
+    let plan = plan(way.strategy(), materials);
+    rendered(way.device(), world, materials, &plan, options)
+}
+
+fn rendered(
+    device: DeviceRef<'static>,
+    world: &World,
+    materials: &Materials,
+    plan: &Plan,
+    options: &RenderOptions,
+) -> Rendering {
+    let mut renderer = Renderer::from_world(device, world, materials, plan, options)
         .unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer
         .render(&mut |_| ControlFlow::Continue(()))
@@ -467,6 +523,11 @@ pub fn render_plan(
     assert!(rendering.film.samples.iter().all(|n| *n == options.samples));
     assert_eq!(rendering.report.queue_overflow, 0);
     rendering
+}
+
+/// Renders on the processor.
+pub fn picture(world: &World, materials: &Materials, options: &RenderOptions) -> Rendering {
+    render_on(Way::Processor, world, materials, options)
 }
 
 /// Renders with one kernel a material.

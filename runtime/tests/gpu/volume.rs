@@ -6,7 +6,7 @@ use impasto_compiler::partition::Strategy;
 use impasto_runtime::render::Rendering;
 
 use crate::gpu::media::assert_channel;
-use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, render, slab};
+use crate::gpu::planes::{Light, Plane, Planes, Solid, Solids, Surface, picture, render, slab};
 use crate::gpu::scene::{self, load_with};
 use crate::gpu::stub::{gpu, mean, red, samples};
 
@@ -26,7 +26,7 @@ fn seen(planes: Vec<Plane>, solids: &Solids, front: f32, samples: u32) -> Render
         max_depth: 2000,
         ..Planes::default()
     };
-    let rendering = render(&planes, solids, Strategy::OWN, samples);
+    let rendering = picture(&planes, solids, samples);
     assert_eq!(rendering.report.lost_paths, 0);
     rendering
 }

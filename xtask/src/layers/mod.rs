@@ -51,6 +51,18 @@ const CRATES: &[Crate] = &[
         ],
     },
     Crate {
+        name: "impasto-cpu",
+        folder: "cpu/src",
+        layers: &[
+            &["cell", "error", "shape"],
+            &["code"],
+            &["arithmetic", "interpret", "lower", "plan"],
+            &["native"],
+            &["wide"],
+            &["kernel"],
+        ],
+    },
+    Crate {
         name: "impasto-runtime",
         folder: "runtime/src",
         layers: &[
@@ -67,6 +79,8 @@ const CRATES: &[Crate] = &[
             &["world"],
             &["kernels"],
             &["gpu"],
+            &["cpu"],
+            &["device"],
             &["render"],
             &["lab", "audit"],
         ],
@@ -75,11 +89,10 @@ const CRATES: &[Crate] = &[
         name: "impasto-trace",
         folder: "trace/src",
         layers: &[
-            &["error", "float", "path", "shape", "textures"],
-            &["compare", "ops", "signature"],
-            &["code", "materials"],
-            &["geometry", "lower", "machine"],
-            &["expressions", "record"],
+            &["error", "path", "textures"],
+            &["compare", "signature"],
+            &["materials"],
+            &["record"],
             &["replay"],
         ],
     },

@@ -416,6 +416,7 @@ impl<'a> Emitter<'a, '_> {
     ) -> Result<(), KernelError> {
         let op = match function {
             Atomic::Exchange => Some(AtomicRmwOp::Xchg),
+            Atomic::Claim => None,
             Atomic::Op(op) => match self.shared.code.ops[op as usize] {
                 Op::Binary(BinaryOperator::Add, _) => Some(AtomicRmwOp::Add),
                 Op::Binary(BinaryOperator::Subtract, _) => Some(AtomicRmwOp::Sub),
@@ -429,14 +430,22 @@ impl<'a> Emitter<'a, '_> {
                 _ => None,
             },
         };
-        let op = op.ok_or_else(|| self.unsupported("atomic operation"))?;
+        if op.is_none() && function != Atomic::Claim {
+            return Err(self.unsupported("atomic operation"));
+        }
         let (address, offset) = self.place(pointer, 4)?;
         let address = self.builder.ins().iadd_imm_s(address, i64::from(offset));
         let value = self.value(value);
-        let old = self
-            .builder
-            .ins()
-            .atomic_rmw(types::I32, TRUSTED, op, address, value);
+        let old = match op {
+            Some(op) => self
+                .builder
+                .ins()
+                .atomic_rmw(types::I32, TRUSTED, op, address, value),
+            None => {
+                let free = self.builder.ins().iconst(types::I32, 0);
+                self.builder.ins().atomic_cas(TRUSTED, address, free, value)
+            }
+        };
         if let Some(to) = to {
             self.set(to, old);
         }

@@ -384,6 +384,7 @@ impl<'a> Translator<'a> {
         };
         let kind = match function {
             Atomic::Exchange => Some(AtomicKind::Exchange),
+            Atomic::Claim => Some(AtomicKind::Claim),
             Atomic::Op(op) => match self.shared.code.ops[op as usize] {
                 Op::Binary(BinaryOperator::Add, _) => Some(AtomicKind::Add),
                 Op::Binary(BinaryOperator::Subtract, _) => Some(AtomicKind::Subtract),

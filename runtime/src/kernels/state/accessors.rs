@@ -172,7 +172,8 @@ mod tests {
                  @group(0) @binding(0) var<storage, read_write> state: array<vec4<u32>>;\n{}",
                 accessors(needs, &every_stage(), Storage::Memory(StateLayout::Arrays))
             );
-            let (module, _) = crate::gpu::shader::validate("state", &text).expect("valid WGSL");
+            let (module, _) =
+                crate::kernels::validate::validate("state", &text).expect("valid WGSL");
             let mut layouter = naga::proc::Layouter::default();
             layouter.update(module.to_ctx()).expect("a layout");
             for u in fields(needs).flat_map(|f| f.uses(needs)) {

@@ -64,10 +64,10 @@ fn roulette_is_fair_at_throughputs_over_one_and_near_none() {
             let place = format!("albedo {albedo}, {depth} segments, from segment {start}");
             let options = samples(spp(64, 4096));
             let expected = series(f64::from(albedo as f32), depth);
-            let both = crate::gpu::stub::render(&room.world(), &surfaces, &options);
+            let both = crate::gpu::stub::picture(&room.world(), &surfaces, &options);
             hold_mean("25", "roulette in a closed room", &place, &both, expected);
             let scattered =
-                crate::gpu::stub::render(&room.scattering().world(), &surfaces, &options);
+                crate::gpu::stub::picture(&room.scattering().world(), &surfaces, &options);
             hold_mean(
                 "25",
                 "roulette in a closed room, by scattering",
@@ -108,7 +108,7 @@ fn a_sun_of_a_million_in_a_dark_sky_is_neither_lost_nor_too_much() {
     };
     let expected = 0.6 / PI * irradiance(&texels, width, height);
     let (scene, program) = load(&toml(true));
-    let rendering = render(&scene, &program, "wavefront", &samples(spp(64, 4096)));
+    let rendering = render(&scene, &program, "processor", &samples(spp(64, 4096)));
     hold_mean(
         "28",
         "a sun of 1e6 in a sky of 1e-3",
@@ -198,7 +198,7 @@ fn pixels_see_where_the_camera_says() {
          [materials.block]\nfile = 'm.impasto'\nmaterial = 'chart'\n"
     );
     let (scene, program) = load(&toml);
-    let rendering = render(&scene, &program, "wavefront", &samples(64));
+    let rendering = render(&scene, &program, "processor", &samples(64));
     let pixel = 2.0 * distance * (0.5 * fov.to_radians()).tan() / f64::from(height);
     let mut worst = 0.0f64;
     for (index, [r, g, _]) in rendering.film.pixels.iter().enumerate() {
@@ -236,7 +236,7 @@ fn an_edge_out_of_focus_is_seen_by_its_share_of_the_lens() {
             2.0 * radius
         );
         let (scene, program) = load(&toml);
-        let rendering = render(&scene, &program, "wavefront", &samples(spp(256, 4096)));
+        let rendering = render(&scene, &program, "processor", &samples(spp(256, 4096)));
         // The segment of the disc beyond a chord.
         let chord: f64 = 2.0 * edge / radius;
         let share = (chord.acos() - chord * (1.0 - chord * chord).sqrt()) / PI;
@@ -278,7 +278,7 @@ fn no_material_is_brighter_than_an_even_sky() {
             .instances()
             .iter()
             .any(|i| i.info.emission != Emission::None);
-        let rendering = render(&scene, &program, "wavefront", &samples(spp(16, 4096)));
+        let rendering = render(&scene, &program, "processor", &samples(spp(16, 4096)));
         assert_eq!(rendering.report.nonfinite_samples, 0, "{name}");
         if emits {
             continue;
@@ -319,7 +319,7 @@ material white { surface = diffuse(0.98); emission = uniform(color(0.02)); }
         )
         .replace("[integrator]\n", "");
     let (scene, program) = load_with(&toml, &[("white.impasto", WALLS)]);
-    let rendering = render(&scene, &program, "wavefront", &samples(spp(1, 64)));
+    let rendering = render(&scene, &program, "processor", &samples(spp(1, 64)));
     hold_mean(
         "29",
         "a room of albedo 0.98 and emission 0.02",
@@ -355,7 +355,7 @@ material chalk { surface = diffuse(1); }
              [materials.ball]\nfile = 'whites.impasto'\nmaterial = '{name}'\n",
         );
         let (scene, program) = load_with(&toml, &[("whites.impasto", WHITES)]);
-        let rendering = render(&scene, &program, "wavefront", &samples(spp(64, 8192)));
+        let rendering = render(&scene, &program, "processor", &samples(spp(64, 8192)));
         let (found, error) = mean(red(&rendering));
         let good = Row {
             table: "26",
@@ -390,7 +390,7 @@ material silver { surface = smooth_conductor(ior: color(0.2), extinction: color(
              [materials.ball]\nfile = 'shiny.impasto'\nmaterial = '{name}'\n",
         );
         let (scene, program) = load_with(&toml, &[("shiny.impasto", SHINY), ("smooth.obj", &ball)]);
-        let rendering = render(&scene, &program, "wavefront", &samples(spp(32, 4096)));
+        let rendering = render(&scene, &program, "processor", &samples(spp(32, 4096)));
         let darkest = red(&rendering).fold(f64::INFINITY, f64::min);
         let good = Row {
             table: "16",

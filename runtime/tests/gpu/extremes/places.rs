@@ -192,7 +192,7 @@ fn scenes(at: At) -> Vec<(&'static str, String)> {
 
 fn picture(toml: &str, spp: u32) -> Rendering {
     let (scene, program) = loaded(toml);
-    render(&scene, &program, "wavefront", &samples(spp))
+    render(&scene, &program, "processor", &samples(spp))
 }
 
 fn loaded(toml: &str) -> (Scene, Program) {

@@ -1,0 +1,250 @@
+//! Devices: which there are, how options choose one, and what is said where the only one is the processor.
+
+use serde_json::Value;
+
+use crate::cli::common::{Run, SCENE, command, folder, impasto, names};
+
+/// Runs the command where there is no driver of a GPU.
+#[cfg(target_os = "linux")]
+fn without_gpu(args: &[&str]) -> Run {
+    let mut command = command(args);
+    command.env("VK_DRIVER_FILES", "/nonexistent");
+    command.env("VK_ICD_FILENAMES", "/nonexistent");
+    command.output().expect("the command starts").into()
+}
+
+fn name(json: &Value) -> &str {
+    let name = json["name"].as_str().unwrap_or_default();
+    assert!(!name.is_empty(), "{json}");
+    name
+}
+
+#[test]
+fn info_names_the_device_and_the_others() {
+    for device in ["gpu", "cpu"] {
+        let json = impasto(&["info", "--device", device, "--format", "json"])
+            .exits(0)
+            .json();
+        let text = impasto(&["info", "--device", device]).exits(0).stdout;
+        assert!(text.starts_with(name(&json)), "{text}");
+        assert_eq!(json["kind"] == "processor", device == "cpu", "{json}");
+        let others = json["others"].as_array().expect("a list");
+        assert!(!others.is_empty(), "{json}");
+        // What chooses each of the others does.
+        for other in others {
+            let options = other["options"].as_str().expect("options").replace('"', "");
+            let (option, value) = options.split_once(' ').expect("an option with a value");
+            let args = ["info", option, value, "--format", "json"];
+            assert_eq!(name(&impasto(&args).exits(0).json()), name(other));
+            assert!(text.contains(name(other)) && text.contains(value), "{text}");
+        }
+        let kinds = others.iter().filter(|o| o["kind"] == "processor").count();
+        assert_eq!(kinds == 1, device == "gpu", "{json}");
+    }
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    let refused = |options: &[&str]| {
+        impasto(&[&["info"], options].concat())
+            .exits(2)
+            .prints_nothing()
+    };
+    refused(&["--device", "cpu", "--gpu", "llvmpipe"])
+        .says("`--gpu` chooses a GPU, but `--device cpu`");
+    refused(&["--device", "gpu", "--threads", "2"]).says("but `--device gpu` chooses a GPU");
+    refused(&["--gpu", "llvmpipe", "--threads", "2"]).says("cannot be used with '--threads <N>'");
+    for threads in ["0", "1025", "100000", "-1", "many"] {
+        refused(&[&format!("--threads={threads}")]).says("--threads");
+    }
+    refused(&["--threads=100000"]).says("100000 is not in 1..=1024");
+    refused(&["--device", "tpu"]).says("[possible values: gpu, cpu]");
+    // Before anything is read.
+    impasto(&[
+        "render",
+        "none.toml",
+        "--out",
+        "p.exr",
+        "--device=cpu",
+        "--gpu=x",
+    ])
+    .exits(2)
+    .says("leave out one of the two");
+}
+
+#[test]
+fn so_many_threads_are_there_as_asked_for() {
+    for threads in [1u64, 3] {
+        let asked = format!("--threads={threads}");
+        let json = impasto(&["info", "--device=cpu", &asked, "--format=json"])
+            .exits(0)
+            .json();
+        assert_eq!(json["limits"][0], serde_json::json!(["threads", threads]));
+    }
+}
+
+/// A plan for a GPU, which the processor replaces, is in the report and a note.
+#[test]
+fn a_replaced_strategy_is_said() {
+    let folder = folder();
+    let [out, report] = ["p.exr", "r.json"].map(|n| folder.path().join(n).display().to_string());
+    let render = |more: &[&str]| {
+        let args = [
+            "render", SCENE, "--device", "cpu", "--size", "6x4", "--spp", "1", "--out", &out,
+            "--report", &report,
+        ];
+        let run = impasto(&[&args, more].concat());
+        let text = std::fs::read_to_string(&report).unwrap_or_default();
+        (run, serde_json::from_str(&text).unwrap_or(Value::Null))
+    };
+    let (run, json) = render(&[]);
+    assert!(!run.exits(0).stderr.contains("in place of"));
+    assert_eq!(
+        (&json["strategy"], &json["plan"]),
+        (&"mega".into(), &"mega".into())
+    );
+    assert!(json["replaced_strategy"].is_null());
+    assert_eq!(json["adapter"]["backend"], "native");
+    let (run, json) = render(&["--strategy", "auto"]);
+    run.exits(0).says("`mega` in place of `auto`");
+    assert_eq!(
+        (&json["strategy"], &json["plan"]),
+        (&"mega".into(), &"mega".into())
+    );
+    assert_eq!(json["replaced_strategy"], "auto");
+    assert!(json["replanned"].is_null());
+    // Some processors run the kernels of other strategies, and others do not.
+    for (options, asked) in [
+        (["--strategy", "own"], "own"),
+        (["--partition", "binned:*"], "partition"),
+    ] {
+        let (run, json) = render(&options);
+        let is_replaced = json["replaced_strategy"] == asked;
+        assert_eq!(run.exits(0).stderr.contains("in place of"), is_replaced);
+        assert_eq!(json["strategy"], if is_replaced { "mega" } else { asked });
+    }
+    // What is wrong with a plan is said all the same.
+    render(&["--partition", "own:marble|*"])
+        .0
+        .exits(2)
+        .says("marble");
+    render(&["--strategy", "exhaustive"])
+        .0
+        .exits(2)
+        .says("impasto plan");
+}
+
+#[test]
+fn the_plan_of_the_processor_is_one_kernel_with_the_reason() {
+    let folder = folder();
+    let saved = folder.path().join("plan.json").display().to_string();
+    let plan = ["plan", SCENE, "--device", "cpu"];
+    let text = impasto(&plan).exits(0).stdout;
+    for part in [
+        "plan `mega`: 1 kernel of materials",
+        "checker_tiles",
+        "why:",
+        "--device gpu",
+    ] {
+        assert!(text.contains(part), "`{part}` is not in\n{text}");
+    }
+    let more = ["--strategy", "auto", "--format", "json", "--save", &saved];
+    let json = impasto(&[&plan[..], &more].concat()).exits(0).json();
+    assert_eq!(
+        (&json["strategy"], &json["replaced_strategy"]),
+        (&"mega".into(), &"auto".into())
+    );
+    assert_eq!(
+        json["kernels"][0]["materials"].as_array().map(Vec::len),
+        Some(5)
+    );
+    assert!(
+        json["why"]
+            .as_str()
+            .is_some_and(|why| why.contains("memory"))
+    );
+    let out = folder.path().join("p.exr").display().to_string();
+    let render = [
+        "render",
+        SCENE,
+        "--size=4x4",
+        "--spp=1",
+        "--plan",
+        &saved,
+        "--out",
+        &out,
+    ];
+    impasto(&render).exits(0);
+    for option in [
+        "--profile=h200",
+        "--workload=tests/plans/cornell.workload.json",
+        "--strategy=exhaustive",
+    ] {
+        impasto(&[&plan[..], &[option]].concat())
+            .exits(2)
+            .prints_nothing()
+            .says("needs a GPU, which the processor is not");
+    }
+}
+
+/// The processor renders where there is no GPU; what measures kernels says that it needs one.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_gpu_the_processor_renders_and_measurements_say_what_they_need() {
+    let folder = folder();
+    let out = folder.path().join("p.exr").display().to_string();
+    let json = without_gpu(&["info", "--format", "json"]).exits(0).json();
+    assert_eq!(json["kind"], "processor");
+    assert_eq!(json["others"], serde_json::json!([]));
+    let text = without_gpu(&["info"]).exits(0).stdout;
+    assert!(!text.contains("other devices"), "{text}");
+    without_gpu(&["plan", SCENE]).exits(0);
+    for args in [
+        &["info", "--device", "gpu"][..],
+        &["render", SCENE, "--device", "gpu", "--out", &out],
+        &["calibrate", "--quick"],
+        &["rays", SCENE],
+        &["plan", SCENE, "--strategy", "exhaustive"],
+        &["plan", SCENE, "--profile", "h200"],
+    ] {
+        let run = without_gpu(args).exits(2).prints_nothing();
+        run.says("no GPU was found")
+            .says("mesa-vulkan-drivers")
+            .says("--device cpu");
+    }
+    without_gpu(&["calibrate", "--quick"])
+        .exits(2)
+        .says("`impasto calibrate` needs a GPU");
+    without_gpu(&["rays", SCENE])
+        .exits(2)
+        .says("`impasto rays` needs a GPU");
+    assert_eq!(names(folder.path()), [""; 0]);
+    without_gpu(&[
+        "render", SCENE, "--size", "6x4", "--spp", "1", "--out", &out,
+    ])
+    .exits(0);
+    assert_eq!(names(folder.path()), ["p.exr", "p.png"]);
+}
+
+/// More memory than there is would end the process.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_picture_that_fits_no_memory_is_refused() {
+    let folder = folder();
+    let out = folder.path().join("p.exr").display().to_string();
+    let layers = "albedo,normal,position,depth,uv,variance,alpha,material,object,lights";
+    let known = std::fs::read_to_string("/proc/meminfo").expect("Linux tells");
+    let kilobytes = known
+        .split_whitespace()
+        .nth(1)
+        .and_then(|n| n.parse::<u64>().ok());
+    if kilobytes.is_none_or(|n| n > 64 << 20) {
+        return; // the largest picture with all layers fits
+    }
+    let size = ["--size", "20000x20000", "--spp", "1", "--aov", layers];
+    let args = ["render", SCENE, "--device", "cpu", "--out", &out];
+    impasto(&[&args[..], &size].concat())
+        .exits(2)
+        .says("the film")
+        .says("`memory`");
+}
