@@ -35,7 +35,7 @@ pub use driver::{compile, compile_for, file_requests, load, plan, render, reques
 pub use error::Error;
 pub use files::FileLoader;
 pub use ir_text::ir_text;
-pub use runtime::cpu::{Cpu, CpuOptions};
+pub use runtime::cpu::{Cpu, CpuOptions, Width};
 pub use runtime::device::{Choice, Device, DeviceOptions};
 pub use runtime::error::RuntimeError;
 pub use runtime::error::SceneError;

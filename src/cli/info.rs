@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use impasto::runtime::cpu::MOST_THREADS;
 use impasto::runtime::gpu::DeviceInfo;
-use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions};
+use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, Width};
 use serde::Serialize;
 
 use super::{Failure, Global, Outcome, print};
@@ -14,6 +14,9 @@ pub(super) struct DeviceArgs {
     /// What renders; by default a GPU that is no software, or else the processor
     #[arg(long, value_enum, value_name = "KIND")]
     device: Option<Kind>,
+    /// Let each thread of the processor take one path at a time, where it could take eight
+    #[arg(long)]
+    one_lane: bool,
     /// Render by so many threads of the processor; by default one for each core
     #[arg(long, value_name = "N", conflicts_with = "gpu", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS as i64))]
     threads: Option<u32>,
@@ -78,7 +81,11 @@ impl DeviceArgs {
             gpu: self.gpu.options(),
             cpu: CpuOptions {
                 threads: self.threads.map(|threads| threads as usize),
-                ..CpuOptions::default()
+                width: if self.one_lane {
+                    Width::One
+                } else {
+                    Width::Best
+                },
             },
         };
         let device = Device::open(&options).map_err(super::runtime)?;
