@@ -129,7 +129,8 @@ fn pixels_that_are_none_are_refused() {
         };
         let (world, surfaces) = (world(), surfaces());
         let plan = plan(Way::Wavefront.strategy(), &surfaces);
-        let built = Renderer::from_world(Way::Wavefront.device(), &world, &surfaces, &plan, &options);
+        let built =
+            Renderer::from_world(Way::Wavefront.device(), &world, &surfaces, &plan, &options);
         built.map(|_| ()).expect_err("refused").to_string()
     };
     for (pixels, says) in [
