@@ -143,8 +143,11 @@ pub struct KernelOfProcessor {
 }
 
 /// Why the processor has one kernel.
-const WHY: &str = "one kernel takes a path from its beginning to its end: between kernels paths would go \
+const ONE: &str = "one kernel takes a path from its beginning to its end: between kernels paths would go \
                    through memory";
+/// Why it has a kernel a material.
+const EACH: &str = "eight paths run at a time, and those that hit the same material do the same: each material \
+                    has a kernel";
 /// Why it has others.
 const ASKED: &str = "they were asked for: no model predicts the times of processors";
 
@@ -179,7 +182,14 @@ impl OnProcessor {
                 plan.kernels.iter().map(kernel).collect()
             },
             unused: plan.unused.iter().map(name).collect(),
-            why: if is_mega { WHY } else { ASKED }.into(),
+            why: if is_mega {
+                ONE
+            } else if plan.strategy == Strategy::OWN.to_string() {
+                EACH
+            } else {
+                ASKED
+            }
+            .into(),
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct Code {
     pub inputs: Vec<Input>,
     /// Threads of a workgroup.
     pub workgroup: u32,
+    /// Whether they wait for each other.
+    pub has_barriers: bool,
     /// Module-scope variables of the invocation, with their first values.
     pub private: Vec<Scalar>,
     /// The names of the buffers it binds, in the order of [`Pointer::Buffer`].

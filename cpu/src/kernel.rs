@@ -38,9 +38,9 @@ pub struct Kernel(Made);
 
 #[derive(Debug)]
 enum Made {
-    One(native::Kernel),
+    One(Box<native::Kernel>),
     #[cfg(all(target_arch = "x86_64", unix))]
-    Eight(wide::Kernel),
+    Eight(Box<wide::Kernel>),
 }
 
 /// What one thread needs to run a kernel.
@@ -74,14 +74,23 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, or there is no memory for code.
     pub fn build(code: &Code, answers: &[Answer], width: Width) -> Result<Self, KernelError> {
+        if code.has_barriers && code.workgroup > 1 {
+            let what = "workgroup whose threads wait for each other";
+            return Err(KernelError::unsupported(what, &code.main.name));
+        }
         #[cfg(all(target_arch = "x86_64", unix))]
         if width == Width::Best && wide::is_possible() {
             let answers: Vec<_> = answers.iter().map(|answer| Some(answer.eight)).collect();
-            return Ok(Self(Made::Eight(wide::Kernel::build(code, &answers)?)));
+            match wide::Kernel::build(code, &answers) {
+                // The other back end knows more, such as arrays of any length.
+                Err(KernelError::Unsupported { .. }) => {}
+                built => return Ok(Self(Made::Eight(Box::new(built?)))),
+            }
         }
         let _ = width;
         let answers: Vec<_> = answers.iter().map(|answer| Some(answer.one)).collect();
-        Ok(Self(Made::One(native::Kernel::build(code, &answers)?)))
+        let kernel = native::Kernel::build(code, &answers)?;
+        Ok(Self(Made::One(Box::new(kernel))))
     }
 
     /// The names of the buffers that it binds, in the order in which they are given.

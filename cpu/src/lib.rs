@@ -22,8 +22,8 @@ mod cell;
 pub mod code;
 mod error;
 pub mod interpret;
-mod lower;
 mod kernel;
+mod lower;
 pub mod native;
 mod plan;
 pub mod shape;
@@ -32,7 +32,7 @@ mod tests;
 #[cfg(all(target_arch = "x86_64", unix))]
 mod wide;
 
-pub use error::KernelError;
 pub use cell::Cell;
+pub use error::KernelError;
 pub use kernel::{Answer, Kernel, Thread, Width, is_wide};
 pub use lower::lower;

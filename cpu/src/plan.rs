@@ -47,7 +47,13 @@ impl Plan {
             walk(&function.body, &mut |node| match node {
                 Node::Ins(ins) => {
                     size += weight(ins);
-                    indexes |= matches!(ins, Ins::Index { first: First::Slot(_), .. });
+                    indexes |= matches!(
+                        ins,
+                        Ins::Index {
+                            first: First::Slot(_),
+                            ..
+                        }
+                    );
                     pointers |= takes_pointers(ins, function.arguments);
                 }
                 Node::Call { function, .. } => {

@@ -107,9 +107,7 @@ impl<'m> Shapes<'m> {
             TypeInner::Array { .. } => {
                 let elements = self.elements(ty)?;
                 match elements.length {
-                    Length::Fixed(length) => {
-                        Some(self.zero(&elements.ty)?.repeat(length as usize))
-                    }
+                    Length::Fixed(length) => Some(self.zero(&elements.ty)?.repeat(length as usize)),
                     Length::Open => None,
                 }
             }

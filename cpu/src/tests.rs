@@ -1,5 +1,7 @@
 //! Small kernels of which it is known what they do: statements, memory, and what is refused.
 
+mod random;
+
 use std::sync::Arc;
 
 use crate::code::Code;

@@ -124,11 +124,14 @@ fn replace(strategies: &mut Vec<Strategy>, device: &Device, global: &Global) {
         .iter()
         .filter(|s| replaced(s) && **s != Strategy::AUTO)
     {
-        global.note(&super::strategy::replaced(&strategy.to_string()));
+        global.note(&super::strategy::replaced(
+            &strategy.to_string(),
+            device.strategy(),
+        ));
     }
     let chosen = strategies
         .iter()
-        .map(|s| if replaced(s) { Strategy::MEGA } else { *s });
+        .map(|s| if replaced(s) { device.strategy() } else { *s });
     *strategies = distinct(&chosen.collect::<Vec<_>>());
 }
 

@@ -148,14 +148,20 @@ impl PlanCommandArgs {
     ) -> Outcome {
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = unused(scene, program);
-        let source = self.wanted.source(&names, &unused, Strategy::MEGA)?;
+        let source = self.wanted.source(&names, &unused, device.strategy())?;
         let asked = match &source {
             Source::Given(plan) => plan.strategy.clone(),
             Source::Strategy(strategy) => strategy.to_string(),
         };
         let is_replaced = device.replaces(&asked);
         let plan = match source {
-            _ if is_replaced => Plan::mega(&names, &unused),
+            _ if is_replaced => device
+                .strategy()
+                .plan(&PlanInputs {
+                    unused: &unused,
+                    ..PlanInputs::of_names(&names)
+                })
+                .map_err(|e| e.to_string())?,
             Source::Given(plan) => plan,
             Source::Strategy(strategy) => {
                 let materials = SceneMaterials::new(scene, program, self.samples as usize);

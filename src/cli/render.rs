@@ -118,7 +118,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let device = args.device.open(global)?;
     let planned = args.planned(&scene, &program, &device)?;
     if planned.plan.organisation != Organisation::Mega && device.replaces(&planned.plan.strategy) {
-        global.note(&replaced(&planned.plan.strategy));
+        global.note(&replaced(&planned.plan.strategy, device.strategy()));
     }
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
@@ -184,11 +184,7 @@ impl RenderArgs {
             plan,
             renewed_by: None,
         };
-        let default = match device {
-            Device::Gpu(_) => Strategy::AUTO,
-            Device::Cpu(_) => Strategy::MEGA,
-        };
-        let strategy = match self.plan.source(&names, &unused, default)? {
+        let strategy = match self.plan.source(&names, &unused, device.strategy())? {
             Source::Given(plan) => return Ok(fixed(plan)),
             Source::Strategy(strategy) => strategy,
         };

@@ -60,10 +60,10 @@ impl PlanArgs {
     }
 }
 
-/// What is said where the device renders by one kernel in place of what was asked for.
-pub(super) fn replaced(asked: &str) -> String {
+/// What is said where the device renders by a strategy in place of what was asked for.
+pub(super) fn replaced(asked: &str, chosen: Strategy) -> String {
     format!(
-        "note: the processor renders by `mega` in place of `{asked}` (`impasto plan --device cpu` says why)"
+        "note: the processor renders by `{chosen}` in place of `{asked}` (`impasto plan --device cpu` says why)"
     )
 }
 

@@ -103,8 +103,9 @@ impl<'a> Stage<'a> {
         if requires == Requires::Costs {
             return strategy.plan(&inputs).map_err(error);
         }
-        let DeviceRef::Gpu(gpu) = self.device else {
-            return Ok(Plan::mega(&names, &unused));
+        let gpu = match self.device {
+            DeviceRef::Gpu(gpu) => gpu,
+            DeviceRef::Cpu(cpu) => return cpu.strategy().plan(&inputs).map_err(error),
         };
         let workload = plan::workload(gpu, scene, program, self.pool)?;
         let info = self.device.info();

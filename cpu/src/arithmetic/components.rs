@@ -109,13 +109,7 @@ fn of_words<M: Arithmetic>(
 
 /// A quotient or rest. Of what WGSL lets nothing be divided by, the quotient is the dividend and the rest
 /// zero, as of a division by one.
-fn divided<M: Arithmetic>(
-    m: &mut M,
-    op: Bin,
-    signed: bool,
-    a: M::Value,
-    b: M::Value,
-) -> M::Value {
+fn divided<M: Arithmetic>(m: &mut M, op: Bin, signed: bool, a: M::Value, b: M::Value) -> M::Value {
     let (zero, one) = (m.word(0), m.word(1));
     let is_zero = m.compare_words(Order::Equal, false, b, zero);
     let mut divisor = m.select(is_zero, one, b);

@@ -95,7 +95,9 @@ fn packed<M: Arithmetic>(m: &mut M, function: Math, x: &[M::Value]) -> Option<Ve
             let high = shifted(m, Word2::ShiftLeft, high, 16);
             vec![m.word2(Word2::Or, low, high)]
         }
-        Math::Unpack2x16unorm => halves(m, first).map(|word| share(m, word, 65535.0)).to_vec(),
+        Math::Unpack2x16unorm => halves(m, first)
+            .map(|word| share(m, word, 65535.0))
+            .to_vec(),
         Math::Unpack2x16snorm => {
             let up = shifted(m, Word2::ShiftLeft, first, 16);
             let each = |word| {
@@ -182,7 +184,10 @@ fn refract<M: Arithmetic>(
     let along = m.float2(Float2::Add, along, root);
     let (v, normal) = (scaled(m, v, eta), scaled(m, normal, along));
     let refracted = zip(m, &v, &normal, Float2::Subtract);
-    refracted.into_iter().map(|x| m.select(beyond, zero, x)).collect()
+    refracted
+        .into_iter()
+        .map(|x| m.select(beyond, zero, x))
+        .collect()
 }
 
 /// A matrix product, column by column.

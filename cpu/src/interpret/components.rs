@@ -184,8 +184,8 @@ fn of_float<F: Float>(function: Math) -> Option<Fn1> {
         Math::Asinh => |a| map::<F>(a, f64::asinh),
         Math::Acosh => |a| map::<F>(a, f64::acosh),
         Math::Atanh => |a| map::<F>(a, f64::atanh),
-        Math::Radians => |a| map::<F>(a, f64::to_radians),
-        Math::Degrees => |a| map::<F>(a, f64::to_degrees),
+        Math::Radians => |a| (f::<F>(a) * F::of(1f64.to_radians())).cell(),
+        Math::Degrees => |a| (f::<F>(a) * F::of(1f64.to_degrees())).cell(),
         Math::Ceil => |a| map::<F>(a, f64::ceil),
         Math::Floor => |a| map::<F>(a, f64::floor),
         Math::Round => |a| map::<F>(a, f64::round_ties_even),
@@ -196,7 +196,7 @@ fn of_float<F: Float>(function: Math) -> Option<Fn1> {
         Math::Log => |a| map::<F>(a, f64::ln),
         Math::Log2 => |a| map::<F>(a, f64::log2),
         Math::Sqrt => |a| f::<F>(a).sqrt().cell(),
-        Math::InverseSqrt => |a| map::<F>(a, |x| 1.0 / x.sqrt()),
+        Math::InverseSqrt => |a| (F::of(1.0) / f::<F>(a).sqrt()).cell(),
         Math::Sign => |a| {
             map::<F>(a, |x| match x {
                 x if x > 0.0 => 1.0,
@@ -286,9 +286,12 @@ pub(super) fn math3<F: Float>(function: Math, kind: Kind) -> Option<Fn3> {
         },
         (Math::Fma, _) => |a, b, c| f::<F>(a).fused(f(b), f(c)).cell(),
         (Math::SmoothStep, _) => |low, high, x| {
-            let [low, high, x] = [low, high, x].map(|cell| f::<F>(cell).f64());
-            let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-            F::of(t * t * (3.0 - 2.0 * t)).cell()
+            let [low, high, x] = [low, high, x].map(f::<F>);
+            let [zero, one] = [0.0, 1.0].map(F::of);
+            let t = (x - low) / (high - low);
+            let t = if t < zero { zero } else { t };
+            let t = if one < t { one } else { t };
+            (t * t * (F::of(3.0) - F::of(2.0) * t)).cell()
         },
         (Math::ExtractBits, Kind::Uint) => |x, offset, count| {
             let (offset, count) = window(offset, count);

@@ -9,6 +9,8 @@ mod vectors;
 
 use std::marker::PhantomData;
 
+use naga::BuiltIn;
+
 use crate::code::{
     Atomic, Block, Case, Code, First, Function, Ins, Node, Op, Pointer, Scalar, Slot,
 };
@@ -104,12 +106,22 @@ impl<'c, F: Float> Machine<'c, F> {
 
     /// Runs the entry point; its arguments are zero: the first thread of the first workgroup.
     pub fn run(&mut self, host: &mut dyn Host) -> Result<(), KernelError> {
+        self.run_lane(0, host)
+    }
+
+    /// The same for another thread of that workgroup.
+    pub fn run_lane(&mut self, lane: u32, host: &mut dyn Host) -> Result<(), KernelError> {
         self.steps = 0;
         self.memory.clear();
         self.memory.extend(cells::<F>(&self.code.private));
         let base = self.memory.len();
         let main = &self.code.main;
         self.enter(self.code.functions.len(), base);
+        for (cell, input) in (base..).zip(&self.code.inputs) {
+            if input.built_in == Some(BuiltIn::LocalInvocationIndex) {
+                self.memory[cell] = lane.into();
+            }
+        }
         self.block(main, &main.body, base, host)?;
         Ok(())
     }

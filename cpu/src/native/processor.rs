@@ -23,7 +23,7 @@ pub fn check() -> Result<(), KernelError> {
     let info = validator.validate(&module).map_err(|e| defect(&e))?;
     let kernel = Kernel::build(&lower(&module, &info, &[], &[])?, &[])?;
     let (buffer, stop) = (Arc::new(Buffer::new(4)), AtomicBool::new(false));
-    let mut invocation = Invocation::new(&kernel, &[buffer.clone()], &[], &stop)?;
+    let mut invocation = Invocation::new(&kernel, std::slice::from_ref(&buffer), &[], &stop)?;
     // SAFETY: all of it is here, and nobody answers.
     #[allow(unsafe_code)]
     unsafe {
@@ -31,7 +31,9 @@ pub fn check() -> Result<(), KernelError> {
     }
     match buffer.read()[0] {
         1 => Ok(()),
-        _ => Err(KernelError::Processor("code does not do what it says".into())),
+        _ => Err(KernelError::Processor(
+            "code does not do what it says".into(),
+        )),
     }
 }
 

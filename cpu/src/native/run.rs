@@ -35,12 +35,17 @@ impl Buffer {
 
     /// Puts zeros in place of all words.
     pub fn clear(&self) {
-        self.0.iter().for_each(|word| word.store(0, Ordering::Relaxed));
+        self.0
+            .iter()
+            .for_each(|word| word.store(0, Ordering::Relaxed));
     }
 
     /// A copy of its words.
     pub fn read(&self) -> Vec<u32> {
-        self.0.iter().map(|word| word.load(Ordering::Relaxed)).collect()
+        self.0
+            .iter()
+            .map(|word| word.load(Ordering::Relaxed))
+            .collect()
     }
 }
 
@@ -114,7 +119,9 @@ impl Invocation {
         unsafe {
             type Main = unsafe extern "C" fn(*mut u64, u32, u32, u32, u32, u32);
             let main: Main = std::mem::transmute(kernel.main);
-            main(context, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4]);
+            main(
+                context, inputs[0], inputs[1], inputs[2], inputs[3], inputs[4],
+            );
         }
     }
 }

@@ -230,7 +230,10 @@ impl Assembler {
     pub(super) fn gather(&mut self, to: Register, index: Register, mask: Register, offset: i32) {
         self.vex(GATHER, to, index, ADDRESS, mask);
         let scale = 2;
-        self.bytes(&[0x80 | (to & 7) << 3 | 4, scale << 6 | (index & 7) << 3 | ADDRESS]);
+        self.bytes(&[
+            0x80 | (to & 7) << 3 | 4,
+            scale << 6 | (index & 7) << 3 | ADDRESS,
+        ]);
         self.bytes(&offset.to_le_bytes());
     }
 
@@ -238,7 +241,10 @@ impl Assembler {
     pub(super) fn gather_own(&mut self, to: Register, index: Register, mask: Register, from: i32) {
         self.vex(GATHER, to, index, BASE, mask);
         let scale = 2;
-        self.bytes(&[0x80 | (to & 7) << 3 | 4, scale << 6 | (index & 7) << 3 | BASE]);
+        self.bytes(&[
+            0x80 | (to & 7) << 3 | 4,
+            scale << 6 | (index & 7) << 3 | BASE,
+        ]);
         self.bytes(&from.to_le_bytes());
     }
 

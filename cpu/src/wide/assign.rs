@@ -165,7 +165,9 @@ impl Assigner<'_> {
         if known || place.stored {
             return;
         }
-        let home = *place.home.get_or_insert_with(|| free.pop().unwrap_or_else(|| memory.cell()));
+        let home = *place
+            .home
+            .get_or_insert_with(|| free.pop().unwrap_or_else(|| memory.cell()));
         place.stored = true;
         self.asm.store(home, register);
     }
@@ -220,7 +222,8 @@ impl Assigner<'_> {
 
     /// A value as the last operand: from memory if it is not read again.
     fn operand(&mut self, value: Value) -> Operand {
-        if self.place(value).register.is_none() && (!self.is_needed(value) || self.is_known(value))
+        if self.place(value).register.is_none()
+            && (!self.is_needed(value) || self.is_known(value))
             && let Some(home) = self.home(value)
         {
             return Operand::Memory(home);
@@ -257,10 +260,9 @@ impl Assigner<'_> {
     /// Brings all values that are still needed to memory.
     fn spill_all(&mut self) {
         for register in 0..REGISTERS as Register {
-            if let Some(value) = self.registers[register as usize] {
-                if self.is_needed(value) {
-                    self.spill(register);
-                }
+            let held = self.registers[register as usize];
+            if held.is_some_and(|value| self.is_needed(value)) {
+                self.spill(register);
             }
         }
     }
@@ -304,7 +306,8 @@ impl Assigner<'_> {
                 let index = self.register(*index);
                 let register = self.room();
                 self.hold(register, *to);
-                self.asm.three(asm::PCMPEQD, SPARE, SPARE, Operand::Register(SPARE));
+                self.asm
+                    .three(asm::PCMPEQD, SPARE, SPARE, Operand::Register(SPARE));
                 self.asm.load_address(self.memory.buffer(*buffer));
                 self.asm.gather(register, index, SPARE, *offset);
             }
@@ -312,7 +315,8 @@ impl Assigner<'_> {
                 let index = self.register(*index);
                 let register = self.room();
                 self.hold(register, *to);
-                self.asm.three(asm::PCMPEQD, SPARE, SPARE, Operand::Register(SPARE));
+                self.asm
+                    .three(asm::PCMPEQD, SPARE, SPARE, Operand::Register(SPARE));
                 self.asm.gather_own(register, index, SPARE, *from);
             }
             Inst::Host {
@@ -374,8 +378,7 @@ impl Assigner<'_> {
                     continue;
                 };
                 let stored = state.stored[register as usize];
-                if self.registers[register as usize].is_none() && self.is_needed(value) && !stored
-                {
+                if self.registers[register as usize].is_none() && self.is_needed(value) && !stored {
                     if let Some(elsewhere) = self.place(value).register {
                         self.asm.load(register, Operand::Register(elsewhere));
                         self.registers[elsewhere as usize] = None;
@@ -432,7 +435,8 @@ impl Assigner<'_> {
                 let first = self.register(a);
                 let second = self.operand(b);
                 let result = self.result(to, &[a, b]);
-                self.asm.three_with(asm::CMPPS, result, first, second, number);
+                self.asm
+                    .three_with(asm::CMPPS, result, first, second, number);
             }
             (Pure::Sqrt | Pure::FloatOfInt | Pure::IntOfFloat, &[a]) => {
                 let first = self.operand(a);

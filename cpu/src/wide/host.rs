@@ -20,8 +20,8 @@ macro_rules! floats {
             // SAFETY: the code that calls leaves one cell and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 2]>() };
             let [Cell(x), Cell(y)] = cells;
+            let function: fn(f32) -> f32 = $function;
             for (y, x) in y.iter_mut().zip(x) {
-                let function: fn(f32) -> f32 = $function;
                 *y = function(f32::from_bits(*x)).to_bits();
             }
         })+
@@ -42,8 +42,8 @@ macro_rules! words {
             // SAFETY: the code that calls leaves one cell and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 2]>() };
             let [Cell(x), Cell(y)] = cells;
+            let function: fn(u32) -> u32 = $function;
             for (y, x) in y.iter_mut().zip(x) {
-                let function: fn(u32) -> u32 = $function;
                 *y = function(*x);
             }
         })+
@@ -64,8 +64,8 @@ macro_rules! pairs {
             // SAFETY: the code that calls leaves two cells and has room for another.
             let cells = unsafe { &mut *cells.cast::<[Cell; 3]>() };
             let [Cell(a), Cell(b), Cell(y)] = cells;
+            let function: fn(u32, u32) -> u32 = $function;
             for (y, (a, b)) in y.iter_mut().zip(a.iter().zip(b)) {
-                let function: fn(u32, u32) -> u32 = $function;
                 *y = function(*a, *b);
             }
         })+
@@ -120,18 +120,24 @@ pub(super) fn address(function: Called) -> usize {
 pub(super) unsafe extern "C" fn scatter(data: *const c_void, cells: *mut Cell) {
     // SAFETY: the code that calls leaves so many cells, and indices are within the buffer.
     unsafe {
-        let Cell(mask) = *cells;
-        let Cell(index) = *cells.add(1);
-        let offset = (*cells.add(2)).0[0] as usize;
-        let words = (*cells.add(3)).0[0] as usize;
-        let buffer = data.cast::<AtomicU32>();
+        let [Cell(mask), Cell(index), Cell(offset), Cell(words)] = &*cells.cast::<[Cell; 4]>();
+        let buffer = data.cast::<AtomicU32>().add(offset[0] as usize);
+        let values = cells.add(4).cast::<u32>();
+        let words = words[0] as usize;
         for lane in 0..8 {
-            if mask[lane] != 0 {
-                let first = buffer.add(index[lane] as usize + offset);
-                for word in 0..words {
-                    let value = (*cells.add(4 + word)).0[lane];
-                    (*first.add(word)).store(value, Ordering::Relaxed);
+            if mask[lane] == 0 {
+                continue;
+            }
+            let first = buffer.add(index[lane] as usize);
+            let value = values.add(lane);
+            if words == 4 {
+                for word in 0..4 {
+                    (*first.add(word)).store(*value.add(8 * word), Ordering::Relaxed);
                 }
+                continue;
+            }
+            for word in 0..words {
+                (*first.add(word)).store(*value.add(8 * word), Ordering::Relaxed);
             }
         }
     }
@@ -175,15 +181,16 @@ impl AtomicKind {
 /// # Safety
 /// The code that calls leaves four cells and has room for another, and indices are within the buffer.
 #[allow(unsafe_code)]
-unsafe fn each(
-    data: *const c_void,
-    cells: *mut Cell,
-    function: impl Fn(&AtomicU32, u32) -> u32,
-) {
+unsafe fn each(data: *const c_void, cells: *mut Cell, function: impl Fn(&AtomicU32, u32) -> u32) {
     // SAFETY: as above.
     unsafe {
-        let [Cell(mask), Cell(index), Cell(offset), Cell(value), Cell(old)] =
-            &mut *cells.cast::<[Cell; 5]>();
+        let [
+            Cell(mask),
+            Cell(index),
+            Cell(offset),
+            Cell(value),
+            Cell(old),
+        ] = &mut *cells.cast::<[Cell; 5]>();
         let buffer = data.cast::<AtomicU32>();
         for lane in 0..8 {
             if mask[lane] != 0 {
@@ -230,24 +237,39 @@ atomics! {
 unsafe extern "C" fn add(data: *const c_void, cells: *mut Cell) {
     // SAFETY: as `each` says.
     unsafe {
-        let [Cell(mask), Cell(index), Cell(offset), Cell(value), Cell(old)] =
-            &mut *cells.cast::<[Cell; 5]>();
-        let Some(first) = mask.iter().position(|lane| *lane != 0) else {
-            return;
-        };
-        let same = (0..8).all(|lane| mask[lane] == 0 || index[lane] == index[first]);
-        if !same {
-            return each(data, cells, |word, x| word.fetch_add(x, ORDER));
-        }
-        let word = &*data.cast::<AtomicU32>().add((index[first] + offset[first]) as usize);
-        let mut sum = 0u32;
-        for lane in 0..8 {
+        let [
+            Cell(mask),
+            Cell(index),
+            Cell(offset),
+            Cell(value),
+            Cell(old),
+        ] = &mut *cells.cast::<[Cell; 5]>();
+        let mut first = 8;
+        for lane in (0..8).rev() {
             if mask[lane] != 0 {
-                old[lane] = sum;
-                sum = sum.wrapping_add(value[lane]);
+                first = lane;
             }
         }
+        if first == 8 {
+            return;
+        }
+        let place = index[first];
+        let mut different = 0;
+        for lane in 0..8 {
+            different |= (index[lane] ^ place) & mask[lane];
+        }
+        if different != 0 {
+            return each(data, cells, |word, x| word.fetch_add(x, ORDER));
+        }
+        let word = &*data.cast::<AtomicU32>().add((place + offset[0]) as usize);
+        let mut sum = 0u32;
+        for lane in 0..8 {
+            old[lane] = sum;
+            sum = sum.wrapping_add(value[lane] & mask[lane]);
+        }
         let before = word.fetch_add(sum, ORDER);
-        old.iter_mut().for_each(|x| *x = x.wrapping_add(before));
+        for old in old {
+            *old = old.wrapping_add(before);
+        }
     }
 }

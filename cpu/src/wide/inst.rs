@@ -114,8 +114,14 @@ pub(super) enum Inst {
         to: Value,
     },
     /// A cell of the thread's memory.
-    Load { from: i32, to: Value },
-    Store { to: i32, from: Value },
+    Load {
+        from: i32,
+        to: Value,
+    },
+    Store {
+        to: i32,
+        from: Value,
+    },
     /// A word of a buffer, for all lanes.
     Uniform {
         buffer: u32,
@@ -130,7 +136,11 @@ pub(super) enum Inst {
         to: Value,
     },
     /// Words of the thread's memory, by their index.
-    GatherOwn { from: i32, index: Value, to: Value },
+    GatherOwn {
+        from: i32,
+        index: Value,
+        to: Value,
+    },
     /// A function of the host, which finds arguments, then room for results.
     Host {
         function: usize,
@@ -141,13 +151,25 @@ pub(super) enum Inst {
     },
     Call(Label),
     /// Goes on at a join if no lane is left.
-    SkipIfNone { mask: Value, to: Label },
+    SkipIfNone {
+        mask: Value,
+        to: Label,
+    },
     Join(Label),
     /// The beginning of a turn.
-    Head { turn: Label, end: Label },
-    LeaveIfNone { mask: Value, end: Label },
+    Head {
+        turn: Label,
+        end: Label,
+    },
+    LeaveIfNone {
+        mask: Value,
+        end: Label,
+    },
     /// The end of a turn, and of the loop.
-    Back { turn: Label, end: Label },
+    Back {
+        turn: Label,
+        end: Label,
+    },
 }
 
 impl Inst {

@@ -14,9 +14,9 @@ use super::host::Answer;
 use super::inst::Constant;
 use super::memory::{CELL, Memory};
 use super::translate::{self, Interface, Shared};
+use crate::cell::Cell;
 use crate::code::{Code, First, Function, Input, Ins, Node, Scalar};
 use crate::error::KernelError;
-use crate::cell::Cell;
 use crate::native::{Buffer, Statistics, layout};
 use crate::plan::{Plan, walk};
 
@@ -34,7 +34,7 @@ pub(crate) struct Kernel {
     inputs: Vec<Input>,
     pub(crate) workgroup: u32,
     /// Module-scope variables at the beginning of an invocation, and where they lie.
-    private: Vec<u32>,
+    private: Vec<Cell>,
     private_at: i32,
     /// By buffer: its name, and the bytes it must have at least.
     buffers: Vec<(String, u64)>,
@@ -66,7 +66,9 @@ impl Kernel {
         };
         let functions = code.functions.iter().enumerate();
         let interfaces = functions.map(|(index, function)| {
-            let own = function.as_ref().filter(|f| !plan.inline[index] && !f.answered);
+            let own = function
+                .as_ref()
+                .filter(|f| !plan.inline[index] && !f.answered);
             own.map(|function| interface(function, &mut asm))
         });
         let interfaces: Vec<Option<Interface>> = interfaces.collect();
@@ -118,9 +120,18 @@ impl Kernel {
             main,
             inputs: code.inputs.clone(),
             workgroup: code.workgroup,
-            private: code.private.iter().map(word).collect(),
+            private: code
+                .private
+                .iter()
+                .map(|cell| Cell([word(cell); 8]))
+                .collect(),
             private_at: private,
-            buffers: code.buffers.iter().cloned().zip(layout::least_bytes(code)).collect(),
+            buffers: code
+                .buffers
+                .iter()
+                .cloned()
+                .zip(layout::least_bytes(code))
+                .collect(),
             statistics: Statistics {
                 functions,
                 bytes: bytes.len(),
@@ -244,13 +255,18 @@ impl Invocation {
     /// It was prepared for this kernel, what it was prepared with is still there, and what answers are given
     /// along is what they expect.
     #[allow(unsafe_code)]
-    pub(crate) unsafe fn run(&mut self, kernel: &Kernel, group: [u32; 3], first: u32, threads: u32) {
+    pub(crate) unsafe fn run(
+        &mut self,
+        kernel: &Kernel,
+        group: [u32; 3],
+        first: u32,
+        threads: u32,
+    ) {
         let lanes = [0, 1, 2, 3, 4, 5, 6, 7];
         let mask = lanes.map(|lane| 0u32.wrapping_sub((lane < threads).into()));
         self.put(kernel.main.mask, mask);
-        for (cell, word) in (0..).zip(&kernel.private) {
-            self.put(kernel.private_at + CELL * cell, [*word; 8]);
-        }
+        let private = (kernel.private_at / CELL) as usize;
+        self.memory[private..][..kernel.private.len()].copy_from_slice(&kernel.private);
         for (at, input) in (0..).zip(&kernel.inputs) {
             let axis = input.component as usize % 3;
             let each = lanes.map(|lane| match input.built_in {

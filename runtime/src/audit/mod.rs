@@ -8,15 +8,15 @@ pub use path_kernel::{PathKernel, PathSample, dropped_value};
 use std::collections::{BTreeMap, BTreeSet};
 
 use impasto_compiler::abi::MaterialInfo;
-use serde::Serialize;
 use naga::{Expression, Function, Module};
+use serde::Serialize;
 
 use crate::error::RuntimeError;
-use crate::kernels::validate::validate;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Kernel, Sizes};
 use crate::kernels::stages::STAGES;
 use crate::kernels::state;
+use crate::kernels::validate::validate;
 use crate::render::CompositionInputs;
 use crate::technique::Technique;
 use crate::world::needs::{Decision, Forcing, Need, NeedInputs, Needs, ROWS, Row};

@@ -53,7 +53,12 @@ type Words = [u32; 8];
 
 fn ray(words: &Words) -> ([f32; 3], [f32; 3], f32, u32) {
     let at = |i: usize| f32::from_bits(words[i]);
-    ([at(0), at(1), at(2)], [at(3), at(4), at(5)], at(6), words[7])
+    (
+        [at(0), at(1), at(2)],
+        [at(3), at(4), at(5)],
+        at(6),
+        words[7],
+    )
 }
 
 /// # Safety
@@ -93,7 +98,10 @@ unsafe extern "C" fn closest_of_eight(data: *const c_void, cells: *mut Cell) {
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 13]>()) };
     let [mask, arguments @ .., t, u, v, primitive] = cells;
     let arguments: &[Cell; 8] = arguments;
-    for lane in (0..8).filter(|lane| mask.0[*lane] != 0) {
+    for lane in 0..8 {
+        if mask.0[lane] == 0 {
+            continue;
+        }
         let (origin, direction, t_max, skip) = ray_of(arguments, lane);
         let hit = caster.closest(origin, direction, t_max, skip);
         t.0[lane] = hit.t.to_bits();
@@ -111,7 +119,10 @@ unsafe extern "C" fn any_of_eight(data: *const c_void, cells: *mut Cell) {
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 10]>()) };
     let [mask, arguments @ .., found] = cells;
     let arguments: &[Cell; 8] = arguments;
-    for lane in (0..8).filter(|lane| mask.0[*lane] != 0) {
+    for lane in 0..8 {
+        if mask.0[lane] == 0 {
+            continue;
+        }
         let (origin, direction, t_max, skip) = ray_of(arguments, lane);
         found.0[lane] = u32::from(caster.any(origin, direction, t_max, skip));
     }

@@ -1,7 +1,7 @@
-//! The processor as a device: the megakernel's own text as machine code, on all cores.
+//! The processor as a device: the kernels that GPUs run as machine code, on all cores.
 //!
-//! There is one kernel, whatever the materials: to branch costs a processor nothing that a kernel more
-//! would save, and between kernels paths would go through memory.
+//! Where eight paths run at a time, paths that hit the same material should do so together: each material has
+//! a kernel, as on GPUs. Where one runs, there is one kernel, since queues would only take time.
 
 mod casts;
 mod work;
@@ -9,15 +9,17 @@ mod work;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use impasto_cpu::native;
+use impasto_compiler::partition::{Form, Organisation, Plan, Requires, Strategy};
 use impasto_cpu::KernelError;
 pub use impasto_cpu::Width;
+use impasto_cpu::native;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;
 use crate::gpu::DeviceInfo;
 use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
 use crate::kernels::validate::validate;
+use crate::world::{MaterialSource, World};
 
 pub(crate) use casts::Casts;
 pub(crate) use work::{Groups, Step, Work};
@@ -83,9 +85,45 @@ impl Cpu {
         self.threads.current_num_threads()
     }
 
-    /// Whether paths in step with each other are so much faster that each material has its kernel.
-    pub(crate) fn is_wide(&self) -> bool {
+    /// Whether eight paths run at a time, so that paths that do the same should do it together.
+    pub fn is_wide(&self) -> bool {
         self.width == Width::Best && impasto_cpu::is_wide()
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(&self) -> Strategy {
+        if self.is_wide() {
+            Strategy::OWN
+        } else {
+            Strategy::MEGA
+        }
+    }
+
+    /// Whether [`Cpu::strategy`] takes the place of another. The automatic one follows a model of GPUs' times;
+    /// threads of a workgroup, which come one after another, cannot wait for each other, as those of kernels
+    /// of several queues do; and one path at a time gains nothing by queues.
+    pub(crate) fn replaces(&self, strategy: Strategy) -> bool {
+        let is_of_gpus = strategy.requires() == Requires::Workload || strategy == Strategy::BINNED;
+        strategy != Strategy::MEGA && (is_of_gpus || !self.is_wide())
+    }
+
+    /// The plan that takes the place of one that cannot run here.
+    pub(crate) fn plan(&self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
+        let is_mega = wanted.organisation == Organisation::Mega;
+        let is_binned = wanted
+            .kernels
+            .iter()
+            .any(|kernel| kernel.form == Form::Binned);
+        let is_replaced = Strategy::parse(&wanted.strategy).is_ok_and(|s| self.replaces(s));
+        if is_mega || self.is_wide() && !is_binned && !is_replaced {
+            return wanted.clone();
+        }
+        let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
+        if self.is_wide() {
+            Plan::own(&names, &world.parts.unbound)
+        } else {
+            Plan::mega(&names, &world.parts.unbound)
+        }
     }
 
     /// What the processor is and can do.
@@ -96,10 +134,7 @@ impl Cpu {
             backend: "native".into(),
             driver: native::compiler(),
             kind: "processor",
-            limits: vec![
-                ("threads", self.threads() as u64),
-                ("cores", cores as u64),
-            ],
+            limits: vec![("threads", self.threads() as u64), ("cores", cores as u64)],
             features_used: native::features(),
             features_missing: Vec::new(),
         }

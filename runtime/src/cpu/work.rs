@@ -108,7 +108,10 @@ impl Work {
                 }
             });
             let buffers: Vec<Arc<Buffer>> = own.collect();
-            let own = BUFFERS.iter().map(|row| row.name).zip(buffers.iter().cloned());
+            let own = BUFFERS
+                .iter()
+                .map(|row| row.name)
+                .zip(buffers.iter().cloned());
             let named: Vec<(&str, Arc<Buffer>)> = own.chain(scene.iter().cloned()).collect();
             let run = |step: &Step| prepared(step, &named, casts.as_ref());
             let runs: Result<Vec<Thread>, RuntimeError> = steps.iter().map(run).collect();
@@ -161,7 +164,8 @@ impl Work {
         match &self.threads[..] {
             [only] => self.pool.install(|| go_on(only)),
             threads => {
-                self.pool.broadcast(|context| go_on(&threads[context.index()]));
+                self.pool
+                    .broadcast(|context| go_on(&threads[context.index()]));
             }
         }
         self.done(most.into_inner(), begin.elapsed().as_secs_f64())
@@ -223,7 +227,10 @@ impl Work {
         }
         let mut counters = self.counters.merged(&parts);
         let left = *self.left.lock().unwrap_or_else(PoisonError::into_inner);
-        for (scalar, word) in [Scalar::NextPixel, Scalar::NextSample].into_iter().zip(left) {
+        for (scalar, word) in [Scalar::NextPixel, Scalar::NextSample]
+            .into_iter()
+            .zip(left)
+        {
             counters[self.counters.index(scalar)] = word;
         }
         Done {
@@ -254,7 +261,9 @@ impl Work {
         for row in BUFFERS.iter().filter(|row| some(row.cleared)) {
             let index = row.id.index();
             self.shared[index].clear();
-            self.threads.iter().for_each(|thread| locked(thread).buffers[index].clear());
+            self.threads
+                .iter()
+                .for_each(|thread| locked(thread).buffers[index].clear());
         }
     }
 
@@ -294,7 +303,9 @@ fn prepared(
     };
     let buffer = |name: &str| {
         let found = named.iter().find(|(known, _)| *known == name);
-        found.map(|(_, buffer)| buffer.clone()).ok_or_else(|| missing(name))
+        found
+            .map(|(_, buffer)| buffer.clone())
+            .ok_or_else(|| missing(name))
     };
     let buffers: Result<_, RuntimeError> = step.kernel.buffers().into_iter().map(buffer).collect();
     let data = casts.map_or_else(Vec::new, |casts| vec![casts.data(); ANSWERED.len()]);

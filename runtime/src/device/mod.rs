@@ -6,7 +6,7 @@ mod work;
 
 use std::fmt;
 
-use impasto_compiler::partition::{Organisation, Plan, Requires, Strategy};
+use impasto_compiler::partition::{Plan, Strategy};
 
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
@@ -99,9 +99,14 @@ impl Device {
         DeviceRef::from(self).info()
     }
 
-    /// Whether it renders by the megakernel in place of the plan of a strategy.
+    /// Whether it renders by [`Device::strategy`] in place of another.
     pub fn replaces(&self, strategy: &str) -> bool {
         DeviceRef::from(self).replaces(strategy)
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(&self) -> Strategy {
+        DeviceRef::from(self).strategy()
     }
 
     /// The GPU, for what only GPUs do.
@@ -175,24 +180,29 @@ impl DeviceRef<'_> {
         }
     }
 
-    /// Whether it renders by the megakernel in place of the plan of a strategy. A processor does if it runs
-    /// one path at a time, and where the plan would follow a model of GPUs' times.
+    /// Whether it renders by [`Device::strategy`] in place of another, of which it cannot have the kernels, or
+    /// which follows a model of GPUs' times.
     pub fn replaces(self, strategy: &str) -> bool {
-        let DeviceRef::Cpu(cpu) = self else {
-            return false;
-        };
-        let strategy = Strategy::parse(strategy).ok();
-        let is_of_gpus = strategy.is_some_and(|s| s.requires() == Requires::Workload);
-        strategy != Some(Strategy::MEGA) && (is_of_gpus || !cpu.is_wide())
+        match self {
+            DeviceRef::Gpu(_) => false,
+            DeviceRef::Cpu(cpu) => Strategy::parse(strategy).is_ok_and(|s| cpu.replaces(s)),
+        }
+    }
+
+    /// The strategy by which materials share kernels unless another is asked for.
+    pub fn strategy(self) -> Strategy {
+        match self {
+            DeviceRef::Gpu(_) => Strategy::AUTO,
+            DeviceRef::Cpu(cpu) => cpu.strategy(),
+        }
     }
 
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
-        if wanted.organisation == Organisation::Mega || !self.replaces(&wanted.strategy) {
-            return wanted.clone();
+        match self {
+            DeviceRef::Gpu(_) => wanted.clone(),
+            DeviceRef::Cpu(cpu) => cpu.plan(wanted, world, source),
         }
-        let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();
-        Plan::mega(&names, &world.parts.unbound)
     }
 
     /// What bounds the sizes of buffers and dispatches.

@@ -48,7 +48,11 @@ impl Work {
         max_iterations: u32,
     ) -> Result<Submission, RuntimeError> {
         let dispatches = max_iterations * self.schedule.steps.len() as u32;
-        Submission::new(&self.gpu, counters, self.schedule.timing.queries(dispatches))
+        Submission::new(
+            &self.gpu,
+            counters,
+            self.schedule.timing.queries(dispatches),
+        )
     }
 
     /// Submits some iterations.

@@ -315,7 +315,9 @@ impl Counters {
         for row in 0..=self.film_row() {
             let at = self.dropped() + dropped::ROW_WORDS * row;
             let example = at + dropped::COUNTS..at + dropped::ROW_WORDS;
-            let claimed = parts.iter().find(|part| part.get(at + dropped::COUNTS).is_some_and(|c| *c > 0));
+            let claimed = parts
+                .iter()
+                .find(|part| part.get(at + dropped::COUNTS).is_some_and(|c| *c > 0));
             if let Some(part) = claimed {
                 sums[example.clone()].copy_from_slice(&part[example]);
             }

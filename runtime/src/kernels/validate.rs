@@ -6,10 +6,7 @@ use naga::{Module, front};
 use crate::error::RuntimeError;
 
 /// Parses and validates `wgsl`, the text of the kernel called `kernel`.
-pub(crate) fn validate(
-    kernel: &str,
-    wgsl: &str,
-) -> Result<(Module, ModuleInfo), RuntimeError> {
+pub(crate) fn validate(kernel: &str, wgsl: &str) -> Result<(Module, ModuleInfo), RuntimeError> {
     let failure = |message| RuntimeError::Shader {
         kernel: kernel.to_string(),
         message,

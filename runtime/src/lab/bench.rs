@@ -10,9 +10,9 @@ use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::Schedule;
+use crate::gpu::submission::Submission;
 use crate::kernels::buffers::BufferId;
 use crate::kernels::queues::Counters;
-use crate::gpu::submission::Submission;
 
 /// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
 const WARM_UP: Duration = Duration::from_millis(200);

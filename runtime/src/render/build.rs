@@ -10,10 +10,10 @@ use impasto_compiler::partition::Plan;
 use impasto_compiler::partition::workload::BLOCK;
 
 use super::{RenderOptions, Renderer, ReportInputs};
-use crate::error::RuntimeError;
-use crate::film::file::Identity;
 use crate::cpu;
 use crate::device::{DeviceRef, Work};
+use crate::error::RuntimeError;
+use crate::film::file::Identity;
 use crate::gpu::resources::Resources;
 use crate::gpu::schedule::{Size, Step};
 use crate::gpu::{self, Gpu};
@@ -178,13 +178,15 @@ impl<'g> Renderer<'g> {
                     |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
                 let (kernels, steps) = build_all(&composer, build)?;
                 gpu.check()?;
-                (kernels, Work::Gpu(gpu::work::Work::new(gpu, resources, steps)))
+                (
+                    kernels,
+                    Work::Gpu(gpu::work::Work::new(gpu, resources, steps)),
+                )
             }
             DeviceRef::Cpu(cpu) => {
                 let casts = cpu::Casts::new(composer.parts);
-                let build = |kernel: &Kernel| {
-                    building.next(|| cpu.build(kernel, sizes, casts.as_ref()))
-                };
+                let build =
+                    |kernel: &Kernel| building.next(|| cpu.build(kernel, sizes, casts.as_ref()));
                 let (kernels, steps) = build_all(&composer, build)?;
                 let work = cpu::Work::new(cpu, &composer, steps, casts, &options)?;
                 (kernels, Work::Cpu(work))

@@ -59,7 +59,8 @@ pub(crate) fn sizes(
     let slot_bytes = state_bytes.max(queue_bytes).max(1);
     if let Some(pool) = options.pool {
         let bytes = u64::from(pool) * slot_bytes;
-        device.check_binding_size("a pool of that size", bytes)
+        device
+            .check_binding_size("a pool of that size", bytes)
             .map_err(|error| error.with_hint("use a smaller pool (`--pool`)"))?;
     }
     let most = device.limits().buffer_bytes;

@@ -8,9 +8,9 @@ use cranelift_codegen::ir::{
 use naga::{BinaryOperator, MathFunction, ScalarKind};
 
 use super::{CONSTANT, Emitter, Place, Target};
-use crate::native::layout::bytes_of;
 use crate::code::{Atomic, First, Ins, Op, Pointer, Scalar, Slot};
 use crate::error::KernelError;
+use crate::native::layout::bytes_of;
 
 /// Memory that is there and aligned.
 const TRUSTED: MemFlagsData = MemFlagsData::trusted();
@@ -28,7 +28,9 @@ impl<'a> Emitter<'a, '_> {
         for (at, cell) in image.iter().enumerate() {
             let value = self.constant(*cell);
             let value = self.widened(value);
-            self.builder.ins().stack_store(types::I64, value, slot, 4 * at as i32);
+            self.builder
+                .ins()
+                .stack_store(types::I64, value, slot, 4 * at as i32);
         }
         Place::Memory(slot)
     }
@@ -172,7 +174,10 @@ impl<'a> Emitter<'a, '_> {
             } => {
                 let bytes = self.buffer_word(*buffer, 8);
                 let bytes = self.builder.ins().iadd_imm_s(bytes, -i64::from(*offset));
-                let length = self.builder.ins().udiv_imm_u(bytes, i64::from((*stride).max(1)));
+                let length = self
+                    .builder
+                    .ins()
+                    .udiv_imm_u(bytes, i64::from((*stride).max(1)));
                 let length = self.builder.ins().ireduce(types::I32, length);
                 self.set(*to, length);
                 Ok(())
@@ -193,9 +198,10 @@ impl<'a> Emitter<'a, '_> {
             let places = &code.layouts[layout as usize];
             let (address, first) = self.place(pointer, bytes_of(places))?;
             for (i, place) in places.iter().enumerate() {
-                let like = match place.float {
-                    true => Scalar::Float(0.0),
-                    false => Scalar::Word(0),
+                let like = if place.float {
+                    Scalar::Float(0.0)
+                } else {
+                    Scalar::Word(0)
                 };
                 let value = self.get(address, first + 4 * place.word as i32, like);
                 self.set(to + i as Slot, value);
@@ -261,7 +267,12 @@ impl<'a> Emitter<'a, '_> {
                         Place::Memory(stack) => {
                             let stack = *stack;
                             let value = self.widened(value);
-                            self.builder.ins().stack_store(types::I64, value, stack, 4 * cell as i32);
+                            self.builder.ins().stack_store(
+                                types::I64,
+                                value,
+                                stack,
+                                4 * cell as i32,
+                            );
                         }
                     }
                 }
@@ -278,7 +289,9 @@ impl<'a> Emitter<'a, '_> {
     /// The address or length of a buffer, which do not change while the code runs.
     fn buffer_word(&mut self, buffer: u32, offset: i32) -> Value {
         let at = self.shared.layout.buffer(buffer) + offset;
-        self.builder.ins().load(types::I64, CONSTANT, self.context, at)
+        self.builder
+            .ins()
+            .load(types::I64, CONSTANT, self.context, at)
     }
 
     /// An address in a buffer, and bytes from there to a value of so many bytes.
@@ -297,7 +310,10 @@ impl<'a> Emitter<'a, '_> {
             return Ok((base, offset as i32));
         };
         let length = self.buffer_word(buffer, 8);
-        let last = self.builder.ins().iadd_imm_s(length, -i64::from(offset + bytes));
+        let last = self
+            .builder
+            .ins()
+            .iadd_imm_s(length, -i64::from(offset + bytes));
         let index = self.value(index);
         let index = self.builder.ins().umin(index, last);
         Ok((self.builder.ins().iadd(base, index), offset as i32))
@@ -346,11 +362,16 @@ impl<'a> Emitter<'a, '_> {
     fn element(&mut self, from: Slot, index: Slot, length: u32, count: u32, to: Slot) {
         let cells = length * count;
         let index = self.value(index);
+        let last = self.builder.ins().iconst(types::I32, i64::from(length) - 1);
+        let index = self.builder.ins().umin(index, last);
         let known = (from..from + cells).all(|s| self.frame().values[s as usize].is_none());
         if !known && length <= 4 {
             let mut chosen: Vec<Value> = (from..from + count).map(|s| self.value(s)).collect();
             for element in 1..length {
-                let is_it = self.builder.ins().icmp_imm_s(IntCC::Equal, index, i64::from(element));
+                let is_it = self
+                    .builder
+                    .ins()
+                    .icmp_imm_s(IntCC::Equal, index, i64::from(element));
                 for (i, value) in (0..count).zip(&mut chosen) {
                     let other = self.value(from + element * count + i);
                     *value = self.builder.ins().select(is_it, other, *value);
@@ -370,12 +391,12 @@ impl<'a> Emitter<'a, '_> {
             for i in 0..cells {
                 let value = self.value(from + i);
                 let value = self.widened(value);
-                self.builder.ins().stack_store(types::I64, value, stack, 4 * i as i32);
+                self.builder
+                    .ins()
+                    .stack_store(types::I64, value, stack, 4 * i as i32);
             }
             self.builder.ins().stack_addr(types::I64, stack, 0)
         };
-        let last = self.builder.ins().iconst(types::I32, i64::from(length) - 1);
-        let index = self.builder.ins().umin(index, last);
         let index = self.builder.ins().uextend(types::I64, index);
         let offset = self.builder.ins().imul_imm_s(index, 4 * i64::from(count));
         let address = self.builder.ins().iadd(address, offset);
@@ -416,7 +437,10 @@ impl<'a> Emitter<'a, '_> {
         let address = self.builder.ins().iadd_imm_s(address, i64::from(offset));
         let value = self.value(value);
         let old = match op {
-            Some(op) => self.builder.ins().atomic_rmw(types::I32, TRUSTED, op, address, value),
+            Some(op) => self
+                .builder
+                .ins()
+                .atomic_rmw(types::I32, TRUSTED, op, address, value),
             None => {
                 let free = self.builder.ins().iconst(types::I32, 0);
                 self.builder.ins().atomic_cas(TRUSTED, address, free, value)

@@ -106,8 +106,15 @@ fn ty(cell: Scalar) -> Type {
 pub(super) fn signature(function: &Function, pointers: &[bool], convention: CallConv) -> Signature {
     let mut signature = Signature::new(convention);
     signature.params.push(AbiParam::new(types::I64));
-    for (slot, cell) in function.image[..function.arguments as usize].iter().enumerate() {
-        let ty = if pointers[slot] { types::I64 } else { ty(*cell) };
+    for (slot, cell) in function.image[..function.arguments as usize]
+        .iter()
+        .enumerate()
+    {
+        let ty = if pointers[slot] {
+            types::I64
+        } else {
+            ty(*cell)
+        };
         signature.params.push(AbiParam::new(ty));
     }
     match function.result[..] {
@@ -140,7 +147,11 @@ impl<'a, 'b> Emitter<'a, 'b> {
         let leave = Leave::Return(parameters.get(1 + arguments).copied());
         this.begin(function, leave);
         this.frame().values[..arguments].clone_from_slice(
-            &parameters[1..=arguments].iter().copied().map(Some).collect::<Vec<_>>(),
+            &parameters[1..=arguments]
+                .iter()
+                .copied()
+                .map(Some)
+                .collect::<Vec<_>>(),
         );
         if this.block(&function.body)? {
             this.leave(None);
@@ -284,9 +295,10 @@ impl<'a, 'b> Emitter<'a, 'b> {
     ) -> Result<Reached, KernelError> {
         let condition = self.value(condition);
         let (first, end) = (self.builder.create_block(), self.builder.create_block());
-        let second = match reject.is_empty() {
-            true => end,
-            false => self.builder.create_block(),
+        let second = if reject.is_empty() {
+            end
+        } else {
+            self.builder.create_block()
         };
         self.builder.ins().brif(condition, first, &[], second, &[]);
         let mut reached = reject.is_empty();
@@ -343,8 +355,14 @@ impl<'a, 'b> Emitter<'a, 'b> {
         let [head, first, turn, end] = [(); 4].map(|()| self.builder.create_block());
         self.builder.ins().jump(head, &[]);
         self.builder.switch_to_block(head);
-        let flag = self.builder.ins().load(types::I64, CONSTANT, self.context, STOP);
-        let stop = self.builder.ins().load(types::I8, MemFlagsData::trusted(), flag, 0);
+        let flag = self
+            .builder
+            .ins()
+            .load(types::I64, CONSTANT, self.context, STOP);
+        let stop = self
+            .builder
+            .ins()
+            .load(types::I8, MemFlagsData::trusted(), flag, 0);
         self.builder.ins().brif(stop, end, &[], first, &[]);
         self.go_on_at(first);
         self.frame().around.push(Around {
@@ -453,7 +471,10 @@ impl<'a, 'b> Emitter<'a, 'b> {
         }
         self.frames.pop();
         self.go_on_at(end);
-        Ok(results.into_iter().map(|v| self.builder.use_var(v)).collect())
+        Ok(results
+            .into_iter()
+            .map(|v| self.builder.use_var(v))
+            .collect())
     }
 
     fn call_compiled(
@@ -493,7 +514,9 @@ impl<'a, 'b> Emitter<'a, 'b> {
             None => self.builder.inst_results(call).to_vec(),
             Some(address) => {
                 let cells = function.result.iter().enumerate();
-                cells.map(|(at, cell)| self.get(address, 4 * at as i32, *cell)).collect()
+                cells
+                    .map(|(at, cell)| self.get(address, 4 * at as i32, *cell))
+                    .collect()
             }
         }
     }
@@ -520,16 +543,27 @@ impl<'a, 'b> Emitter<'a, 'b> {
         signature.params = vec![AbiParam::new(types::I64); 3];
         let signature = self.builder.import_signature(signature);
         let at = self.shared.layout.data(hook);
-        let data = self.builder.ins().load(types::I64, CONSTANT, self.context, at);
-        let answer = self.builder.ins().iconst(types::I64, answer as usize as i64);
+        let data = self
+            .builder
+            .ins()
+            .load(types::I64, CONSTANT, self.context, at);
+        let answer = self
+            .builder
+            .ins()
+            .iconst(types::I64, answer as usize as i64);
         let first = i64::from(exchange);
         let arguments = self.builder.ins().iadd_imm_s(self.context, first);
         let behind = exchange + 4 * values.len() as i32;
-        let result = self.builder.ins().iadd_imm_s(self.context, i64::from(behind));
+        let result = self
+            .builder
+            .ins()
+            .iadd_imm_s(self.context, i64::from(behind));
         let given = [data, arguments, result];
         self.builder.ins().call_indirect(signature, answer, &given);
         let cells = function.result.iter().enumerate();
-        Ok(cells.map(|(at, cell)| self.get(self.context, behind + 4 * at as i32, *cell)).collect())
+        Ok(cells
+            .map(|(at, cell)| self.get(self.context, behind + 4 * at as i32, *cell))
+            .collect())
     }
 
     /// Calls a function of the host on numbers.
@@ -542,7 +576,10 @@ impl<'a, 'b> Emitter<'a, 'b> {
         signature.returns.push(AbiParam::new(result));
         let signature = self.builder.import_signature(signature);
         let address = self.builder.ins().iconst(types::I64, function as i64);
-        let call = self.builder.ins().call_indirect(signature, address, arguments);
+        let call = self
+            .builder
+            .ins()
+            .call_indirect(signature, address, arguments);
         self.builder.inst_results(call)[0]
     }
 
@@ -616,7 +653,9 @@ impl<'a, 'b> Emitter<'a, 'b> {
                 count,
             } => {
                 let of = |this: &mut Self, at: usize, width: u32| {
-                    (from[at]..from[at] + width).map(|slot| this.value(slot)).collect()
+                    (from[at]..from[at] + width)
+                        .map(|slot| this.value(slot))
+                        .collect()
                 };
                 let op = self.shared.code.ops[*op as usize];
                 let values = crate::arithmetic::vectors(self, op, *width, of);

@@ -141,8 +141,8 @@ impl<'a> Translator<'a> {
             let value = match target {
                 Target::Cell { frame, slot } => {
                     let variable = self.frames[frame].cells.get(&(slot + i)).copied();
-                    let variable =
-                        variable.ok_or_else(|| self.unsupported("pointer to what is no variable"))?;
+                    let variable = variable
+                        .ok_or_else(|| self.unsupported("pointer to what is no variable"))?;
                     self.get(variable)
                 }
                 Target::Private { cell } => {
@@ -184,7 +184,10 @@ impl<'a> Translator<'a> {
             let places = &self.shared.code.layouts[layout as usize];
             let (index, offset) = self.place(pointer, bytes_of(places))?;
             let index = index.unwrap_or_else(|| self.bits(0));
-            let whole = places.iter().zip(0..).all(|(place, word)| place.word == word);
+            let whole = places
+                .iter()
+                .zip(0..)
+                .all(|(place, word)| place.word == word);
             if !whole {
                 return Err(self.unsupported("store of a value with gaps"));
             }
@@ -203,8 +206,8 @@ impl<'a> Translator<'a> {
             match target {
                 Target::Cell { frame, slot } => {
                     let variable = self.frames[frame].cells.get(&(slot + i)).copied();
-                    let variable =
-                        variable.ok_or_else(|| self.unsupported("pointer to what is no variable"))?;
+                    let variable = variable
+                        .ok_or_else(|| self.unsupported("pointer to what is no variable"))?;
                     self.assign(variable, value);
                 }
                 Target::Private { cell } => {
@@ -238,11 +241,7 @@ impl<'a> Translator<'a> {
 
     /// The index of a word in a buffer, unless it is the first, and bytes from there to a value of so many
     /// bytes.
-    fn place(
-        &mut self,
-        pointer: Pointer,
-        bytes: u32,
-    ) -> Result<(Option<Value>, i32), KernelError> {
+    fn place(&mut self, pointer: Pointer, bytes: u32) -> Result<(Option<Value>, i32), KernelError> {
         let Pointer::Buffer {
             buffer,
             offset,
@@ -302,7 +301,12 @@ impl<'a> Translator<'a> {
             });
             return Ok(());
         }
-        // Places in buffers are counted in words: bytes would not reach as far.
+        // Places in buffers are counted in words: bytes would not reach as far. What is beyond all words must
+        // not begin anew.
+        if length.is_none() {
+            let last = self.bits(u32::MAX / (stride / 4).max(1));
+            index = self.two(Two::MinU, index, last);
+        }
         let words = self.bits(stride / 4);
         let mut offset = self.two(Two::Mul, index, words);
         if let First::Slot(slot) = first {

@@ -80,8 +80,13 @@ struct Frame<'a> {
 /// What a pointer to cells points to.
 #[derive(Clone, Copy, Debug)]
 enum Target {
-    Cell { frame: usize, slot: Slot },
-    Private { cell: u32 },
+    Cell {
+        frame: usize,
+        slot: Slot,
+    },
+    Private {
+        cell: u32,
+    },
     /// A cell of an element of an array in memory.
     Array {
         from: i32,
@@ -160,7 +165,10 @@ fn escapes(node: &Node) -> Escapes {
 }
 
 fn escapes_of(block: &[Node]) -> Escapes {
-    block.iter().map(escapes).fold(Escapes::default(), Escapes::with)
+    block
+        .iter()
+        .map(escapes)
+        .fold(Escapes::default(), Escapes::with)
 }
 
 /// About how many instructions a block takes; `None` if it has loops or calls.
@@ -210,9 +218,10 @@ pub(super) fn translate<'a>(
         let at = shared.private + CELL * cell as i32;
         // Other lanes have such variables as well, but for those that never began.
         let mask = if is_main { this.mask } else { Value(u32::MAX) };
-        let variable = match shared.indexed[cell] {
-            true => this.variables.of_array(at, mask),
-            false => this.variables.in_memory(at, mask),
+        let variable = if shared.indexed[cell] {
+            this.variables.of_array(at, mask)
+        } else {
+            this.variables.in_memory(at, mask)
         };
         this.private.push(variable);
     }
@@ -295,7 +304,12 @@ impl<'a> Translator<'a> {
         {
             key.swap(0, 1);
         }
-        if let Some(value) = self.known.iter().rev().find_map(|known| known.get(&(op, key))) {
+        if let Some(value) = self
+            .known
+            .iter()
+            .rev()
+            .find_map(|known| known.get(&(op, key)))
+        {
             return *value;
         }
         let to = self.new_value();
@@ -315,7 +329,9 @@ impl<'a> Translator<'a> {
         let (x, y) = (self.bits_of(a), self.bits_of(b));
         match (two, x, y) {
             (Two::And, Some(u32::MAX), _) => return b,
-            (Two::And, _, Some(u32::MAX)) | (Two::Or | Two::Xor | Two::Add, _, Some(0)) => return a,
+            (Two::And, _, Some(u32::MAX)) | (Two::Or | Two::Xor | Two::Add, _, Some(0)) => {
+                return a;
+            }
             (Two::Or | Two::Xor | Two::Add, Some(0), _) => return b,
             (Two::And, _, Some(0)) | (Two::AndNot, _, Some(0)) => return self.bits(0),
             (Two::AndNot, Some(0), _) => return b,
@@ -387,9 +403,10 @@ impl<'a> Translator<'a> {
             }
         }
         let tail = matches!(function.body.last(), Some(Node::Return(_)));
-        let before = match tail {
-            true => &function.body[..function.body.len() - 1],
-            false => &function.body[..],
+        let before = if tail {
+            &function.body[..function.body.len() - 1]
+        } else {
+            &function.body[..]
         };
         let returned = escapes_of(before).returns.then(|| {
             let none = self.bits(0);
@@ -465,7 +482,13 @@ impl<'a> Translator<'a> {
             left.extend(frame.around.last().and_then(|around| around.broken));
         }
         if escapes.continues {
-            left.extend(frame.around.iter().rev().find_map(|around| around.continued));
+            left.extend(
+                frame
+                    .around
+                    .iter()
+                    .rev()
+                    .find_map(|around| around.continued),
+            );
         }
         let mut mask = mask;
         for variable in left {
@@ -701,7 +724,10 @@ impl<'a> Translator<'a> {
         self.block(&function.body)?;
         self.mask = mask;
         self.frames.pop();
-        let results = result.into_iter().map(|variable| self.get(variable)).collect();
+        let results = result
+            .into_iter()
+            .map(|variable| self.get(variable))
+            .collect();
         self.variables.end(first);
         Ok(results)
     }
@@ -725,7 +751,9 @@ impl<'a> Translator<'a> {
             self.variables.renew(variable);
         }
         let results = 0..function.result.len() as i32;
-        Ok(results.map(|at| self.load(interface.result + CELL * at)).collect())
+        Ok(results
+            .map(|at| self.load(interface.result + CELL * at))
+            .collect())
     }
 
     /// Calls the host, which answers in place of a function.
@@ -844,7 +872,9 @@ impl<'a> Translator<'a> {
                 count,
             } => {
                 let of = |this: &mut Self, at: usize, width: u32| {
-                    (from[at]..from[at] + width).map(|slot| this.value(slot)).collect()
+                    (from[at]..from[at] + width)
+                        .map(|slot| this.value(slot))
+                        .collect()
                 };
                 let op = self.shared.code.ops[*op as usize];
                 let values = crate::arithmetic::vectors(self, op, *width, of);

@@ -161,8 +161,8 @@ impl Arithmetic for Translator<'_> {
             Conversion::Bits | Conversion::OfBits => a,
             Conversion::OfSigned => self.pure(Pure::FloatOfInt, &[a]),
             Conversion::OfUnsigned => self.of_unsigned(a),
-            Conversion::ToSigned => self.to_signed(a),
-            Conversion::ToUnsigned => self.to_unsigned(a),
+            Conversion::ToSigned => self.signed_of(a),
+            Conversion::ToUnsigned => self.unsigned_of(a),
             Conversion::WordOfBool => {
                 let one = self.bits(1);
                 self.two(Two::And, a, one)
@@ -217,7 +217,7 @@ impl Translator<'_> {
     }
 
     /// The instruction gives the least integer for all that it cannot convert.
-    fn to_signed(&mut self, a: Value) -> Value {
+    fn signed_of(&mut self, a: Value) -> Value {
         let converted = self.pure(Pure::IntOfFloat, &[a]);
         let limit = self.float(2f32.powi(31));
         let beyond = self.compare_floats(Order::GreaterEqual, a, limit);
@@ -226,7 +226,7 @@ impl Translator<'_> {
         self.two(Two::And, converted, is_number)
     }
 
-    fn to_unsigned(&mut self, a: Value) -> Value {
+    fn unsigned_of(&mut self, a: Value) -> Value {
         let zero = self.float(0.0);
         // What is no number becomes 0 as well.
         let a = self.pure(Pure::Two(Two::MaxF), &[a, zero]);
