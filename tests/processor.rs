@@ -12,6 +12,9 @@ use impasto::runtime::cpu::Width;
 use impasto::runtime::device::DeviceRef;
 use impasto::runtime::film::Film;
 use impasto::runtime::scene::FilmSettings;
+use impasto::runtime::world::World;
+use impasto::trace::MaterialCode;
+use impasto::trace::path::{Replayer, with_room};
 use impasto::{
     Cpu, CpuOptions, Gpu, GpuOptions, Program, RenderOptions, Renderer, Rendering, Scene, Strategy,
 };
@@ -37,6 +40,8 @@ fn root() -> &'static Path {
 struct Subject {
     scene: Scene,
     program: Program,
+    /// What was generated for it, which it reads while it is rendered.
+    _folder: tempfile::TempDir,
 }
 
 impl Subject {
@@ -51,7 +56,11 @@ impl Subject {
         let mut scene = impasto::load(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
         scene.film = FilmSettings { width, height };
         let program = impasto::compile(&scene).unwrap_or_else(|e| panic!("{name}: {e}"));
-        Self { scene, program }
+        Self {
+            scene,
+            program,
+            _folder: out,
+        }
     }
 
     fn render<'d>(
@@ -115,8 +124,8 @@ fn scenes() -> Vec<String> {
 }
 
 /// One path in a thousand may differ. Between curved mirrors each bounce makes a difference larger, until
-/// it is another path: there so many may that differ on the GPU alone when the camera moves by the last
-/// digit of its place.
+/// it is another path, and noise of a tenth of a millimetre differs between neighbouring coordinates. There
+/// [`FUNCTIONS`] times as many may as differ on the GPU alone when the camera moves by a last digit.
 #[test]
 fn paths_are_those_of_a_gpu() {
     let processor = cpu(2);
@@ -127,13 +136,6 @@ fn paths_are_those_of_a_gpu() {
         let theirs = subject.render(&*GPU, Strategy::OWN, &samples(1));
         let astray = 1.0 - equal(&ours.film, &theirs.film);
         eprintln!("{name}: {:.3} % of the paths differ", 100.0 * astray);
-        let pixels = ours.film.pixels.iter().zip(&theirs.film.pixels).enumerate();
-        for (at, (a, b)) in pixels
-            .filter(|(_, (a, b))| !(0..3).all(|c| is_near(a[c], b[c])))
-            .take(12)
-        {
-            eprintln!("{at}: {a:?} {b:?}");
-        }
         if astray <= 0.001 {
             continue;
         }
@@ -142,11 +144,45 @@ fn paths_are_those_of_a_gpu() {
         let moved = subject.render(&*GPU, Strategy::OWN, &samples(1));
         let allowed = 1.0 - equal(&moved.film, &theirs.film);
         eprintln!("{name}: {:.3} % differ by a last digit", 100.0 * allowed);
-        if astray > allowed.min(0.03) {
+        if astray > (FUNCTIONS * allowed).min(0.05) {
             wrong.push((name, astray, allowed));
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// How many last digits the functions of a driver in software are off: powers, sines, logarithms.
+const FUNCTIONS: f64 = 6.0;
+
+/// Native code does what the interpreter does, which was held to the specification operation by operation.
+#[test]
+fn paths_are_those_that_the_interpreter_replays() {
+    for name in scenes() {
+        let subject = Subject::example(&name, [16, 12]);
+        let rendered = subject
+            .render(&cpu(2), Strategy::MEGA, &samples(1))
+            .film
+            .pixels;
+        let (scene, program) = (&subject.scene, &subject.program);
+        let technique = RenderOptions::default().technique;
+        let world = World::of_program(scene, program, &technique);
+        let world = world.unwrap_or_else(|e| panic!("{name}: {e}"));
+        let replayed: Vec<[f64; 3]> = with_room(|| {
+            let replayer = Replayer::new(&world, program, technique.sampler).expect("a kernel");
+            let code = replayer.code(MaterialCode::Wgsl).expect("known code");
+            let mut session = replayer.session::<f32>(&code).expect("known buffers");
+            let places = (0..16 * 12).map(|p| [p % 16, p / 16]);
+            let path = |place| session.path(place, 0, 0).unwrap_or_else(|e| panic!("{e}"));
+            places.map(path).map(|path| path.radiance).collect()
+        })
+        .unwrap_or_else(|e| panic!("{name}: {e}"));
+        let pairs = rendered.iter().zip(&replayed);
+        let astray = pairs.filter(|(a, b)| !(0..3).all(|c| is_near(a[c], b[c] as f32)));
+        let astray: Vec<_> = astray.collect();
+        eprintln!("{name}: {} of 192 replays differ", astray.len());
+        // Two may, where functions that both round otherwise are told apart by what follows.
+        assert!(astray.len() <= 2, "{name}: {astray:?}");
+    }
 }
 
 /// Which thread computes a path, and beside which others, never changes its value.
