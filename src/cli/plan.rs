@@ -153,7 +153,10 @@ impl PlanCommandArgs {
             Source::Given(plan) => plan.strategy.clone(),
             Source::Strategy(strategy) => strategy.to_string(),
         };
-        let is_replaced = device.replaces(&asked);
+        let is_replaced = match &source {
+            Source::Given(plan) => device.replaces_plan(plan),
+            Source::Strategy(_) => device.replaces(&asked),
+        };
         let plan = match source {
             _ if is_replaced => device
                 .strategy()

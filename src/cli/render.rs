@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use impasto::compiler::partition::{Organisation, PlanInputs, Requires};
+use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
@@ -117,7 +117,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let material_seconds = started.elapsed().as_secs_f64();
     let device = args.device.open(global)?;
     let planned = args.planned(&scene, &program, &device)?;
-    if planned.plan.organisation != Organisation::Mega && device.replaces(&planned.plan.strategy) {
+    if device.replaces_plan(&planned.plan) {
         global.note(&replaced(&planned.plan.strategy, device.strategy()));
     }
     let given = args.device_profile.as_deref().map(Profile::given);

@@ -4,6 +4,12 @@ use serde_json::Value;
 
 use crate::cli::common::{Run, SCENE, command, folder, impasto, names};
 
+/// The strategy of this processor, unless another is asked for.
+fn strategy() -> &'static str {
+    let cpu = impasto::Cpu::new(&impasto::CpuOptions::default()).expect("a processor");
+    if cpu.is_wide() { "own" } else { "mega" }
+}
+
 /// Runs the command where there is no driver of a GPU.
 #[cfg(target_os = "linux")]
 fn without_gpu(args: &[&str]) -> Run {
@@ -99,30 +105,29 @@ fn a_replaced_strategy_is_said() {
     };
     let (run, json) = render(&[]);
     assert!(!run.exits(0).stderr.contains("in place of"));
-    assert_eq!(
-        (&json["strategy"], &json["plan"]),
-        (&"mega".into(), &"mega".into())
-    );
+    let chosen = strategy();
+    assert_eq!(json["strategy"], chosen);
     assert!(json["replaced_strategy"].is_null());
     assert_eq!(json["adapter"]["backend"], "native");
-    let (run, json) = render(&["--strategy", "auto"]);
-    run.exits(0).says("`mega` in place of `auto`");
+    // With one path at a time there is one kernel.
+    for (options, asked, has) in [
+        (&["--strategy", "auto"][..], "auto", chosen),
+        (&["--strategy", "binned"], "binned", chosen),
+        (&["--partition", "binned:*"], "partition", chosen),
+        (&["--strategy", "own", "--one-lane"], "own", "mega"),
+    ] {
+        let (run, json) = render(options);
+        run.exits(0).says(&format!("`{has}` in place of `{asked}`"));
+        assert_eq!(json["strategy"], has);
+        assert_eq!(json["replaced_strategy"], asked);
+        assert!(json["replanned"].is_null());
+    }
+    let (run, json) = render(&["--strategy", "mega"]);
+    assert!(!run.exits(0).stderr.contains("in place of"));
     assert_eq!(
         (&json["strategy"], &json["plan"]),
         (&"mega".into(), &"mega".into())
     );
-    assert_eq!(json["replaced_strategy"], "auto");
-    assert!(json["replanned"].is_null());
-    // Some processors run the kernels of other strategies, and others do not.
-    for (options, asked) in [
-        (["--strategy", "own"], "own"),
-        (["--partition", "binned:*"], "partition"),
-    ] {
-        let (run, json) = render(&options);
-        let is_replaced = json["replaced_strategy"] == asked;
-        assert_eq!(run.exits(0).stderr.contains("in place of"), is_replaced);
-        assert_eq!(json["strategy"], if is_replaced { "mega" } else { asked });
-    }
     // What is wrong with a plan is said all the same.
     render(&["--partition", "own:marble|*"])
         .0
@@ -135,11 +140,11 @@ fn a_replaced_strategy_is_said() {
 }
 
 #[test]
-fn the_plan_of_the_processor_is_one_kernel_with_the_reason() {
+fn the_plan_of_the_processor_has_a_reason() {
     let folder = folder();
     let saved = folder.path().join("plan.json").display().to_string();
-    let plan = ["plan", SCENE, "--device", "cpu"];
-    let text = impasto(&plan).exits(0).stdout;
+    let one = ["plan", SCENE, "--device", "cpu", "--one-lane"];
+    let text = impasto(&one).exits(0).stdout;
     for part in [
         "plan `mega`: 1 kernel of materials",
         "checker_tiles",
@@ -148,21 +153,21 @@ fn the_plan_of_the_processor_is_one_kernel_with_the_reason() {
     ] {
         assert!(text.contains(part), "`{part}` is not in\n{text}");
     }
+    let plan = ["plan", SCENE, "--device", "cpu"];
     let more = ["--strategy", "auto", "--format", "json", "--save", &saved];
     let json = impasto(&[&plan[..], &more].concat()).exits(0).json();
     assert_eq!(
         (&json["strategy"], &json["replaced_strategy"]),
-        (&"mega".into(), &"auto".into())
+        (&strategy().into(), &"auto".into())
     );
-    assert_eq!(
-        json["kernels"][0]["materials"].as_array().map(Vec::len),
-        Some(5)
-    );
-    assert!(
-        json["why"]
-            .as_str()
-            .is_some_and(|why| why.contains("memory"))
-    );
+    let kernels = json["kernels"].as_array().expect("kernels");
+    assert_eq!(kernels.len(), if strategy() == "own" { 5 } else { 1 });
+    let reason = if strategy() == "own" {
+        "eight paths"
+    } else {
+        "memory"
+    };
+    assert!(json["why"].as_str().is_some_and(|why| why.contains(reason)));
     let out = folder.path().join("p.exr").display().to_string();
     let render = [
         "render",

@@ -107,15 +107,17 @@ impl Cpu {
         strategy != Strategy::MEGA && (is_of_gpus || !self.is_wide())
     }
 
+    /// The same of a plan.
+    pub(crate) fn replaces_plan(&self, plan: &Plan) -> bool {
+        let is_mega = plan.organisation == Organisation::Mega;
+        let is_binned = plan.kernels.iter().any(|k| k.form == Form::Binned);
+        let is_replaced = Strategy::parse(&plan.strategy).is_ok_and(|s| self.replaces(s));
+        !is_mega && (is_replaced || is_binned || !self.is_wide())
+    }
+
     /// The plan that takes the place of one that cannot run here.
     pub(crate) fn plan(&self, wanted: &Plan, world: &World, source: &dyn MaterialSource) -> Plan {
-        let is_mega = wanted.organisation == Organisation::Mega;
-        let is_binned = wanted
-            .kernels
-            .iter()
-            .any(|kernel| kernel.form == Form::Binned);
-        let is_replaced = Strategy::parse(&wanted.strategy).is_ok_and(|s| self.replaces(s));
-        if is_mega || self.is_wide() && !is_binned && !is_replaced {
+        if !self.replaces_plan(wanted) {
             return wanted.clone();
         }
         let names: Vec<String> = source.infos().into_iter().map(|m| m.name).collect();

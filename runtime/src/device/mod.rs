@@ -104,6 +104,11 @@ impl Device {
         DeviceRef::from(self).replaces(strategy)
     }
 
+    /// The same of a plan.
+    pub fn replaces_plan(&self, plan: &Plan) -> bool {
+        DeviceRef::from(self).replaces_plan(plan)
+    }
+
     /// The strategy by which materials share kernels unless another is asked for.
     pub fn strategy(&self) -> Strategy {
         DeviceRef::from(self).strategy()
@@ -186,6 +191,14 @@ impl DeviceRef<'_> {
         match self {
             DeviceRef::Gpu(_) => false,
             DeviceRef::Cpu(cpu) => Strategy::parse(strategy).is_ok_and(|s| cpu.replaces(s)),
+        }
+    }
+
+    /// The same of a plan.
+    pub fn replaces_plan(self, plan: &Plan) -> bool {
+        match self {
+            DeviceRef::Gpu(_) => false,
+            DeviceRef::Cpu(cpu) => cpu.replaces_plan(plan),
         }
     }
 
