@@ -154,7 +154,7 @@ impl<'g> Renderer<'g> {
         let begin = Instant::now();
         let asked = plan;
         let plan = &device.plan(asked, world, source);
-        let replaced = plan.organisation != asked.organisation;
+        let replaced = plan.strategy != asked.strategy;
         let mut options = options.clone();
         options.technique = device.technique(options.technique);
         settings::check(world, &options)?;
