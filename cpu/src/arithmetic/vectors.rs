@@ -56,9 +56,9 @@ fn of_numbers<M: Arithmetic>(
             cross(m, x, &y)
         }
         Math::Normalize => {
-            let (one, length) = (m.float(1.0), length(m, x));
-            let scale = m.float2(Float2::Divide, one, length);
-            scaled(m, x, scale)
+            let length = length(m, x);
+            let each = |x: &M::Value| m.float2(Float2::Divide, *x, length);
+            x.iter().map(each).collect()
         }
         Math::Reflect => {
             let normal = of(m, 1, width);

@@ -92,9 +92,9 @@ fn cross<F: Float>(cells: &mut [u64], [a, b, _]: [Slot; 3], _: u32, to: Slot) {
 }
 
 fn normalize<F: Float>(cells: &mut [u64], [a, ..]: [Slot; 3], width: u32, to: Slot) {
-    let scale = F::of(1.0) / length::<F>(cells, a, width);
+    let length = length::<F>(cells, a, width);
     for i in 0..width {
-        put(cells, to, i, at::<F>(cells, a, i) * scale);
+        put(cells, to, i, at::<F>(cells, a, i) / length);
     }
 }
 

@@ -213,7 +213,10 @@ fn sources(folder: &Path) -> Result<Vec<Source>> {
         for entry in std::fs::read_dir(&path).map_err(text)? {
             let path = entry.map_err(text)?.path();
             if path.is_dir() {
-                left.push(path);
+                // Tests of a crate, which may name all of it.
+                if path.file_name().is_none_or(|name| name != "tests") {
+                    left.push(path);
+                }
             } else if is_source(&path) {
                 let below = path.strip_prefix(folder).unwrap_or(&path);
                 let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
