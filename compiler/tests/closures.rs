@@ -12,6 +12,21 @@ use impasto_fuzz::Stopwatch;
 
 const USES: &str = "use std::bsdf::{diffuse, mirror, specular};\nuse std::edf::uniform;\n";
 
+/// Functions are checked on their own, too, where nobody knows yet what their arguments reflect.
+#[test]
+fn sums_of_parameters_are_weighed() {
+    for (sum, expected) in [
+        ("base + base", &["W0001"][..]),
+        ("0.5 * base + base", &["W0001"]),
+        ("0.5 * base + 0.5 * base", &[]),
+    ] {
+        let text = format!(
+            "{USES}fn f(base: bsdf) -> bsdf = {sum};\nmaterial m {{ surface = f(diffuse(0.2)); }}\n"
+        );
+        assert_eq!(codes(&text, &[]), expected, "{sum}");
+    }
+}
+
 /// What the material answers about some directions, at one point, exactly.
 fn answers(program: &Program) -> Vec<Vec<f64>> {
     let vector = |v: &[f64]| Value::<f64>::vector(v);

@@ -69,11 +69,17 @@ pub fn is_wide() -> bool {
 }
 
 impl Kernel {
-    /// Compiles `code`. By hook, `answers` are called in place of functions that the host answers.
+    /// Compiles `code`. By hook, `answers` are called in place of functions that the host answers. By name,
+    /// `is_alone` says which buffers only one thread uses at a time: operations on them need not be atomic.
     ///
     /// # Errors
     /// If the code has what is not known here, or there is no memory for code.
-    pub fn build(code: &Code, answers: &[Answer], width: Width) -> Result<Self, KernelError> {
+    pub fn build(
+        code: &Code,
+        answers: &[Answer],
+        is_alone: impl Fn(&str) -> bool,
+        width: Width,
+    ) -> Result<Self, KernelError> {
         if code.has_barriers && code.workgroup > 1 {
             let what = "workgroup whose threads wait for each other";
             return Err(KernelError::unsupported(what, &code.main.name));
@@ -81,13 +87,13 @@ impl Kernel {
         #[cfg(all(target_arch = "x86_64", unix))]
         if width == Width::Best && wide::is_possible() {
             let answers: Vec<_> = answers.iter().map(|answer| Some(answer.eight)).collect();
-            match wide::Kernel::build(code, &answers) {
+            match wide::Kernel::build(code, &answers, &is_alone) {
                 // The other back end knows more, such as arrays of any length.
                 Err(KernelError::Unsupported { .. }) => {}
                 built => return Ok(Self(Made::Eight(Box::new(built?)))),
             }
         }
-        let _ = width;
+        let _ = (width, &is_alone);
         let answers: Vec<_> = answers.iter().map(|answer| Some(answer.one)).collect();
         let kernel = native::Kernel::build(code, &answers)?;
         Ok(Self(Made::One(Box::new(kernel))))

@@ -75,7 +75,7 @@ impl Body<'_, '_> {
     fn stand_ins(&mut self, params: &[Param], span: Span) -> Vec<Operand> {
         let mut values = 0..;
         let stand_in = |p: &Param| match p.ty {
-            // The tree is dropped, so the node is never looked at.
+            // The tree is dropped, so there is no node; what looks at nodes takes it for any closure.
             Ty::Bsdf | Ty::Edf => Operand::Closure(ClosureId(u32::MAX), p.ty),
             Ty::Medium => {
                 let parts = empty_space().map(|value| self.constant(value, span));

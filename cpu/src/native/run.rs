@@ -12,22 +12,29 @@ use crate::error::KernelError;
 
 /// Words that kernels read and write, on several threads at once.
 #[derive(Debug)]
-pub struct Buffer(Box<[AtomicU32]>);
+pub struct Buffer {
+    /// Those, and behind them some that may be read but count for nothing.
+    words: Box<[AtomicU32]>,
+}
+
+/// Words that are read behind a value at most, by code that reads four where it needs fewer.
+const BEHIND: usize = 3;
 
 impl Buffer {
     /// So many words, all of them zero.
     pub fn new(words: usize) -> Self {
-        Self((0..words).map(|_| AtomicU32::new(0)).collect())
+        let words = (0..words + BEHIND).map(|_| AtomicU32::new(0)).collect();
+        Self { words }
     }
 
     /// The words that it holds.
     pub fn words(&self) -> &[AtomicU32] {
-        &self.0
+        &self.words[..self.words.len() - BEHIND]
     }
 
     /// Puts words in place of those from `first` on, as far as there are any.
     pub fn write(&self, first: usize, words: &[u32]) {
-        let places = self.0.get(first..).unwrap_or_default();
+        let places = self.words().get(first..).unwrap_or_default();
         for (place, word) in places.iter().zip(words) {
             place.store(*word, Ordering::Relaxed);
         }
@@ -35,14 +42,14 @@ impl Buffer {
 
     /// Puts zeros in place of all words.
     pub fn clear(&self) {
-        self.0
+        self.words()
             .iter()
             .for_each(|word| word.store(0, Ordering::Relaxed));
     }
 
     /// A copy of its words.
     pub fn read(&self) -> Vec<u32> {
-        self.0
+        self.words()
             .iter()
             .map(|word| word.load(Ordering::Relaxed))
             .collect()
@@ -72,7 +79,7 @@ impl Invocation {
         context[STOP as usize / 8] = std::ptr::from_ref(stop) as u64;
         for (index, (name, least)) in kernel.buffers.iter().enumerate() {
             let buffer = buffers.get(index);
-            let bytes = buffer.map_or(0, |b| 4 * b.0.len() as u64);
+            let bytes = buffer.map_or(0, |b| 4 * b.words().len() as u64);
             let (Some(buffer), true) = (buffer, bytes >= *least) else {
                 return Err(KernelError::Bounds {
                     what: format!("the buffer `{name}` of {bytes} bytes"),
@@ -80,7 +87,7 @@ impl Invocation {
                 });
             };
             let at = layout.buffer(index as u32) as usize / 8;
-            context[at] = buffer.0.as_ptr() as u64;
+            context[at] = buffer.words().as_ptr() as u64;
             context[at + 1] = bytes;
         }
         for (hook, data) in (0..layout.hooks).zip(data) {

@@ -422,8 +422,12 @@ fn results(text: &str, input: &[u32], wild: bool) -> Result<Vec<Vec<u32>>, Kerne
         .unwrap_or_else(|e| panic!("{}\n{text}", e.emit_to_string(text)));
     let code = lower(&module, &info, &[], &[])?;
     let mut found = Vec::new();
-    for width in [Width::One, Width::Best] {
-        let kernel = Arc::new(Kernel::build(&code, &[], width)?);
+    for (width, alone) in [
+        (Width::One, false),
+        (Width::Best, false),
+        (Width::Best, true),
+    ] {
+        let kernel = Arc::new(Kernel::build(&code, &[], |_| alone, width)?);
         let (given, out) = (Arc::new(Buffer::new(WORDS)), Arc::new(Buffer::new(WORDS)));
         given.write(0, input);
         let buffers = code.buffers.iter().map(|name| match name.as_str() {

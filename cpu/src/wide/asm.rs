@@ -59,6 +59,14 @@ pub(super) const PSRAVD: Opcode = op(1, 2, 0x46);
 pub(super) const CVTDQ2PS: Opcode = op(0, 1, 0x5b);
 pub(super) const CVTTPS2DQ: Opcode = op(2, 1, 0x5b);
 pub(super) const ROUNDPS: Opcode = op(1, 3, 0x08);
+pub(super) const UNPCKLPS: Opcode = op(0, 1, 0x14);
+pub(super) const UNPCKHPS: Opcode = op(0, 1, 0x15);
+pub(super) const UNPCKLPD: Opcode = op(1, 1, 0x14);
+pub(super) const UNPCKHPD: Opcode = op(1, 1, 0x15);
+const LOAD_ROW: Opcode = op(0, 1, 0x10);
+const STORE_ROW: Opcode = op(0, 1, 0x11);
+const INSERT_HALF: Opcode = op(1, 3, 0x18);
+const EXTRACT_HALF: Opcode = op(1, 3, 0x19);
 const BLENDVPS: Opcode = op(1, 3, 0x4a);
 const LOAD: Opcode = op(0, 1, 0x28);
 const STORE: Opcode = op(0, 1, 0x29);
@@ -125,11 +133,16 @@ impl Assembler {
 
     /// The prefix: of the registers the highest bits, which are inverted.
     fn vex(&mut self, op: Opcode, reg: u8, index: u8, rm: u8, second: u8) {
+        self.vex_of(256, op, reg, index, rm, second);
+    }
+
+    /// The same of registers of so many bits.
+    fn vex_of(&mut self, bits: u32, op: Opcode, reg: u8, index: u8, rm: u8, second: u8) {
         let high = |register: u8| !(register >> 3) & 1;
         self.bytes(&[
             0xc4,
             high(reg) << 7 | high(index) << 6 | high(rm) << 5 | op.table,
-            (!second & 15) << 3 | 1 << 2 | op.prefix,
+            (!second & 15) << 3 | u8::from(bits == 256) << 2 | op.prefix,
             op.code,
         ]);
     }
@@ -246,6 +259,89 @@ impl Assembler {
             scale << 6 | (index & 7) << 3 | BASE,
         ]);
         self.bytes(&from.to_le_bytes());
+    }
+
+    /// Loads the address of a buffer, which lies at a place, to rcx.
+    pub(super) fn load_buffer(&mut self, from: i32) {
+        self.bytes(&[0x48, 0x8b, 0x8b]);
+        self.bytes(&from.to_le_bytes());
+    }
+
+    /// Loads the index of a lane, which lies at a place, to eax.
+    pub(super) fn load_index(&mut self, from: i32) {
+        self.bytes(&[0x8b, 0x83]);
+        self.bytes(&from.to_le_bytes());
+    }
+
+    /// The operands of a register and what lies at `[rcx + 4 rax + offset]`.
+    fn indexed(&mut self, reg: u8, offset: i32) {
+        self.bytes(&[0x80 | (reg & 7) << 3 | 4, 0x81]);
+        self.bytes(&offset.to_le_bytes());
+    }
+
+    /// Loads the row of the lane whose index was loaded to the lower or the upper half of a register. The
+    /// lower one clears the upper one.
+    pub(super) fn load_row(&mut self, to: Register, offset: i32, upper: bool) {
+        if upper {
+            self.vex(INSERT_HALF, to, 0, 1, to);
+            self.indexed(to, offset);
+            self.bytes(&[1]);
+        } else {
+            self.vex_of(128, LOAD_ROW, to, 0, 1, 0);
+            self.indexed(to, offset);
+        }
+    }
+
+    /// Stores such a half.
+    pub(super) fn store_row(&mut self, from: Register, offset: i32, upper: bool) {
+        if upper {
+            self.vex(EXTRACT_HALF, from, 0, 1, 0);
+            self.indexed(from, offset);
+            self.bytes(&[1]);
+        } else {
+            self.vex_of(128, STORE_ROW, from, 0, 1, 0);
+            self.indexed(from, offset);
+        }
+    }
+
+    /// Stores the word that lies at a place.
+    pub(super) fn store_word(&mut self, from: i32, offset: i32) {
+        // mov esi, [rbx + from]; mov [rcx + 4 rax + offset], esi
+        self.bytes(&[0x8b, 0xb3]);
+        self.bytes(&from.to_le_bytes());
+        self.bytes(&[0x89]);
+        self.indexed(6, offset);
+    }
+
+    /// Adds the word that lies at a place, and puts what was there before at another.
+    pub(super) fn add_word(&mut self, offset: i32, from: i32, before: i32) {
+        // mov esi, [rcx + 4 rax + offset]; mov [rbx + before], esi; add esi, [rbx + from]; mov back
+        self.bytes(&[0x8b]);
+        self.indexed(6, offset);
+        self.bytes(&[0x89, 0xb3]);
+        self.bytes(&before.to_le_bytes());
+        self.bytes(&[0x03, 0xb3]);
+        self.bytes(&from.to_le_bytes());
+        self.bytes(&[0x89]);
+        self.indexed(6, offset);
+    }
+
+    /// The bits of a mask, to edx.
+    pub(super) fn mask_bits(&mut self, mask: Register) {
+        self.vex(MOVMSKPS, 2, 0, mask, 0);
+        self.operands(2, Operand::Register(mask));
+    }
+
+    /// Jumps if a lane of that mask is not set, to where [`Assembler::land`] says.
+    pub(super) fn skip_lane(&mut self, lane: u8) -> usize {
+        // test dl, bit; jz
+        self.bytes(&[0xf6, 0xc2, 1 << lane, 0x74, 0]);
+        self.code.len()
+    }
+
+    /// The end of such a jump, which is short.
+    pub(super) fn land(&mut self, skip: usize) {
+        self.code[skip - 1] = (self.code.len() - skip) as u8;
     }
 
     /// Jumps if no lane of a mask is set.

@@ -8,11 +8,12 @@ use std::collections::HashMap;
 
 use super::asm::{self, Assembler, Label, Opcode, Operand, Register};
 use super::inst::{Constant, Inst, Pure, Two, Value};
-use super::memory::Memory;
+use super::memory::{CELL, Memory};
 
 /// Registers of values; the one behind them is for masks of gathers and for moves.
 const REGISTERS: usize = 15;
 const SPARE: Register = 15;
+const LANES: i32 = 8;
 
 /// A function whose values have no registers yet.
 #[derive(Debug)]
@@ -103,13 +104,8 @@ fn lives(text: &Text) -> Vec<Place> {
             }
             _ => {}
         }
-        if let Some(value) = inst.makes() {
+        for value in inst.results() {
             made[value.0 as usize] = at;
-        }
-        if let Inst::Host { results, .. } = inst {
-            for value in results {
-                made[value.0 as usize] = at;
-            }
         }
         for value in inst.reads() {
             let begin = made[value.0 as usize];
@@ -311,6 +307,27 @@ impl Assigner<'_> {
                 self.asm.load_address(self.memory.buffer(*buffer));
                 self.asm.gather(register, index, SPARE, *offset);
             }
+            Inst::Rows {
+                buffer,
+                index,
+                offset,
+                to,
+            } => self.rows(*buffer, *index, *offset, to),
+            Inst::Scatter {
+                buffer,
+                reads,
+                offset,
+            } => {
+                if let [mask, index, words @ ..] = &reads[..] {
+                    self.scatter(*buffer, *mask, *index, words, *offset);
+                }
+            }
+            Inst::Add {
+                buffer,
+                reads: [mask, index, value],
+                offset,
+                to,
+            } => self.add(*buffer, [*mask, *index, *value], *offset, *to),
             Inst::GatherOwn { from, index, to } => {
                 let index = self.register(*index);
                 let register = self.room();
@@ -413,6 +430,118 @@ impl Assigner<'_> {
                 self.asm.load(register, Operand::Memory(from));
                 self.locked = [false; REGISTERS];
             }
+        }
+    }
+
+    /// Where a value lies in memory, after it was brought there if need be.
+    fn in_memory(&mut self, value: Value, scratch: i32) -> i32 {
+        if let Some(home) = self.home(value) {
+            return home;
+        }
+        let register = self.register(value);
+        self.asm.store(scratch, register);
+        scratch
+    }
+
+    /// Loads what each lane has in a row, and makes columns of the rows.
+    fn rows(&mut self, buffer: u32, index: Value, offset: i32, to: &[Option<Value>; 4]) {
+        let needed = to.map(|value| value.filter(|v| self.places[v.0 as usize].last > 0));
+        if needed == [None; 4] {
+            return;
+        }
+        let index = self.in_memory(index, self.memory.exchange());
+        self.locked = [false; REGISTERS];
+        self.asm.load_buffer(self.memory.buffer(buffer));
+        let [a, b, c, d] = needed.map(|_| self.room());
+        for lane in 0..LANES {
+            let row = [a, b, c, d][lane as usize % 4];
+            self.asm.load_index(index + 4 * lane);
+            self.asm.load_row(row, offset, lane >= 4);
+        }
+        let (low, high) = (asm::UNPCKLPS, asm::UNPCKHPS);
+        let (low_pairs, high_pairs) = (asm::UNPCKLPD, asm::UNPCKHPD);
+        let mut mix = |op, to, x, y| self.asm.three(op, to, x, Operand::Register(y));
+        mix(low, SPARE, a, b);
+        mix(high, a, a, b);
+        mix(low, b, c, d);
+        mix(high, c, c, d);
+        // First and second words are in the spare register and `b`, third and fourth ones in `a` and `c`.
+        mix(high_pairs, d, SPARE, b);
+        mix(low_pairs, b, SPARE, b);
+        mix(high_pairs, SPARE, a, c);
+        mix(low_pairs, a, a, c);
+        self.asm.load(c, Operand::Register(SPARE));
+        for (register, value) in [b, d, a, c].into_iter().zip(needed) {
+            if let Some(value) = value {
+                self.hold(register, value);
+            }
+        }
+    }
+
+    /// Stores words of each lane of a mask: four as a row, or else one by one.
+    fn scatter(&mut self, buffer: u32, mask: Value, index: Value, words: &[Value], offset: i32) {
+        let scratch = self.memory.exchange();
+        let mask = self.register(mask);
+        self.asm.mask_bits(mask);
+        let index = self.in_memory(index, scratch);
+        self.locked = [false; REGISTERS];
+        self.asm.load_buffer(self.memory.buffer(buffer));
+        let &[x, y, z, w] = words else {
+            for (word, value) in (0..).zip(words) {
+                let from = self.in_memory(*value, scratch + CELL);
+                self.locked = [false; REGISTERS];
+                for lane in 0..LANES {
+                    let skip = self.asm.skip_lane(lane as u8);
+                    self.asm.load_index(index + 4 * lane);
+                    self.asm.store_word(from + 4 * lane, offset + 4 * word);
+                    self.asm.land(skip);
+                }
+            }
+            return;
+        };
+        let [x, y, z, w] = [x, y, z, w].map(|value| self.register(value));
+        let [a, b, c, d] = [(); 4].map(|()| self.room());
+        let (low, high) = (asm::UNPCKLPS, asm::UNPCKHPS);
+        let (low_pairs, high_pairs) = (asm::UNPCKLPD, asm::UNPCKHPD);
+        let mut mix = |op, to, x, y| self.asm.three(op, to, x, Operand::Register(y));
+        mix(low, a, x, y);
+        mix(low, b, z, w);
+        mix(low_pairs, c, a, b);
+        mix(high_pairs, a, a, b);
+        mix(high, b, x, y);
+        mix(high, SPARE, z, w);
+        mix(low_pairs, d, b, SPARE);
+        mix(high_pairs, b, b, SPARE);
+        for lane in 0..LANES {
+            let row = [c, a, d, b][lane as usize % 4];
+            let skip = self.asm.skip_lane(lane as u8);
+            self.asm.load_index(index + 4 * lane);
+            self.asm.store_row(row, offset, lane >= 4);
+            self.asm.land(skip);
+        }
+    }
+
+    /// Adds to a word of each lane of a mask.
+    fn add(&mut self, buffer: u32, [mask, index, value]: [Value; 3], offset: i32, to: Value) {
+        let scratch = self.memory.exchange();
+        let before = scratch + 2 * CELL;
+        let mask = self.register(mask);
+        self.asm.mask_bits(mask);
+        let index = self.in_memory(index, scratch);
+        let value = self.in_memory(value, scratch + CELL);
+        self.locked = [false; REGISTERS];
+        self.asm.load_buffer(self.memory.buffer(buffer));
+        for lane in 0..LANES {
+            let skip = self.asm.skip_lane(lane as u8);
+            self.asm.load_index(index + 4 * lane);
+            self.asm
+                .add_word(offset, value + 4 * lane, before + 4 * lane);
+            self.asm.land(skip);
+        }
+        if self.places[to.0 as usize].last > 0 {
+            let register = self.room();
+            self.hold(register, to);
+            self.asm.load(register, Operand::Memory(before));
         }
     }
 

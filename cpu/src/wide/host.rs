@@ -114,35 +114,6 @@ pub(super) fn address(function: Called) -> usize {
     found as usize
 }
 
-/// Stores words to a buffer, whose address is given along: the mask, indices of words, an offset and a number
-/// of words; then those.
-#[allow(unsafe_code)]
-pub(super) unsafe extern "C" fn scatter(data: *const c_void, cells: *mut Cell) {
-    // SAFETY: the code that calls leaves so many cells, and indices are within the buffer.
-    unsafe {
-        let [Cell(mask), Cell(index), Cell(offset), Cell(words)] = &*cells.cast::<[Cell; 4]>();
-        let buffer = data.cast::<AtomicU32>().add(offset[0] as usize);
-        let values = cells.add(4).cast::<u32>();
-        let words = words[0] as usize;
-        for lane in 0..8 {
-            if mask[lane] == 0 {
-                continue;
-            }
-            let first = buffer.add(index[lane] as usize);
-            let value = values.add(lane);
-            if words == 4 {
-                for word in 0..4 {
-                    (*first.add(word)).store(*value.add(8 * word), Ordering::Relaxed);
-                }
-                continue;
-            }
-            for word in 0..words {
-                (*first.add(word)).store(*value.add(8 * word), Ordering::Relaxed);
-            }
-        }
-    }
-}
-
 /// What an atomic operation leaves.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum AtomicKind {

@@ -135,6 +135,29 @@ pub(super) enum Inst {
         offset: i32,
         to: Value,
     },
+    /// Up to four words of a buffer that follow each other: by index and bytes behind it where the first is.
+    Rows {
+        buffer: u32,
+        index: Value,
+        offset: i32,
+        to: [Option<Value>; 4],
+    },
+    /// Stores such words, in the lanes of a mask.
+    Scatter {
+        buffer: u32,
+        /// mask, index, words
+        reads: Vec<Value>,
+        offset: i32,
+    },
+    /// Adds to words of a buffer that only this thread uses, in the lanes of a mask, one after another.
+    Add {
+        buffer: u32,
+        /// mask, index, what is added
+        reads: [Value; 3],
+        offset: i32,
+        /// What was there before.
+        to: Value,
+    },
     /// Words of the thread's memory, by their index.
     GatherOwn {
         from: i32,
@@ -180,9 +203,11 @@ impl Inst {
                 arguments, count, ..
             } => &arguments[..usize::from(*count)],
             Inst::Store { from, .. } => std::slice::from_ref(from),
-            Inst::Gather { index, .. } | Inst::GatherOwn { index, .. } => {
-                std::slice::from_ref(index)
-            }
+            Inst::Gather { index, .. }
+            | Inst::Rows { index, .. }
+            | Inst::GatherOwn { index, .. } => std::slice::from_ref(index),
+            Inst::Scatter { reads, .. } => reads,
+            Inst::Add { reads, .. } => reads,
             Inst::Host { arguments, .. } => arguments,
             Inst::SkipIfNone { mask, .. } | Inst::LeaveIfNone { mask, .. } => {
                 std::slice::from_ref(mask)
@@ -206,5 +231,23 @@ impl Inst {
             | Inst::GatherOwn { to, .. } => Some(*to),
             _ => None,
         }
+    }
+
+    /// All values that it makes.
+    pub(super) fn results(&self) -> impl Iterator<Item = Value> {
+        let several: &[Value] = match self {
+            Inst::Host { results, .. } => results,
+            Inst::Add { to, .. } => std::slice::from_ref(to),
+            _ => &[],
+        };
+        let words = match self {
+            Inst::Rows { to, .. } => *to,
+            _ => [None; 4],
+        };
+        let words = words.into_iter().flatten();
+        self.makes()
+            .into_iter()
+            .chain(words)
+            .chain(several.iter().copied())
     }
 }

@@ -48,11 +48,16 @@ pub(crate) fn is_possible() -> bool {
 }
 
 impl Kernel {
-    /// Compiles `code`. By hook, `answers` are called in place of functions that the host answers.
+    /// Compiles `code`. By hook, `answers` are called in place of functions that the host answers. By name,
+    /// `is_alone` says whether a thread has a buffer for itself.
     ///
     /// # Errors
     /// If the code has what is not known here, or there is no memory for code.
-    pub(crate) fn build(code: &Code, answers: &[Option<Answer>]) -> Result<Self, KernelError> {
+    pub(crate) fn build(
+        code: &Code,
+        answers: &[Option<Answer>],
+        is_alone: impl Fn(&str) -> bool,
+    ) -> Result<Self, KernelError> {
         let begin = Instant::now();
         let plan = Plan::new(code);
         let mut memory = Memory::new(code.buffers.len(), answers.len());
@@ -74,6 +79,7 @@ impl Kernel {
         let interfaces: Vec<Option<Interface>> = interfaces.collect();
         let main = interface(&code.main, &mut asm);
         let indexed = indexed(code);
+        let alone: Vec<bool> = code.buffers.iter().map(|name| is_alone(name)).collect();
         let shared = Shared {
             code,
             plan: &plan,
@@ -81,6 +87,7 @@ impl Kernel {
             private,
             indexed: &indexed,
             answers,
+            alone: &alone,
         };
         let mut functions = 0;
         let own = code.functions.iter().zip(&interfaces);
@@ -269,16 +276,16 @@ impl Invocation {
         self.memory[private..][..kernel.private.len()].copy_from_slice(&kernel.private);
         for (at, input) in (0..).zip(&kernel.inputs) {
             let axis = input.component as usize % 3;
-            let each = lanes.map(|lane| match input.built_in {
-                Some(BuiltIn::WorkGroupId) => group[axis],
-                Some(BuiltIn::LocalInvocationIndex) => first + lane,
-                Some(BuiltIn::LocalInvocationId) if axis == 0 => first + lane,
+            let from = |begin: u32| lanes.map(|lane| begin.wrapping_add(lane));
+            let each = match input.built_in {
+                Some(BuiltIn::WorkGroupId) => [group[axis]; 8],
+                Some(BuiltIn::LocalInvocationIndex) => from(first),
+                Some(BuiltIn::LocalInvocationId) if axis == 0 => from(first),
                 Some(BuiltIn::GlobalInvocationId) if axis == 0 => {
-                    let before = group[0].wrapping_mul(kernel.workgroup);
-                    before.wrapping_add(first + lane)
+                    from(group[0].wrapping_mul(kernel.workgroup).wrapping_add(first))
                 }
-                _ => 0,
-            });
+                _ => [0; 8],
+            };
             self.put(kernel.main.arguments + CELL * at, each);
         }
         let memory = self.memory.as_mut_ptr();

@@ -193,7 +193,7 @@ impl Cpu {
         let hooks: Vec<usize> = (0..names.len()).collect();
         let code = impasto_cpu::lower(&module, &info, &names, &hooks).map_err(refused)?;
         let answers: Vec<_> = answered.iter().map(|(_, answer)| *answer).collect();
-        let build = || impasto_cpu::Kernel::build(&code, &answers, self.width);
+        let build = || impasto_cpu::Kernel::build(&code, &answers, work::is_alone, self.width);
         let built = Arc::new(self.threads.install(build).map_err(refused)?);
         let mut kept = kept();
         if kept.len() >= MOST_KEPT {

@@ -77,6 +77,12 @@ fn is_shared(id: BufferId) -> bool {
     )
 }
 
+/// Whether every thread has a buffer, by its name, for itself.
+pub(super) fn is_alone(name: &str) -> bool {
+    let row = BUFFERS.iter().find(|row| row.name == name);
+    row.is_some_and(|row| !is_shared(row.id))
+}
+
 impl Work {
     /// Makes the runtime's buffers and fills the scene's.
     pub(crate) fn new(

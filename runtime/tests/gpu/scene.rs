@@ -400,7 +400,13 @@ fn every_organisation_renders_the_same_scene() {
                 assert!(other.film == reference.film, "{block}: {strategy} differs");
             }
             let (difference, error) = mean(red(&other).zip(red(&reference)).map(|(a, b)| a - b));
-            assert!(difference.abs() <= 4.0 * error, "{block}: {strategy}");
+            // Where all paths are the same, what is left is rounding, which need not be even.
+            let rounding = 1e-5 * mean(red(&reference)).0;
+            let allowed = 4.0 * error + rounding;
+            assert!(
+                difference.abs() <= allowed,
+                "{block}: {strategy} differs by {difference}, more than {allowed}"
+            );
         }
     }
 }

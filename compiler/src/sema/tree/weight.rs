@@ -70,7 +70,11 @@ impl Body<'_, '_> {
 
     /// How much a closure reflects at most in each channel, by its constant weights.
     fn most_reflected(&self, id: ClosureId) -> [f64; 3] {
-        match &self.closures[id.index()] {
+        // Closures that stand in for parameters are not there.
+        let Some(closure) = self.closures.get(id.index()) else {
+            return [1.0; 3];
+        };
+        match closure {
             Closure::Weight(w, a) => match self.builder.function().constant(*w) {
                 Some(Const::Float(w)) => {
                     let a = self.most_reflected(*a);

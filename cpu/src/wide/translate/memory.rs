@@ -5,7 +5,7 @@ use super::{Target, Translator};
 use crate::code::{Atomic, First, Ins, Op, Pointer, Scalar, Slot};
 use crate::error::KernelError;
 use crate::native::layout::bytes_of;
-use crate::wide::host::{self, AtomicKind};
+use crate::wide::host::AtomicKind;
 use crate::wide::inst::{Constant, Inst, Pure, ShiftKind, Two, Value};
 use crate::wide::memory::CELL;
 use naga::{BinaryOperator, MathFunction, ScalarKind};
@@ -120,18 +120,14 @@ impl<'a> Translator<'a> {
         if let Pointer::Buffer { buffer, .. } = pointer {
             let places = &self.shared.code.layouts[layout as usize];
             let (index, offset) = self.place(pointer, bytes_of(places))?;
+            if let Some(index) = index {
+                self.load_rows(buffer, index, offset, layout, to);
+                return Ok(());
+            }
             for (slot, place) in (to..).zip(places) {
                 let offset = offset + 4 * place.word as i32;
                 let to = self.new_value();
-                self.insts.push(match index {
-                    Some(index) => Inst::Gather {
-                        buffer,
-                        index,
-                        offset,
-                        to,
-                    },
-                    None => Inst::Uniform { buffer, offset, to },
-                });
+                self.insts.push(Inst::Uniform { buffer, offset, to });
                 self.set(slot, to);
             }
             return Ok(());
@@ -160,6 +156,42 @@ impl<'a> Translator<'a> {
             self.set(to + i, value);
         }
         Ok(())
+    }
+
+    /// A value from where each lane has it in a buffer.
+    fn load_rows(&mut self, buffer: u32, index: Value, offset: i32, layout: u32, to: Slot) {
+        let mut rest = &self.shared.code.layouts[layout as usize][..];
+        let mut slot = to;
+        while let Some(first) = rest.first().map(|place| place.word) {
+            let row = rest
+                .iter()
+                .take_while(|p| (first..first + 4).contains(&p.word));
+            let count = row.count();
+            let (row, behind) = rest.split_at(count);
+            let offset = offset + 4 * first as i32;
+            let mut words = [None; 4];
+            for place in row {
+                let value = self.new_value();
+                words[(place.word - first) as usize] = Some(value);
+                self.set(slot, value);
+                slot += 1;
+            }
+            self.insts.push(match words {
+                [Some(to), None, None, None] => Inst::Gather {
+                    buffer,
+                    index,
+                    offset,
+                    to,
+                },
+                to => Inst::Rows {
+                    buffer,
+                    index,
+                    offset,
+                    to,
+                },
+            });
+            rest = behind;
+        }
     }
 
     /// A cell of an element of an array in the thread's memory.
@@ -191,13 +223,16 @@ impl<'a> Translator<'a> {
             if !whole {
                 return Err(self.unsupported("store of a value with gaps"));
             }
-            let (offset, words) = (self.bits(offset as u32 / 4), self.bits(places.len() as u32));
-            let mut arguments = vec![self.mask, index, offset, words];
-            for slot in (from..).take(places.len()) {
-                arguments.push(self.value(slot));
+            let slots: Vec<Slot> = (from..).take(places.len()).collect();
+            for (row, offset) in slots.chunks(4).zip((offset..).step_by(16)) {
+                let mut reads = vec![self.mask, index];
+                reads.extend(row.iter().map(|slot| self.value(*slot)));
+                self.insts.push(Inst::Scatter {
+                    buffer,
+                    reads,
+                    offset,
+                });
             }
-            let data = self.memory.buffer(buffer);
-            self.host(host::scatter as *const () as usize, data, arguments, 0)?;
             return Ok(());
         }
         let target = self.target(pointer)?;
@@ -401,6 +436,20 @@ impl<'a> Translator<'a> {
         let kind = kind.ok_or_else(|| self.unsupported("atomic operation"))?;
         let (index, offset) = self.place(pointer, 4)?;
         let index = index.unwrap_or_else(|| self.bits(0));
+        if matches!(kind, AtomicKind::Add) && self.shared.alone[buffer as usize] {
+            let before = self.new_value();
+            let reads = [self.mask, index, self.value(value)];
+            self.insts.push(Inst::Add {
+                buffer,
+                reads,
+                offset,
+                to: before,
+            });
+            if let Some(to) = to {
+                self.set(to, before);
+            }
+            return Ok(());
+        }
         let offset = self.bits(offset as u32 / 4);
         let value = self.value(value);
         let arguments = vec![self.mask, index, offset, value];

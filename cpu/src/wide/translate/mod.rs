@@ -44,6 +44,8 @@ pub(super) struct Shared<'a> {
     pub indexed: &'a [bool],
     /// By hook: who answers.
     pub answers: &'a [Option<host::Answer>],
+    /// By buffer: whether a thread has it for itself.
+    pub alone: &'a [bool],
 }
 
 /// A function that is being translated.
