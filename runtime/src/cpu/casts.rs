@@ -6,7 +6,7 @@ use std::sync::Arc;
 use impasto_cpu::{Answer, Cell};
 
 use crate::world::KernelParts;
-use crate::world::bvh::Caster;
+use crate::world::bvh::{Caster, Rays};
 
 /// The functions of kernels that are answered, and who answers them.
 pub(super) const ANSWERED: [(&str, Answer); 2] = [
@@ -85,9 +85,10 @@ unsafe extern "C" fn any(data: *const c_void, arguments: *const u32, result: *mu
     unsafe { *result = u32::from(caster.any(origin, direction, t_max, skip)) };
 }
 
-/// The ray of a lane, of cells as those of the arguments.
-fn ray_of(cells: &[Cell; 8], lane: usize) -> ([f32; 3], [f32; 3], f32, u32) {
-    ray(&cells.map(|Cell(words)| words[lane]))
+/// The bits of a mask.
+fn bits(mask: &Cell) -> u32 {
+    let lanes = (0..).zip(&mask.0);
+    lanes.fold(0, |bits, (lane, word)| bits | (word & 1) << lane)
 }
 
 /// # Safety
@@ -96,14 +97,9 @@ fn ray_of(cells: &[Cell; 8], lane: usize) -> ([f32; 3], [f32; 3], f32, u32) {
 unsafe extern "C" fn closest_of_eight(data: *const c_void, cells: *mut Cell) {
     // SAFETY: as above.
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 13]>()) };
-    let [mask, arguments @ .., t, u, v, primitive] = cells;
-    let arguments: &[Cell; 8] = arguments;
-    for lane in 0..8 {
-        if mask.0[lane] == 0 {
-            continue;
-        }
-        let (origin, direction, t_max, skip) = ray_of(arguments, lane);
-        let hit = caster.closest(origin, direction, t_max, skip);
+    let [mask, rays @ .., t, u, v, primitive] = cells;
+    let hits = caster.closest_of(bytemuck::cast_ref::<[Cell; 8], Rays>(rays), bits(mask));
+    for (lane, hit) in hits.iter().enumerate() {
         t.0[lane] = hit.t.to_bits();
         u.0[lane] = hit.u.to_bits();
         v.0[lane] = hit.v.to_bits();
@@ -117,13 +113,9 @@ unsafe extern "C" fn closest_of_eight(data: *const c_void, cells: *mut Cell) {
 unsafe extern "C" fn any_of_eight(data: *const c_void, cells: *mut Cell) {
     // SAFETY: as above.
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 10]>()) };
-    let [mask, arguments @ .., found] = cells;
-    let arguments: &[Cell; 8] = arguments;
-    for lane in 0..8 {
-        if mask.0[lane] == 0 {
-            continue;
-        }
-        let (origin, direction, t_max, skip) = ray_of(arguments, lane);
-        found.0[lane] = u32::from(caster.any(origin, direction, t_max, skip));
+    let [mask, rays @ .., found] = cells;
+    let hits = caster.any_of(bytemuck::cast_ref::<[Cell; 8], Rays>(rays), bits(mask));
+    for (lane, found) in found.0.iter_mut().enumerate() {
+        *found = hits >> lane & 1;
     }
 }

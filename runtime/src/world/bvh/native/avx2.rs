@@ -4,11 +4,11 @@
 
 use std::arch::x86_64::*;
 
-use super::Hit;
 use super::lanes::{Lanes, WIDTH};
 use super::slabs::Slabs;
 use super::tree::{Node, Trees};
-use super::walk::{self, Ray};
+use super::walk;
+use super::{Hits, Rays};
 use crate::world::bvh::text::SLACK;
 
 /// Whether this processor has the instructions.
@@ -25,8 +25,8 @@ pub(super) fn is_there() -> bool {
 /// # Safety
 /// [`is_there`] has said that the instructions are.
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) unsafe fn cast<const ANY: bool>(trees: &Trees, ray: &Ray) -> Hit {
-    walk::cast::<Avx2, ANY>(trees, ray)
+pub(super) unsafe fn cast<const ANY: bool>(trees: &Trees, rays: &Rays, lanes: u32) -> Hits {
+    walk::cast::<Avx2, ANY>(trees, rays, lanes)
 }
 
 /// Lanes of a register, which exist only below [`cast`].
@@ -96,6 +96,12 @@ impl Lanes for Avx2 {
     fn bits(mask: __m256) -> u32 {
         // SAFETY: masks are made of lanes.
         unsafe { _mm256_movemask_ps(mask) as u32 }
+    }
+
+    #[inline(always)]
+    fn where_else(self, mask: __m256, other: Self) -> Self {
+        // SAFETY: masks are made of lanes.
+        Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask) })
     }
 
     #[inline(always)]

@@ -31,6 +31,8 @@ pub(super) trait Lanes: Copy {
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// A bit for each lane, the first one lowest.
     fn bits(mask: Self::Mask) -> u32;
+    /// `self` where the mask is, else `other`.
+    fn where_else(self, mask: Self::Mask, other: Self) -> Self;
 
     /// `intersect_children` of `wide.wgsl` for all children: inner ones in bits 24..31, most urgent first, and
     /// triangles in bits 0..23.
@@ -115,6 +117,13 @@ impl Lanes for Portable {
     #[inline(always)]
     fn bits(mask: Self::Mask) -> u32 {
         (0..WIDTH).fold(0, |bits, i| bits | u32::from(mask[i]) << i)
+    }
+
+    #[inline(always)]
+    fn where_else(self, mask: Self::Mask, other: Self) -> Self {
+        Self(std::array::from_fn(|i| {
+            if mask[i] { self.0[i] } else { other.0[i] }
+        }))
     }
 
     #[inline(always)]

@@ -15,7 +15,10 @@ mod tree;
 mod triangles;
 mod walk;
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::wgsl::ShaderPart;
+use lanes::WIDTH;
 
 /// Stands for no primitive: in a hit, and for a ray that skips none.
 pub const NO_PRIMITIVE: u32 = u32::MAX;
@@ -32,6 +35,45 @@ pub struct Hit {
     pub v: f32,
     /// [`NO_PRIMITIVE`] on a miss.
     pub primitive: u32,
+}
+
+/// The hits of eight rays.
+pub type Hits = [Hit; WIDTH];
+
+/// Eight rays: a word of each in a row.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct Rays {
+    /// By axis.
+    pub origins: [[f32; WIDTH]; 3],
+    /// By axis; unit vectors.
+    pub directions: [[f32; WIDTH]; 3],
+    /// How far they reach.
+    pub t_max: [f32; WIDTH],
+    /// Which primitive each goes through.
+    pub skip: [u32; WIDTH],
+}
+
+impl Rays {
+    /// A ray in all lanes.
+    pub fn of_one(origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> Self {
+        Self {
+            origins: origin.map(|x| [x; WIDTH]),
+            directions: direction.map(|x| [x; WIDTH]),
+            t_max: [t_max; WIDTH],
+            skip: [skip; WIDTH],
+        }
+    }
+
+    #[inline(always)]
+    fn origin(&self, lane: usize) -> [f32; 3] {
+        self.origins.map(|values| values[lane])
+    }
+
+    #[inline(always)]
+    fn direction(&self, lane: usize) -> [f32; 3] {
+        self.directions.map(|values| values[lane])
+    }
 }
 
 /// The instructions that rays are cast with.
@@ -83,38 +125,42 @@ impl Caster {
     /// The nearest hit with 0 < t < `t_max` on another primitive than `skip`; `direction` is a unit vector. Rays
     /// that are no rays hit nothing.
     pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> Hit {
-        let ray = walk::Ray {
-            origin,
-            direction,
-            t_max,
-            skip,
-        };
-        self.cast::<false>(&ray)
+        let rays = Rays::of_one(origin, direction, t_max, skip);
+        self.closest_of(&rays, 1)[0]
     }
 
     /// Is there any such hit?
     pub fn any(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> bool {
-        let ray = walk::Ray {
-            origin,
-            direction,
-            t_max,
-            skip,
-        };
-        self.cast::<true>(&ray).primitive != NO_PRIMITIVE
+        let rays = Rays::of_one(origin, direction, t_max, skip);
+        self.any_of(&rays, 1) != 0
+    }
+
+    /// [`Caster::closest`] of the rays that have a bit in `lanes`; of others there is no hit.
+    pub fn closest_of(&self, rays: &Rays, lanes: u32) -> Hits {
+        self.cast::<false>(rays, lanes)
+    }
+
+    /// [`Caster::any`] of the rays that have a bit in `lanes`: bits of those that hit something.
+    pub fn any_of(&self, rays: &Rays, lanes: u32) -> u32 {
+        let hits = self.cast::<true>(rays, lanes);
+        let bits = (0..).zip(&hits);
+        bits.fold(0, |bits, (lane, hit)| {
+            bits | u32::from(hit.primitive != NO_PRIMITIVE) << lane
+        })
     }
 
     #[inline(always)]
-    fn cast<const ANY: bool>(&self, ray: &walk::Ray) -> Hit {
+    fn cast<const ANY: bool>(&self, rays: &Rays, lanes: u32) -> Hits {
         match self.instructions {
-            Instructions::Portable => portable::<ANY>(&self.trees, ray),
+            Instructions::Portable => portable::<ANY>(&self.trees, rays, lanes),
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             // SAFETY: it is chosen where these instructions are.
-            Instructions::Avx2 => unsafe { avx2::cast::<ANY>(&self.trees, ray) },
+            Instructions::Avx2 => unsafe { avx2::cast::<ANY>(&self.trees, rays, lanes) },
         }
     }
 }
 
-fn portable<const ANY: bool>(trees: &tree::Trees, ray: &walk::Ray) -> Hit {
-    walk::cast::<lanes::Portable, ANY>(trees, ray)
+fn portable<const ANY: bool>(trees: &tree::Trees, rays: &Rays, lanes: u32) -> Hits {
+    walk::cast::<lanes::Portable, ANY>(trees, rays, lanes)
 }

@@ -1,6 +1,7 @@
 //! The part of a ray that nodes are tested with: `safe_inverse`, `traversal_octant` and `set_slabs` of the WGSL,
 //! and what a node's planes are to it.
 
+use super::lanes::Lanes;
 use super::tree::{Node, Placement};
 use crate::world::bvh::text::SLACK;
 
@@ -25,10 +26,10 @@ pub(super) struct Head {
 }
 
 impl Slabs {
-    /// Of a ray in the world.
+    /// Of a ray in the world, whose inverse direction is known.
     #[inline(always)]
-    pub(super) fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
-        Self::with(origin, direction, safe_inverse(direction), [0.0; 3])
+    pub(super) fn new(origin: [f32; 3], direction: [f32; 3], inverse: [f32; 3]) -> Self {
+        Self::with(origin, direction, inverse, [0.0; 3])
     }
 
     #[inline(always)]
@@ -84,6 +85,14 @@ pub(super) fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
 #[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `safe_inverse` of a component of the directions of eight rays.
+#[inline(always)]
+pub(super) fn safe_inverses<L: Lanes>(d: L) -> L {
+    let tiny = L::splat(-1e-18).where_else(d.below(L::splat(0.0)), L::splat(1e-18));
+    let is_large = d.abs().above(L::splat(1e-18));
+    L::splat(1.0).div(d.where_else(is_large, tiny))
 }
 
 #[inline(always)]

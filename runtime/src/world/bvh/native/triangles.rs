@@ -1,8 +1,8 @@
 //! The triangle test of `triangle.wgsl`, of a packet at once.
 
-use super::Hit;
 use super::lanes::{Lanes, WIDTH};
 use super::tree::{Packet, Placement};
+use super::{Hit, Rays};
 
 type Vector<L> = [L; 3];
 
@@ -16,17 +16,14 @@ pub(super) struct Frame<L> {
 }
 
 impl<L: Lanes> Frame<L> {
+    /// Of the ray of a lane.
     #[inline(always)]
-    pub(super) fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
-        let [x, y, z] = direction;
-        let side = if z >= 0.0 { 1.0 } else { -1.0 };
-        let a = -1.0 / (side + z);
-        let b = x * y * a;
+    pub(super) fn of(rays: &Rays, across: &Across, lane: usize) -> Self {
         Self {
-            origin: splat(origin),
-            x: splat([1.0 + side * x * x * a, side * b, -side * x]),
-            y: splat([b, side + y * y * a, -y]),
-            z: splat(direction),
+            origin: splat(rays.origin(lane)),
+            x: splat(across.x.map(|values| values[lane])),
+            y: splat(across.y.map(|values| values[lane])),
+            z: splat(rays.direction(lane)),
         }
     }
 
@@ -34,6 +31,33 @@ impl<L: Lanes> Frame<L> {
     #[inline(always)]
     fn project(&self, point: Vector<L>) -> [L; 2] {
         [dot(self.x, point), dot(self.y, point)]
+    }
+}
+
+/// The first two axes of the frames of eight rays.
+pub(super) struct Across {
+    x: [[f32; WIDTH]; 3],
+    y: [[f32; WIDTH]; 3],
+}
+
+impl Across {
+    /// `frame_from_z` of the WGSL, whose order of operations this has.
+    #[inline(always)]
+    pub(super) fn new<L: Lanes>([x, y, z]: [L; 3]) -> Self {
+        let (zero, one, minus) = (L::splat(0.0), L::splat(1.0), L::splat(-1.0));
+        let side = one.where_else(z.at_least(zero), minus);
+        let a = minus.div(side.add(z));
+        let b = x.mul(y).mul(a);
+        let negative = |v: L| v.mul(minus);
+        Self {
+            x: [
+                one.add(side.mul(x).mul(x).mul(a)),
+                side.mul(b),
+                negative(side).mul(x),
+            ]
+            .map(L::values),
+            y: [b, side.add(y.mul(y).mul(a)), negative(y)].map(L::values),
+        }
     }
 }
 
