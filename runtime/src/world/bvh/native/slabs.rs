@@ -1,7 +1,7 @@
 //! The part of a ray that nodes are tested with: `safe_inverse`, `traversal_octant` and `set_slabs` of the WGSL,
 //! and what a node's planes are to it.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, WIDTH};
 use super::tree::{Node, Placement};
 use crate::world::bvh::text::SLACK;
 
@@ -87,9 +87,19 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// `safe_inverse` of a component of the directions of eight rays.
+/// `safe_inverse` of the directions of eight rays. Lanes are not given to closures of the library, which would not
+/// be compiled for their instructions.
 #[inline(always)]
-pub(super) fn safe_inverses<L: Lanes>(d: L) -> L {
+pub(super) fn safe_inverses<L: Lanes>([x, y, z]: [L; 3]) -> [[f32; WIDTH]; 3] {
+    [
+        safe_inverses_along(x).values(),
+        safe_inverses_along(y).values(),
+        safe_inverses_along(z).values(),
+    ]
+}
+
+#[inline(always)]
+fn safe_inverses_along<L: Lanes>(d: L) -> L {
     let tiny = L::splat(-1e-18).where_else(d.below(L::splat(0.0)), L::splat(1e-18));
     let is_large = d.abs().above(L::splat(1e-18));
     L::splat(1.0).div(d.where_else(is_large, tiny))

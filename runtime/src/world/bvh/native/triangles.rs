@@ -48,15 +48,17 @@ impl Across {
         let side = one.where_else(z.at_least(zero), minus);
         let a = minus.div(side.add(z));
         let b = x.mul(y).mul(a);
-        let negative = |v: L| v.mul(minus);
         Self {
             x: [
-                one.add(side.mul(x).mul(x).mul(a)),
-                side.mul(b),
-                negative(side).mul(x),
-            ]
-            .map(L::values),
-            y: [b, side.add(y.mul(y).mul(a)), negative(y)].map(L::values),
+                one.add(side.mul(x).mul(x).mul(a)).values(),
+                side.mul(b).values(),
+                side.mul(minus).mul(x).values(),
+            ],
+            y: [
+                b.values(),
+                side.add(y.mul(y).mul(a)).values(),
+                y.mul(minus).values(),
+            ],
         }
     }
 }
