@@ -13,9 +13,9 @@ use crate::native::Buffer;
 use crate::{Kernel, KernelError, Thread, Width, lower};
 
 /// Invocations of a kernel.
-const LANES: u32 = 8;
+const LANES: u32 = 20;
 /// Words that each reads, and words of what they write.
-const WORDS: usize = 64;
+const WORDS: usize = 160;
 
 /// SplitMix64.
 struct Random(u64);
@@ -404,7 +404,7 @@ fn kernel(random: &mut Random, wild: bool) -> String {
             {end}
             out[8u * lane + 6u] = bitcast<u32>(numbers[seed % 5u] + numbers_before[lane % 4u]);
         }}
-        @compute @workgroup_size(8) fn main(@builtin(local_invocation_index) lane: u32) {{
+        @compute @workgroup_size({LANES}) fn main(@builtin(local_invocation_index) lane: u32) {{
             work(lane, input[lane].x);
             out[8u * lane + 7u] = bitcast<u32>(shared_number);
         }}"
