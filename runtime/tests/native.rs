@@ -10,7 +10,7 @@ use glam::Vec3;
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
 use impasto_runtime::technique::{Technique, Traversal};
 use impasto_runtime::wgsl::ShaderPart;
-use impasto_runtime::world::bvh::{Bvh, Caster, Hit};
+use impasto_runtime::world::bvh::{Bvh, Caster, Hit, Rays};
 use impasto_runtime::world::surface::geometry_part;
 use reference::{Geometry, brute_force};
 use speed::{any, closest};
@@ -159,6 +159,54 @@ fn the_nearest_of_all_triangles_is_hit() {
                 }
             }
             assert!(hits > 150, "{hits} hits");
+        }
+    }
+}
+
+/// Each of eight rays has the bits that it has alone, and those that are not asked for hit nothing.
+#[test]
+fn rays_side_by_side_hit_what_they_hit_alone() {
+    let mut random = Random::new(15);
+    for world in worlds(&mut random) {
+        let geometry = Geometry::new(&world[0]);
+        let mut rays = rays(&mut random, &geometry, 1200);
+        for ray in rays.iter_mut().step_by(31) {
+            ray.direction.x = f32::NAN;
+        }
+        for caster in casters(&world) {
+            let alone = |ray: &Ray| closest(&caster, ray);
+            // Without what each skips, some hit something else.
+            let skips = rays.iter().filter(|ray| ray.skip != MISS);
+            let changed = skips.filter(|ray| {
+                let other = Ray {
+                    skip: MISS,
+                    ..**ray
+                };
+                bits(alone(ray)) != bits(alone(&other))
+            });
+            assert!(geometry.all.len() < 9 || changed.count() > 20);
+            for (rays, mask) in rays.chunks(8).zip((0..).step_by(37)) {
+                let mut eight = Rays::of_one([0.0; 3], [0.0, 0.0, 1.0], 1.0, MISS);
+                for (lane, ray) in rays.iter().enumerate() {
+                    for axis in 0..3 {
+                        eight.origins[axis][lane] = ray.origin[axis];
+                        eight.directions[axis][lane] = ray.direction[axis];
+                    }
+                    (eight.t_max[lane], eight.skip[lane]) = (ray.t_max, ray.skip);
+                }
+                let mask = mask % 256;
+                let (hits, any) = (caster.closest_of(&eight, mask), caster.any_of(&eight, mask));
+                for (lane, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                    let expected = alone(ray);
+                    let is_hit = any >> lane & 1 == 1;
+                    if mask >> lane & 1 == 1 {
+                        assert_eq!(bits(hit), bits(expected), "{ray:?}");
+                        assert_eq!(is_hit, expected.primitive != MISS, "{ray:?}");
+                    } else {
+                        assert!(hit.primitive == MISS && !is_hit);
+                    }
+                }
+            }
         }
     }
 }

@@ -195,7 +195,7 @@ def write_results(args: argparse.Namespace, results: list[dict], nearest: str) -
             to_error = row["seconds"] * row["relative_mse"] / EQUAL_ERROR
             rate = row["mpaths_per_second"]
             lines.append(
-                f"| {entry['scene']} | {label} | {rate:.1f} | {rate / best:.2f} | {row['relative_mse']:.3g} "
+                f"| {entry['scene']} | {label} | {rate:.3g} | {rate / best:.2f} | {row['relative_mse']:.3g} "
                 f"| {to_error:.3g} | {row['mse'] * row['seconds']:.3g} |"
             )
         for mode in ("megakernel", "wavefront"):

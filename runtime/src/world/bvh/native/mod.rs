@@ -5,7 +5,8 @@
 //! a triangle at a time; for rays that are scattered that is about half as fast (tests/native/speed.rs measures both).
 //!
 //! `tree` holds what is walked, `walk` walks it, `slabs` and `triangles` are the tests of nodes and triangles,
-//! written in the `lanes` of an instruction set.
+//! written in the `lanes` of an instruction set. Rays come in eights, since what is done once a ray is done for eight
+//! at once; they walk one after another, for they part ways soon.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
