@@ -75,12 +75,9 @@ pub(super) fn cast<L: Lanes, const ANY: bool>(trees: &Trees, rays: &Rays, lanes:
 fn are_rays<L: Lanes>(rays: &Rays, directions: [L; 3]) -> u32 {
     let is_finite = |x: L| x.abs().at_most(L::splat(f32::MAX));
     let mut found = L::load(&rays.t_max).above(L::splat(0.0));
-    for axis in 0..3 {
-        let origin = L::load(&rays.origins[axis]);
-        found = L::and(
-            found,
-            L::and(is_finite(origin), is_finite(directions[axis])),
-        );
+    for (origins, direction) in rays.origins.iter().zip(directions) {
+        let origin = L::load(origins);
+        found = L::and(found, L::and(is_finite(origin), is_finite(direction)));
     }
     L::bits(found)
 }
