@@ -22,7 +22,7 @@ use crate::wgsl::{BufferData, ShaderPart};
 
 pub(crate) use build::binary_tree;
 pub use levels::{Levels, ObjectTree};
-pub use native::{Caster, Hit, Hits, Instructions, NO_PRIMITIVE, Rays};
+pub use native::{Caster, Hit, Instructions, NO_PRIMITIVE, Rays};
 pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
 
 /// The parent of the root, which nobody asks for.

@@ -1,7 +1,6 @@
 //! The part of a ray that nodes are tested with: `safe_inverse`, `traversal_octant` and `set_slabs` of the WGSL,
 //! and what a node's planes are to it.
 
-use super::lanes::{Lanes, WIDTH};
 use super::tree::{Node, Placement};
 use crate::world::bvh::text::SLACK;
 
@@ -55,7 +54,7 @@ impl Slabs {
         let [origin, direction] = [offset, direction].map(|v| [dot(x, v), dot(y, v), dot(z, v)]);
         let [a, b, c] = direction.map(f32::abs);
         let size = a.max(b.max(c));
-        let inverse = safe_inverse(direction.map(|d| d / size)).map(|i| i / size);
+        let inverse = direction.map(|d| safe_inverse(d / size) / size);
         let padding = std::array::from_fn(|i| SLACK * reach * sums[i] * inverse[i].abs());
         Self::with(origin, direction, inverse, padding)
     }
@@ -87,28 +86,9 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// `safe_inverse` of the directions of eight rays. Lanes are not given to closures of the library, which would not
-/// be compiled for their instructions.
+/// A component of `safe_inverse`.
 #[inline(always)]
-pub(super) fn safe_inverses<L: Lanes>([x, y, z]: [L; 3]) -> [[f32; WIDTH]; 3] {
-    [
-        safe_inverses_along(x).values(),
-        safe_inverses_along(y).values(),
-        safe_inverses_along(z).values(),
-    ]
-}
-
-#[inline(always)]
-fn safe_inverses_along<L: Lanes>(d: L) -> L {
-    let tiny = L::splat(-1e-18).where_else(d.below(L::splat(0.0)), L::splat(1e-18));
-    let is_large = d.abs().above(L::splat(1e-18));
-    L::splat(1.0).div(d.where_else(is_large, tiny))
-}
-
-#[inline(always)]
-fn safe_inverse(direction: [f32; 3]) -> [f32; 3] {
-    direction.map(|d| {
-        let tiny = if d < 0.0 { -1e-18 } else { 1e-18 };
-        1.0 / if d.abs() > 1e-18 { d } else { tiny }
-    })
+pub(super) fn safe_inverse(d: f32) -> f32 {
+    let tiny = if d < 0.0 { -1e-18 } else { 1e-18 };
+    1.0 / if d.abs() > 1e-18 { d } else { tiny }
 }

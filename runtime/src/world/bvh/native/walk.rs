@@ -1,7 +1,7 @@
 //! The walk through one tree or two, in the order of `wide.wgsl` and `placed.wgsl`.
 
 use super::lanes::{Lanes, WIDTH};
-use super::slabs::{Slabs, safe_inverses};
+use super::slabs::{Slabs, safe_inverse};
 use super::tree::{Node, Packet, Placement, Trees};
 use super::triangles::{Across, Frame, Place, intersect};
 use super::{Hit, Hits, NO_PRIMITIVE, Rays};
@@ -25,7 +25,7 @@ pub(super) fn cast<L: Lanes, const ANY: bool>(trees: &Trees, rays: &Rays, lanes:
     let [x, y, z] = &rays.directions;
     let directions = [L::load(x), L::load(y), L::load(z)];
     let mut lanes = lanes & are_rays::<L>(rays, directions);
-    let inverses = safe_inverses(directions);
+    let inverses = rays.directions.map(|values| values.map(safe_inverse));
     let across = Across::new(directions);
     let mut shallow = [(0, 0); SHALLOW];
     let mut deep = Vec::new();
