@@ -186,7 +186,7 @@ fn rays_side_by_side_hit_what_they_hit_alone() {
             });
             assert!(geometry.all.len() < 9 || changed.count() > 20);
             for (rays, mask) in rays.chunks(8).zip((0..).step_by(37)) {
-                let mut eight = Rays::of_one([0.0; 3], [0.0, 0.0, 1.0], 1.0, MISS);
+                let mut eight = Rays::<8>::of_one([0.0; 3], [0.0, 0.0, 1.0], 1.0, MISS);
                 for (lane, ray) in rays.iter().enumerate() {
                     for axis in 0..3 {
                         eight.origins[axis][lane] = ray.origin[axis];

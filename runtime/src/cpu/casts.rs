@@ -98,7 +98,7 @@ unsafe extern "C" fn closest_of_eight(data: *const c_void, cells: *mut Cell) {
     // SAFETY: as above.
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 13]>()) };
     let [mask, rays @ .., t, u, v, primitive] = cells;
-    let hits = caster.closest_of(bytemuck::cast_ref::<[Cell; 8], Rays>(rays), bits(mask));
+    let hits = caster.closest_of(bytemuck::cast_ref::<[Cell; 8], Rays<8>>(rays), bits(mask));
     for (lane, hit) in hits.iter().enumerate() {
         t.0[lane] = hit.t.to_bits();
         u.0[lane] = hit.u.to_bits();
@@ -114,7 +114,7 @@ unsafe extern "C" fn any_of_eight(data: *const c_void, cells: *mut Cell) {
     // SAFETY: as above.
     let (caster, cells) = unsafe { (&*data.cast::<Caster>(), &mut *cells.cast::<[Cell; 10]>()) };
     let [mask, rays @ .., found] = cells;
-    let hits = caster.any_of(bytemuck::cast_ref::<[Cell; 8], Rays>(rays), bits(mask));
+    let hits = caster.any_of(bytemuck::cast_ref::<[Cell; 8], Rays<8>>(rays), bits(mask));
     for (lane, found) in found.0.iter_mut().enumerate() {
         *found = hits >> lane & 1;
     }

@@ -5,11 +5,9 @@
 use std::arch::x86_64::*;
 
 use super::lanes::{Lanes, WIDTH};
-use super::slabs::Slabs;
-use super::tree::{Node, Trees};
+use super::tree::Trees;
 use super::walk;
-use super::{Hits, Rays};
-use crate::world::bvh::text::SLACK;
+use super::{Hit, Rays};
 
 /// Whether this processor has the instructions.
 pub(super) fn is_there() -> bool {
@@ -25,8 +23,12 @@ pub(super) fn is_there() -> bool {
 /// # Safety
 /// [`is_there`] has said that the instructions are.
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-pub(super) unsafe fn cast<const ANY: bool>(trees: &Trees, rays: &Rays, lanes: u32) -> Hits {
-    walk::cast::<Avx2, ANY>(trees, rays, lanes)
+pub(super) unsafe fn cast<const ANY: bool, const N: usize>(
+    trees: &Trees,
+    rays: &Rays<N>,
+    lanes: u32,
+) -> [Hit; N] {
+    walk::cast::<Avx2, ANY, N>(trees, rays, lanes)
 }
 
 /// Lanes of a register, which exist only below [`cast`].
@@ -58,6 +60,7 @@ impl Lanes for Avx2 {
     type Mask = __m256;
 
     binary!(add: _mm256_add_ps, sub: _mm256_sub_ps, mul: _mm256_mul_ps, div: _mm256_div_ps);
+    binary!(max: _mm256_max_ps, min: _mm256_min_ps);
     comparison!(at_least: _CMP_GE_OQ, at_most: _CMP_LE_OQ, above: _CMP_GT_OQ, below: _CMP_LT_OQ);
 
     #[inline(always)]
@@ -99,96 +102,24 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn where_else(self, mask: __m256, other: Self) -> Self {
-        // SAFETY: masks are made of lanes.
-        Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask) })
+    fn united(mask: __m256, words: &[u32; WIDTH]) -> u32 {
+        // SAFETY: masks are made of lanes, and there are eight words.
+        unsafe {
+            let words = _mm256_loadu_ps(words.as_ptr().cast());
+            let all = _mm256_and_ps(mask, words);
+            let half = _mm_or_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps::<1>(all));
+            let quarter = _mm_or_ps(half, _mm_movehl_ps(half, half));
+            let one = _mm_or_ps(quarter, _mm_movehdup_ps(quarter));
+            _mm_cvtsi128_si32(_mm_castps_si128(one)) as u32
+        }
     }
 
     #[inline(always)]
-    fn children(node: &Node, slabs: &Slabs, t_max: f32) -> u32 {
-        // SAFETY: nodes are tested below `cast` alone. Loads are of 16 bytes from the beginning of a node, of 4
-        // from its exponents on, after which there are more, and of arrays of 8.
-        unsafe {
-            let head = _mm_loadu_ps(std::ptr::from_ref(node).cast());
-            // The fourth component is no float.
-            let low = _mm_blend_ps::<8>(head, _mm_setzero_ps());
-            let exponents = _mm_cvtepu8_epi32(_mm_srli_si128::<12>(_mm_castps_si128(head)));
-            let scale = _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents));
-            let inverse = _mm_load_ps(slabs.inverse.as_ptr());
-            let step = _mm_mul_ps(scale, inverse);
-            let start = _mm_mul_ps(_mm_sub_ps(low, _mm_load_ps(slabs.origin.as_ptr())), inverse);
-            let sign = _mm_set1_ps(-0.0);
-            let reach = _mm_add_ps(
-                _mm_andnot_ps(sign, start),
-                _mm_mul_ps(_mm_set1_ps(255.0), _mm_andnot_ps(sign, step)),
-            );
-            let slack = _mm_add_ps(
-                _mm_mul_ps(_mm_set1_ps(SLACK), reach),
-                _mm_load_ps(slabs.padding.as_ptr()),
-            );
-            let near = _mm_sub_ps(start, slack);
-            let far = _mm_add_ps(start, slack);
-
-            let [x, y, z] = &node.planes;
-            let [flip_x, flip_y, flip_z] = slabs.flips.map(usize::from);
-            let t_near = _mm256_max_epi32(
-                _mm256_max_epi32(
-                    distances::<0>(&x[flip_x], step, near),
-                    distances::<1>(&y[flip_y], step, near),
-                ),
-                _mm256_max_epi32(
-                    distances::<2>(&z[flip_z], step, near),
-                    _mm256_setzero_si256(),
-                ),
-            );
-            let t_max = _mm256_castps_si256(_mm256_set1_ps(t_max));
-            let t_far = _mm256_min_epi32(
-                _mm256_min_epi32(
-                    distances::<0>(&x[1 - flip_x], step, far),
-                    distances::<1>(&y[1 - flip_y], step, far),
-                ),
-                _mm256_min_epi32(distances::<2>(&z[1 - flip_z], step, far), t_max),
-            );
-            let missed = _mm256_cmpgt_epi32(t_near, t_far);
-
-            let meta = _mm256_cvtepu8_epi32(_mm_loadl_epi64(node.meta.as_ptr().cast()));
-            let shifts = _mm256_and_si256(meta, _mm256_set1_epi32(31));
-            let inner = _mm256_cmpgt_epi32(shifts, _mm256_set1_epi32(23));
-            let octant = _mm256_set1_epi32(slabs.octant as i32);
-            let shifts = _mm256_xor_si256(shifts, _mm256_and_si256(inner, octant));
-            let bits = _mm256_sllv_epi32(_mm256_srli_epi32::<5>(meta), shifts);
-            let bits = _mm256_andnot_si256(missed, bits);
-            let half = _mm_or_si128(
-                _mm256_castsi256_si128(bits),
-                _mm256_extracti128_si256::<1>(bits),
-            );
-            let quarter = _mm_or_si128(half, _mm_unpackhi_epi64(half, half));
-            let one = _mm_or_si128(quarter, _mm_shuffle_epi32::<1>(quarter));
-            _mm_cvtsi128_si32(one) as u32
+    fn prefetch<T>(of: &T) {
+        for line in (0..size_of::<T>()).step_by(64) {
+            let line = std::ptr::from_ref(of).cast::<i8>().wrapping_add(line);
+            // SAFETY: what there is no memory for is not prefetched.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(line) }
         }
     }
-}
-
-/// Where planes of an axis are on the ray, as integers of the same order.
-///
-/// # Safety
-/// It is called below [`cast`].
-#[inline(always)]
-unsafe fn distances<const AXIS: i32>(planes: &[u8; WIDTH], step: __m128, start: __m128) -> __m256i {
-    // SAFETY: as above, and there are eight planes.
-    unsafe {
-        let planes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(planes.as_ptr().cast()));
-        let distances = _mm256_mul_ps(_mm256_cvtepi32_ps(planes), lane::<AXIS>(step));
-        _mm256_castps_si256(_mm256_add_ps(distances, lane::<AXIS>(start)))
-    }
-}
-
-/// A component in every lane.
-///
-/// # Safety
-/// It is called below [`cast`].
-#[inline(always)]
-unsafe fn lane<const AXIS: i32>(of: __m128) -> __m256 {
-    // SAFETY: as above.
-    unsafe { _mm256_permutevar8x32_ps(_mm256_castps128_ps256(of), _mm256_set1_epi32(AXIS)) }
 }

@@ -3,9 +3,6 @@
 //!
 //! Every operation is that of WGSL in each lane, rounded once; none is fused with another.
 
-use super::slabs::Slabs;
-use super::tree::Node;
-
 /// How many floats these are: the children of a node, the triangles of a packet.
 pub(super) const WIDTH: usize = 8;
 
@@ -22,6 +19,9 @@ pub(super) trait Lanes: Copy {
     fn mul(self, other: Self) -> Self;
     fn div(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    /// The greater one, of numbers.
+    fn max(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
     /// `self >= other`; false where one of them is no number, as in all comparisons.
     fn at_least(self, other: Self) -> Self::Mask;
     fn at_most(self, other: Self) -> Self::Mask;
@@ -31,12 +31,10 @@ pub(super) trait Lanes: Copy {
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// A bit for each lane, the first one lowest.
     fn bits(mask: Self::Mask) -> u32;
-    /// `self` where the mask is, else `other`.
-    fn where_else(self, mask: Self::Mask, other: Self) -> Self;
-
-    /// `intersect_children` of `wide.wgsl` for all children: inner ones in bits 24..31, most urgent first, and
-    /// triangles in bits 0..23.
-    fn children(node: &Node, slabs: &Slabs, t_max: f32) -> u32;
+    /// The words of all lanes in the mask, by `or`.
+    fn united(mask: Self::Mask, words: &[u32; WIDTH]) -> u32;
+    /// Brings what will be read soon into the cache, where that can be asked for.
+    fn prefetch<T>(of: &T);
 }
 
 /// Lanes that the compiler makes instructions of.
@@ -91,6 +89,14 @@ impl Lanes for Portable {
         Self(self.0.map(f32::abs))
     }
     #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
     fn at_least(self, other: Self) -> Self::Mask {
         self.compare(other, f32::ge)
     }
@@ -120,40 +126,10 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn where_else(self, mask: Self::Mask, other: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            if mask[i] { self.0[i] } else { other.0[i] }
-        }))
+    fn united(mask: Self::Mask, words: &[u32; WIDTH]) -> u32 {
+        (0..WIDTH).fold(0, |all, i| all | if mask[i] { words[i] } else { 0 })
     }
 
     #[inline(always)]
-    fn children(node: &Node, slabs: &Slabs, t_max: f32) -> u32 {
-        let head = slabs.enter(node);
-        let mut near = [0i32; WIDTH];
-        let mut far = [t_max.to_bits() as i32; WIDTH];
-        for axis in 0..3 {
-            let [low, high] = &node.planes[axis];
-            let flip = slabs.flips[axis];
-            let (first, last) = if flip { (high, low) } else { (low, high) };
-            for i in 0..WIDTH {
-                let enter = f32::from(first[i]) * head.step[axis] + head.near[axis];
-                let leave = f32::from(last[i]) * head.step[axis] + head.far[axis];
-                near[i] = near[i].max(enter.to_bits() as i32);
-                far[i] = far[i].min(leave.to_bits() as i32);
-            }
-        }
-        let mut hits = 0;
-        for i in 0..WIDTH {
-            let meta = u32::from(node.meta[i]);
-            let shift = meta & 31;
-            let shift = if shift >= 24 {
-                shift ^ slabs.octant
-            } else {
-                shift
-            };
-            let bits = (meta >> 5) << shift;
-            hits |= if near[i] <= far[i] { bits } else { 0 };
-        }
-        hits
-    }
+    fn prefetch<T>(_: &T) {}
 }

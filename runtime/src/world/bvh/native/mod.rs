@@ -5,8 +5,8 @@
 //! a triangle at a time; for rays that are scattered that is about half as fast (tests/native/speed.rs measures both).
 //!
 //! `tree` holds what is walked, `walk` walks it, `slabs` and `triangles` are the tests of nodes and triangles,
-//! written in the `lanes` of an instruction set. Rays come in eights, since what is done once a ray is done for eight
-//! at once; they walk one after another, for they part ways soon.
+//! written in the `lanes` of an instruction set. Rays may come in eights, since what is done once a ray is then done
+//! for eight at once; they walk one after another, for they part ways soon.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -19,7 +19,6 @@ mod walk;
 use bytemuck::{Pod, Zeroable};
 
 use crate::wgsl::ShaderPart;
-use lanes::WIDTH;
 
 /// Stands for no primitive: in a hit, and for a ray that skips none.
 pub const NO_PRIMITIVE: u32 = u32::MAX;
@@ -38,31 +37,35 @@ pub struct Hit {
     pub primitive: u32,
 }
 
-/// The hits of eight rays.
-pub type Hits = [Hit; WIDTH];
-
-/// Eight rays: a word of each in a row.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+/// Rays: a word of each in a row.
+#[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub struct Rays {
+pub struct Rays<const N: usize> {
     /// By axis.
-    pub origins: [[f32; WIDTH]; 3],
+    pub origins: [[f32; N]; 3],
     /// By axis; unit vectors.
-    pub directions: [[f32; WIDTH]; 3],
+    pub directions: [[f32; N]; 3],
     /// How far they reach.
-    pub t_max: [f32; WIDTH],
+    pub t_max: [f32; N],
     /// Which primitive each goes through.
-    pub skip: [u32; WIDTH],
+    pub skip: [u32; N],
 }
 
-impl Rays {
+// SAFETY: they are 64 words, without anything between them or behind.
+#[allow(unsafe_code)]
+unsafe impl Zeroable for Rays<8> {}
+// SAFETY: the same.
+#[allow(unsafe_code)]
+unsafe impl Pod for Rays<8> {}
+
+impl<const N: usize> Rays<N> {
     /// A ray in all lanes.
     pub fn of_one(origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> Self {
         Self {
-            origins: origin.map(|x| [x; WIDTH]),
-            directions: direction.map(|x| [x; WIDTH]),
-            t_max: [t_max; WIDTH],
-            skip: [skip; WIDTH],
+            origins: origin.map(|x| [x; N]),
+            directions: direction.map(|x| [x; N]),
+            t_max: [t_max; N],
+            skip: [skip; N],
         }
     }
 
@@ -126,24 +129,23 @@ impl Caster {
     /// The nearest hit with 0 < t < `t_max` on another primitive than `skip`; `direction` is a unit vector. Rays
     /// that are no rays hit nothing.
     pub fn closest(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> Hit {
-        let rays = Rays::of_one(origin, direction, t_max, skip);
-        self.closest_of(&rays, 1)[0]
+        let [hit] = self.closest_of(&Rays::of_one(origin, direction, t_max, skip), 1);
+        hit
     }
 
     /// Is there any such hit?
     pub fn any(&self, origin: [f32; 3], direction: [f32; 3], t_max: f32, skip: u32) -> bool {
-        let rays = Rays::of_one(origin, direction, t_max, skip);
-        self.any_of(&rays, 1) != 0
+        self.any_of(&Rays::<1>::of_one(origin, direction, t_max, skip), 1) != 0
     }
 
     /// [`Caster::closest`] of the rays that have a bit in `lanes`; of others there is no hit.
-    pub fn closest_of(&self, rays: &Rays, lanes: u32) -> Hits {
-        self.cast::<false>(rays, lanes)
+    pub fn closest_of<const N: usize>(&self, rays: &Rays<N>, lanes: u32) -> [Hit; N] {
+        self.cast::<false, N>(rays, lanes)
     }
 
     /// [`Caster::any`] of the rays that have a bit in `lanes`: bits of those that hit something.
-    pub fn any_of(&self, rays: &Rays, lanes: u32) -> u32 {
-        let hits = self.cast::<true>(rays, lanes);
+    pub fn any_of<const N: usize>(&self, rays: &Rays<N>, lanes: u32) -> u32 {
+        let hits = self.cast::<true, N>(rays, lanes);
         let bits = (0..).zip(&hits);
         bits.fold(0, |bits, (lane, hit)| {
             bits | u32::from(hit.primitive != NO_PRIMITIVE) << lane
@@ -151,17 +153,21 @@ impl Caster {
     }
 
     #[inline(always)]
-    fn cast<const ANY: bool>(&self, rays: &Rays, lanes: u32) -> Hits {
+    fn cast<const ANY: bool, const N: usize>(&self, rays: &Rays<N>, lanes: u32) -> [Hit; N] {
         match self.instructions {
-            Instructions::Portable => portable::<ANY>(&self.trees, rays, lanes),
+            Instructions::Portable => portable::<ANY, N>(&self.trees, rays, lanes),
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             // SAFETY: it is chosen where these instructions are.
-            Instructions::Avx2 => unsafe { avx2::cast::<ANY>(&self.trees, rays, lanes) },
+            Instructions::Avx2 => unsafe { avx2::cast::<ANY, N>(&self.trees, rays, lanes) },
         }
     }
 }
 
-fn portable<const ANY: bool>(trees: &tree::Trees, rays: &Rays, lanes: u32) -> Hits {
-    walk::cast::<lanes::Portable, ANY>(trees, rays, lanes)
+fn portable<const ANY: bool, const N: usize>(
+    trees: &tree::Trees,
+    rays: &Rays<N>,
+    lanes: u32,
+) -> [Hit; N] {
+    walk::cast::<lanes::Portable, ANY, N>(trees, rays, lanes)
 }

@@ -1,49 +1,108 @@
-//! The part of a ray that nodes are tested with: `safe_inverse`, `traversal_octant` and `set_slabs` of the WGSL,
-//! and what a node's planes are to it.
+//! The part of a ray that boxes are tested with: `safe_inverse` and `traversal_octant` of the WGSL, and slabs.
+//!
+//! A walk must meet every box with a triangle in it that the ray hits as triangles are tested, which rounds where
+//! corners lie across the ray by some units in the last place of how far away they are. So a ray is as thick as
+//! that to boxes. The distances of planes then have relative errors alone, since nothing is subtracted but what is
+//! exact: some units in the last place, by which slabs are widened. After Ize, "Robust BVH Ray Traversal" (2013).
 
-use super::tree::{Node, Placement};
+use super::Rays;
+use super::lanes::{Lanes, WIDTH};
+use super::tree::{Boxes, Placement};
 use crate::world::bvh::text::SLACK;
 
-/// A ray in the space of a tree. The fourth components are 0, so that vectors of four have no surprises there.
+/// Rays in the space of a tree.
 #[derive(Clone, Copy)]
-#[repr(C, align(16))]
-pub(super) struct Slabs {
-    pub origin: [f32; 4],
-    pub inverse: [f32; 4],
-    pub padding: [f32; 4],
-    /// Along which axes the ray meets the upper planes first.
-    pub flips: [bool; 3],
+pub(super) struct Slabs<const N: usize> {
+    /// By axis: from where planes are entered, behind the origin if they are ahead; and from where they are left.
+    origins: [[[f32; N]; 2]; 3],
+    inverses: [[[f32; N]; 2]; 3],
+    /// By axis: whether the ray meets the upper planes first, 0 or 1.
+    flips: [[u32; N]; 3],
     /// The bits that make slots an order of visiting.
-    pub octant: u32,
+    pub octants: [u32; N],
 }
 
-/// Where planes of a node are on the ray: a byte times `step`, plus `near` or `far`.
-pub(super) struct Head {
-    pub step: [f32; 3],
-    pub near: [f32; 3],
-    pub far: [f32; 3],
-}
-
-impl Slabs {
-    /// Of a ray in the world, whose inverse direction is known.
+impl<const N: usize> Slabs<N> {
+    /// Of rays in the world, through a tree within `bounds`.
     #[inline(always)]
-    pub(super) fn new(origin: [f32; 3], direction: [f32; 3], inverse: [f32; 3]) -> Self {
-        Self::with(origin, direction, inverse, [0.0; 3])
-    }
-
-    #[inline(always)]
-    fn with(origin: [f32; 3], direction: [f32; 3], inverse: [f32; 3], padding: [f32; 3]) -> Self {
-        let bit = |axis: usize, bit: u32| if direction[axis] < 0.0 { 0 } else { bit };
-        let four = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
-        Self {
-            origin: four(origin),
-            inverse: four(inverse),
-            padding: four(padding),
-            flips: inverse.map(|i| i < 0.0),
-            octant: bit(0, 4) | bit(1, 2) | bit(2, 1),
+    pub(super) fn new(bounds: &[[f32; 2]; 3], rays: &Rays<N>) -> Self {
+        let mut thickness = [0.0; N];
+        for (origins, [least, greatest]) in rays.origins.iter().zip(bounds) {
+            for (thickness, origin) in thickness.iter_mut().zip(origins) {
+                let reach = larger(origin - least, greatest - origin);
+                *thickness = larger(*thickness, SLACK * reach);
+            }
         }
+        let mut inverses = [[0.0; N]; 3];
+        for (inverses, directions) in inverses.iter_mut().zip(&rays.directions) {
+            for (inverse, direction) in inverses.iter_mut().zip(directions) {
+                *inverse = safe_inverse(*direction);
+            }
+        }
+        Self::with(&rays.origins, &rays.directions, &inverses, &[thickness; 3])
     }
 
+    #[inline(always)]
+    fn with(
+        origins: &[[f32; N]; 3],
+        directions: &[[f32; N]; 3],
+        inverses: &[[f32; N]; 3],
+        thickness: &[[f32; N]; 3],
+    ) -> Self {
+        let mut this = Self {
+            origins: [[[0.0; N]; 2]; 3],
+            inverses: [[[0.0; N]; 2]; 3],
+            flips: [[0; N]; 3],
+            octants: [0; N],
+        };
+        for axis in 0..3 {
+            for lane in 0..N {
+                let (origin, inverse) = (origins[axis][lane], inverses[axis][lane]);
+                let behind = thickness[axis][lane].copysign(inverse);
+                this.origins[axis][0][lane] = origin + behind;
+                this.origins[axis][1][lane] = origin - behind;
+                this.inverses[axis][0][lane] = inverse * (1.0 - SLACK);
+                this.inverses[axis][1][lane] = inverse * (1.0 + SLACK);
+                this.flips[axis][lane] = u32::from(inverse < 0.0);
+                let is_forward = u32::from(directions[axis][lane] >= 0.0);
+                this.octants[lane] |= is_forward << (2 - axis);
+            }
+        }
+        this
+    }
+
+    /// Takes a ray from others.
+    #[inline(always)]
+    pub(super) fn set<const M: usize>(&mut self, lane: usize, others: &Slabs<M>, other: usize) {
+        for axis in 0..3 {
+            for end in 0..2 {
+                self.origins[axis][end][lane] = others.origins[axis][end][other];
+                self.inverses[axis][end][lane] = others.inverses[axis][end][other];
+            }
+            self.flips[axis][lane] = others.flips[axis][other];
+        }
+        self.octants[lane] = others.octants[other];
+    }
+
+    /// Which of the boxes the ray of a lane meets nearer than `t_max`.
+    #[inline(always)]
+    pub(super) fn meet<L: Lanes>(&self, lane: usize, boxes: &Boxes, t_max: f32) -> L::Mask {
+        let mut near = L::splat(0.0);
+        let mut far = L::splat(t_max);
+        for axis in 0..3 {
+            let (planes, flip) = (&boxes.0[axis], self.flips[axis][lane] as usize);
+            let [enter, leave] = &self.origins[axis];
+            let [slower, faster] = &self.inverses[axis];
+            let enter = plane::<L>(&planes[flip % 2], enter[lane], slower[lane]);
+            let leave = plane::<L>(&planes[(flip + 1) % 2], leave[lane], faster[lane]);
+            near = near.max(enter);
+            far = far.min(leave);
+        }
+        near.at_most(far)
+    }
+}
+
+impl Slabs<1> {
     /// Of a ray brought to where an object is: `enter_placement`.
     #[inline(always)]
     pub(super) fn within(placement: &Placement, origin: [f32; 3], direction: [f32; 3]) -> Self {
@@ -55,25 +114,22 @@ impl Slabs {
         let [a, b, c] = direction.map(f32::abs);
         let size = a.max(b.max(c));
         let inverse = direction.map(|d| safe_inverse(d / size) / size);
-        let padding = std::array::from_fn(|i| SLACK * reach * sums[i] * inverse[i].abs());
-        Self::with(origin, direction, inverse, padding)
+        let thickness: [f32; 3] = std::array::from_fn(|i| SLACK * reach * sums[i]);
+        let [origin, direction, inverse, thickness] =
+            [origin, direction, inverse, thickness].map(|v| v.map(|x| [x]));
+        Self::with(&origin, &direction, &inverse, &thickness)
     }
+}
 
-    #[inline(always)]
-    pub(super) fn enter(&self, node: &Node) -> Head {
-        let scale = node.exponents.map(|e| f32::from_bits(u32::from(e) << 23));
-        let step: [f32; 3] = std::array::from_fn(|i| scale[i] * self.inverse[i]);
-        let start: [f32; 3] =
-            std::array::from_fn(|i| (node.origin[i] - self.origin[i]) * self.inverse[i]);
-        let slack: [f32; 3] = std::array::from_fn(|i| {
-            SLACK * (start[i].abs() + 255.0 * step[i].abs()) + self.padding[i]
-        });
-        Head {
-            step,
-            near: std::array::from_fn(|i| start[i] - slack[i]),
-            far: std::array::from_fn(|i| start[i] + slack[i]),
-        }
-    }
+/// Where planes are on the ray.
+#[inline(always)]
+fn plane<L: Lanes>(planes: &[f32; WIDTH], origin: f32, inverse: f32) -> L {
+    L::load(planes).sub(L::splat(origin)).mul(L::splat(inverse))
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 #[inline(always)]

@@ -18,7 +18,7 @@ pub(super) struct Frame<L> {
 impl<L: Lanes> Frame<L> {
     /// Of the ray of a lane.
     #[inline(always)]
-    pub(super) fn of(rays: &Rays, across: &Across, lane: usize) -> Self {
+    pub(super) fn of<const N: usize>(rays: &Rays<N>, across: &Across<N>, lane: usize) -> Self {
         Self {
             origin: splat(rays.origin(lane)),
             x: splat(across.x.map(|values| values[lane])),
@@ -34,32 +34,33 @@ impl<L: Lanes> Frame<L> {
     }
 }
 
-/// The first two axes of the frames of eight rays.
-pub(super) struct Across {
-    x: [[f32; WIDTH]; 3],
-    y: [[f32; WIDTH]; 3],
+/// The first two axes of the frames of rays.
+pub(super) struct Across<const N: usize> {
+    x: [[f32; N]; 3],
+    y: [[f32; N]; 3],
 }
 
-impl Across {
+impl<const N: usize> Across<N> {
     /// `frame_from_z` of the WGSL, whose order of operations this has.
     #[inline(always)]
-    pub(super) fn new<L: Lanes>([x, y, z]: [L; 3]) -> Self {
-        let (zero, one, minus) = (L::splat(0.0), L::splat(1.0), L::splat(-1.0));
-        let side = one.where_else(z.at_least(zero), minus);
-        let a = minus.div(side.add(z));
-        let b = x.mul(y).mul(a);
-        Self {
-            x: [
-                one.add(side.mul(x).mul(x).mul(a)).values(),
-                side.mul(b).values(),
-                side.mul(minus).mul(x).values(),
-            ],
-            y: [
-                b.values(),
-                side.add(y.mul(y).mul(a)).values(),
-                y.mul(minus).values(),
-            ],
+    pub(super) fn new(directions: &[[f32; N]; 3]) -> Self {
+        let mut this = Self {
+            x: [[0.0; N]; 3],
+            y: [[0.0; N]; 3],
+        };
+        for lane in 0..N {
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| directions[axis][lane]);
+            let side = if z >= 0.0 { 1.0 } else { -1.0 };
+            let a = -1.0 / (side + z);
+            let b = x * y * a;
+            this.x[0][lane] = 1.0 + side * x * x * a;
+            this.x[1][lane] = side * b;
+            this.x[2][lane] = -side * x;
+            this.y[0][lane] = b;
+            this.y[1][lane] = side + y * y * a;
+            this.y[2][lane] = -y;
         }
+        this
     }
 }
 

@@ -1,13 +1,17 @@
-//! The walk through one tree or two, in the order of `wide.wgsl` and `placed.wgsl`.
+//! The walk through one tree or two, each ray in the order of `wide.wgsl` and `placed.wgsl`.
+//!
+//! Rays take turns: each tests the boxes of a node, then those that have to meet triangles do, then each goes on to
+//! its next node, which is asked for before it is needed. A processor that waits for a ray's memory, or has guessed
+//! wrong where it goes, works on the others; and the turns have few branches that it could guess wrong.
 
 use super::lanes::{Lanes, WIDTH};
-use super::slabs::{Slabs, safe_inverse};
-use super::tree::{Node, Packet, Placement, Trees};
+use super::slabs::Slabs;
+use super::tree::{Placement, Trees};
 use super::triangles::{Across, Frame, Place, intersect};
-use super::{Hit, Hits, NO_PRIMITIVE, Rays};
+use super::{Hit, NO_PRIMITIVE, Rays};
 
 /// Entries of a stack for trees that are not unusually deep.
-const SHALLOW: usize = 64;
+const SHALLOW: usize = 32;
 
 /// The index of the first inner child of a node; in bits 24..31 those that are still to be visited, most urgent
 /// first, and in 0..7 which children are inner ones.
@@ -15,183 +19,245 @@ type Group = (u32, u32);
 
 /// Of each ray that has a bit in `lanes` the nearest hit, or `ANY`, whichever comes first.
 #[inline(always)]
-pub(super) fn cast<L: Lanes, const ANY: bool>(trees: &Trees, rays: &Rays, lanes: u32) -> Hits {
-    let mut hits = rays.t_max.map(|t| Hit {
-        t,
+pub(super) fn cast<L: Lanes, const ANY: bool, const N: usize>(
+    trees: &Trees,
+    rays: &Rays<N>,
+    lanes: u32,
+) -> [Hit; N] {
+    let missed = Hit {
+        t: 0.0,
         u: 0.0,
         v: 0.0,
         primitive: NO_PRIMITIVE,
-    });
-    let [x, y, z] = &rays.directions;
-    let directions = [L::load(x), L::load(y), L::load(z)];
-    let mut lanes = lanes & are_rays::<L>(rays, directions);
-    let inverses = rays.directions.map(|values| values.map(safe_inverse));
-    let across = Across::new(directions);
-    let mut shallow = [(0, 0); SHALLOW];
-    let mut deep = Vec::new();
-    let stack = if trees.depth <= SHALLOW {
-        &mut shallow[..]
-    } else {
-        deep.resize(trees.depth, (0, 0));
-        &mut deep[..]
     };
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize % WIDTH;
-        lanes &= lanes - 1;
-        let (origin, direction) = (rays.origin(lane), rays.direction(lane));
-        let inverse = inverses.map(|values| values[lane]);
-        let slabs = Slabs::new(origin, direction, inverse);
-        let frame = Frame::<L>::of(rays, &across, lane);
-        let (skip, hit) = (rays.skip[lane], &mut hits[lane]);
-        match &trees.placements {
-            None => {
-                let mut leaves = Triangles::<L, ANY> {
-                    packets: &trees.packets,
-                    frame: &frame,
-                    place: None,
-                    shift: 0,
-                    skip,
-                };
-                walk::<L, _>(&trees.nodes, 0, &slabs, stack, hit, &mut leaves);
-            }
-            Some(placements) => {
-                let mut leaves = Placements::<L, ANY> {
-                    trees,
-                    placements,
-                    frame: &frame,
-                    origin,
-                    direction,
-                    skip,
-                };
-                walk::<L, _>(&trees.nodes, 0, &slabs, stack, hit, &mut leaves);
-            }
-        }
+    let mut hits = [missed; N];
+    for (hit, t_max) in hits.iter_mut().zip(rays.t_max) {
+        hit.t = t_max;
     }
-    hits
+    let lanes = lanes & are_rays(rays);
+    let mut shallow = [[(0, 0); SHALLOW]; N];
+    let mut deep = Vec::new();
+    let (stack, depth) = if trees.depth <= SHALLOW {
+        (shallow.as_flattened_mut(), SHALLOW)
+    } else {
+        deep.resize(N * trees.depth, (0, 0));
+        (&mut deep[..], trees.depth)
+    };
+    let slabs = Slabs::new(&trees.bounds, rays);
+    let walks = Walks {
+        trees,
+        placements: trees.placements.as_deref().unwrap_or_default(),
+        rays,
+        across: Across::new(&rays.directions),
+        outside: trees.placements.is_some().then_some(slabs),
+        slabs,
+        points: [Point::default(); N],
+        hits,
+        stack,
+        depth,
+    };
+    if trees.placements.is_none() {
+        walks.end::<L, ANY, false>(lanes)
+    } else {
+        walks.end::<L, ANY, true>(lanes)
+    }
 }
 
 /// Bits of those that are rays: what is none would walk all of the tree to hit nothing.
 #[inline(always)]
-fn are_rays<L: Lanes>(rays: &Rays, directions: [L; 3]) -> u32 {
-    let is_finite = |x: L| x.abs().at_most(L::splat(f32::MAX));
-    let mut found = L::load(&rays.t_max).above(L::splat(0.0));
-    for (origins, direction) in rays.origins.iter().zip(directions) {
-        let origin = L::load(origins);
-        found = L::and(found, L::and(is_finite(origin), is_finite(direction)));
+fn are_rays<const N: usize>(rays: &Rays<N>) -> u32 {
+    let mut are = [0; N];
+    for (are, t_max) in are.iter_mut().zip(&rays.t_max) {
+        *are = u32::from(*t_max > 0.0);
     }
-    L::bits(found)
-}
-
-/// What a tree has in its leaves.
-trait Leaves {
-    /// Meets those of a node, from `first` on, that have a bit, the last first. Is the walk at its end?
-    fn meet(&mut self, first: u32, bits: u32, stack: &mut [Group], hit: &mut Hit) -> bool;
-}
-
-/// Walks the tree below `root`. Did its leaves end it?
-#[inline(always)]
-fn walk<L: Lanes, M: Leaves>(
-    nodes: &[Node],
-    root: u32,
-    slabs: &Slabs,
-    stack: &mut [Group],
-    hit: &mut Hit,
-    leaves: &mut M,
-) -> bool {
-    let mut stacked = 0;
-    let mut group: Group = (root, 0x8000_0000);
-    loop {
-        let bit = 31 - group.1.leading_zeros();
-        let slot = (bit - 24) ^ slabs.octant;
-        let node = group.0 + (group.1 & !(u32::MAX << slot)).count_ones();
-        let rest = group.1 & !(1 << bit);
-        if rest > 0x00ff_ffff {
-            stack[stacked] = (group.0, rest);
-            stacked += 1;
+    for values in rays.origins.iter().chain(&rays.directions) {
+        for (are, value) in are.iter_mut().zip(values) {
+            *are &= u32::from(value.abs() <= f32::MAX);
         }
-        let node = &nodes[node as usize];
-        let hits = L::children(node, slabs, hit.t);
-        group = (node.first_child, hits & 0xff00_0000 | u32::from(node.inner));
-        let bits = hits & 0x00ff_ffff;
-        if bits != 0 && leaves.meet(node.first_leaf, bits, &mut stack[stacked..], hit) {
+    }
+    (0..).zip(are).fold(0, |bits, (lane, is)| bits | is << lane)
+}
+
+/// Rays on their way.
+struct Walks<'w, const N: usize> {
+    trees: &'w Trees,
+    placements: &'w [Placement],
+    rays: &'w Rays<N>,
+    across: Across<N>,
+    /// The rays in the world, if they go elsewhere.
+    outside: Option<Slabs<N>>,
+    /// The rays in the space of the tree that each is in.
+    slabs: Slabs<N>,
+    points: [Point; N],
+    hits: [Hit; N],
+    /// So many entries for each ray.
+    stack: &'w mut [Group],
+    depth: usize,
+}
+
+/// Where a ray is.
+#[derive(Clone, Copy, Default)]
+struct Point {
+    /// The node that it visits next.
+    node: u32,
+    /// Which of the node's leaves it meets, and where they begin.
+    leaves: u32,
+    first_leaf: u32,
+    /// How many groups are on its stack, and with how many its tree is left.
+    stacked: u32,
+    floor: u32,
+    /// The placement that it is in, if it is in one, and those that it will enter next.
+    placement: u32,
+    is_inside: bool,
+    first_placement: u32,
+    next_placements: u32,
+}
+
+impl<const N: usize> Walks<'_, N> {
+    /// Goes on until all are at their ends. There are two levels if they are `PLACED`.
+    #[inline(always)]
+    fn end<L: Lanes, const ANY: bool, const PLACED: bool>(mut self, lanes: u32) -> [Hit; N] {
+        let mut walking = lanes;
+        while walking != 0 {
+            let mut meeting = 0;
+            for lane in Ones(walking) {
+                meeting |= u32::from(self.visit::<L, PLACED>(lane % N)) << lane;
+            }
+            for lane in Ones(meeting) {
+                let is_hit = self.meet::<L, ANY, PLACED>(lane % N);
+                if ANY && is_hit {
+                    walking &= !(1 << lane);
+                }
+            }
+            for lane in Ones(walking) {
+                if !self.go_on::<L, PLACED>(lane % N) {
+                    walking &= !(1 << lane);
+                }
+            }
+        }
+        self.hits
+    }
+
+    /// Tests the boxes of the next node of a ray. Does it meet triangles there?
+    #[inline(always)]
+    fn visit<L: Lanes, const PLACED: bool>(&mut self, lane: usize) -> bool {
+        let point = &mut self.points[lane];
+        let node = &self.trees.nodes[point.node as usize];
+        let met = self.slabs.meet::<L>(lane, &node.boxes, self.hits[lane].t);
+        let children = L::bits(met) as usize % 256;
+        let order = &ORDERS[self.slabs.octants[lane] as usize % 8];
+        let visited = order[children & usize::from(node.inner)];
+        let group = u32::from(visited) << 24 | u32::from(node.inner);
+        self.stack[lane * self.depth + point.stacked as usize] = (node.first_child, group);
+        point.stacked += u32::from(visited != 0);
+        let leaves = L::united(met, &node.leaves);
+        if PLACED && !point.is_inside {
+            (point.first_placement, point.next_placements) = (node.first_leaf, leaves);
+            point.floor = point.stacked;
+            return false;
+        }
+        (point.first_leaf, point.leaves) = (node.first_leaf, leaves);
+        let first = (node.first_leaf + highest(leaves | 1) / WIDTH as u32) as usize;
+        if let Some(packet) = self.trees.packets.get(first) {
+            L::prefetch(packet);
+        }
+        leaves != 0
+    }
+
+    /// Tests triangles, the last first, and of `ANY` no more than it takes. Is there a hit that is nearer than before?
+    #[inline(always)]
+    fn meet<L: Lanes, const ANY: bool, const PLACED: bool>(&mut self, lane: usize) -> bool {
+        let point = &self.points[lane];
+        let frame = Frame::<L>::of(self.rays, &self.across, lane);
+        let placement = PLACED.then(|| &self.placements[point.placement as usize]);
+        let place = placement.map(Place::new);
+        let shift = placement.map_or(0, Placement::shift);
+        let (skip, hit) = (self.rays.skip[lane], &mut self.hits[lane]);
+        let mut rest = point.leaves;
+        let mut is_hit = false;
+        while rest != 0 {
+            let packet = highest(rest) / WIDTH as u32;
+            let at = packet * WIDTH as u32;
+            let bits = rest >> at;
+            rest &= !(u32::MAX << at);
+            let packet = &self.trees.packets[(point.first_leaf + packet) as usize];
+            is_hit |= intersect(packet, place.as_ref(), shift, bits, &frame, skip, hit);
+            if ANY && is_hit {
+                return true;
+            }
+        }
+        is_hit
+    }
+
+    /// Finds the next node of a ray, if there is one.
+    #[inline(always)]
+    fn go_on<L: Lanes, const PLACED: bool>(&mut self, lane: usize) -> bool {
+        let point = &mut self.points[lane];
+        if PLACED && point.stacked == point.floor && point.next_placements != 0 {
+            let bit = highest(point.next_placements);
+            point.next_placements &= !(1 << bit);
+            point.placement = point.first_placement + bit;
+            point.is_inside = true;
+            let placement = &self.placements[point.placement as usize];
+            let (origin, direction) = (self.rays.origin(lane), self.rays.direction(lane));
+            let slabs = Slabs::within(placement, origin, direction);
+            self.slabs.set(lane, &slabs, 0);
+            point.node = placement.root();
+            L::prefetch(&self.trees.nodes[point.node as usize]);
             return true;
         }
-        if group.1 <= 0x00ff_ffff {
-            if stacked == 0 {
-                return false;
-            }
-            stacked -= 1;
-            group = stack[stacked];
+        if point.stacked == 0 {
+            return false;
         }
+        if PLACED && point.is_inside && point.stacked == point.floor {
+            point.is_inside = false;
+            point.floor = 0;
+            if let Some(outside) = &self.outside {
+                self.slabs.set(lane, outside, lane);
+            }
+        }
+        let top = &mut self.stack[lane * self.depth + point.stacked as usize - 1];
+        let (first_child, group) = *top;
+        let bit = highest(group);
+        let slot = (bit - 24) ^ self.slabs.octants[lane];
+        point.node = first_child + (group & !(u32::MAX << slot)).count_ones();
+        L::prefetch(&self.trees.nodes[point.node as usize]);
+        top.1 = group & !(1 << bit);
+        point.stacked -= u32::from(top.1 <= 0x00ff_ffff);
+        true
     }
 }
 
-/// Triangles in the world, or of a placement.
-struct Triangles<'t, L, const ANY: bool> {
-    packets: &'t [Packet],
-    frame: &'t Frame<L>,
-    place: Option<Place<L>>,
-    shift: u32,
-    skip: u32,
-}
+/// The numbers of the bits that are set.
+struct Ones(u32);
 
-impl<L: Lanes, const ANY: bool> Leaves for Triangles<'_, L, ANY> {
+impl Iterator for Ones {
+    type Item = usize;
+
     #[inline(always)]
-    fn meet(&mut self, first: u32, bits: u32, _: &mut [Group], hit: &mut Hit) -> bool {
-        let mut rest = bits;
-        while rest != 0 {
-            let packet = (31 - rest.leading_zeros()) / WIDTH as u32;
-            let at = packet * WIDTH as u32;
-            let lanes = rest >> at;
-            rest &= !(u32::MAX << at);
-            let found = intersect(
-                &self.packets[(first + packet) as usize],
-                self.place.as_ref(),
-                self.shift,
-                lanes,
-                self.frame,
-                self.skip,
-                hit,
-            );
-            if ANY && found {
-                return true;
-            }
-        }
-        false
+    fn next(&mut self) -> Option<usize> {
+        let bits = self.0;
+        self.0 &= bits.wrapping_sub(1);
+        (bits != 0).then(|| bits.trailing_zeros() as usize)
     }
 }
 
-/// Placements, each with a tree of its own.
-struct Placements<'t, L, const ANY: bool> {
-    trees: &'t Trees,
-    placements: &'t [Placement],
-    frame: &'t Frame<L>,
-    origin: [f32; 3],
-    direction: [f32; 3],
-    skip: u32,
+/// The number of the highest bit that is set.
+#[inline(always)]
+fn highest(bits: u32) -> u32 {
+    31 - bits.leading_zeros()
 }
 
-impl<L: Lanes, const ANY: bool> Leaves for Placements<'_, L, ANY> {
-    #[inline(always)]
-    fn meet(&mut self, first: u32, bits: u32, stack: &mut [Group], hit: &mut Hit) -> bool {
-        let mut rest = bits;
-        while rest != 0 {
-            let bit = 31 - rest.leading_zeros();
-            rest &= !(1 << bit);
-            let placement = &self.placements[(first + bit) as usize];
-            let slabs = Slabs::within(placement, self.origin, self.direction);
-            let mut leaves = Triangles::<L, ANY> {
-                packets: &self.trees.packets,
-                frame: self.frame,
-                place: Some(Place::new(placement)),
-                shift: placement.shift(),
-                skip: self.skip,
-            };
-            let nodes = &self.trees.nodes;
-            if walk::<L, _>(nodes, placement.root(), &slabs, stack, hit, &mut leaves) {
-                return true;
-            }
-        }
-        false
+/// By octant and bits of slots: the same bits in the order of visiting, the most urgent highest.
+static ORDERS: [[u8; 256]; 8] = orders();
+
+const fn orders() -> [[u8; 256]; 8] {
+    let mut orders = [[0; 256]; 8];
+    let mut at = 0;
+    while at < 8 * 256 * 8 {
+        let (octant, slots, slot) = (at / 2048, at / 8 % 256, at % 8);
+        orders[octant][slots] |= ((slots >> slot & 1) << (slot ^ octant)) as u8;
+        at += 1;
     }
+    orders
 }
