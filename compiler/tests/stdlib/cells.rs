@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::statistics::{self, sine};
+use super::statistics::direction;
 use crate::common::record::effort;
 
 /// A rectangle in z and azimuth.
@@ -117,14 +117,12 @@ impl Cell {
         [c, d, e, f]
     }
 
-    /// The nodes of the rule, rows of equal cosine one after another. Sines take most of the time: those of a
-    /// column are taken once.
     fn points(&self) -> impl Iterator<Item = [f64; 3]> + use<> {
-        let at = |[low, high]: [f64; 2]| NODES.map(|(s, _)| low + s * (high - low));
-        let columns = at(self.phi).map(|phi| (phi.cos(), phi.sin()));
-        at(self.z).into_iter().flat_map(move |z| {
-            let across = sine(z);
-            columns.map(|(cos, sin)| [across * cos, across * sin, z])
+        let (z, phi) = (self.z, self.phi);
+        NODES.into_iter().flat_map(move |(s, _)| {
+            NODES.into_iter().map(move |(t, _)| {
+                direction(z[0] + s * (z[1] - z[0]), phi[0] + t * (phi[1] - phi[0]))
+            })
         })
     }
 }
@@ -377,9 +375,9 @@ fn rule(cells: &[Cell], measure: &dyn Fn(&[[f64; 3]]) -> Vec<Measures>) -> Vec<M
 
 #[test]
 fn cells_cover_the_sphere_once_and_integrate_it() {
-    let mut n = statistics::Numbers::new(3);
+    let mut n = super::statistics::Numbers::new(3);
     let lobe: Vec<[f64; 3]> = (0..4000)
-        .map(|_| statistics::direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit()))
+        .map(|_| direction(1.0 - 1e-4 * n.unit(), 6.0 * n.unit()))
         .collect();
     let partition = partition(&lobe, 50);
     let cells = &partition.cells;

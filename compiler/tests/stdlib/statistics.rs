@@ -45,13 +45,8 @@ impl Numbers {
 
 /// The unit direction with the cosine `z` to the normal, `phi` radians around it.
 pub fn direction(z: f64, phi: f64) -> [f64; 3] {
-    let across = sine(z);
-    [across * phi.cos(), across * phi.sin(), z]
-}
-
-/// The sine of the angle whose cosine is `z`.
-pub fn sine(z: f64) -> f64 {
-    ((1.0 - z) * (1.0 + z)).max(0.0).sqrt()
+    let s = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
+    [s * phi.cos(), s * phi.sin(), z]
 }
 
 /// The probability that a chi-squared variable with `freedom` degrees exceeds `x`.
