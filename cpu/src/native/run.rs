@@ -17,8 +17,8 @@ pub struct Buffer {
     words: Box<[AtomicU32]>,
 }
 
-/// Words that are read behind a value at most, by code that reads four where it needs fewer.
-const BEHIND: usize = 3;
+/// Words behind a buffer: code reads four where it needs fewer, and lanes that have nothing to store store there.
+pub(crate) const BEHIND: usize = 4;
 
 impl Buffer {
     /// So many words, all of them zero.

@@ -316,18 +316,23 @@ impl Assigner<'_> {
             Inst::Scatter {
                 buffer,
                 reads,
+                is_masked,
                 offset,
             } => {
-                if let [mask, index, words @ ..] = &reads[..] {
-                    self.scatter(*buffer, *mask, *index, words, *offset);
+                let (mask, reads) = match reads.split_last() {
+                    Some((mask, reads)) if *is_masked => (Some(*mask), reads),
+                    _ => (None, &reads[..]),
+                };
+                if let [index, words @ ..] = reads {
+                    self.scatter(*buffer, mask, *index, words, *offset);
                 }
             }
             Inst::Add {
                 buffer,
-                reads: [mask, index, value],
+                reads: [index, value],
                 offset,
                 to,
-            } => self.add(*buffer, [*mask, *index, *value], *offset, *to),
+            } => self.add(*buffer, *index, *value, *offset, *to),
             Inst::GatherOwn { from, index, to } => {
                 let index = self.register(*index);
                 let register = self.room();
@@ -478,11 +483,20 @@ impl Assigner<'_> {
         }
     }
 
-    /// Stores words of each lane of a mask: four as a row, or else one by one.
-    fn scatter(&mut self, buffer: u32, mask: Value, index: Value, words: &[Value], offset: i32) {
+    /// Stores words of each lane, or of each that is in a mask: four as a row, or else one by one.
+    fn scatter(
+        &mut self,
+        buffer: u32,
+        mask: Option<Value>,
+        index: Value,
+        words: &[Value],
+        offset: i32,
+    ) {
         let scratch = self.memory.exchange();
-        let mask = self.register(mask);
-        self.asm.mask_bits(mask);
+        if let Some(mask) = mask {
+            let mask = self.register(mask);
+            self.asm.mask_bits(mask);
+        }
         let index = self.in_memory(index, scratch);
         self.locked = [false; REGISTERS];
         self.asm.load_buffer(self.memory.buffer(buffer));
@@ -491,10 +505,10 @@ impl Assigner<'_> {
                 let from = self.in_memory(*value, scratch + CELL);
                 self.locked = [false; REGISTERS];
                 for lane in 0..LANES {
-                    let skip = self.asm.skip_lane(lane as u8);
+                    let skip = mask.map(|_| self.asm.skip_lane(lane as u8));
                     self.asm.load_index(index + 4 * lane);
                     self.asm.store_word(from + 4 * lane, offset + 4 * word);
-                    self.asm.land(skip);
+                    skip.into_iter().for_each(|skip| self.asm.land(skip));
                 }
             }
             return;
@@ -514,29 +528,25 @@ impl Assigner<'_> {
         mix(high_pairs, b, b, SPARE);
         for lane in 0..LANES {
             let row = [c, a, d, b][lane as usize % 4];
-            let skip = self.asm.skip_lane(lane as u8);
+            let skip = mask.map(|_| self.asm.skip_lane(lane as u8));
             self.asm.load_index(index + 4 * lane);
             self.asm.store_row(row, offset, lane >= 4);
-            self.asm.land(skip);
+            skip.into_iter().for_each(|skip| self.asm.land(skip));
         }
     }
 
-    /// Adds to a word of each lane of a mask.
-    fn add(&mut self, buffer: u32, [mask, index, value]: [Value; 3], offset: i32, to: Value) {
+    /// Adds to a word of each lane.
+    fn add(&mut self, buffer: u32, index: Value, value: Value, offset: i32, to: Value) {
         let scratch = self.memory.exchange();
         let before = scratch + 2 * CELL;
-        let mask = self.register(mask);
-        self.asm.mask_bits(mask);
         let index = self.in_memory(index, scratch);
         let value = self.in_memory(value, scratch + CELL);
         self.locked = [false; REGISTERS];
         self.asm.load_buffer(self.memory.buffer(buffer));
         for lane in 0..LANES {
-            let skip = self.asm.skip_lane(lane as u8);
             self.asm.load_index(index + 4 * lane);
             self.asm
                 .add_word(offset, value + 4 * lane, before + 4 * lane);
-            self.asm.land(skip);
         }
         if self.places[to.0 as usize].last > 0 {
             let register = self.room();

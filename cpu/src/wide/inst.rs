@@ -142,18 +142,19 @@ pub(super) enum Inst {
         offset: i32,
         to: [Option<Value>; 4],
     },
-    /// Stores such words, in the lanes of a mask.
+    /// Stores such words, in the lanes of a mask or in all.
     Scatter {
         buffer: u32,
-        /// mask, index, words
+        /// index, words, and the mask if there is one
         reads: Vec<Value>,
+        is_masked: bool,
         offset: i32,
     },
-    /// Adds to words of a buffer that only this thread uses, in the lanes of a mask, one after another.
+    /// Adds to words of a buffer that only this thread uses, one lane after another.
     Add {
         buffer: u32,
-        /// mask, index, what is added
-        reads: [Value; 3],
+        /// index, what is added
+        reads: [Value; 2],
         offset: i32,
         /// What was there before.
         to: Value,

@@ -194,6 +194,17 @@ impl<'a> Translator<'a> {
         }
     }
 
+    /// The index where lanes store something, and behind the buffer for those that do not: nobody reads what is
+    /// there, and all lanes are stored without asking which. In a buffer that others use, they would be in each
+    /// other's way.
+    fn behind_others(&mut self, buffer: u32, index: Value, offset: i32) -> Value {
+        let behind = self.known_before(Constant::Last {
+            buffer,
+            words: offset as u32 / 4,
+        });
+        self.select_lanes(self.mask, index, behind)
+    }
+
     /// A cell of an element of an array in the thread's memory.
     fn element_of(&mut self, from: i32, index: Value, stride: u32) -> Value {
         let words = self.bits(8 * stride);
@@ -224,12 +235,20 @@ impl<'a> Translator<'a> {
                 return Err(self.unsupported("store of a value with gaps"));
             }
             let slots: Vec<Slot> = (from..).take(places.len()).collect();
+            let is_masked = !self.shared.alone[buffer as usize];
             for (row, offset) in slots.chunks(4).zip((offset..).step_by(16)) {
-                let mut reads = vec![self.mask, index];
+                let index = if is_masked {
+                    index
+                } else {
+                    self.behind_others(buffer, index, offset)
+                };
+                let mut reads = vec![index];
                 reads.extend(row.iter().map(|slot| self.value(*slot)));
+                reads.extend(is_masked.then_some(self.mask));
                 self.insts.push(Inst::Scatter {
                     buffer,
                     reads,
+                    is_masked,
                     offset,
                 });
             }
@@ -438,7 +457,8 @@ impl<'a> Translator<'a> {
         let index = index.unwrap_or_else(|| self.bits(0));
         if matches!(kind, AtomicKind::Add) && self.shared.alone[buffer as usize] {
             let before = self.new_value();
-            let reads = [self.mask, index, self.value(value)];
+            let index = self.behind_others(buffer, index, offset);
+            let reads = [index, self.value(value)];
             self.insts.push(Inst::Add {
                 buffer,
                 reads,
