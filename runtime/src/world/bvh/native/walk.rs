@@ -4,18 +4,22 @@
 //! its next node, which is asked for before it is needed. A processor that waits for a ray's memory, or has guessed
 //! wrong where it goes, works on the others; and the turns have few branches that it could guess wrong.
 
+use std::cell::Cell;
+
 use super::lanes::{Lanes, WIDTH};
 use super::slabs::Slabs;
 use super::tree::{Placement, Trees};
 use super::triangles::{Across, Frame, Place, intersect};
 use super::{Hit, NO_PRIMITIVE, Rays};
 
-/// Entries of a stack for trees that are not unusually deep.
-const SHALLOW: usize = 32;
-
 /// The index of the first inner child of a node; in bits 24..31 those that are still to be visited, most urgent
 /// first, and in 0..7 which children are inner ones.
 type Group = (u32, u32);
+
+thread_local! {
+    /// What a thread keeps for its next cast: what stacks hold at first does not matter, so they are not cleared.
+    static STACK: Cell<Vec<Group>> = const { Cell::new(Vec::new()) };
+}
 
 /// Of each ray that has a bit in `lanes` the nearest hit, or `ANY`, whichever comes first.
 #[inline(always)]
@@ -35,14 +39,10 @@ pub(super) fn cast<L: Lanes, const ANY: bool, const N: usize>(
         hit.t = t_max;
     }
     let lanes = lanes & are_rays(rays);
-    let mut shallow = [[(0, 0); SHALLOW]; N];
-    let mut deep = Vec::new();
-    let (stack, depth) = if trees.depth <= SHALLOW {
-        (shallow.as_flattened_mut(), SHALLOW)
-    } else {
-        deep.resize(N * trees.depth, (0, 0));
-        (&mut deep[..], trees.depth)
-    };
+    let mut stack = STACK.take();
+    if stack.len() < N * trees.depth {
+        stack.resize(N * trees.depth, (0, 0));
+    }
     let slabs = Slabs::new(&trees.bounds, rays);
     let walks = Walks {
         trees,
@@ -53,14 +53,16 @@ pub(super) fn cast<L: Lanes, const ANY: bool, const N: usize>(
         slabs,
         points: [Point::default(); N],
         hits,
-        stack,
-        depth,
+        stack: &mut stack,
+        depth: trees.depth,
     };
-    if trees.placements.is_none() {
+    let hits = if trees.placements.is_none() {
         walks.end::<L, ANY, false>(lanes)
     } else {
         walks.end::<L, ANY, true>(lanes)
-    }
+    };
+    STACK.set(stack);
+    hits
 }
 
 /// Bits of those that are rays: what is none would walk all of the tree to hit nothing.
