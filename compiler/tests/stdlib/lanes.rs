@@ -159,7 +159,7 @@ pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> La
 
 /// Lanes that are run together: enough that what is the same in all lanes, and is computed for each
 /// block anew, is a small part of the work.
-const BLOCK: usize = 1 << 14;
+const BLOCK: usize = 1 << 13;
 
 /// Runs a function that need not be in the module.
 pub fn run<F: Real>(module: &Module, f: &Function, args: Vec<Lanes<F>>) -> Lanes<F> {

@@ -18,7 +18,8 @@ use std::sync::LazyLock;
 
 use impasto_compiler::ast::{ClosureKind, ItemKind};
 use impasto_compiler::ir::{
-    Closure, ClosureId, Const, FunctionId, Local, Material, Methods, Module,
+    Closure, ClosureId, Const, Expr, ExprId, ExprKind, Function, FunctionId, Local, Material,
+    Methods, Module, Stmt, Type,
 };
 use impasto_compiler::source::FileId;
 use impasto_compiler::{MemoryLoader, check, diag, parser, passes};
@@ -276,6 +277,59 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         passes,
         cases,
         module,
+    }
+}
+
+impl Bsdf {
+    /// What methods answer for a case, one after another in a vector: a function of `wo` and what they take besides.
+    /// It is optimised as in a kernel, with the case's arguments for constants: what the methods share is computed
+    /// once, and what the case does not need is not.
+    pub fn answers(&self, case: &Case, methods: &[FunctionId]) -> Function {
+        let method = |id: FunctionId| &self.module.functions[id.index()];
+        let span = method(methods[0]).span;
+        let mut exprs = Vec::new();
+        let mut add = |kind: ExprKind, ty: Type| {
+            exprs.push(Expr {
+                kind,
+                ty,
+                span,
+                via: None,
+                name: None,
+            });
+            ExprId(exprs.len() as u32 - 1)
+        };
+        let (given, taken) = method(methods[0]).params.split_at(case.args.len());
+        let args = case.args.iter().zip(given);
+        let mut args: Vec<ExprId> = args
+            .map(|(c, param)| add(ExprKind::Const(c.clone()), param.ty))
+            .collect();
+        args.extend((0..).zip(taken).map(|(i, p)| add(ExprKind::Param(i), p.ty)));
+        let call = |&id: &FunctionId| add(ExprKind::Call(id, args.clone()), method(id).result);
+        let mut made: Vec<ExprId> = methods.iter().map(call).collect();
+        let widths = methods.iter().filter_map(|&id| method(id).result.width());
+        let result = match widths.sum() {
+            1 => Type::Float,
+            3 => Type::Vec3,
+            4 => Type::Vec4,
+            width => panic!("{}: {width} answers", self.name),
+        };
+        if made.len() > 1 {
+            made.push(add(ExprKind::Compose(made.clone()), result));
+        }
+        let mut function = Function {
+            name: "answers".into(),
+            params: taken.to_vec(),
+            result,
+            locals: Vec::new(),
+            value: made[made.len() - 1],
+            body: made.into_iter().map(Stmt::Eval).collect(),
+            exprs,
+            turns: methods.iter().map(|&id| method(id).turns).sum(),
+            sites: Vec::new(),
+            span,
+        };
+        passes::run(&self.module, &mut function);
+        function
     }
 }
 

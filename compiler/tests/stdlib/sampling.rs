@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use impasto_compiler::ir::Const;
+use impasto_compiler::ir::{Const, Function};
 
 use super::cells::{self, Measures};
 use super::lanes::{self, Lanes};
@@ -71,35 +71,24 @@ pub struct Outcome {
 
 /// A BSDF seen from `wo`.
 pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distribution<'a> {
-    let first = move || -> Vec<Lanes> {
-        let args = case.args.iter().map(lanes::constant);
-        args.chain([lanes::uniform(&wo)]).collect()
+    let [sampled, measured] =
+        [&[bsdf.sample][..], &[bsdf.pdf, bsdf.eval]].map(|methods| bsdf.answers(case, methods));
+    let ask = move |function: &Function, second: Lanes| {
+        lanes::run(&bsdf.module, function, vec![lanes::uniform(&wo), second])
     };
     let sample = move |u: &[[f64; 4]]| {
-        let mut args = first();
-        args.push(
-            (0..3)
-                .map(|c| lanes::floats(u.iter().map(|u| u[c]).collect()))
-                .collect(),
-        );
-        let wi = lanes::call(&bsdf.module, bsdf.sample, args);
+        let numbers = (0..3).map(|c| lanes::floats(u.iter().map(|u| u[c]).collect()));
+        let wi = ask(&sampled, numbers.collect());
         (0..u.len())
             .map(|l| std::array::from_fn(|c| lanes::float_at(&wi, c, l)))
             .collect()
     };
     let measure = move |wi: &[[f64; 3]]| {
-        let mut args = first();
-        args.push(
-            (0..3)
-                .map(|c| lanes::floats(wi.iter().map(|w| w[c]).collect()))
-                .collect(),
-        );
-        let pdf = lanes::call(&bsdf.module, bsdf.pdf, args.clone());
-        let value = lanes::call(&bsdf.module, bsdf.eval, args);
+        let found = ask(&measured, lanes::vectors(wi));
         let answer = |(l, wi): (usize, &[f64; 3])| {
             let power = bsdf.power_over_radiance(case, wo[2], wi[2]);
-            let v = |c: usize| power * lanes::float_at(&value, c, l);
-            [lanes::float_at(&pdf, 0, l), v(0), v(1), v(2)]
+            let v = |c: usize| power * lanes::float_at(&found, 1 + c, l);
+            [lanes::float_at(&found, 0, l), v(0), v(1), v(2)]
         };
         wi.iter().enumerate().map(answer).collect()
     };
