@@ -282,8 +282,6 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
 
 impl Bsdf {
     /// What methods answer for a case, one after another in a vector: a function of `wo` and what they take besides.
-    /// It is optimised as in a kernel, with the case's arguments for constants: what the methods share is computed
-    /// once, and what the case does not need is not.
     pub fn answers(&self, case: &Case, methods: &[FunctionId]) -> Function {
         let method = |id: FunctionId| &self.module.functions[id.index()];
         let span = method(methods[0]).span;
@@ -316,7 +314,7 @@ impl Bsdf {
         if made.len() > 1 {
             made.push(add(ExprKind::Compose(made.clone()), result));
         }
-        let mut function = Function {
+        Function {
             name: "answers".into(),
             params: taken.to_vec(),
             result,
@@ -327,9 +325,7 @@ impl Bsdf {
             turns: methods.iter().map(|&id| method(id).turns).sum(),
             sites: Vec::new(),
             span,
-        };
-        passes::run(&self.module, &mut function);
-        function
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use impasto_compiler::ir::{Const, Function};
+use impasto_compiler::passes;
 
 use super::cells::{self, Measures};
 use super::lanes::{self, Lanes};
@@ -71,8 +72,32 @@ pub struct Outcome {
 
 /// A BSDF seen from `wo`.
 pub fn distribution<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distribution<'a> {
-    let [sampled, measured] =
-        [&[bsdf.sample][..], &[bsdf.pdf, bsdf.eval]].map(|methods| bsdf.answers(case, methods));
+    let [sample, measure] = functions(bsdf, case);
+    distribution_of(bsdf, case, wo, sample, measure)
+}
+
+/// The same for very many directions. Its functions are optimised as in a kernel, with the case's arguments for
+/// constants: what density and value share is computed once, and what the case does not need is not.
+fn optimised<'a>(bsdf: &'a Bsdf, case: &'a Case, wo: [f64; 3]) -> Distribution<'a> {
+    let [sample, measure] = functions(bsdf, case).map(|mut function| {
+        passes::run(&bsdf.module, &mut function);
+        function
+    });
+    distribution_of(bsdf, case, wo, sample, measure)
+}
+
+/// What samples directions, and what gives their density and value.
+fn functions(bsdf: &Bsdf, case: &Case) -> [Function; 2] {
+    [&[bsdf.sample][..], &[bsdf.pdf, bsdf.eval]].map(|methods| bsdf.answers(case, methods))
+}
+
+fn distribution_of<'a>(
+    bsdf: &'a Bsdf,
+    case: &'a Case,
+    wo: [f64; 3],
+    sampled: Function,
+    measured: Function,
+) -> Distribution<'a> {
     let ask = move |function: &Function, second: Lanes| {
         lanes::run(&bsdf.module, function, vec![lanes::uniform(&wo), second])
     };
@@ -272,7 +297,7 @@ fn samples_follow_the_density_and_keep_energy() {
             return (case.label.clone(), Vec::new());
         }
         let wo = view(*degrees);
-        let d = distribution(bsdf, case, wo);
+        let d = optimised(bsdf, case, wo);
         let found = |seed: u64| {
             let outcome = examine(&d, samples(), seed);
             let mut faults = faults(&outcome, tests);
