@@ -57,9 +57,9 @@ pub(super) fn cast<L: Lanes, const ANY: bool, const N: usize>(
         depth: trees.depth,
     };
     let hits = if trees.placements.is_none() {
-        walks.end::<L, ANY, false>(lanes)
+        walks.finish::<L, ANY, false>(lanes)
     } else {
-        walks.end::<L, ANY, true>(lanes)
+        walks.finish::<L, ANY, true>(lanes)
     };
     STACK.set(stack);
     hits
@@ -118,7 +118,7 @@ struct Point {
 impl<const N: usize> Walks<'_, N> {
     /// Goes on until all are at their ends. There are two levels if they are `PLACED`.
     #[inline(always)]
-    fn end<L: Lanes, const ANY: bool, const PLACED: bool>(mut self, lanes: u32) -> [Hit; N] {
+    fn finish<L: Lanes, const ANY: bool, const PLACED: bool>(mut self, lanes: u32) -> [Hit; N] {
         let mut walking = lanes;
         while walking != 0 {
             let mut meeting = 0;
