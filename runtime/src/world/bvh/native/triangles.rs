@@ -48,9 +48,9 @@ impl<const N: usize> Across<N> {
             x: [[0.0; N]; 3],
             y: [[0.0; N]; 3],
         };
-        for lane in 0..N {
-            let [x, y, z] = [0, 1, 2].map(|axis: usize| directions[axis][lane]);
-            let side = if z >= 0.0 { 1.0 } else { -1.0 };
+        let [x, y, z] = directions;
+        for (lane, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
+            let side = if *z >= 0.0 { 1.0 } else { -1.0 };
             let a = -1.0 / (side + z);
             let b = x * y * a;
             this.x[0][lane] = 1.0 + side * x * x * a;
