@@ -3,6 +3,9 @@
 //! A kernel is text that a generator wrote: expressions of all types, variables, arrays that are indexed by
 //! anything, branches, loops, functions that take pointers, and stores to a buffer at any index. What no number
 //! is may be any such number; calls of sine and the like are left out, since they round as libraries do.
+//!
+//! Under valgrind, the same tests watch what machine code reads and writes:
+//! `valgrind target/debug/deps/impasto_cpu-* random_kernels`.
 
 use std::fmt::Write;
 use std::sync::Arc;
