@@ -158,7 +158,8 @@ pub fn call<F: Real>(module: &Module, id: FunctionId, args: Vec<Lanes<F>>) -> La
 }
 
 /// Lanes that are run together: enough that what is the same in all lanes, and is computed for each
-/// block anew, is a small part of the work.
+/// block anew, is a small part of the work, and so few that a column is no memory of its own, which the system
+/// would clear each time.
 const BLOCK: usize = 1 << 13;
 
 /// Runs a function that need not be in the module.

@@ -306,7 +306,6 @@ impl Bsdf {
         let mut made: Vec<ExprId> = methods.iter().map(call).collect();
         let widths = methods.iter().filter_map(|&id| method(id).result.width());
         let result = match widths.sum() {
-            1 => Type::Float,
             3 => Type::Vec3,
             4 => Type::Vec4,
             width => panic!("{}: {width} answers", self.name),

@@ -18,7 +18,7 @@ pub struct Buffer {
 }
 
 /// Words behind a buffer: code reads four where it needs fewer, and lanes that have nothing to store store there.
-pub(crate) const BEHIND: usize = 4;
+const BEHIND: usize = 4;
 
 impl Buffer {
     /// So many words, all of them zero.

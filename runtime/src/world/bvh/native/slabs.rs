@@ -26,11 +26,11 @@ impl<const N: usize> Slabs<N> {
     /// Of rays in the world, through a tree within `bounds`.
     #[inline(always)]
     pub(super) fn new(bounds: &[[f32; 2]; 3], rays: &Rays<N>) -> Self {
-        let mut thickness = [0.0; N];
+        let mut thickness = [0.0_f32; N];
         for (origins, [least, greatest]) in rays.origins.iter().zip(bounds) {
             for (thickness, origin) in thickness.iter_mut().zip(origins) {
-                let reach = larger(origin - least, greatest - origin);
-                *thickness = larger(*thickness, SLACK * reach);
+                let reach = (origin - least).max(greatest - origin);
+                *thickness = thickness.max(SLACK * reach);
             }
         }
         let mut inverses = [[0.0; N]; 3];
@@ -125,11 +125,6 @@ impl Slabs<1> {
 #[inline(always)]
 fn plane<L: Lanes>(planes: &[f32; WIDTH], origin: f32, inverse: f32) -> L {
     L::load(planes).sub(L::splat(origin)).mul(L::splat(inverse))
-}
-
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 #[inline(always)]

@@ -54,7 +54,6 @@ pub(super) fn cast<L: Lanes, const ANY: bool, const N: usize>(
         points: [Point::default(); N],
         hits,
         stack: &mut stack,
-        depth: trees.depth,
     };
     let hits = if trees.placements.is_none() {
         walks.finish::<L, ANY, false>(lanes)
@@ -92,9 +91,8 @@ struct Walks<'w, const N: usize> {
     slabs: Slabs<N>,
     points: [Point; N],
     hits: [Hit; N],
-    /// So many entries for each ray.
+    /// For each ray as many entries as the trees are deep.
     stack: &'w mut [Group],
-    depth: usize,
 }
 
 /// Where a ray is.
@@ -150,7 +148,7 @@ impl<const N: usize> Walks<'_, N> {
         let order = &ORDERS[self.slabs.octants[lane] as usize % 8];
         let visited = order[children & usize::from(node.inner)];
         let group = u32::from(visited) << 24 | u32::from(node.inner);
-        self.stack[lane * self.depth + point.stacked as usize] = (node.first_child, group);
+        self.stack[lane * self.trees.depth + point.stacked as usize] = (node.first_child, group);
         point.stacked += u32::from(visited != 0);
         let leaves = L::united(met, &node.leaves);
         if PLACED && !point.is_inside {
@@ -218,7 +216,7 @@ impl<const N: usize> Walks<'_, N> {
                 self.slabs.set(lane, outside, lane);
             }
         }
-        let top = &mut self.stack[lane * self.depth + point.stacked as usize - 1];
+        let top = &mut self.stack[lane * self.trees.depth + point.stacked as usize - 1];
         let (first_child, group) = *top;
         let bit = highest(group);
         let slot = (bit - 24) ^ self.slabs.octants[lane];
