@@ -2,8 +2,8 @@
 //! of a compiled material, and what a kernel must provide for it.
 //!
 //! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
-//! `stdlib/core/material.impasto`, and printed into every generated module. Fields that only
-//! `filter_width` needs are left out of modules that read none of them ([`InputSet::declares`]).
+//! `stdlib/core/material.impasto`, and printed into every generated module. Fields that few materials
+//! need are left out of modules that read none of them ([`InputSet::declares`]).
 //!
 //! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
 //! `evaluate_`, `emission_`, `albedo_` or `normal_`; kernels must not define such names.
@@ -28,6 +28,10 @@
 //!
 //! A *material* is code; an *instance* is a material with values for its parameters, what a scene
 //! binds to geometry. Instances that differ in values share the code, and the values lie in a table.
+
+mod point;
+
+pub use point::{Input, InputSet, Tangents};
 
 /// The WGSL function that evaluates any material of a module.
 pub const EVALUATE: &str = "evaluate_material";
@@ -211,32 +215,4 @@ pub struct MaterialInfo {
     pub textures: Vec<usize>,
     /// Number of lobes after layering.
     pub lobes: usize,
-}
-
-/// The fields of `SurfacePoint` that code reads, so that the others need not be computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub struct InputSet {
-    pub position: bool,
-    pub normal: bool,
-    pub geometric_normal: bool,
-    pub tangent: bool,
-    pub uv: bool,
-    pub exterior_ior: bool,
-    /// How position varies over what a ray sees: `footprint_x` and `footprint_y`.
-    pub footprint: bool,
-    /// How texture coordinates do: `footprint_uv_x` and `footprint_uv_y`.
-    pub footprint_uv: bool,
-}
-
-impl InputSet {
-    /// Whether `SurfacePoint` has a field in generated code: all but those that only widths need
-    /// always are there.
-    pub fn declares(&self, field: &str) -> bool {
-        match field {
-            "footprint_x" | "footprint_y" => self.footprint,
-            "footprint_uv_x" | "footprint_uv_y" => self.footprint_uv,
-            _ => true,
-        }
-    }
 }

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use crate::common::{codes, compilation, program};
+use impasto_compiler::abi::Input;
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::ir::{Const, ExprId, ExprKind, Material};
@@ -358,7 +359,7 @@ fn the_index_outside_is_an_input() {
     );
     let reads = |surface: &str| {
         let text = format!("{USES}material m {{ surface = {surface}; }}");
-        program(&text).infos()[0].inputs.exterior_ior
+        program(&text).infos()[0].inputs.has(Input::ExteriorIor)
     };
     assert!(reads("specular(exterior_ior / 2.0)") && !reads("specular(uv.x)"));
 }

@@ -1,7 +1,7 @@
 //! What reaches the WGSL, what does not, and that the text is legal whatever names an author uses.
 
 use crate::common::{codes, compilation, program, wgsl};
-use impasto_compiler::abi::{Emission, TextureSpace};
+use impasto_compiler::abi::{Emission, Input, TextureSpace};
 use impasto_compiler::ir::build::Builder;
 use impasto_compiler::ir::ops::Op;
 use impasto_compiler::ir::{Local, Type};
@@ -236,7 +236,10 @@ fn inputs_are_those_read() {
     );
     let inputs = program(&text).infos()[0].inputs;
     assert!(
-        inputs.uv && inputs.normal && inputs.geometric_normal && !inputs.position,
+        inputs.has(Input::Uv)
+            && inputs.has(Input::Normal)
+            && inputs.has(Input::GeometricNormal)
+            && !inputs.has(Input::Position),
         "{inputs:?}"
     );
 }

@@ -24,6 +24,7 @@ mod parser;
 mod passes;
 mod reference;
 mod render;
+mod slopes;
 mod stdlib;
 mod textures;
 mod widths;

@@ -251,7 +251,7 @@ fn integer_texels<const LEVELS: usize>(
 }
 
 /// IEC 61966-2-1.
-fn srgb_to_linear(encoded: f64) -> f64 {
+pub(crate) fn srgb_to_linear(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
         encoded / 12.92
     } else {

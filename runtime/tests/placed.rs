@@ -98,6 +98,7 @@ pub(crate) fn crowd(random: &mut Random, scale: f32, world: bool) -> Scene {
             object: index % 3,
             transform,
             materials: [index % 4, 4].into(),
+            place: 0,
         });
     }
     scene
@@ -340,6 +341,7 @@ fn one_ball(n: usize, transform: Transform) -> Scene {
         object: 0,
         transform,
         materials: [0, 1].into(),
+        place: 0,
     }];
     scene
 }
@@ -482,6 +484,7 @@ fn triangles_that_shine_leave_their_objects() {
         object: 0,
         transform: Transform::new(Vec3::new(-1.0, 1.0, 1.0), Vec3::ZERO, x * Vec3::X),
         materials: materials.into(),
+        place: 0,
     };
     scene.placements = vec![place(0.0, [0, 1]), place(4.0, [0, 2]), place(8.0, [0, 1])];
     let mut infos = instances();

@@ -7,7 +7,8 @@ use crate::support::worlds::{kernel_parts, world};
 use crate::support::{Random, Row, floats, row, run};
 use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
-use impasto_compiler::abi::{Emission, InstanceInfo, TextureRef, TextureSpace};
+
+use impasto_compiler::abi::{Emission, Input, InstanceInfo, TextureRef, TextureSpace};
 use impasto_compiler::{MaterialRequest, MemoryLoader, compile};
 use impasto_runtime::audit;
 use impasto_runtime::error::SceneError;
@@ -217,7 +218,10 @@ fn a_scene_without_attributes_has_no_buffers_for_them() {
         .unwrap_or_else(|| panic!("{:?}", compilation.diagnostics));
     let materials = program.infos();
     let read = materials[0].inputs;
-    assert!(read.normal && read.uv && read.tangent, "{read:?}");
+    assert!(
+        read.has(Input::Normal) && read.has(Input::Uv) && read.has(Input::Tangent),
+        "{read:?}"
+    );
 
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let (scene, instances) = scene(Mesh {

@@ -59,6 +59,8 @@ pub fn scene(palette: &Palette, coherence: Coherence, side: u32) -> Scene {
         mesh: Mesh::default(),
         objects: Vec::new(),
         placements: Vec::new(),
+        places: Vec::new(),
+        object_places: Vec::new(),
         materials: palette.materials.iter().map(binding).collect(),
         lights: Vec::new(),
         environment: None,

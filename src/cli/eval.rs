@@ -99,7 +99,8 @@ fn text(query: &Query, found: &Inspection) -> String {
     let mut out = String::new();
     if !found.answers.is_empty() {
         let entries = query.at.entries();
-        let entries = entries.map(|(key, numbers)| format!("{key}={}", Shown::floats(numbers)));
+        let entry = |(key, numbers): &(&str, Vec<f64>)| format!("{key}={}", Shown::floats(numbers));
+        let entries: Vec<String> = entries.iter().map(entry).collect();
         section(&mut out, "", "at", &entries);
     }
     for answer in &found.answers {

@@ -70,6 +70,10 @@ fn recording(outputs: &'static [&'static str]) -> Text {
     }
 }
 
+fn with(corners: Corners, text: Text) -> Text {
+    Text { corners, ..text }
+}
+
 fn with_uvs(text: Text) -> Text {
     Text {
         corners: Corners::Uvs,
@@ -166,10 +170,27 @@ pairs! {
     "ray cones", also &[], "+16 bytes; functions +footprint +load_cone +scattered_spread +store_cone",
         thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x)));")
         => thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x) * exp(-1.0 * filter_width(position).x)));");
-    "widths of texture coordinates", also &["ray cones"], "+16 bytes; functions +footprint +hit_uv_change +load_cone \
-         +scattered_spread +store_cone",
+    "widths of texture coordinates", also &["ray cones"], "+16 bytes; functions +attribute_corners +barycentric_change \
+         +footprint +hit_uv_change +load_cone +scattered_spread +store_cone",
         with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"))
         => with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x * exp(-1.0 * filter_width(uv).x)));"));
+    "a second set of texture coordinates", also &[], "bindings +vertex_uvs1; functions +attribute_corners +hit_uv1",
+        with(Corners::Uvs1, thing(SHADE))
+        => with(Corners::Uvs1, thing("surface = diffuse(color(0.3 + 0.4 * uv1.x));"));
+    "widths of the second set", also &["ray cones"], "+16 bytes; functions +barycentric_change +footprint +hit_uv1_change +load_cone +scattered_spread +store_cone",
+        with(Corners::Uvs1, thing("surface = diffuse(color(0.3 + 0.4 * uv1.x));"))
+        => with(Corners::Uvs1, thing("surface = diffuse(color(0.3 + 0.4 * uv1.x * exp(-1.0 * filter_width(uv1).x)));"));
+    "vertex colors", also &[], "bindings +vertex_colors; functions +attribute_corners +hit_color +vertex_color_of",
+        with(Corners::Colors, thing(SHADE)) => with(Corners::Colors, thing("surface = diffuse(vertex_color);"));
+    "widths of vertex colors", also &["ray cones"], "+16 bytes; functions +barycentric_change +footprint +hit_color_change +load_cone +scattered_spread +store_cone",
+        with(Corners::Colors, thing("surface = diffuse(vertex_color);"))
+        => with(Corners::Colors, thing("surface = diffuse(vertex_color * exp(-1.0 * filter_width(vertex_color).r));"));
+    "view directions", also &[], "",
+        thing(SHADE) => thing("surface = diffuse(color(0.3 + 0.4 * facing));");
+    "places of objects", also &[], "bindings +triangle_places; functions +hit_place",
+        thing(SHADE) => thing("surface = diffuse(color(0.3 + 0.4 * instance_random(1)));");
+    "spaces of objects", also &["places of objects"], "bindings +place_spaces +triangle_places; functions +hit_object_position +hit_place",
+        thing(SHADE) => thing("surface = diffuse(color(0.4 + 0.2 * sin(object_position.x)));");
     "textures", also &[], "bindings +texture_data; functions +texel +texture_fetch +wrap_texel",
         with_uvs(thing("surface = diffuse(color(0.3 + 0.4 * uv.x));"))
         => with_uvs(thing("surface = diffuse(image(picture, uv));"));

@@ -12,6 +12,9 @@ pub enum Corners {
     Plain,
     Normals,
     Uvs,
+    /// The second set is that of another file.
+    Uvs1,
+    Colors,
 }
 
 /// A scene as text: a floor and a wall, and two tilted tiles above them.
@@ -104,6 +107,10 @@ impl Text {
             self.camera, self.integrator
         );
         scene += "[[geometry]]\nobj = \"room.obj\"\n";
+        if self.corners == Corners::Uvs1 {
+            scene += "uv1 = \"second.obj\"\n";
+            file("second.obj", &self.obj());
+        }
         if let Some(shared) = self.shared {
             scene += &format!(
                 "share = {shared}\nplacements = [{{}}, {{ translate = [0.3, 0.4, -0.2] }}]\n"
@@ -169,15 +176,19 @@ impl Text {
         let mut text = String::from("vn 0 1 0\nvn 0.1 0.9 0.3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n");
         for (at, (material, corners)) in tiles.iter().enumerate() {
             text += &format!("usemtl {material}\n");
-            for [x, y, z] in corners {
-                text += &format!("v {x} {y} {z}\n");
+            for (k, [x, y, z]) in corners.iter().enumerate() {
+                let color = match self.corners {
+                    Corners::Colors => format!(" 0.9 0.{k} 0.5"),
+                    _ => String::new(),
+                };
+                text += &format!("v {x} {y} {z}{color}\n");
             }
             let corner = |k: usize| {
                 let v = 4 * at + k + 1;
                 match self.corners {
-                    Corners::Plain => format!(" {v}"),
+                    Corners::Plain | Corners::Colors => format!(" {v}"),
                     Corners::Normals => format!(" {v}//{}", 1 + k % 2),
-                    Corners::Uvs => format!(" {v}/{}", k + 1),
+                    Corners::Uvs | Corners::Uvs1 => format!(" {v}/{}", k + 1),
                 }
             };
             text += &format!("f{}\n", (0..4).map(corner).collect::<String>());

@@ -91,11 +91,16 @@ impl<'p, F: Float> Oracle<'p, F> {
             Some(Type::Struct(id)) => {
                 let structs = &self.program.ir().structs;
                 let fields = structs[id.index()].fields.iter().map(|(name, ty)| {
-                    let value = vector(&format!("point.{name}"));
-                    if value.components().is_empty() {
-                        Value::zero(*ty, structs)
-                    } else {
-                        value
+                    let name = format!("point.{name}");
+                    let numbers = of.arguments.numbers::<F>(&name, cells);
+                    match (ty, &numbers[..]) {
+                        (_, []) => Value::zero(*ty, structs),
+                        (Type::Int, _) => Value::Int(of.arguments.word(&name, cells) as i32),
+                        (Type::Mat3, &[a, b, c, d, e, f, g, h, i]) => {
+                            let columns = [[a, b, c], [d, e, f], [g, h, i]];
+                            Value::Mat3(columns.map(|column| column.map(F::of)))
+                        }
+                        _ => vector(&name),
                     }
                 });
                 Value::Struct(fields.collect())

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use crate::abi::{Input, InputSet};
 use crate::ir::{ExprKind, Function, StructId, Type};
 use crate::parameters::TableLayout;
 use crate::program::{Program, identifier};
@@ -223,11 +224,8 @@ fn use_struct(program: &Program, ty: Type, used: &mut BTreeSet<StructId>) {
 }
 
 /// The fields of `SurfacePoint` that a material's functions read.
-pub fn inputs(
-    program_structs: &[crate::ir::Struct],
-    functions: &[&Function],
-) -> crate::abi::InputSet {
-    let mut set = crate::abi::InputSet::default();
+pub fn inputs(program_structs: &[crate::ir::Struct], functions: &[&Function]) -> InputSet {
+    let mut set = InputSet::default();
     for f in functions {
         for id in f.evaluated() {
             let ExprKind::Field(base, i) = f.expr(id).kind else {
@@ -236,16 +234,10 @@ pub fn inputs(
             let (ExprKind::Param(0), Type::Struct(s)) = (&f.expr(base).kind, f.ty(base)) else {
                 continue;
             };
-            match program_structs[s.index()].fields[i as usize].0.as_str() {
-                "position" => set.position = true,
-                "normal" => set.normal = true,
-                "geometric_normal" => set.geometric_normal = true,
-                "tangent" => set.tangent = true,
-                "uv" => set.uv = true,
-                "footprint_x" | "footprint_y" => set.footprint = true,
-                "footprint_uv_x" | "footprint_uv_y" => set.footprint_uv = true,
-                _ => set.exterior_ior = true,
-            }
+            let field = &program_structs[s.index()].fields[i as usize].0;
+            Input::of_field(field)
+                .into_iter()
+                .for_each(|input| set.insert(input));
         }
     }
     set

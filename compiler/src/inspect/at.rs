@@ -25,6 +25,18 @@ pub struct At {
     /// The diameter of what a ray sees, in metres, for `filter_width`. Along the tangent and across
     /// it, u and v grow by as much.
     pub footprint: f64,
+    /// Where it is in its object; where it is in the world if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object_position: Option<[f64; 3]>,
+    /// Which placement it is on; the first if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instance_id: Option<[f64; 1]>,
+    /// The second texture coordinates; the first if they are not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uv1: Option<[f64; 2]>,
+    /// The color of the geometry; white if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertex_color: Option<[f64; 3]>,
     /// Toward the viewer.
     pub wo: [f64; 3],
     /// Toward the light.
@@ -43,6 +55,10 @@ impl Default for At {
             uv: [0.25, 0.75],
             exterior_ior: 1.0,
             footprint: 0.0,
+            object_position: None,
+            instance_id: None,
+            uv1: None,
+            vertex_color: None,
             wo: [0.6, 0.0, 0.8],
             wi: [-0.48, 0.36, 0.8],
             u: [0.5; 4],
@@ -51,7 +67,7 @@ impl Default for At {
 }
 
 /// The keys in the order they are shown, each with how many numbers it takes.
-const KEYS: [(&str, usize); 10] = [
+const KEYS: [(&str, usize); 14] = [
     ("position", 3),
     ("normal", 3),
     ("geometric_normal", 3),
@@ -59,50 +75,62 @@ const KEYS: [(&str, usize); 10] = [
     ("uv", 2),
     ("exterior_ior", 1),
     ("footprint", 1),
+    ("object_position", 3),
+    ("instance_id", 1),
+    ("uv1", 2),
+    ("vertex_color", 3),
     ("wo", 3),
     ("wi", 3),
     ("u", 4),
 ];
 
 impl At {
-    /// Every key with its numbers.
-    pub fn entries(&self) -> [(&'static str, &[f64]); 10] {
-        let numbers: [&[f64]; 10] = [
-            &self.position,
-            &self.normal,
-            &self.geometric_normal,
-            &self.tangent,
-            &self.uv,
-            std::slice::from_ref(&self.exterior_ior),
-            std::slice::from_ref(&self.footprint),
-            &self.wo,
-            &self.wi,
-            &self.u,
-        ];
-        std::array::from_fn(|i| (KEYS[i].0, numbers[i]))
+    /// Every key that was given or has a default, with its numbers.
+    pub fn entries(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let mut copy = *self;
+        let mut entry = |(key, _): (&'static str, usize)| {
+            let is_there = match key {
+                "object_position" => self.object_position.is_some(),
+                "instance_id" => self.instance_id.is_some(),
+                "uv1" => self.uv1.is_some(),
+                "vertex_color" => self.vertex_color.is_some(),
+                _ => true,
+            };
+            let numbers = copy.numbers(key).filter(|_| is_there)?;
+            Some((key, numbers.to_vec()))
+        };
+        KEYS.into_iter().filter_map(&mut entry).collect()
     }
 
-    /// The numbers of `key`, if it is one.
-    pub fn get(&self, key: &str) -> Option<&[f64]> {
-        let mut entries = self.entries().into_iter();
-        entries.find(|(k, _)| *k == key).map(|(_, numbers)| numbers)
-    }
-
-    /// The numbers of a field of `SurfacePoint`.
+    /// The numbers of a key, or of a field of `SurfacePoint`; the columns of a matrix one after another.
     pub(crate) fn field(&self, name: &str) -> Option<Vec<f64>> {
         let d = self.footprint;
         let [x, y] = perpendicular(self.geometric_normal, self.tangent);
         Some(match name {
             "footprint_x" => x.map(|c| d * c).to_vec(),
             "footprint_y" => y.map(|c| d * c).to_vec(),
-            "footprint_uv_x" => vec![d, 0.0],
-            "footprint_uv_y" => vec![0.0, d],
-            _ => self.get(name)?.to_vec(),
+            "footprint_uv_x" | "footprint_uv1_x" => vec![d, 0.0],
+            "footprint_uv_y" | "footprint_uv1_y" => vec![0.0, d],
+            "footprint_color_x" | "footprint_color_y" => vec![0.0; 3],
+            "view" => self.wo.to_vec(),
+            "object_scale" => vec![1.0],
+            "object_from_world" | "world_from_object" => {
+                vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+            }
+            _ => {
+                let mut copy = *self;
+                copy.numbers(name)?.to_vec()
+            }
         })
     }
 
+    /// The numbers of a key; those that are not said are taken from what stands for them.
     fn numbers(&mut self, key: &str) -> Option<&mut [f64]> {
         Some(match key {
+            "object_position" => self.object_position.get_or_insert(self.position),
+            "instance_id" => self.instance_id.get_or_insert([0.0]),
+            "uv1" => self.uv1.get_or_insert(self.uv),
+            "vertex_color" => self.vertex_color.get_or_insert([1.0; 3]),
             "position" => &mut self.position,
             "normal" => &mut self.normal,
             "geometric_normal" => &mut self.geometric_normal,
@@ -174,7 +202,16 @@ fn check(key: &str, values: &mut [f64]) -> Result<(), String> {
         "exterior_ior" => Err("`exterior_ior` must be above 0; air has 1".into()),
         "footprint" if values.iter().all(|x| *x >= 0.0) => Ok(()),
         "footprint" => Err("`footprint` is a diameter and cannot be below 0".into()),
-        "position" | "uv" | "u" => Ok(()),
+        "instance_id"
+            if !values
+                .iter()
+                .all(|x| x.fract() == 0.0 && *x >= 0.0 && *x < 2e9) =>
+        {
+            Err("`instance_id` is a whole number from 0".into())
+        }
+        "position" | "uv" | "u" | "object_position" | "instance_id" | "uv1" | "vertex_color" => {
+            Ok(())
+        }
         _ => {
             let longest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             if longest > 0.0 {
@@ -280,6 +317,8 @@ mod tests {
             ("u=(0,0,0,1)", "[0, 1)"),
             ("exterior_ior=0", "above 0"),
             ("footprint=-1", "below 0"),
+            ("instance_id=0.5", "whole number"),
+            ("instance_id=-1", "whole number"),
             ("wo=(0,0,x)", "`x` in `wo` is not a number"),
             ("wo=(0,0,1", "not closed"),
             ("wo", "has no `=`"),
@@ -314,7 +353,7 @@ mod tests {
     fn every_key_is_shown_and_set() {
         let mut at = At::default();
         for (key, width) in KEYS {
-            assert_eq!(at.get(key).map(<[f64]>::len), Some(width), "{key}");
+            assert_eq!(at.field(key).map(|n| n.len()), Some(width), "{key}");
             assert_eq!(at.numbers(key).map(|n| n.len()), Some(width), "{key}");
         }
     }

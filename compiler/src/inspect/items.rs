@@ -70,13 +70,19 @@ impl Kind {
 pub const NAME: &str = "evaluated_item";
 
 /// What a function's arguments may be made of: the inputs of a material, and the directions.
-pub const CONTEXT: [(&str, &str); 9] = [
+pub const CONTEXT: [(&str, &str); 15] = [
     ("position", "point"),
     ("normal", "normal"),
     ("geometric_normal", "normal"),
     ("tangent", "vector"),
     ("uv", "vec2"),
     ("exterior_ior", "float"),
+    ("view", "vector"),
+    ("instance_id", "int"),
+    ("object_position", "point"),
+    ("object_scale", "float"),
+    ("uv1", "vec2"),
+    ("vertex_color", "color"),
     ("wo", "vector"),
     ("wi", "vector"),
     ("u", "vec4"),

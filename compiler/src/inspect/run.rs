@@ -65,10 +65,21 @@ fn parameters(module: &Module, material: &Material, values: &[Const]) -> Vec<Nam
 /// The surface point.
 pub(crate) fn point<F: Real>(at: &At, point: &Struct) -> Value<F> {
     let field = |(name, ty): &(String, Type)| match at.field(name) {
-        Some(numbers) => Value::vector(&numbers),
+        Some(numbers) => of_type(*ty, &numbers),
         None => Value::zero(*ty, &[]),
     };
     Value::Struct(point.fields.iter().map(field).collect())
+}
+
+/// The value of a machine type that some numbers are.
+fn of_type<F: Real>(ty: Type, numbers: &[f64]) -> Value<F> {
+    match (ty, numbers) {
+        (Type::Int, [number, ..]) => Value::Int(*number as i32),
+        (Type::Mat3, &[a, b, c, d, e, f, g, h, i]) => {
+            Value::Mat3([[a, b, c], [d, e, f], [g, h, i]].map(|column| column.map(F::of)))
+        }
+        _ => Value::vector(numbers),
+    }
 }
 
 fn vector<F: Real>(numbers: &[f64]) -> Value<F> {
@@ -78,7 +89,11 @@ fn vector<F: Real>(numbers: &[f64]) -> Value<F> {
 /// The arguments of a function over the context of [`items::CONTEXT`].
 pub(crate) fn context<F: Real>(at: &At) -> Vec<Value<F>> {
     let context = items::CONTEXT.iter();
-    let args = context.map(|(name, _)| vector(at.get(name).unwrap_or(&[])));
+    let args = context.map(|(name, ty)| {
+        let numbers = at.field(name).unwrap_or_default();
+        let ty = if *ty == "int" { Type::Int } else { Type::Float };
+        of_type(ty, &numbers)
+    });
     args.collect()
 }
 

@@ -244,6 +244,11 @@ impl Builder {
         self.add(ExprKind::Load(local), ty, span)
     }
 
+    /// What was done up to here, in the open blocks.
+    pub fn so_far(&self) -> impl Iterator<Item = &Stmt> {
+        self.blocks.iter().flatten()
+    }
+
     /// Adds a statement.
     pub fn stmt(&mut self, stmt: Stmt) {
         if let Some(block) = self.blocks.last_mut() {

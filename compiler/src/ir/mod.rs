@@ -266,6 +266,16 @@ impl ExprKind {
         }
     }
 
+    /// The same, to be changed.
+    pub fn operands_mut(&mut self) -> &mut [ExprId] {
+        use ExprKind::*;
+        match self {
+            Const(_) | Param(_) | MaterialParam(_) | TableValue(_) | Load(_) => &mut [],
+            Op(_, args) | Compose(args) | Call(_, args) | Make(_, args) => args,
+            Swizzle(arg, _) | Field(arg, _) => std::slice::from_mut(arg),
+        }
+    }
+
     /// Is its value available without being evaluated by a statement?
     pub fn is_free(&self) -> bool {
         matches!(

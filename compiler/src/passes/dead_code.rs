@@ -3,7 +3,6 @@
 //! All functions are pure, so an unused call goes as well. What is left is numbered anew in the
 //! order of evaluation, so that equal code has equal text however it came about.
 
-use super::rewrite::operands_mut;
 use crate::ir::{Block, CallSite, Expr, ExprId, ExprKind, Function, Local, LocalId, SiteId, Stmt};
 
 /// The pass.
@@ -269,7 +268,7 @@ impl Renumber<'_> {
         if let ExprKind::Load(local) = &mut expr.kind {
             *local = self.local(*local);
         }
-        for operand in operands_mut(&mut expr.kind) {
+        for operand in expr.kind.operands_mut() {
             *operand = self.expr(*operand);
         }
         let new = ExprId(self.exprs.len() as u32);

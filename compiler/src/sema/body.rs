@@ -113,6 +113,8 @@ pub struct Body<'c, 'l> {
     pub called: Vec<[Option<Operand>; OUTPUTS.len()]>,
     /// The ranges of a material's parameters, by their numbers.
     pub ranges: Vec<Option<(f64, f64)>>,
+    /// How many expressions were added to evaluate slopes.
+    pub slopes: usize,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -134,6 +136,7 @@ impl<'c, 'l> Body<'c, 'l> {
             outputs: Vec::new(),
             called: Vec::new(),
             ranges: Vec::new(),
+            slopes: 0,
         }
     }
 

@@ -7,6 +7,7 @@ use crate::ir::{self, ExprId};
 use crate::source::Span;
 
 use super::body::{Body, Operand};
+use super::inputs;
 use super::types::{NAMED, Ty};
 use super::{Checked, Param};
 
@@ -69,6 +70,9 @@ impl Body<'_, '_> {
             }
             "srgb" => self.srgb(args, span),
             "filter_width" => self.filter_width(callee, args, span),
+            name if inputs::FUNCTIONS.contains(&name) => {
+                self.function_of_surface(callee, args, span)
+            }
             name => match NAMED.iter().find(|(n, _)| *n == name) {
                 // `length(v)` is the function; lengths are made with units.
                 Some((_, ty)) if *ty != Ty::Length => self.convert(*ty, args, span),
@@ -321,6 +325,7 @@ impl Body<'_, '_> {
         );
         names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
         names.extend(["filter_width", "gradient", "layer", "medium", "srgb"].map(String::from));
+        names.extend(inputs::FUNCTIONS.map(String::from));
         let unknown = Diagnostic::new(
             Code::UnknownName,
             callee.span,

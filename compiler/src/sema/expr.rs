@@ -8,6 +8,7 @@ use crate::source::Span;
 
 use super::Checked;
 use super::body::{Binding, Body, Operand, Place};
+use super::inputs;
 use super::stmt::component;
 use super::types::Ty;
 
@@ -16,16 +17,6 @@ pub const DEFAULT_OF_PARAMETER: &str = "the default";
 
 /// The medium that is none, unless the name is that of something else.
 pub const NO_MEDIUM: &str = "none";
-
-/// Fields of `SurfacePoint` that a material sees as names.
-pub const INPUTS: [&str; 6] = [
-    "position",
-    "normal",
-    "geometric_normal",
-    "tangent",
-    "uv",
-    "exterior_ior",
-];
 
 impl Body<'_, '_> {
     /// Checks an expression that must be a `ty`.
@@ -147,7 +138,7 @@ impl Body<'_, '_> {
             Some(Binding::Broken) => return None,
             None => {}
         }
-        if self.place == Place::Material && INPUTS.contains(&name) {
+        if self.place == Place::Material && inputs::is_input(name) {
             return self.input(name, span);
         }
         let Some(item) = self.cx.lookup(self.module, name) else {
@@ -170,24 +161,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// A field of the surface point, the only parameter of a material's body.
-    pub fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
-        let point = self.builder.param(0, span);
-        let ir::Type::Struct(id) = self.builder.ty(point) else {
-            return None;
-        };
-        let fields = &self.cx.fields[id.index()];
-        let index = fields.iter().position(|f| f.name == name)?;
-        let ty = fields[index].ty;
-        Some(Operand::Value(
-            self.builder.field(&self.cx.ir, point, index, span),
-            ty,
-        ))
-    }
-
     fn unknown_name<T>(&mut self, name: &str, span: Span) -> Option<T> {
         let unknown = Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"));
-        if self.place != Place::Material && INPUTS.contains(&name) {
+        if self.place != Place::Material && inputs::is_input(name) {
             let unknown = unknown
                 .expected("a parameter, variable or constant")
                 .hint(format!(
@@ -201,7 +177,7 @@ impl Body<'_, '_> {
                 .visible(self.module, |k| matches!(k, ast::ItemKind::Const(_))),
         );
         if self.place == Place::Material {
-            names.extend(INPUTS.map(String::from));
+            names.extend(inputs::names().map(String::from));
         }
         let unknown = unknown
             .expected("a name in scope")

@@ -18,8 +18,12 @@ use super::{Checked, Signature};
 const POINTS: i32 = 6;
 
 impl Body<'_, '_> {
-    /// `gradient(f(position, ...), step: e)`, a vector: per metre for a float, plain for a length.
+    /// `gradient(x)` along the surface, or `gradient(f(position, ...), step: e)` in space; a vector: per metre
+    /// for a float, plain for a length.
     pub fn gradient(&mut self, args: &[Arg], span: Span) -> Option<Operand> {
+        if let [Arg { name: None, value }] = args {
+            return self.slope(value, span);
+        }
         let (call, step) = self.gradient_arguments(args, span)?;
         let step_value = self.step_of_gradient(step);
         let (f, values) = self.sampled_function(call)?;

@@ -8,7 +8,7 @@ use crate::ir::{self, ExprKind, Material, Type};
 use super::body::{Binding, Body, Operand, Place};
 use super::called::{self, Declared, MaterialSignature, Origin};
 use super::modules::{ItemRef, ModuleId, list};
-use super::{Checker, expr};
+use super::{Checker, inputs};
 
 impl Checker<'_> {
     /// The material called `name` in a file, or its only one.
@@ -135,7 +135,7 @@ impl Body<'_, '_> {
             // `normal: normal = normal` is the input, unless a caller gives another.
             let of = |d: &Declared| matches!(&d.origin, Origin::Input(i) if *i == p.name.node);
             let same = declared.as_ref().is_some_and(of);
-            if expr::INPUTS.contains(&p.name.node.as_str()) && !same {
+            if inputs::is_input(&p.name.node) && !same {
                 let message = format!("`{}` is an input of every material", p.name.node);
                 self.report::<()>(
                     Diagnostic::new(Code::Duplicate, p.name.span, message).expected("another name"),

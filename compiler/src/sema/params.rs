@@ -10,7 +10,7 @@ use crate::source::Span;
 use super::called::{Declared, Origin};
 use super::modules::ModuleId;
 use super::types::{NAMED, Ty};
-use super::{Checked, Checker, expr};
+use super::{Checked, Checker, expr, inputs};
 
 impl Checker<'_> {
     /// The parameters of a material.
@@ -40,7 +40,7 @@ impl Checker<'_> {
             return None;
         };
         if let ast::ExprKind::Name(input) = &p.default.kind
-            && expr::INPUTS.contains(&input.as_str())
+            && inputs::is_input(input)
         {
             return self.connected_param(module, p, ty, input);
         }

@@ -1,7 +1,7 @@
 //! What code comes of widths: little, and none where nothing asks.
 
 use crate::common::{codes, program, wgsl};
-use impasto_compiler::abi::InputSet;
+use impasto_compiler::abi::{Input, InputSet};
 
 fn emitting(x: &str) -> String {
     format!("use std::edf::uniform;\nmaterial m {{ emission = uniform(color({x})); }}")
@@ -32,13 +32,22 @@ fn a_width_of_scaled_coordinates_is_a_few_operations() {
 #[test]
 fn what_a_width_is_made_of_is_asked_for() {
     let none = inputs("vec3(uv, position.x)");
-    assert!(!none.footprint && !none.footprint_uv);
+    assert!(!none.has(Input::Footprint) && !none.has(Input::FootprintUv));
     let of_uv = inputs("vec3(filter_width(uv), 0.0)");
-    assert!(of_uv.footprint_uv && !of_uv.footprint && !of_uv.uv && !of_uv.position);
+    assert!(
+        of_uv.has(Input::FootprintUv)
+            && !of_uv.has(Input::Footprint)
+            && !of_uv.has(Input::Uv)
+            && !of_uv.has(Input::Position)
+    );
     let of_position = inputs("vec3(filter_width(position))");
-    assert!(of_position.footprint && !of_position.footprint_uv && !of_position.position);
+    assert!(
+        of_position.has(Input::Footprint)
+            && !of_position.has(Input::FootprintUv)
+            && !of_position.has(Input::Position)
+    );
     let of_steps = inputs("vec3(filter_width(floor(uv)), filter_width(normal.x))");
-    assert!(!of_steps.footprint_uv && !of_steps.footprint);
+    assert!(!of_steps.has(Input::FootprintUv) && !of_steps.has(Input::Footprint));
 }
 
 /// Fields that nobody reads are not declared, so that scenes without widths have the code they had.

@@ -17,11 +17,12 @@ use crate::kernels::profile;
 use crate::kernels::run;
 use crate::kernels::stages::{Part, Stage};
 use crate::kernels::state::{self, Storage};
+use crate::kernels::surface_point;
 use crate::wgsl;
 use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::needs::{Need, Needs};
+use crate::world::needs::Need;
 
 /// A buffer as a kernel binds it, in group 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -157,11 +158,8 @@ impl Composer<'_> {
         let seen = infos
             .iter()
             .map(|m| m.inputs)
-            .fold(InputSet::default(), both);
-        if seen.footprint || seen.footprint_uv {
-            out += include_str!("../world/footprint.wgsl");
-        }
-        out += &surface_point(needs, seen);
+            .fold(InputSet::default(), InputSet::or);
+        out += &surface_point::text(needs, seen);
         out + &dropped_row(members)
     }
 
@@ -261,54 +259,3 @@ fn dropped_row(members: &[usize]) -> String {
 /// The emission of materials of which none has any that varies, where it is asked for nevertheless.
 const NO_EMISSION: &str = "fn material_emission(instance: u32, point: SurfacePoint, wo: vec3<f32>) -> vec3<f32> {\n    \
                            return vec3<f32>(0.0);\n}\n";
-
-/// The fields of footprints that code which reads either must be given.
-fn both(a: InputSet, b: InputSet) -> InputSet {
-    InputSet {
-        footprint: a.footprint || b.footprint,
-        footprint_uv: a.footprint_uv || b.footprint_uv,
-        ..a
-    }
-}
-
-/// The function that fills a material's inputs, those that some member reads; the others get
-/// what is at hand.
-fn surface_point(needs: Needs, seen: InputSet) -> String {
-    let cone = if needs.has(Need::RayCones) {
-        ", wo: vec3<f32>, width: f32"
-    } else {
-        ""
-    };
-    let (footprint, axes) = cones::footprint(needs, seen);
-    let geometric = "hit_geometric_normal(hit.primitive)";
-    let pick = |need, value, other| if needs.has(need) { value } else { other };
-    format!(
-        "fn surface_point(hit: PathHit, exterior_ior: f32{cone}) -> SurfacePoint {{\n    \
-         let barycentrics = vec2<f32>(hit.u, hit.v);\n    {footprint}\
-         return SurfacePoint({}, {}, {geometric}, {}, {}, exterior_ior{axes});\n}}\n",
-        pick(
-            Need::Position,
-            if needs.has(Need::Moved) {
-                "in_world(hit_position(hit.primitive, barycentrics))"
-            } else {
-                "hit_position(hit.primitive, barycentrics)"
-            },
-            "vec3<f32>(0.0)"
-        ),
-        pick(
-            Need::Normals,
-            "hit_normal(hit.primitive, barycentrics)",
-            geometric
-        ),
-        pick(
-            Need::Tangents,
-            "hit_tangent(hit.primitive)",
-            "vec3<f32>(0.0)"
-        ),
-        pick(
-            Need::Uvs,
-            "hit_uv(hit.primitive, barycentrics)",
-            "vec2<f32>(0.0)"
-        ),
-    )
-}

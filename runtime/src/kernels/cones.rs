@@ -5,11 +5,8 @@
 //! (`kernels/material.wgsl`), and meets surfaces as an ellipse (`world/footprint.wgsl`).
 //! docs/filtering.md has the formulas.
 
-use impasto_compiler::abi::InputSet;
-
 use crate::wgsl::constant_f32;
 use crate::world::camera::CameraFrame;
-use crate::world::needs::{Need, Needs};
 
 /// A scattered ray stands for the solid angle that it would have to itself among so many rays of its
 /// density: about as many as a pixel gets in a quick picture.
@@ -32,32 +29,4 @@ fn pixel_angle(camera: &CameraFrame, width: u32, height: u32) -> f32 {
     let across = 2.0 * camera.right.length() / width as f32;
     let down = 2.0 * camera.up.length() / height as f32;
     across.sqrt() * down.sqrt()
-}
-
-/// The WGSL that computes what code that reads `inputs` is told of footprints: statements, and the last
-/// arguments of `SurfacePoint`.
-pub(crate) fn footprint(needs: Needs, inputs: InputSet) -> (&'static str, String) {
-    let cones = needs.has(Need::RayCones);
-    let uvs = cones && needs.has(Need::UvWidths);
-    let mut arguments = String::new();
-    if inputs.footprint {
-        arguments += if cones {
-            ", seen.x, seen.y"
-        } else {
-            ", vec3<f32>(0.0), vec3<f32>(0.0)"
-        };
-    }
-    if inputs.footprint_uv {
-        arguments += if uvs {
-            ", hit_uv_change(hit.primitive, seen.x), hit_uv_change(hit.primitive, seen.y)"
-        } else {
-            ", vec2<f32>(0.0), vec2<f32>(0.0)"
-        };
-    }
-    let statements = if arguments.contains("seen") {
-        "let seen = footprint(hit_geometric_normal(hit.primitive), wo, width);\n    "
-    } else {
-        ""
-    };
-    (statements, arguments)
 }

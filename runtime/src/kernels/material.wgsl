@@ -30,7 +30,11 @@ fn material(slot: u32, instance: u32) {
     let width = cone.width + cone.spread * hit.t;
     let point = surface_point(hit, exterior, wo, width);
 #else
+#if view
+    let point = surface_point(hit, exterior, wo);
+#else
     let point = surface_point(hit, exterior);
+#endif
 #endif
     let vertex = (path.flags & DEPTH_MASK) - 1u;
     let place = vec3<u32>(pixel, arrived.sample, vertex);

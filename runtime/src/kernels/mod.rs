@@ -18,6 +18,7 @@ pub(crate) mod run;
 pub(crate) mod shells;
 pub(crate) mod stages;
 pub(crate) mod state;
+mod surface_point;
 pub(crate) mod validate;
 mod wavefront;
 

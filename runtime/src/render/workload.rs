@@ -1,7 +1,7 @@
 //! What a render tells the time model of plans: how paths hit materials, what a hit reads and
 //! writes, and what the kernels take that evaluate none.
 
-use impasto_compiler::abi::MaterialInfo;
+use impasto_compiler::abi::{Input, MaterialInfo};
 use impasto_compiler::partition::workload::BLOCK;
 use impasto_compiler::partition::{Hits, Workload};
 
@@ -59,9 +59,12 @@ fn traffic(layout: &PlanLayout, material: &MaterialInfo) -> [u64; 2] {
 /// Bytes of the triangle that was hit, as far as some material asks for it.
 fn geometry_bytes(surface: &ShaderPart, materials: &[MaterialInfo]) -> u64 {
     let has = |name: &str| surface.buffers.iter().any(|b| b.name == name);
+    let reads = |inputs: &[Input]| materials.iter().any(|m| m.inputs.any(inputs));
     let asked = |name: &str| match name {
-        "vertex_normals" => materials.iter().any(|m| m.inputs.normal),
-        _ => materials.iter().any(|m| m.inputs.uv || m.inputs.tangent),
+        "vertex_normals" => reads(&[Input::Normal]),
+        "vertex_uvs1" => reads(&[Input::Uv1]),
+        "vertex_colors" => reads(&[Input::VertexColor]),
+        _ => reads(&[Input::Uv, Input::Tangent]),
     };
     let read = VERTEX_BYTES.iter().filter(|(n, _)| has(n) && asked(n));
     TRIANGLE_BYTES + read.map(|(_, bytes)| bytes).sum::<u64>()

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::MAX_TRIANGLES;
 use super::bindings::Bindings;
-use super::description::{Description, GeometrySpec};
+use super::description::{Description, GeometrySpec, SourceName};
 use super::duplicates::{self, Removed};
 use super::formats::{self, Format};
 use super::load::Source;
@@ -30,6 +30,8 @@ pub(super) struct Assembled {
     pub(super) mesh: Mesh,
     pub(super) objects: Vec<Object>,
     pub(super) placements: Vec<Placement>,
+    pub(super) places: Vec<Transform>,
+    pub(super) object_places: Vec<u32>,
     pub(super) materials: Vec<MaterialBinding>,
     pub(super) camera_media: Vec<u32>,
     pub(super) lights: Vec<Light>,
@@ -42,7 +44,7 @@ pub(super) fn assemble(
     path: &Path,
     formats: &[Format],
     description: &Description,
-    sources: &BTreeMap<String, Source>,
+    sources: &BTreeMap<SourceName, Source>,
     warnings: &mut Vec<String>,
 ) -> Result<Assembled, SceneError> {
     let base = path.parent().unwrap_or(Path::new(""));
@@ -53,7 +55,7 @@ pub(super) fn assemble(
         .zip(&files)
         .map(|(spec, file)| Entry {
             spec,
-            source: &sources[&spec.file],
+            source: &sources[&spec.source()],
             places: match (&spec.places, file) {
                 (PlacesSpec::Listed(places), _) | (_, Some(places)) => places,
                 (PlacesSpec::File(_), None) => &NOWHERE,
@@ -66,10 +68,13 @@ pub(super) fn assemble(
         bindings: Bindings::new(&description.materials),
         copies: copies(&entries),
         origin: origin(&entries, description),
+        object_sources: Vec::new(),
         object_origins: Vec::new(),
         mesh: Mesh::default(),
         objects: Vec::new(),
         placements: Vec::new(),
+        places: Vec::new(),
+        object_places: Vec::new(),
         labels: Labels::default(),
         seen: BTreeMap::new(),
         warnings,
@@ -148,11 +153,15 @@ struct Assembly<'d, 'w> {
     bindings: Bindings<'d>,
     copies: BTreeMap<&'d str, usize>,
     origin: DVec3,
+    /// What each object was read from.
+    object_sources: Vec<SourceName>,
     /// Where the coordinates of each object count from, in its geometry file.
     object_origins: Vec<DVec3>,
     mesh: Mesh,
     objects: Vec<Object>,
     placements: Vec<Placement>,
+    places: Vec<Transform>,
+    object_places: Vec<u32>,
     labels: Labels,
     /// How often each geometry file was placed so far.
     seen: BTreeMap<&'d str, u32>,
@@ -226,11 +235,20 @@ impl<'d> Assembly<'d, '_> {
             let first = self.labels.objects.len() as u32;
             let named = |part: &String| labels::name(&entry.spec.file, part, copy);
             self.labels.objects.extend(names.iter().map(named));
+            let place = self.next_place(&transform);
+            let places = std::iter::repeat_n(place, names.len());
+            self.object_places.extend(places);
             let object = |triangle: usize| first + of_triangle[triangle];
             let (mesh, origin) = (&mut self.mesh, self.origin);
             repairs += mesh.push_geometry(path, geometry, &transform, origin, materials, object)?;
         }
         Ok(repairs)
+    }
+
+    /// The number of a place, which is the next.
+    fn next_place(&mut self, transform: &Transform) -> u32 {
+        self.places.push(*transform);
+        self.places.len() as u32 - 1
     }
 
     /// Which copy of its geometry file is the next of an entry.
@@ -258,6 +276,7 @@ impl<'d> Assembly<'d, '_> {
         let largest = corners.fold(0.0f32, |m, p| m.max(p.abs().max_element()));
         for (place, materials) in entry.places.list.iter().zip(materials) {
             let transform = self.transform(entry, &place.transform)?;
+            let place = self.next_place(&transform);
             let columns = transform.matrix.abs();
             let transform = transform.before(self.object_origins[object as usize]);
             let reach = columns * DVec3::splat(largest.into()) + transform.translation.abs();
@@ -267,6 +286,7 @@ impl<'d> Assembly<'d, '_> {
                 object,
                 transform: transform.moved(-self.origin),
                 materials: Arc::clone(materials),
+                place,
             });
             let copy = self.next_copy(entry);
             self.labels.copies.push(copy);
@@ -277,7 +297,8 @@ impl<'d> Assembly<'d, '_> {
     /// The object of the entry's geometry file, and what was done to it if it is new.
     fn object(&mut self, entry: &Entry) -> Result<(u32, Repairs), SceneError> {
         let name = &entry.spec.file;
-        if let Some(known) = self.objects.iter().position(|o| o.name == *name) {
+        let of = entry.spec.source();
+        if let Some(known) = self.object_sources.iter().position(|o| *o == of) {
             return Ok((known as u32, Repairs::default()));
         }
         let Source { path, geometry, .. } = entry.source;
@@ -293,6 +314,7 @@ impl<'d> Assembly<'d, '_> {
         self.counted(name, "triangles", removed.triangles);
         let name = name.clone();
         self.objects.push(Object { name, mesh });
+        self.object_sources.push(of);
         self.object_origins.push(at);
         self.labels.parts.push(names);
         Ok((self.objects.len() as u32 - 1, repairs))
@@ -351,6 +373,8 @@ impl<'d> Assembly<'d, '_> {
             mesh: self.mesh,
             objects: self.objects,
             placements: self.placements,
+            places: self.places,
+            object_places: self.object_places,
             materials: self.bindings.finish(self.warnings),
             camera_media,
             lights,

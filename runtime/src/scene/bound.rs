@@ -73,6 +73,7 @@ mod tests {
             object: 0,
             transform: Transform::default(),
             materials: Arc::from(materials),
+            place: 0,
         };
         Scene {
             name: String::new(),
@@ -101,6 +102,8 @@ mod tests {
                 mesh: mesh(&[1, 1]),
             }],
             placements: vec![place(&[4, 3]), place(&[4, 1])],
+            places: Vec::new(),
+            object_places: Vec::new(),
             materials: Vec::new(),
             lights: Vec::new(),
             environment: None,

@@ -83,6 +83,8 @@ pub(super) struct MaterialName {
 pub(super) struct GeometrySpec<'f> {
     pub(super) file: String,
     pub(super) format: &'f Format,
+    /// Where its second texture coordinates are.
+    pub(super) uv1: Option<SecondUvs<'f>>,
     /// From the geometry file to where its places count from.
     pub(super) transform: Transform,
     /// Material of all its faces, whatever the file says.
@@ -90,6 +92,23 @@ pub(super) struct GeometrySpec<'f> {
     pub(super) places: PlacesSpec,
     /// Is it stored once for all of its places? Decided by size if not said.
     pub(super) share: Option<bool>,
+}
+
+/// A file of the same triangles, whose texture coordinates are the second of another.
+pub(super) struct SecondUvs<'f> {
+    pub(super) file: String,
+    pub(super) format: &'f Format,
+}
+
+/// What geometry is read from: a file, and the one with its second texture coordinates.
+pub(super) type SourceName = (String, Option<String>);
+
+impl GeometrySpec<'_> {
+    /// What it is read from.
+    pub(super) fn source(&self) -> SourceName {
+        let second = self.uv1.as_ref().map(|second| second.file.clone());
+        (self.file.clone(), second)
+    }
 }
 
 /// A `[materials.NAME]` entry.
@@ -264,6 +283,7 @@ fn geometry<'f>(
         let spec = GeometrySpec {
             file,
             format,
+            uv1: second_uvs(&mut table, formats)?,
             transform: placements::transform(&mut table)?,
             material: optional(&mut table, "material", named, None)?,
             places: placements::places(&mut table)?,
@@ -292,13 +312,32 @@ fn geometry_file<'f>(
     let name = value.string()?;
     match formats::of_file(formats, name).or(otherwise) {
         Some(format) => Ok((name.to_owned(), format)),
-        None => Err(value
-            .error(format!("`{name}` is in no format that is read here"))
-            .hint(format!(
-                "geometry is read from {}, told by the extension",
-                formats::readable(formats)
-            ))),
+        None => Err(unreadable(&value, name, formats)),
     }
+}
+
+/// The file that an entry takes its second texture coordinates from.
+fn second_uvs<'f>(
+    table: &mut Table,
+    formats: &'f [Format],
+) -> Result<Option<SecondUvs<'f>>, SceneError> {
+    let Some(value) = table.get("uv1") else {
+        return Ok(None);
+    };
+    let file = value.string()?.to_owned();
+    let Some(format) = formats::of_file(formats, &file) else {
+        return Err(unreadable(&value, &file, formats));
+    };
+    Ok(Some(SecondUvs { file, format }))
+}
+
+fn unreadable(value: &Value, name: &str, formats: &[Format]) -> SceneError {
+    value
+        .error(format!("`{name}` is in no format that is read here"))
+        .hint(format!(
+            "geometry is read from {}, told by the extension",
+            formats::readable(formats)
+        ))
 }
 
 fn materials(root: &mut Table, formats: &[Format]) -> Result<Vec<MaterialSpec>, SceneError> {

@@ -9,6 +9,7 @@ use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash};
 
 use rayon::prelude::*;
 
+use super::mesh::Attributes;
 use super::{Labels, Light, Mesh, Placement};
 
 /// Leaves out the triangles of a mesh that are equal to an earlier one: corners, normals, texture
@@ -102,25 +103,32 @@ fn classes(lights: &[Light], labels: &Labels) -> Vec<u32> {
 }
 
 /// All that a picture shows of a triangle. Which corner is the first does not matter.
-fn words(mesh: &Mesh, triangle: usize, lights: &[u32]) -> [u32; 27] {
+fn words(mesh: &Mesh, triangle: usize, lights: &[u32]) -> [u32; 42] {
     // Zero has two signs.
     let bits = |value: f32| (value + 0.0).to_bits();
     let corners = mesh.positions[triangle].map(|p| p.to_array().map(bits));
     let first = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
-    let normals = mesh.normals.get(triangle).copied().flatten();
-    let uvs = mesh.uvs.get(triangle).copied().unwrap_or_default();
-    let mut words = [0; 27];
+    let Attributes {
+        normals,
+        uvs,
+        uvs1,
+        colors,
+    } = mesh.attributes(triangle);
+    let mut words = [0; 42];
     for (place, corner) in (0..3).map(|i| (first + i) % 3).enumerate() {
         let normal = normals.map_or([0; 3], |n| n[corner].to_array().map(bits));
         let [x, y, z] = corners[corner];
         let [u, v] = uvs[corner].to_array().map(bits);
-        words[8 * place..8 * place + 8]
-            .copy_from_slice(&[x, y, z, normal[0], normal[1], normal[2], u, v]);
+        let [u1, v1] = uvs1[corner].to_array().map(bits);
+        let [r, g, b] = colors[corner].to_array().map(bits);
+        words[13 * place..13 * place + 13].copy_from_slice(&[
+            x, y, z, normal[0], normal[1], normal[2], u, v, u1, v1, r, g, b,
+        ]);
     }
     let light = mesh.lights.get(triangle).copied().flatten();
-    words[24] = mesh.materials[triangle];
-    words[25] = light.map_or(0, |light| 1 + lights[light as usize]);
-    words[26] = u32::from(normals.is_some());
+    words[39] = mesh.materials[triangle];
+    words[40] = light.map_or(0, |light| 1 + lights[light as usize]);
+    words[41] = u32::from(normals.is_some());
     words
 }
 
@@ -188,6 +196,7 @@ mod tests {
             object,
             transform: Transform::new(Vec3::ONE, Vec3::ZERO, Vec3::new(x, 0.0, 0.0)),
             materials: Arc::from([material]),
+            place: 0,
         };
         let mut placements = vec![
             place(0, 1.0, 0),

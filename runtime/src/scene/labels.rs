@@ -48,6 +48,18 @@ impl Scene {
         names
     }
 
+    /// For each name of [`Scene::object_names`] the index of its place.
+    pub(crate) fn places_of_objects(&self) -> Vec<u32> {
+        let mut places = self.object_places.clone();
+        // Lights are at no place of an entry.
+        places.resize(self.labels.objects.len(), 0);
+        for placement in &self.placements {
+            let parts = self.labels.parts_of(placement);
+            places.extend(std::iter::repeat_n(placement.place, parts));
+        }
+        places
+    }
+
     /// The index of the first name of each placement.
     pub(crate) fn first_objects(&self) -> Vec<u32> {
         let mut next = self.labels.objects.len();

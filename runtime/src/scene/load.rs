@@ -7,7 +7,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::assemble::assemble;
-use super::description::{Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec};
+use super::description::{
+    Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec, SourceName,
+};
 use super::document::Document;
 use super::formats::{Format, Geometry};
 use super::{Environment, EnvironmentMap, EnvironmentSource, LightReader, Scene};
@@ -55,6 +57,8 @@ pub fn load_with(
         mesh: assembled.mesh,
         objects: assembled.objects,
         placements: assembled.placements,
+        places: assembled.places,
+        object_places: assembled.object_places,
         materials: assembled.materials,
         lights: assembled.lights,
         environment,
@@ -77,25 +81,31 @@ pub(super) struct Source<'f> {
     pub(super) geometry: Geometry,
 }
 
-/// Every geometry file that entries name, read once, by the name they use.
+/// Every geometry file that entries name, read once, by the names they use.
 fn load_sources<'f>(
     base: &Path,
     entries: &[GeometrySpec<'f>],
-) -> Result<BTreeMap<String, Source<'f>>, SceneError> {
-    let formats = entries.iter().map(|entry| (&entry.file, entry.format));
-    let files: BTreeMap<&String, &Format> = formats.collect();
-    let files: Vec<(&String, &Format)> = files.into_iter().collect();
-    let load = |(name, format): &(&String, &'f Format)| {
-        let geometry = (format.read)(base, name)?;
+) -> Result<BTreeMap<SourceName, Source<'f>>, SceneError> {
+    let formats = entries.iter().map(|entry| (entry.source(), entry));
+    let files: BTreeMap<SourceName, &GeometrySpec<'f>> = formats.collect();
+    let files: Vec<(SourceName, &GeometrySpec<'f>)> = files.into_iter().collect();
+    let load = |(name, entry): &(SourceName, &GeometrySpec<'f>)| {
+        let mut geometry = (entry.format.read)(base, &entry.file)?;
+        if let Some(second) = &entry.uv1 {
+            let path = &base.join(&second.file);
+            let other = (second.format.read)(base, &second.file)?;
+            geometry.take_second_uvs(other, &entry.file, path)?;
+        }
         let source = Source {
-            path: base.join(name),
-            format,
+            path: base.join(&entry.file),
+            format: entry.format,
             geometry,
         };
-        Ok(((*name).clone(), source))
+        Ok((name.clone(), source))
     };
     // Collected first, so that of several errors it is always the same one that is told.
-    let loaded: Vec<Result<(String, Source), SceneError>> = files.par_iter().map(load).collect();
+    let loaded: Vec<Result<(SourceName, Source), SceneError>> =
+        files.par_iter().map(load).collect();
     loaded.into_iter().collect()
 }
 

@@ -29,6 +29,10 @@ pub struct Mesh {
     pub normals: Vec<Option<[Vec3; 3]>>,
     /// Texture coordinates of the corners. Empty if no triangle has them.
     pub uvs: Vec<[Vec2; 3]>,
+    /// A second set of texture coordinates. Empty if no triangle has them.
+    pub uvs1: Vec<[Vec2; 3]>,
+    /// Colors of the corners, linear RGB; white where a file gives none. Empty if no triangle has them.
+    pub colors: Vec<[Vec3; 3]>,
     /// Index into [`super::Scene::materials`], or [`NO_MATERIAL`]; of an object, an index into
     /// [`super::Placement::materials`].
     pub materials: Vec<u32>,
@@ -37,6 +41,29 @@ pub struct Mesh {
     /// Which object it is of: an index into the names of [`super::Labels`]; of an object's mesh one into the parts of
     /// the object. Empty if nobody knows.
     pub objects: Vec<u32>,
+}
+
+/// What the corners of a triangle have beside places.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Attributes {
+    pub(super) normals: Option<[Vec3; 3]>,
+    pub(super) uvs: [Vec2; 3],
+    pub(super) uvs1: [Vec2; 3],
+    pub(super) colors: [Vec3; 3],
+}
+
+/// The colors of corners that have none.
+const NO_COLORS: [Vec3; 3] = [Vec3::ONE; 3];
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
+            normals: None,
+            uvs: Default::default(),
+            uvs1: Default::default(),
+            colors: NO_COLORS,
+        }
+    }
 }
 
 impl Mesh {
@@ -66,6 +93,17 @@ impl Mesh {
         if self.uvs.iter().flatten().all(|uv| *uv == Vec2::ZERO) {
             self.uvs.clear();
         }
+        if self.uvs1.iter().flatten().all(|uv| *uv == Vec2::ZERO) {
+            self.uvs1.clear();
+        }
+        if self
+            .colors
+            .iter()
+            .flatten()
+            .all(|color| *color == Vec3::ONE)
+        {
+            self.colors.clear();
+        }
     }
 
     /// Adds the triangles of the light numbered `index`, which are those of `object`. Whether it has any.
@@ -73,7 +111,7 @@ impl Mesh {
         let triangles = light.triangles();
         let has_any = !triangles.is_empty();
         for positions in triangles {
-            self.push(positions, None, [Vec2::ZERO; 3], [NO_MATERIAL, object]);
+            self.push(positions, Attributes::default(), [NO_MATERIAL, object]);
             if let Some(light) = self.lights.last_mut() {
                 *light = Some(index);
             }
@@ -104,10 +142,14 @@ impl Mesh {
                 repairs.degenerate += 1;
                 continue;
             }
-            let normals = vertex_normals(triangle, transform);
-            let uvs = triangle.uvs.unwrap_or_default();
+            let attributes = Attributes {
+                normals: vertex_normals(triangle, transform),
+                uvs: triangle.uvs.unwrap_or_default(),
+                uvs1: triangle.uvs1.unwrap_or_default(),
+                colors: triangle.colors.unwrap_or(NO_COLORS),
+            };
             let named = [materials[triangle.material], objects(index)];
-            self.push(positions, normals, uvs, named);
+            self.push(positions, attributes, named);
             if mirrored {
                 self.flip_last();
             }
@@ -135,28 +177,23 @@ impl Mesh {
             if !has_area(&positions) {
                 continue;
             }
-            let normals = object.normals.get(triangle).copied().flatten();
-            let normals = normals.map(|n| n.map(|n| transform.normal(n)));
-            let uvs = object.uvs.get(triangle).copied().unwrap_or_default();
+            let mut attributes = object.attributes(triangle);
+            attributes.normals = attributes.normals.map(|n| n.map(|n| transform.normal(n)));
             let material = materials[object.materials[triangle] as usize];
             let part = object.objects.get(triangle).copied().unwrap_or(0);
-            self.push(positions, normals, uvs, [material, first_object + part]);
+            self.push(positions, attributes, [material, first_object + part]);
             if mirrored {
                 self.flip_last();
             }
         }
     }
 
-    fn push(
-        &mut self,
-        positions: [Vec3; 3],
-        normals: Option<[Vec3; 3]>,
-        uvs: [Vec2; 3],
-        [material, object]: [u32; 2],
-    ) {
+    fn push(&mut self, positions: [Vec3; 3], attributes: Attributes, [material, object]: [u32; 2]) {
         self.positions.push(positions);
-        self.normals.push(normals);
-        self.uvs.push(uvs);
+        self.normals.push(attributes.normals);
+        self.uvs.push(attributes.uvs);
+        self.uvs1.push(attributes.uvs1);
+        self.colors.push(attributes.colors);
         self.materials.push(material);
         self.lights.push(None);
         self.objects.push(object);
@@ -170,8 +207,24 @@ impl Mesh {
         if let Some(corners) = self.uvs.last_mut() {
             corners.swap(1, 2);
         }
+        if let Some(corners) = self.uvs1.last_mut() {
+            corners.swap(1, 2);
+        }
+        if let Some(corners) = self.colors.last_mut() {
+            corners.swap(1, 2);
+        }
         if let Some(Some(corners)) = self.normals.last_mut() {
             corners.swap(1, 2);
+        }
+    }
+
+    /// What the corners of a triangle have.
+    pub(super) fn attributes(&self, triangle: usize) -> Attributes {
+        Attributes {
+            normals: self.normals.get(triangle).copied().flatten(),
+            uvs: self.uvs.get(triangle).copied().unwrap_or_default(),
+            uvs1: self.uvs1.get(triangle).copied().unwrap_or_default(),
+            colors: self.colors.get(triangle).copied().unwrap_or(NO_COLORS),
         }
     }
 
@@ -181,6 +234,11 @@ impl Mesh {
             (Some(corners), Some(Some(normals))) => faces_away(corners, normals),
             _ => false,
         }
+    }
+
+    /// The colors of a triangle's corners, linear RGB.
+    pub(crate) fn colors_of(&self, triangle: usize) -> [Vec3; 3] {
+        self.attributes(triangle).colors
     }
 
     /// The triangles that `keep` keeps.
@@ -193,6 +251,8 @@ impl Mesh {
             positions: pick(&self.positions, &kept),
             normals: pick(&self.normals, &kept),
             uvs: pick(&self.uvs, &kept),
+            uvs1: pick(&self.uvs1, &kept),
+            colors: pick(&self.colors, &kept),
             materials: pick(&self.materials, &kept),
             lights: pick(&self.lights, &kept),
             objects: pick(&self.objects, &kept),
@@ -205,6 +265,8 @@ impl Mesh {
     pub(crate) fn spell_out(&mut self) {
         self.normals.resize(self.len(), None);
         self.uvs.resize(self.len(), [Vec2::ZERO; 3]);
+        self.uvs1.resize(self.len(), [Vec2::ZERO; 3]);
+        self.colors.resize(self.len(), NO_COLORS);
         self.objects.resize(self.len(), 0);
     }
 }

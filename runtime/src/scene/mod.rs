@@ -63,6 +63,11 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Where the objects are.
     pub placements: Vec<Placement>,
+    /// Every place that an entry of `[[geometry]]` puts its file at, in the order of the scene: from the
+    /// coordinates of the file to the world.
+    pub places: Vec<Transform>,
+    /// For each object of [`Labels::objects`] its place, an index into [`Scene::places`].
+    pub object_places: Vec<u32>,
     /// The materials that triangles use, in order of first use.
     pub materials: Vec<MaterialBinding>,
     /// The lights of `[[lights]]` in the order of the file.
@@ -93,6 +98,8 @@ pub struct Placement {
     pub transform: Transform,
     /// For each material of the object an index into [`Scene::materials`].
     pub materials: Arc<[u32]>,
+    /// Its place, an index into [`Scene::places`].
+    pub place: u32,
 }
 
 /// A thin-lens camera.

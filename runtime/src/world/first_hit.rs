@@ -247,6 +247,8 @@ mod tests {
             mesh,
             objects: Vec::new(),
             placements: Vec::new(),
+            places: Vec::new(),
+            object_places: Vec::new(),
             materials: Vec::new(),
             lights: Vec::new(),
             environment: None,
@@ -298,6 +300,7 @@ mod tests {
             object: 0,
             transform: Transform::new(Vec3::splat(scale), Vec3::ZERO, Vec3::new(0.0, 0.0, z)),
             materials: Arc::from(materials),
+            place: 0,
         };
         scene.placements = vec![place(0.5, 0.5, [0, 5]), place(2.0, -0.5, [0, 6])];
         let seen = materials(&scene);
@@ -338,6 +341,7 @@ mod tests {
                 object: 0,
                 transform,
                 materials: Arc::from([0]),
+                place: 0,
             }];
             let found = placed_box(&scene, &scene.placements[0]);
             let reach = 3f32.sqrt();

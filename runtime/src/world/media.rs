@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Medium};
+use impasto_compiler::abi::{Input, InstanceInfo, MaterialInfo, Medium};
 
 use crate::error::SceneError;
 use crate::scene::MAX_NESTED;
@@ -71,7 +71,7 @@ impl Media {
             .iter()
             .any(|m| any(m.absorption) || any(m.scattering));
         let overlap = table.ranks.len() > 1;
-        let reads_ior = materials.iter().any(|m| m.inputs.exterior_ior);
+        let reads_ior = materials.iter().any(|m| m.inputs.has(Input::ExteriorIor));
         if table.media.is_empty() || !(absorb || overlap || reads_ior) {
             return Ok(Media::default());
         }

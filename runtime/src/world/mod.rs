@@ -14,6 +14,7 @@ pub(crate) mod needs;
 pub mod outputs;
 mod parts;
 mod placed;
+pub(crate) mod places;
 mod split;
 pub mod surface;
 pub mod texture;

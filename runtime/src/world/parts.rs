@@ -11,7 +11,7 @@
 //! | `texture` | `texture_fetch` | |
 
 use glam::Vec3;
-use impasto_compiler::abi::{InstanceInfo, MaterialInfo, TextureRef};
+use impasto_compiler::abi::{InputSet, InstanceInfo, MaterialInfo, TextureRef};
 
 use super::surface::{Corners, Surface, geometry_part};
 use super::{GeometryCounts, Placed, Split};
@@ -26,6 +26,7 @@ use crate::world::lights::{Kinds, Lights};
 use crate::world::media::{self, Media};
 use crate::world::needs::{Need, Needs};
 use crate::world::outputs::{Recorded, objects_part};
+use crate::world::places::{Places, Reads};
 use crate::world::texture;
 
 /// Everything that kernels may read of a scene. What depends on needs is no text yet.
@@ -96,11 +97,9 @@ impl SceneParts {
     ) -> Result<(SceneParts, Recorded), SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
-        let reads_uv = |m: &MaterialInfo| {
-            let inputs = &m.inputs;
-            inputs.uv || inputs.tangent || inputs.footprint_uv
-        };
-        let reads_uv = materials.iter().any(reads_uv) || layers.ask(Ask::Uvs);
+        let inputs = materials.iter().map(|m| m.inputs);
+        let mut reads = Reads::of(inputs.fold(InputSet::default(), InputSet::or));
+        reads.uvs |= layers.ask(Ask::Uvs);
         let tells_objects = layers.ask(Ask::Objects);
         let split = Split::new(scene, instances, technique.copies)?;
         let lights = |order: &[u32]| {
@@ -114,7 +113,12 @@ impl SceneParts {
             (
                 geometry_part(mesh, bvh.order(), &of_triangle, &media.of_instance),
                 bvh.part(technique),
-                Corners::of_mesh(mesh, bvh.order(), reads_uv),
+                Corners {
+                    places: reads
+                        .places
+                        .then(|| Places::of_mesh(scene, mesh, bvh.order())),
+                    ..Corners::of_mesh(mesh, bvh.order(), reads)
+                },
                 lights,
                 tells_objects.then(|| objects_part(mesh, bvh.order())),
             )
@@ -126,7 +130,10 @@ impl SceneParts {
             (
                 placed.geometry_part(&of_triangle, &media.of_instance),
                 placed.levels().part(technique),
-                placed.corners(reads_uv),
+                Corners {
+                    places: reads.places.then(|| placed.places(scene)),
+                    ..placed.corners(reads)
+                },
                 lights,
                 tells_objects.then(|| placed.objects_part(&split.first_objects)),
             )

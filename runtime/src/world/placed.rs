@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::places::{Places, Reads};
 use super::split::Split;
-use super::surface::{Corners, GEOMETRY, normals_buffer, uvs_buffer};
+use super::surface::{Corners, GEOMETRY, colors_buffer, normals_buffer, uvs_buffer, uvs1_buffer};
 use crate::error::SceneError;
-use crate::scene::{Mesh, NO_MATERIAL, Placement, Transform};
+use crate::scene::{Mesh, NO_MATERIAL, Placement, Scene, Transform};
 use crate::technique::Traversal;
 use crate::wgsl;
 use crate::wgsl::{BufferData, ShaderPart};
@@ -49,6 +50,7 @@ impl<'s> Placed<'s> {
             object: 0,
             transform: Transform::default(),
             materials: (0..materials as u32).chain([NO_MATERIAL]).collect(),
+            place: 0,
         };
         let others = split.placements.iter().cloned().map(|p| Placement {
             object: p.object + shift,
@@ -106,8 +108,8 @@ impl<'s> Placed<'s> {
         }
     }
 
-    /// What corners have beside positions; texture coordinates are left out unless materials read them.
-    pub(super) fn corners(&self, reads_uv: bool) -> Corners {
+    /// What corners have beside positions, left out unless code reads it.
+    pub(super) fn corners(&self, reads: Reads) -> Corners {
         let any = |has: fn(&Mesh) -> bool| self.meshes.iter().any(|mesh| has(mesh));
         let normals = || {
             let of_triangle = self.gather(|mesh, t| mesh.normals.get(t).copied().flatten());
@@ -117,14 +119,38 @@ impl<'s> Placed<'s> {
             let of_triangle = self.gather(|mesh, t| mesh.uvs.get(t).copied().unwrap_or_default());
             uvs_buffer(of_triangle)
         };
+        let uvs1 = || {
+            let of_triangle = self.gather(|mesh, t| mesh.uvs1.get(t).copied().unwrap_or_default());
+            uvs1_buffer(of_triangle)
+        };
+        let colors = || colors_buffer(self.gather(Mesh::colors_of));
         Corners {
             bounds: self.bounds,
             origin: DVec3::ZERO,
             placed: true,
             triangles: self.gather(|_, _| ()).count(),
             normals: any(|m| !m.normals.is_empty()).then(normals),
-            uvs: (reads_uv && any(|m| !m.uvs.is_empty())).then(uvs),
+            uvs: (reads.uvs && any(|m| !m.uvs.is_empty())).then(uvs),
+            uvs1: (reads.uvs1 && any(|m| !m.uvs1.is_empty())).then(uvs1),
+            colors: (reads.colors && any(|m| !m.colors.is_empty())).then(colors),
+            places: None,
         }
+    }
+
+    /// The places of what is placed in `scene`.
+    pub(super) fn places(&self, scene: &Scene) -> Places {
+        let world = self.meshes.first().filter(|_| self.has_world);
+        let object = |t: &u32| {
+            let of_world = world.and_then(|mesh| mesh.objects.get(*t as usize));
+            of_world.copied().unwrap_or(0)
+        };
+        let at_home = |index: u32| self.has_world && index == 0;
+        let place = |index: &u32| {
+            let placement = &self.placements[*index as usize];
+            (!at_home(*index)).then_some(placement.place)
+        };
+        let triangles = self.world_order().iter().map(object);
+        Places::new(scene, triangles, self.levels.order().iter().map(place))
     }
 
     /// Which object a primitive is of; the parts of the placements that are no world begin with

@@ -183,6 +183,7 @@ impl Scene {
                     object,
                     transform,
                     materials,
+                    ..
                 } = placement;
                 let object = &self.objects[*object as usize].mesh;
                 mesh.push_copy(object, |_| true, transform, materials, first);

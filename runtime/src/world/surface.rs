@@ -8,6 +8,7 @@ use crate::wgsl;
 use crate::wgsl::template::{Template, template};
 use crate::wgsl::{BufferData, ShaderPart};
 use crate::world::needs::{Need, Needs, SurfaceTraits};
+use crate::world::places::{Places, Reads};
 
 /// Triangles, where they are or placed.
 pub(super) const GEOMETRY: Template = template!("geometry.wgsl");
@@ -67,6 +68,12 @@ pub struct Corners {
     pub(super) normals: Option<BufferData>,
     /// The same; absent as well if no material reads any.
     pub(super) uvs: Option<BufferData>,
+    /// The same.
+    pub(super) uvs1: Option<BufferData>,
+    /// The same.
+    pub(super) colors: Option<BufferData>,
+    /// Where objects are placed; absent if no material asks.
+    pub(super) places: Option<Places>,
 }
 
 /// What corners may have beside positions.
@@ -92,6 +99,24 @@ const UVS: Attribute = Attribute {
     functions: template!("surface_uv.wgsl"),
 };
 
+const UVS1: Attribute = Attribute {
+    buffer: "vertex_uvs1",
+    wgsl_type: "array<vec2<f32>>",
+    bytes: 24,
+    functions: template!("surface_uv1.wgsl"),
+};
+
+/// Of triangles without colors the bytes are those of black, which nobody reads.
+const COLORS: Attribute = Attribute {
+    buffer: "vertex_colors",
+    wgsl_type: "array<vec2<u32>>",
+    bytes: 24,
+    functions: template!("surface_color.wgsl"),
+};
+
+/// What finds the corners of the last three, and says how what they have changes.
+const CORNERS: Template = template!("surface_corners.wgsl");
+
 impl Attribute {
     /// The buffer of three values for each of some triangles.
     fn buffer<T: bytemuck::NoUninit>(&self, triangles: &[T]) -> BufferData {
@@ -116,19 +141,38 @@ pub(super) fn uvs_buffer(triangles: impl Iterator<Item = [Vec2; 3]>) -> BufferDa
     UVS.buffer(&rows)
 }
 
+/// The second set of texture coordinates.
+pub(super) fn uvs1_buffer(triangles: impl Iterator<Item = [Vec2; 3]>) -> BufferData {
+    let rows: Vec<[Vec2; 3]> = triangles.collect();
+    UVS1.buffer(&rows)
+}
+
+/// Colors, three a triangle.
+pub(super) fn colors_buffer(triangles: impl Iterator<Item = [Vec3; 3]>) -> BufferData {
+    let half = |x: f32| u32::from(half::f16::from_f32(x).to_bits());
+    let pack = |c: Vec3| [half(c.x) | half(c.y) << 16, half(c.z)];
+    let rows: Vec<[[u32; 2]; 3]> = triangles.map(|colors| colors.map(pack)).collect();
+    COLORS.buffer(&rows)
+}
+
 impl Corners {
-    /// Of the triangles of `mesh` in `order`; texture coordinates are left out unless materials read them.
-    pub(super) fn of_mesh(mesh: &Mesh, order: &[u32], reads_uv: bool) -> Self {
+    /// Of the triangles of `mesh` in `order`; what corners may have is left out unless code reads it.
+    pub(super) fn of_mesh(mesh: &Mesh, order: &[u32], reads: Reads) -> Self {
         let in_order = || order.iter().map(|index| *index as usize);
         let normals = || normals_buffer(in_order().map(|i| mesh.normals[i]));
         let uvs = || uvs_buffer(in_order().map(|i| mesh.uvs[i]));
+        let uvs1 = || uvs1_buffer(in_order().map(|i| mesh.uvs1[i]));
+        let colors = || colors_buffer(in_order().map(|i| mesh.colors[i]));
         Self {
             bounds: mesh.bounds(),
             origin: DVec3::ZERO,
             placed: false,
             triangles: order.len(),
             normals: (!mesh.normals.is_empty()).then(normals),
-            uvs: (reads_uv && !mesh.uvs.is_empty()).then(uvs),
+            uvs: (reads.uvs && !mesh.uvs.is_empty()).then(uvs),
+            uvs1: (reads.uvs1 && !mesh.uvs1.is_empty()).then(uvs1),
+            colors: (reads.colors && !mesh.colors.is_empty()).then(colors),
+            places: None,
         }
     }
 
@@ -138,14 +182,29 @@ impl Corners {
         if needs.has(Need::Moved) {
             wgsl += &in_world(self.origin);
         }
+        let widths = [Need::UvWidths, Need::Uv1Widths, Need::ColorWidths];
+        let flags = [
+            ("placed", self.placed),
+            ("corner_widths", needs.any(&widths)),
+            ("uv_widths", needs.has(Need::UvWidths)),
+            ("uv1_widths", needs.has(Need::Uv1Widths)),
+            ("color_widths", needs.has(Need::ColorWidths)),
+        ];
         let any_uvs = [Need::Uvs, Need::Tangents, Need::UvWidths];
+        let reads_uvs1 = needs.any(&[Need::Uvs1, Need::Uv1Widths]);
+        let reads_colors = needs.any(&[Need::Colors, Need::ColorWidths]);
+        if reads_uvs1 || reads_colors || needs.any(&widths) {
+            wgsl += &CORNERS.wgsl(&flags);
+        }
         let mut read = Vec::new();
         for (is_read, attribute, values) in [
             (needs.has(Need::Normals), NORMALS, &self.normals),
             (needs.any(&any_uvs), UVS, &self.uvs),
+            (reads_uvs1, UVS1, &self.uvs1),
+            (reads_colors, COLORS, &self.colors),
         ] {
             if is_read {
-                wgsl += &attribute.functions.wgsl(&[("placed", self.placed)]);
+                wgsl += &attribute.functions.wgsl(&flags);
                 read.push((attribute, values));
             }
         }
@@ -155,10 +214,15 @@ impl Corners {
             let nothing = || attribute.nothing(self.triangles);
             values.clone().unwrap_or_else(nothing)
         };
-        ShaderPart {
-            wgsl,
-            buffers: read.into_iter().map(buffer).collect(),
+        let mut buffers: Vec<BufferData> = read.into_iter().map(buffer).collect();
+        if needs.has(Need::Places) {
+            let nowhere = Places::nowhere(self.triangles);
+            let places = self.places.as_ref().unwrap_or(&nowhere);
+            let part = places.written(needs, self.placed);
+            wgsl += &part.wgsl;
+            buffers.extend(part.buffers);
         }
+        ShaderPart { wgsl, buffers }
     }
 }
 
@@ -177,12 +241,16 @@ impl Surface {
             Surface::OfScene(corners) => SurfaceTraits {
                 normals: corners.normals.is_some(),
                 uvs: corners.uvs.is_some(),
+                uvs1: corners.uvs1.is_some(),
+                colors: corners.colors.is_some(),
                 moved: corners.origin != DVec3::ZERO,
                 placed: corners.placed,
             },
             Surface::ByHand(_) => SurfaceTraits {
                 normals: true,
                 uvs: true,
+                uvs1: false,
+                colors: false,
                 moved: false,
                 placed: false,
             },
@@ -192,8 +260,18 @@ impl Surface {
     /// The buffers that it may read.
     pub(super) fn buffers_mut(&mut self) -> Vec<&mut BufferData> {
         match self {
-            Surface::OfScene(Corners { normals, uvs, .. }) => {
-                normals.iter_mut().chain(uvs).collect()
+            Surface::OfScene(corners) => {
+                let Corners {
+                    normals,
+                    uvs,
+                    uvs1,
+                    colors,
+                    places,
+                    ..
+                } = corners;
+                let attributes = normals.iter_mut().chain(uvs).chain(uvs1).chain(colors);
+                let places = places.iter_mut().flat_map(Places::buffers_mut);
+                attributes.chain(places).collect()
             }
             Surface::ByHand(part) => part.buffers.iter_mut().collect(),
         }

@@ -36,29 +36,13 @@ fn hit_tangent(primitive: u32) -> vec3<f32> {
     }
     return normalize(tangent / longest);
 }
+#if uv_widths
 
-// How the texture coordinates change along a vector in the plane of the triangle; they do not where it has no
-// area.
+// How the texture coordinates change along a vector in the plane of the triangle.
 fn hit_uv_change(primitive: u32, along: vec3<f32>) -> vec2<f32> {
-    let triangle = triangle_vertices(primitive);
-    let e1 = triangle.b - triangle.a;
-    let e2 = triangle.c - triangle.a;
-    // Scaled first, so that squares stay in range.
-    let longest = max(max_abs_component(e1), max_abs_component(e2));
-    let area = cross(e1 / longest, e2 / longest);
-    let squared = dot(area, area);
-    if !(squared > 1e-30) {
-        return vec2<f32>(0.0);
-    }
-    let way = along / longest;
-    let u = dot(cross(way, e2 / longest), area) / squared;
-    let v = dot(cross(e1 / longest, way), area) / squared;
-#if placed
-    let corner = corners_of(primitive);
+    let corner = attribute_corners(primitive);
+    let way = barycentric_change(primitive, along);
     let a = vertex_uvs[corner.x];
-    return u * (vertex_uvs[corner.y] - a) + v * (vertex_uvs[corner.z] - a);
-#else
-    let a = vertex_uvs[3u * primitive];
-    return u * (vertex_uvs[3u * primitive + 1u] - a) + v * (vertex_uvs[3u * primitive + 2u] - a);
-#endif
+    return way.x * (vertex_uvs[corner.y] - a) + way.y * (vertex_uvs[corner.z] - a);
 }
+#endif

@@ -2,7 +2,7 @@
 //! angles is known in closed form.
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Medium, Table};
+use impasto_compiler::abi::{Emission, Input, InputSet, InstanceInfo, MaterialInfo, Medium, Table};
 use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
 use impasto_runtime::device::DeviceRef;
 use impasto_runtime::options::RenderOptions;
@@ -79,9 +79,9 @@ impl MaterialSource for Solids {
                 crosses,
                 transmissive: crosses && solid.medium.is_some(),
                 varying_emission: matches!(solid.surface, Surface::Glow(_)),
-                inputs: InputSet {
-                    exterior_ior: solid.surface == Surface::Smooth,
-                    ..InputSet::default()
+                inputs: match solid.surface {
+                    Surface::Smooth => InputSet::of(&[Input::ExteriorIor]),
+                    _ => InputSet::default(),
                 },
                 textures: Vec::new(),
                 lobes: 1,

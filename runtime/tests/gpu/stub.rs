@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use glam::Vec3;
-use impasto_compiler::abi::{Emission, InputSet, InstanceInfo, MaterialInfo, Table};
+use impasto_compiler::abi::{Emission, Input, InputSet, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::{Plan, PlanInputs, Strategy};
 use impasto_runtime::cpu::{Cpu, CpuOptions};
 use impasto_runtime::device::DeviceRef;
@@ -96,10 +96,7 @@ pub fn materials(kinds: &[Kind]) -> Materials {
         crosses: false,
         transmissive: false,
         varying_emission: matches!(kind, Kind::Glowing(..) | Kind::GlowingWrong),
-        inputs: InputSet {
-            normal: true,
-            ..InputSet::default()
-        },
+        inputs: InputSet::of(&[Input::Normal]),
         textures: Vec::new(),
         lobes: 1,
     };

@@ -81,6 +81,7 @@ fn two_levels(random: &mut Random) -> [ShaderPart; 2] {
             random.point().into(),
         ),
         materials: [0].into(),
+        place: 0,
     };
     let world = soup(random, 12);
     let split = Split {

@@ -41,6 +41,8 @@ pub(crate) fn dark_scene() -> Scene {
         mesh: Mesh::default(),
         objects: Vec::new(),
         placements: Vec::new(),
+        places: Vec::new(),
+        object_places: Vec::new(),
         materials: Vec::new(),
         lights: Vec::new(),
         environment: None,

@@ -1,6 +1,6 @@
 //! Scenes as their kernels read them, without files: the texts are those that a render includes.
 
-use impasto_compiler::abi::{InputSet, InstanceInfo, MaterialInfo};
+use impasto_compiler::abi::{Input, InputSet, InstanceInfo, MaterialInfo};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::scene::Scene;
 use impasto_runtime::technique::Technique;
@@ -15,14 +15,13 @@ pub(crate) fn reader() -> MaterialInfo {
         crosses: false,
         transmissive: false,
         varying_emission: false,
-        inputs: InputSet {
-            position: true,
-            normal: true,
-            tangent: true,
-            uv: true,
-            exterior_ior: true,
-            ..InputSet::default()
-        },
+        inputs: InputSet::of(&[
+            Input::Position,
+            Input::Normal,
+            Input::Tangent,
+            Input::Uv,
+            Input::ExteriorIor,
+        ]),
         textures: Vec::new(),
         lobes: 1,
     }

@@ -83,7 +83,7 @@ impl Prelude {
         let evaluated = uses.order.iter().filter(|id| needed.contains(id));
         for &id in needed.iter().filter(free).chain(evaluated) {
             let mut e = f.expr(id).clone();
-            for operand in operands_mut(&mut e.kind) {
+            for operand in e.kind.operands_mut() {
                 *operand = self.copies.get(operand).copied().unwrap_or(*operand);
             }
             let copy = self.add(e);
@@ -166,20 +166,5 @@ fn part_of(f: &Function, whole: ExprId, kind: ExprKind, ty: Type) -> Expr {
         span: f.expr(whole).span,
         via: f.expr(whole).via,
         name: None,
-    }
-}
-
-fn operands_mut(kind: &mut ExprKind) -> &mut [ExprId] {
-    match kind {
-        ExprKind::Const(_)
-        | ExprKind::Param(_)
-        | ExprKind::MaterialParam(_)
-        | ExprKind::TableValue(_)
-        | ExprKind::Load(_) => &mut [],
-        ExprKind::Op(_, args)
-        | ExprKind::Compose(args)
-        | ExprKind::Call(_, args)
-        | ExprKind::Make(_, args) => args,
-        ExprKind::Swizzle(arg, _) | ExprKind::Field(arg, _) => std::slice::from_mut(arg),
     }
 }

@@ -5,7 +5,7 @@ use crate::ir::{
     Block, CallSite, Const, Expr, ExprId, ExprKind, Function, FunctionId, LocalId, SiteId, Stmt,
     Type,
 };
-use crate::passes::rewrite::{Rewriter, operands_mut};
+use crate::passes::rewrite::Rewriter;
 use crate::source::Span;
 
 /// Copies the body of a function, called by the expression `call`, into the open block; gives its
@@ -91,7 +91,7 @@ impl Shift {
         if let ExprKind::Load(local) = kind {
             *local = self.local(*local);
         }
-        for operand in operands_mut(kind) {
+        for operand in kind.operands_mut() {
             *operand = self.expr(*operand);
         }
     }

@@ -225,7 +225,7 @@ impl Rewriter<'_> {
         self.via = self.f.expr(id).via;
         let unset = ExprKind::Const(Const::Bool(false));
         let mut kind = std::mem::replace(&mut self.f.exprs[id.index()].kind, unset);
-        for operand in operands_mut(&mut kind) {
+        for operand in kind.operands_mut() {
             *operand = self.resolve(*operand);
         }
         let load = match kind {
@@ -315,15 +315,5 @@ impl Rewriter<'_> {
             }
         }
         value
-    }
-}
-
-/// The operands of an expression, to be changed.
-pub(super) fn operands_mut(kind: &mut ExprKind) -> &mut [ExprId] {
-    use ExprKind::*;
-    match kind {
-        Const(_) | Param(_) | MaterialParam(_) | TableValue(_) | Load(_) => &mut [],
-        Op(_, args) | Compose(args) | Call(_, args) | Make(_, args) => args,
-        Swizzle(arg, _) | Field(arg, _) => std::slice::from_mut(arg),
     }
 }

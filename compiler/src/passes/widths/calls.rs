@@ -10,7 +10,6 @@ use crate::ir::{
     Block, Const, ExprId, ExprKind, Function, FunctionId, LocalId, Module, SiteId, Stmt, Type,
 };
 use crate::passes::inline::unset;
-use crate::passes::rewrite::operands_mut;
 
 /// The calls that need tangents.
 pub(super) fn in_slice(f: &Function, slice: &Slice) -> Vec<ExprId> {
@@ -127,7 +126,7 @@ impl Copy<'_> {
         if let ExprKind::Load(local) = kind {
             *local = self.local(*local);
         }
-        for operand in operands_mut(kind) {
+        for operand in kind.operands_mut() {
             *operand = self.expr(*operand);
         }
     }

@@ -16,6 +16,7 @@
 mod calls;
 mod slice;
 
+use crate::abi::{Input, Tangents};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::Builder;
 use crate::ir::ops::{Op, Rule, STEEPEST, Tangent};
@@ -25,12 +26,6 @@ use slice::Slice;
 
 /// Expressions that calls put in line may add to one material.
 const MAX_GROWTH: usize = 50_000;
-
-/// The inputs that vary over a footprint, each with the fields that say how.
-const INPUTS: [(&str, [&str; 2]); 2] = [
-    ("position", ["footprint_x", "footprint_y"]),
-    ("uv", ["footprint_uv_x", "footprint_uv_y"]),
-];
 
 /// Computes every width in a material's body, whose first parameter is the surface point. Expressions
 /// keep their numbers, since closures refer to them.
@@ -89,16 +84,27 @@ fn argument(f: &Function, id: ExprId) -> Option<ExprId> {
     }
 }
 
-/// The fields with the tangents of a field of the surface point, if it varies and they are there.
-fn input(module: &Module, f: &Function, base: ExprId, field: u32) -> Option<[usize; 2]> {
+/// How a field of the surface point varies over the footprint, by numbers of fields.
+enum Varies {
+    /// As two fields say.
+    As([usize; 2]),
+    /// As a matrix maps what two fields say.
+    Mapped(usize, [usize; 2]),
+}
+
+/// How an expression varies that is a field of the surface point, if it does and what says so is there.
+fn input(module: &Module, f: &Function, base: ExprId, field: u32) -> Option<Varies> {
     let (ExprKind::Param(0), Type::Struct(id)) = (&f.expr(base).kind, f.ty(base)) else {
         return None;
     };
     let fields = &module.structs[id.index()].fields;
-    let name = &fields.get(field as usize)?.0;
-    let (_, tangents) = INPUTS.iter().find(|(input, _)| input == name)?;
-    let [x, y] = tangents.map(|t| fields.iter().position(|(name, _)| name == t));
-    Some([x?, y?])
+    let number = |name: &str| fields.iter().position(|(n, _)| n == name);
+    let both = |[x, y]: [&str; 2]| Some([number(x)?, number(y)?]);
+    match Input::of_field(&fields.get(field as usize)?.0)?.tangents() {
+        Tangents::None => None,
+        Tangents::Fields(names) => Some(Varies::As(both(names)?)),
+        Tangents::Mapped(matrix, names) => Some(Varies::Mapped(number(matrix)?, both(names)?)),
+    }
 }
 
 /// Adds tangents to what a slice has, and computes the widths.
@@ -220,8 +226,8 @@ impl Walk<'_> {
                 Some(self.b.load(dual, span))
             }
             ExprKind::Field(base, field) => {
-                if let Some(fields) = input(self.module, self.b.function(), base, field) {
-                    return Some(self.b.field(self.module, base, fields[axis], span));
+                if let Some(varies) = input(self.module, self.b.function(), base, field) {
+                    return Some(self.of_input(base, &varies, axis, span));
                 }
                 let base = self.tangents[base.index()][axis]?;
                 Some(self.b.field(self.module, base, field as usize, span))
@@ -243,6 +249,17 @@ impl Walk<'_> {
             | ExprKind::MaterialParam(_)
             | ExprKind::TableValue(_)
             | ExprKind::Call(..) => None,
+        }
+    }
+
+    fn of_input(&mut self, point: ExprId, varies: &Varies, axis: usize, span: Span) -> ExprId {
+        match *varies {
+            Varies::As(fields) => self.b.field(self.module, point, fields[axis], span),
+            Varies::Mapped(matrix, fields) => {
+                let matrix = self.b.field(self.module, point, matrix, span);
+                let change = self.b.field(self.module, point, fields[axis], span);
+                self.b.op(Op::MatVec, &[matrix, change], span)
+            }
         }
     }
 

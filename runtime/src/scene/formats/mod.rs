@@ -71,7 +71,7 @@ pub struct Geometry {
 }
 
 /// A triangle as a file has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Triangle {
     /// Its corners, counter-clockwise seen from outside.
     pub positions: [DVec3; 3],
@@ -79,6 +79,10 @@ pub struct Triangle {
     pub normals: Option<[Vec3; 3]>,
     /// Texture coordinates of the corners, v up.
     pub uvs: Option<[Vec2; 3]>,
+    /// A second set of them.
+    pub uvs1: Option<[Vec2; 3]>,
+    /// Colors of the corners, linear RGB.
+    pub colors: Option<[Vec3; 3]>,
     /// Index into [`Geometry::materials`].
     pub material: usize,
 }
@@ -99,6 +103,38 @@ pub struct FileMaterial {
     pub name: String,
     /// What the file says of it, by the names of [`Format::values`].
     pub values: Vec<(&'static str, ParameterValue)>,
+}
+
+impl Geometry {
+    /// Takes the texture coordinates of `other`, the file at `path`, as second ones.
+    ///
+    /// # Errors
+    /// It has other triangles, or none of them has coordinates.
+    pub(super) fn take_second_uvs(
+        &mut self,
+        other: Geometry,
+        name: &str,
+        path: &Path,
+    ) -> Result<(), SceneError> {
+        let hint = "export the same mesh twice, each time with another set of texture coordinates";
+        let differ = |message: String| SceneError::in_file(path, message).hint(hint);
+        let (own, others) = (self.triangles.len(), other.triangles.len());
+        if own != others {
+            return Err(differ(format!(
+                "it has {others} triangles, but `{name}` has {own}"
+            )));
+        }
+        if other.triangles.iter().all(|t| t.uvs.is_none()) {
+            return Err(differ("it has no texture coordinates".into()));
+        }
+        for (triangle, second) in self.triangles.iter_mut().zip(&other.triangles) {
+            if triangle.positions != second.positions {
+                return Err(differ(format!("its triangles are not those of `{name}`")));
+            }
+            triangle.uvs1 = second.uvs;
+        }
+        Ok(())
+    }
 }
 
 /// Something strange in a file.

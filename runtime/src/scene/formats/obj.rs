@@ -7,11 +7,12 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use impasto_compiler::ParameterValue;
 
 use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning, polygon};
 use crate::error::SceneError;
+use crate::image_file::srgb_to_linear;
 use crate::input;
 
 mod mtl;
@@ -117,6 +118,9 @@ impl Library {
 /// The three lists that faces index, in the order of indices in `1/2/3`.
 const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
+/// The color of vertices that have none in a file in which others have.
+const WHITE: &str = " 1 1 1";
+
 /// What a pass over the lines finds.
 struct Scan<'p> {
     path: &'p Path,
@@ -125,6 +129,8 @@ struct Scan<'p> {
     /// `usemtl` lines with an index of `materials`, and `f` lines with absolute indices.
     faces: String,
     counts: [usize; 3],
+    /// Do the `v` lines of `vertices` have colors?
+    colored: bool,
     /// The largest index into each list, and the line that has it.
     largest: [(usize, usize); 3],
     /// For each triangle whether all corners have texture coordinates and normals.
@@ -149,6 +155,7 @@ impl<'p> Scan<'p> {
             vertices: String::new(),
             faces: String::new(),
             counts: [0; 3],
+            colored: false,
             largest: [(0, 0); 3],
             attributes: Vec::new(),
             materials: Vec::new(),
@@ -211,8 +218,8 @@ impl<'p> Scan<'p> {
         });
     }
 
-    /// A line of at least `needed` numbers. What a fourth number of `v` divides by is kept,
-    /// colors and third texture coordinates are not.
+    /// A line of at least `needed` numbers. A fourth number of `v` divides the others, and three more are a
+    /// color; third texture coordinates are left out.
     fn vertex(
         &mut self,
         line: usize,
@@ -223,17 +230,20 @@ impl<'p> Scan<'p> {
     ) -> Result<(), SceneError> {
         self.counts[list] += 1;
         let what = || format!("{} {}", LISTS[list], self.counts[list]);
-        let mut words = [""; 5];
+        let mut words = [""; 6];
         for (place, word) in words.iter_mut().zip(rest.split_whitespace()) {
             *place = word;
         }
         let has_weight = key == "v" && !words[3].is_empty() && words[4].is_empty();
+        let has_color = key == "v" && !words[5].is_empty();
         let kept = match key {
             "vt" => 2,
-            _ => 3 + usize::from(has_weight),
+            _ if has_color => 6,
+            _ => 3,
         };
-        let mut values = [0.0f64, 0.0, 0.0, 1.0];
-        for (found, word) in words[..kept].iter().enumerate() {
+        let read = kept + usize::from(has_weight);
+        let mut values = [0.0f64; 6];
+        for (found, word) in words[..read].iter().enumerate() {
             if word.is_empty() && found < needed {
                 let message = format!("{} has {found} of {needed} numbers", what());
                 return Err(self.error(line, message).hint("is the file complete?"));
@@ -244,19 +254,42 @@ impl<'p> Scan<'p> {
                 self.error(line, message)
             })?;
         }
-        if !values[..3]
-            .iter()
-            .all(|v| ((v / values[3]) as f32).is_finite())
-        {
+        let weight = if has_weight { values[3] } else { 1.0 };
+        let is_finite = |v: &f64| ((v / weight) as f32).is_finite();
+        if !values[..kept].iter().all(is_finite) {
             return Err(self.error(line, format!("{} is not finite: {}", what(), rest.trim())));
         }
+        if has_color && !self.colored {
+            self.color_before();
+        }
         self.vertices += key;
-        for word in &words[..kept] {
+        for (word, value) in words[..kept].iter().zip(values) {
             self.vertices.push(' ');
-            self.vertices += if word.is_empty() { "0" } else { word };
+            match word {
+                _ if has_weight => self.vertices += &(value / weight).to_string(),
+                &"" => self.vertices.push('0'),
+                word => self.vertices += word,
+            }
+        }
+        if key == "v" && self.colored && !has_color {
+            self.vertices += WHITE;
         }
         self.vertices.push('\n');
         Ok(())
+    }
+
+    /// Gives the vertices before the first one with a color white, since tobj wants all or none.
+    fn color_before(&mut self) {
+        self.colored = true;
+        let mut vertices = String::with_capacity(2 * self.vertices.len());
+        for line in self.vertices.lines() {
+            vertices += line;
+            if line.starts_with("v ") {
+                vertices += WHITE;
+            }
+            vertices.push('\n');
+        }
+        self.vertices = vertices;
     }
 
     fn face(&mut self, line: usize, rest: &str) -> Result<(), SceneError> {
@@ -420,10 +453,20 @@ fn triangle(mesh: &tobj::Mesh, corners: [usize; 3], has_uv: bool, has_normal: bo
         let first = 2 * mesh.texcoord_indices[k] as usize;
         DVec2::from_slice(&mesh.texcoords[first..]).as_vec2()
     };
+    // Programs write the colors that they show, which are in sRGB.
+    let color = |k: usize| {
+        let first = 3 * mesh.indices[k] as usize;
+        let shown = mesh.vertex_color.get(first..first + 3);
+        shown.map_or(Vec3::ONE, |c| {
+            DVec3::from_slice(c).map(srgb_to_linear).as_vec3()
+        })
+    };
     Triangle {
         positions: corners.map(|k| position(mesh, k)),
         normals: has_normal.then(|| corners.map(normal)),
         uvs: has_uv.then(|| corners.map(pair)),
+        uvs1: None,
+        colors: (!mesh.vertex_color.is_empty()).then(|| corners.map(color)),
         material: mesh.material_id.unwrap_or_default(),
     }
 }

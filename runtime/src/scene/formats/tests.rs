@@ -53,9 +53,8 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
                 });
                 geometry.triangles.push(Triangle {
                     positions: [0, 3, 6].map(|first| DVec3::from_slice(&at[first..])),
-                    normals: None,
-                    uvs: None,
                     material,
+                    ..Triangle::default()
                 });
             }
             _ => geometry.warnings.push(Warning {

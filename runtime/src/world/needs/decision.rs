@@ -56,7 +56,7 @@ impl Decision {
 
 #[cfg(test)]
 mod tests {
-    use impasto_compiler::abi::{InputSet, MaterialInfo};
+    use impasto_compiler::abi::{Input, InputSet, MaterialInfo};
 
     use super::*;
     use crate::technique::{RayData, RayOrder};
@@ -83,9 +83,9 @@ mod tests {
             material(|m| m.delta_only = true),
             material(|m| (m.transmissive, m.delta_only) = (true, true)),
             material(|m| (m.varying_emission, m.lobes) = (true, 2)),
-            material(|m| (m.inputs.exterior_ior, m.inputs.normal) = (true, true)),
+            material(|m| m.inputs = InputSet::of(&[Input::ExteriorIor, Input::Normal])),
             material(|m| {
-                (m.inputs.uv, m.inputs.position, m.inputs.footprint_uv) = (true, true, true)
+                m.inputs = InputSet::of(&[Input::Uv, Input::Position, Input::FootprintUv])
             }),
         ]
     }

@@ -1,6 +1,6 @@
 //! What the table of needs judges by: all that is known before a kernel is written, as plain data.
 
-use impasto_compiler::abi::{InputSet, MaterialInfo};
+use impasto_compiler::abi::{Input, MaterialInfo};
 
 use super::Need;
 use crate::film::layers::Layers;
@@ -85,6 +85,10 @@ pub(crate) struct SurfaceTraits {
     pub normals: bool,
     /// Have any corners texture coordinates?
     pub uvs: bool,
+    /// Have any a second set of them?
+    pub uvs1: bool,
+    /// Have any colors?
+    pub colors: bool,
     /// Are coordinates counted from elsewhere than the world's origin?
     pub moved: bool,
     /// Are objects placed by a second level of the acceleration structure?
@@ -130,7 +134,7 @@ impl NeedInputs<'_> {
     }
 
     /// The same of the first material that reads some input.
-    pub(super) fn reads(&self, what: &str, reads: impl Fn(&InputSet) -> bool) -> Option<String> {
-        self.material(&format!("reads {what}"), |m| reads(&m.inputs))
+    pub(super) fn reads(&self, what: &str, inputs: &[Input]) -> Option<String> {
+        self.material(&format!("reads {what}"), |m| m.inputs.any(inputs))
     }
 }

@@ -1,9 +1,12 @@
 //! The table of needs: a row for everything that a scene may do without.
 
+use impasto_compiler::abi::Input;
+
 use super::{NeedInputs, Needs};
 use crate::film::outputs::{Ask, At};
 use crate::technique::{RayData, RayOrder};
 use crate::world::lights::table::light_kinds;
+use crate::world::places::{OF_PLACES, OF_SPACES};
 
 /// One row.
 #[derive(Debug)]
@@ -178,7 +181,7 @@ rows! {
     ExteriorIor, "index outside of surfaces", "exterior_ior",
         "paths follow media, and a material reads `exterior_ior`",
         on &[Media], draws "", Whole, |f, n| {
-            n.has(Media).then(|| f.reads("`exterior_ior`", |i| i.exterior_ior))?
+            n.has(Media).then(|| f.reads("`exterior_ior`", &[Input::ExteriorIor]))?
         };
     // ---- Materials ----
     VaryingEmission, "emission that varies", "varying_emission",
@@ -189,7 +192,7 @@ rows! {
     Position, "positions", "reads_position",
         "a material reads `position`, or the film records it",
         on &[], draws "", Whole, |f, _| {
-            let read = f.reads("`position`", |i| i.position);
+            let read = f.reads("`position`", &[Input::Position]);
             read.or_else(|| f.asks(Ask::Position))
         };
     Moved, "an origin of the scene's own", "moved",
@@ -202,33 +205,78 @@ rows! {
         "corners have normals, and a material or the film reads `normal`",
         on &[], draws "", Whole, |f, _| {
             let any = f.surface.normals;
-            let read = || f.reads("`normal`, and corners have some", |i| i.normal);
+            let read = || f.reads("`normal`, and corners have some", &[Input::Normal]);
             any.then(|| read().or_else(|| f.asks(Ask::Normals)))?
         };
     Uvs, "texture coordinates", "uvs",
         "corners have texture coordinates, and a material or the film reads `uv`",
         on &[], draws "", Whole, |f, _| {
             let any = f.surface.uvs;
-            let read = || f.reads("`uv`, and corners have some", |i| i.uv);
+            let read = || f.reads("`uv`, and corners have some", &[Input::Uv]);
             any.then(|| read().or_else(|| f.asks(Ask::Uvs)))?
         };
     Tangents, "tangents", "tangents",
         "corners have texture coordinates, and a material reads `tangent`",
         on &[], draws "", Whole, |f, _| {
             let any = f.surface.uvs;
-            any.then(|| f.reads("`tangent`, and corners have coordinates", |i| i.tangent))?
+            any.then(|| f.reads("`tangent`, and corners have coordinates", &[Input::Tangent]))?
         };
     RayCones, "ray cones", "ray_cones",
         "a material asks for the `filter_width` of what varies",
         on &[], draws "", Whole, |f, _| {
-            let any = f.surface.uvs;
-            f.reads("how wide it is seen", |i| i.footprint || any && i.footprint_uv)
+            let there = [
+                (true, Input::Footprint),
+                (f.surface.uvs, Input::FootprintUv),
+                (f.surface.uvs1, Input::FootprintUv1),
+                (f.surface.colors, Input::FootprintColor),
+            ];
+            let there = there.iter().filter(|(any, _)| *any).map(|(_, input)| *input);
+            f.reads("how wide it is seen", &there.collect::<Vec<_>>())
         };
     UvWidths, "widths of texture coordinates", "uv_widths",
         "corners have texture coordinates, and a material asks for the `filter_width` of `uv`",
         on &[RayCones], draws "", Whole, |f, _| {
             let any = f.surface.uvs;
-            any.then(|| f.reads("how wide it sees `uv`, and corners have some", |i| i.footprint_uv))?
+            any.then(|| f.reads("how wide it sees `uv`, and corners have some", &[Input::FootprintUv]))?
+        };
+    Uvs1, "a second set of texture coordinates", "uvs1",
+        "corners have a second set of texture coordinates, and a material reads `uv1`",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.surface.uvs1;
+            any.then(|| f.reads("`uv1`, and corners have some", &[Input::Uv1]))?
+        };
+    Uv1Widths, "widths of the second set", "uv1_widths",
+        "corners have a second set of texture coordinates, and a material asks for the `filter_width` of `uv1`",
+        on &[RayCones], draws "", Whole, |f, _| {
+            let any = f.surface.uvs1;
+            any.then(|| f.reads("how wide it sees `uv1`, and corners have some", &[Input::FootprintUv1]))?
+        };
+    Colors, "vertex colors", "colors",
+        "corners have colors, and a material reads `vertex_color`",
+        on &[], draws "", Whole, |f, _| {
+            let any = f.surface.colors;
+            any.then(|| f.reads("`vertex_color`, and corners have some", &[Input::VertexColor]))?
+        };
+    ColorWidths, "widths of vertex colors", "color_widths",
+        "corners have colors, and a material asks for the `filter_width` of `vertex_color`",
+        on &[RayCones], draws "", Whole, |f, _| {
+            let any = f.surface.colors;
+            any.then(|| f.reads("how wide it sees `vertex_color`, and corners have some", &[Input::FootprintColor]))?
+        };
+    View, "view directions", "view",
+        "a material reads `view` or `facing`",
+        on &[], draws "", Whole, |f, _| {
+            f.reads("where it is seen from", &[Input::View])
+        };
+    Places, "places of objects", "places",
+        "a material reads `instance_id` or where it is in its object",
+        on &[], draws "", Whole, |f, _| {
+            f.reads("which object it is on", &OF_PLACES)
+        };
+    Spaces, "spaces of objects", "spaces",
+        "a material reads where it is in its object",
+        on &[Places], draws "", Whole, |f, _| {
+            f.reads("where it is in its object", &OF_SPACES)
         };
     Textures, "textures", "textures",
         "a material reads a texture",
@@ -302,6 +350,13 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
     Uvs,
     Tangents,
     UvWidths,
+    Uvs1,
+    Uv1Widths,
+    Colors,
+    ColorWidths,
+    View,
+    Places,
+    Spaces,
     Textures,
     LobeChoice,
 ]);
