@@ -94,7 +94,7 @@ enum Command {
     /// Explain which materials share a kernel in a scene, and why
     Plan(Box<plan::PlanCommandArgs>),
     /// Evaluate a material, closure or function at one point
-    Eval(eval::EvalArgs),
+    Eval(Box<eval::EvalArgs>),
     /// Render a scene
     Render(Box<render::RenderArgs>),
     /// Measure how fast renders converge: error against run time

@@ -146,11 +146,11 @@ impl SceneParts {
         let parts = SceneParts {
             geometry,
             bvh,
-            surface: Surface::OfScene(Corners {
+            surface: Surface::OfScene(Box::new(Corners {
                 bounds: split.bounds,
                 origin: scene.origin,
                 ..corners
-            }),
+            })),
             bounds: split.bounds,
             lights: Lights::OfScene(lights),
             counts: split.counts(),

@@ -49,7 +49,7 @@ pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) 
 #[derive(Clone, Debug)]
 pub enum Surface {
     /// A scene's corners, of which text is written once it is known what of them materials read.
-    OfScene(Corners),
+    OfScene(Box<Corners>),
     /// A text by hand, which is taken as it is.
     ByHand(ShaderPart),
 }
@@ -268,7 +268,7 @@ impl Surface {
                     colors,
                     places,
                     ..
-                } = corners;
+                } = &mut **corners;
                 let attributes = normals.iter_mut().chain(uvs).chain(uvs1).chain(colors);
                 let places = places.iter_mut().flat_map(Places::buffers_mut);
                 attributes.chain(places).collect()
