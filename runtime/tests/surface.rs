@@ -544,3 +544,85 @@ fn offsets_are_outward_and_relative_to_the_place() {
         assert_eq!((moved.x, moved.y), (0.0, 0.0));
     }
 }
+
+#[test]
+fn textures_in_tiles_have_a_picture_a_unit_square() {
+    let grey = |value: u8| {
+        let picture = RgbaImage::from_pixel(2, 2, image::Rgba([value, 7, 9, 255]));
+        encode(picture, ImageFormat::Png)
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str, bytes: Vec<u8>| {
+        std::fs::create_dir_all(folder.path().join("maps")).expect("a folder");
+        std::fs::write(folder.path().join(name), bytes).expect("it is written");
+    };
+    file("plain.png", grey(10));
+    for (number, value) in [(1001, 50), (1002, 100), (1010, 150), (1021, 200)] {
+        file(&format!("maps/wood.{number}.png"), grey(value));
+    }
+    // What only looks like a tile is none.
+    for name in [
+        "maps/wood.999.png",
+        "maps/wood.10011.png",
+        "maps/wood.1003.jpg",
+        "maps/stone.1003.png",
+    ] {
+        file(name, b"no picture".to_vec());
+    }
+    let texture = |path: &str| TextureRef {
+        path: path.into(),
+        space: TextureSpace::Data,
+        lookups: Default::default(),
+    };
+    let textures = [texture("maps/wood.<UDIM>.png"), texture("plain.png")];
+    let part = texture::part(&textures, folder.path());
+    let part = part.expect("it loads").expect("there are textures");
+    // Tiles end where they end: nothing of the picture's other side, or of the next, shows at their edges.
+    let cases = [
+        (0, [0.5, 0.5], Some(50)),
+        (0, [0.0, 0.0], Some(50)),
+        (0, [0.999, 0.999], Some(50)),
+        (0, [1.0, 0.5], Some(100)),
+        (0, [1.999, 0.001], Some(100)),
+        (0, [9.5, 0.5], Some(150)),
+        (0, [0.5, 2.5], Some(200)),
+        (0, [2.5, 0.5], None),
+        (0, [0.5, 1.5], None),
+        (0, [10.5, 0.5], None),
+        (0, [-0.5, 0.5], None),
+        (0, [0.5, -0.001], None),
+        (0, [0.5, 3.0], None),
+        (0, [1e30, 1e30], None),
+        (1, [0.5, 0.5], Some(10)),
+        (1, [5.5, 7.5], Some(10)),
+    ];
+    let at: Vec<(u32, Vec2)> = cases.iter().map(|c| (c.0, Vec2::from(c.1))).collect();
+    for ((slot, uv, expected), [r, g, _, a]) in cases.iter().zip(fetch(&part, &at)) {
+        let value = expected.unwrap_or(0) as f32 / 255.0;
+        assert!(
+            (r - value).abs() < 1e-3,
+            "{slot} at {uv:?}: {r}, not {value}"
+        );
+        let covered = f32::from(u8::from(expected.is_some()));
+        assert_eq!((a, g > 0.0), (covered, covered > 0.0), "{slot} at {uv:?}");
+    }
+}
+
+#[test]
+fn tiles_that_are_not_there_are_an_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (path, said) in [
+        ("wood.<UDIM>.png", "`wood.1001.png`"),
+        ("maps/wood.<UDIM>.png", "cannot read the folder"),
+        ("<UDIM>/wood.png", "not of a folder"),
+    ] {
+        let texture = TextureRef {
+            path: path.into(),
+            space: TextureSpace::Color,
+            lookups: Default::default(),
+        };
+        let error = texture::part(&[texture], folder.path()).expect_err(path);
+        assert!(error.to_string().contains(said), "{path}: {error}");
+        assert!(error.to_string().contains("UDIM"), "{path}: {error}");
+    }
+}

@@ -1,11 +1,14 @@
 //! Textures for replays: lookups as kernels make them, from the same words, in double precision.
 
 use impasto_compiler::Program;
-use impasto_compiler::abi::{TextureRef, TextureSpace};
+use impasto_compiler::abi::{TextureRef, TextureSpace, texture_mode};
 use impasto_compiler::ir::interp::TextureRequest;
 
 /// Most taps along the longer side of a width, as in the compiler's `codegen::lookups`.
 const TAPS: f64 = 8.0;
+
+/// How tiles are looked up within.
+const CLAMPED: i32 = texture_mode(2, 2, 0);
 
 /// The texels of a program's textures.
 pub(super) struct Textures {
@@ -48,8 +51,31 @@ impl Textures {
         let data = usize::from(of.op.texture_space() == Some(TextureSpace::Data));
         let last = self.slots.len().saturating_sub(1);
         let slot = self.slots.get(of.texture.min(last)).and_then(|s| s[data]);
-        slot.and_then(|slot| self.mean(slot, of))
+        slot.and_then(|slot| self.fetched(slot, of))
             .unwrap_or_default()
+    }
+
+    /// What a lookup of a slot gives, or of its tile there.
+    fn fetched(&self, slot: usize, of: &TextureRequest) -> Option<[f64; 4]> {
+        let [table, size] = self.pair(slot)?;
+        if size != 0 {
+            return self.mean(slot, of);
+        }
+        let [rows, _] = self.pair(table as usize)?;
+        let [u, v] = of.uv.map(f64::floor);
+        let is_there = (0.0..10.0).contains(&u) && (0.0..f64::from(rows)).contains(&v);
+        let place = is_there.then_some(table as usize + 1 + u as usize + 10 * v as usize)?;
+        let [tile, _] = self.pair(place)?;
+        let of = TextureRequest {
+            uv: [of.uv[0] - u, of.uv[1] - v],
+            mode: CLAMPED + (of.mode & 0x30),
+            ..*of
+        };
+        (tile != u32::MAX).then(|| self.mean(tile as usize, &of))?
+    }
+
+    fn pair(&self, at: usize) -> Option<[u32; 2]> {
+        Some([*self.words.get(2 * at)?, *self.words.get(2 * at + 1)?])
     }
 
     /// The mean over the width of a lookup.
@@ -82,11 +108,10 @@ impl Textures {
     }
 
     fn level(&self, slot: usize, level: u32) -> Option<Level> {
-        let pair = |at: usize| Some([*self.words.get(2 * at)?, *self.words.get(2 * at + 1)?]);
-        let [picture, _] = pair(slot)?;
+        let [picture, _] = self.pair(slot)?;
         let [first, size] = match level {
-            0 => pair(slot)?,
-            _ => pair(picture.checked_sub(level)? as usize)?,
+            0 => self.pair(slot)?,
+            _ => self.pair(picture.checked_sub(level)? as usize)?,
         };
         let size = [(size & 0xffff).max(1), (size >> 16).max(1)];
         Some(Level { first, size })

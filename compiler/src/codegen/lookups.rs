@@ -20,8 +20,28 @@ use crate::abi::Lookups;
 const TAPS: u32 = 8;
 
 /// `texture_fetch_as`, and `texture_fetch_wide` if some lookup averages over a width; nothing where
-/// all lookups are plain.
-pub fn lookups(uses: Lookups) -> String {
+/// all lookups are plain. Where some texture is in `tiles`, the target provides
+///
+/// ```wgsl
+/// fn texture_is_tiled(slot: u32) -> bool
+/// // The slot of the tile at `uv`, or NO_TILE.
+/// fn texture_tile(slot: u32, uv: vec2<f32>) -> u32
+/// // The mode of a tile, but for its filter.
+/// const CLAMPED_TILE: i32
+/// ```
+pub fn lookups(uses: Lookups, tiles: bool) -> String {
+    let mut out = written(uses);
+    if tiles && !uses.is_plain() {
+        out = out.replace("fn texture_fetch_", "fn texture_tile_");
+        out += TILED;
+        if uses.levels {
+            out += TILED_WIDE;
+        }
+    }
+    out
+}
+
+fn written(uses: Lookups) -> String {
     if uses.is_plain() {
         return String::new();
     }
@@ -93,6 +113,34 @@ fn texture_fetch_as(slot: u32, uv: vec2<f32>, mode: i32) -> vec4<f32> {
     return texture_filter(texture_level(slot, 0u), uv, mode);
 }
 
+";
+
+const TILED: &str = "
+// The texture, or its tile at the place, which goes on at its edges as it ends.
+fn texture_fetch_as(slot: u32, uv: vec2<f32>, mode: i32) -> vec4<f32> {
+    if !texture_is_tiled(slot) {
+        return texture_tile_as(slot, uv, mode);
+    }
+    let tile = texture_tile(slot, uv);
+    if tile == NO_TILE {
+        return vec4<f32>(0.0);
+    }
+    return texture_tile_as(tile, fract(uv), CLAMPED_TILE + (mode & 0x30));
+}
+";
+
+const TILED_WIDE: &str = "
+// The same over a width, of which what lies beyond the tile is as its edge.
+fn texture_fetch_wide(slot: u32, at: vec4<f32>, mode: i32) -> vec4<f32> {
+    if !texture_is_tiled(slot) {
+        return texture_tile_wide(slot, at, mode);
+    }
+    let tile = texture_tile(slot, at.xy);
+    if tile == NO_TILE {
+        return vec4<f32>(0.0);
+    }
+    return texture_tile_wide(tile, vec4<f32>(fract(at.xy), at.zw), CLAMPED_TILE + (mode & 0x30));
+}
 ";
 
 const FILTER_BEGINS: &str = "\

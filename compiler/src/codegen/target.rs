@@ -139,7 +139,7 @@ fn textures(program: &Program, body: &str, first: usize, out: &mut String) {
     }
     if special {
         let _ = write!(out, "\n{}", levels(slots));
-        out.push_str(&lookups(program.lookups()));
+        out.push_str(&lookups(program.lookups(), false));
     }
 }
 

@@ -3,6 +3,9 @@
 //! It begins with a pair of words a texture: where its texels begin, and its size. Levels, which only
 //! textures have that are looked up with a width, stand behind the picture's own texels, and the pairs
 //! of these levels before them, in reverse: the pair of level n lies n before the first texel.
+//!
+//! A texture in tiles has no size, and the place of its table instead: how many rows of ten tiles it has, and
+//! for each tile the number of its pair, which stands behind those of all textures.
 
 use std::path::Path;
 
@@ -13,9 +16,13 @@ use rayon::prelude::*;
 
 use crate::error::SceneError;
 use crate::image_file::{self, Picture};
+use crate::wgsl;
+use crate::wgsl::template::template;
 use crate::wgsl::{BufferData, ShaderPart};
+use tiles::{Slot, Slots};
 
 mod levels;
+mod tiles;
 
 /// Texels of all textures of a scene, levels not counted: 32 pictures of 4096 x 4096, 4 GiB.
 const MAX_TEXELS: u64 = 1 << 29;
@@ -32,28 +39,55 @@ pub fn part(textures: &[TextureRef], base: &Path) -> Result<Option<ShaderPart>, 
     if textures.is_empty() {
         return Ok(None);
     }
-    let packed = load_all(textures, base)?;
-    let mut data: Vec<[u32; 2]> = Vec::with_capacity(packed.iter().map(Packed::pairs).sum());
-    let mut at = packed.len() as u32;
-    for texture in &packed {
-        let first = at + texture.levels.len() as u32 - 1;
-        data.push([first, texture.levels[0].size]);
-        at += texture.pairs() as u32 - 1;
-    }
-    for (slot, texture) in packed.into_iter().enumerate() {
-        texture.write(data[slot][0], &mut data);
-    }
+    let slots = Slots::of(textures, base)?;
+    let data = words(&slots, load_all(&slots.pictures, base)?);
     let all = textures.iter().map(|texture| texture.lookups);
-    let all = all.fold(Lookups::default(), Lookups::and);
-    let mut wgsl = include_str!("../texture.wgsl").to_owned();
+    let all = all.fold(slots.lookups(), Lookups::and);
+    let tiled = slots.is_tiled();
+    let mut wgsl = String::new();
+    if tiled {
+        wgsl += &wgsl::constant_u32("NO_TILE", tiles::NO_TILE);
+        wgsl += &format!("const CLAMPED_TILE: i32 = {};\n", tiles::CLAMPED);
+    }
+    wgsl += &template!("../texture.wgsl").wgsl(&[("tiles", tiled)]);
     if !all.is_plain() {
         wgsl += include_str!("../texture_levels.wgsl");
-        wgsl += &codegen::lookups(all);
+        wgsl += &codegen::lookups(all, tiled);
     }
     Ok(Some(ShaderPart {
         wgsl,
         buffers: vec![BufferData::new("texture_data", "array<vec2<u32>>", &data)],
     }))
+}
+
+/// The buffer: pairs of textures and tiles, tables, then texels.
+fn words(slots: &Slots, packed: Vec<Packed>) -> Vec<[u32; 2]> {
+    let count = slots.slots.len();
+    let whole = slots.slots.iter().filter(|s| matches!(s, Slot::Picture(_)));
+    let whole = whole.count();
+    // The pair of a tile.
+    let tile = |picture: usize| (count + picture - whole) as u32;
+    let pairs = count + packed.len() - whole;
+    let mut data: Vec<[u32; 2]> = vec![[0; 2]; pairs];
+    data.reserve(packed.iter().map(Packed::pairs).sum());
+    let mut pair_of: Vec<usize> = (0..packed.len())
+        .map(|picture| (picture + count).saturating_sub(whole))
+        .collect();
+    for (slot, of) in slots.slots.iter().enumerate() {
+        match of {
+            Slot::Picture(picture) => pair_of[*picture] = slot,
+            Slot::Tiles(tiles) => {
+                data[slot] = [data.len() as u32, 0];
+                data.extend(tiles::table(tiles, tile));
+            }
+        }
+    }
+    for (picture, texture) in packed.into_iter().enumerate() {
+        let first = (data.len() + texture.levels.len() - 1) as u32;
+        data[pair_of[picture]] = [first, texture.levels[0].size];
+        texture.write(first, &mut data);
+    }
+    data
 }
 
 /// Loads textures, as many at a time as memory is meant for. Sizes are looked at first, so that too
