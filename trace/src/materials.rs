@@ -170,7 +170,9 @@ impl<F: Float> Materials<'_, F> {
         };
         let (instance, material) = asked(oracle.program, of, cells)?;
         result.resize(of.result.cells().max(1), 0);
-        if let Some(function) = &material.emission {
+        // Kernels leave emission that is the same everywhere to lights.
+        let varies = material.info.varying_emission;
+        if let Some(function) = material.emission.as_ref().filter(|_| varies) {
             let arguments = oracle.arguments(function, &["wo"], of, cells);
             let value = oracle.run(instance, function, arguments)?;
             of.result.put("", value.components(), result);
