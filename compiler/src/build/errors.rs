@@ -1,5 +1,6 @@
-//! What may be wrong with a material that checked: it takes too much.
+//! What may be wrong with a material that checked: it takes too much, or gives too much.
 
+use crate::closure::Gain;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::Material;
 use crate::passes::HOIST_FUEL;
@@ -39,4 +40,16 @@ pub(super) fn too_long(material: &Material, instance: &str) -> Diagnostic {
     Diagnostic::new(Code::TooLarge, material.span, message)
         .expected(format!("at most {HOIST_FUEL} operations"))
         .hint("shorten loops whose length depends on a parameter")
+}
+
+/// A material that sends out more light than it gets, seen from somewhere.
+pub(super) fn gains(material: &Material, gain: Gain) -> Diagnostic {
+    let Gain { angle, albedo } = gain;
+    let message = format!(
+        "seen at {angle:.0} degrees from its normal, `{}` scatters {albedo:.2} of the light that falls on it",
+        material.name
+    );
+    Diagnostic::new(Code::EnergyGain, material.span, message)
+        .expected("weights that depend on the view to keep the albedo up to 1")
+        .hint("use `mix(a, b, t)` with a `t` that depends on `facing`, or divide the weight by its largest value")
 }

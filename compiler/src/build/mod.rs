@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::abi::{Emission, MaterialInfo};
+use crate::abi::{Emission, Input, MaterialInfo};
 use crate::closure::{self, Core};
 use crate::codegen;
 use crate::diag::Diagnostic;
@@ -114,9 +114,26 @@ impl ProgramBuilder {
         let module = &self.functions.module;
         let textures = instances::textures(&state.material, settings, &checker.literal_textures);
         let instances = instances::instances(module, &state, settings, self.materials.len())?;
+        let gained = settings
+            .iter()
+            .filter_map(|setting| self.gain(&state, setting))
+            .next();
+        checker.diagnostics.extend(gained);
         self.finish_material(state, textures, &instances);
         self.instances.extend(instances);
         Ok(())
+    }
+
+    /// A warning if a material whose look depends on the view gains light with the values of a setting.
+    fn gain(&self, state: &MaterialState, setting: &Setting) -> Option<Diagnostic> {
+        let module = &self.functions.module;
+        let evaluate = state.functions.first()?;
+        let inputs = codegen::inputs(&module.structs, &[evaluate]);
+        let m = &state.material;
+        let gain = inputs
+            .has(Input::View)
+            .then(|| closure::gain(module, &self.core, m, &setting.values))??;
+        Some(errors::gains(m, gain))
     }
 
     /// Takes a material through passes that belong together, and before them what it calls.

@@ -15,6 +15,7 @@ use crate::ir::{
 
 mod emission;
 mod evaluate;
+mod gain;
 mod looks;
 mod opacity;
 mod probe;
@@ -22,6 +23,7 @@ mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
+pub use gain::{Gain, gain};
 pub use looks::Looks;
 pub use opacity::cut_out;
 pub use probe::{Probe, ProbedLobe, probe};
