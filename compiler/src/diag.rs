@@ -152,6 +152,8 @@ codes! {
         "The name is defined and never used. If that is intended, start it with an underscore.";
     LobesNeverSampled = "W0004", Warning, "weight is always zero",
         "The closure's weight is the constant zero, so it never contributes.";
+    AboveOne = "W0005", Warning, "color above one",
+        "Reflectances and the components of `srgb` go from 0 to 1. Above, a surface sends out more light than falls on it.";
 }
 
 impl Code {

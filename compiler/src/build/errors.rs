@@ -1,6 +1,6 @@
 //! What may be wrong with a material that checked: it takes too much, or gives too much.
 
-use crate::closure::Gain;
+use crate::closure::{Excess, Gain};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::Material;
 use crate::passes::HOIST_FUEL;
@@ -52,4 +52,25 @@ pub(super) fn gains(material: &Material, gain: Gain) -> Diagnostic {
     Diagnostic::new(Code::EnergyGain, material.span, message)
         .expected("weights that depend on the view to keep the albedo up to 1")
         .hint("use `mix(a, b, t)` with a `t` that depends on `facing`, or divide the weight by its largest value")
+}
+
+/// A lobe that scatters more light than falls on it, with the values of the setting `name`.
+pub(super) fn too_bright(material: &Material, excess: &Excess, name: &str) -> Diagnostic {
+    let by: Vec<String> = excess
+        .params
+        .iter()
+        .map(|p| format!("`{}`", material.params[*p].name))
+        .collect();
+    let by = if by.is_empty() {
+        String::new()
+    } else {
+        format!("with {} of `{name}`, ", by.join(" and "))
+    };
+    let message = format!(
+        "{by}`{}` scatters {} times the light that falls on it",
+        excess.bsdf, excess.albedo as f32
+    );
+    Diagnostic::new(Code::AboveOne, excess.span, message)
+        .expected("reflectances from 0 to 1 in each component")
+        .hint("a color in bytes is written `srgb(0xff8000)`")
 }

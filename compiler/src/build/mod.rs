@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::abi::{Emission, Input, MaterialInfo};
-use crate::closure::{self, Core};
+use crate::closure::{self, Core, Excess};
 use crate::codegen;
 use crate::diag::Diagnostic;
 use crate::ir::{self, Function, Module};
@@ -23,6 +23,23 @@ mod lookups;
 
 use functions::{Functions, Size};
 pub(crate) use instances::Setting;
+
+/// Adds a warning unless one of its kind points there already.
+fn note_once(diagnostics: &mut Vec<Diagnostic>, warning: Diagnostic) {
+    let overlaps = |d: &Diagnostic| match (d.span, warning.span) {
+        (Some(a), Some(b)) => {
+            let (a_range, b_range) = (a.range(), b.range());
+            a.file == b.file && a_range.start < b_range.end && b_range.start < a_range.end
+        }
+        _ => false,
+    };
+    if !diagnostics
+        .iter()
+        .any(|d| d.code == warning.code && overlaps(d))
+    {
+        diagnostics.push(warning);
+    }
+}
 
 /// Collects lowered materials.
 pub(crate) struct ProgramBuilder {
@@ -119,6 +136,9 @@ impl ProgramBuilder {
             .filter_map(|setting| self.gain(&state, setting))
             .next();
         checker.diagnostics.extend(gained);
+        for bright in self.too_bright(&state, settings) {
+            note_once(&mut checker.diagnostics, bright);
+        }
         self.finish_material(state, textures, &instances);
         self.instances.extend(instances);
         Ok(())
@@ -134,6 +154,17 @@ impl ProgramBuilder {
             .has(Input::View)
             .then(|| closure::gain(module, &self.core, m, &setting.values))??;
         Some(errors::gains(m, gain))
+    }
+
+    /// Warnings of lobes that scatter more light than falls on them.
+    fn too_bright(&self, state: &MaterialState, settings: &[Setting]) -> Vec<Diagnostic> {
+        let (module, m) = (&self.functions.module, &state.material);
+        let each = settings.iter().flat_map(|setting| {
+            let excesses = closure::excesses(module, m, &setting.values);
+            let warning = |e: Excess| errors::too_bright(m, &e, &setting.name);
+            excesses.into_iter().map(warning)
+        });
+        each.collect()
     }
 
     /// Takes a material through passes that belong together, and before them what it calls.

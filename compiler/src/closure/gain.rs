@@ -1,12 +1,14 @@
-//! Finds out whether a material whose look depends on the view sends out more light than falls on it.
+//! Finds out whether a material sends out more light than falls on it.
 //!
-//! The checker sees weights and sums that are constants. What depends on the view is tried: the albedo of
-//! the whole material, seen from every elevation.
+//! The checker sees weights and sums that are constants. Of what depends on the view the albedo of the whole
+//! material is tried, seen from every elevation; of lobes with the same arguments all over the surface
+//! their own albedo, so that no list says which parameters are reflectances.
 
-use super::{Core, probe};
+use super::{Core, probe, surface_lobes};
 use crate::ir::interp::Interpreter;
 use crate::ir::value::Value;
-use crate::ir::{Const, Material, Module, Type};
+use crate::ir::{Const, ExprKind, Lobe, Material, Methods, Module, Type};
+use crate::source::Span;
 
 /// Elevations that are tried.
 const VIEWS: u32 = 24;
@@ -76,4 +78,68 @@ fn flat_point(module: &Module, core: &Core, view: [f64; 3]) -> Value<f64> {
         _ => Value::zero(*ty, &module.structs),
     };
     Value::Struct(fields.iter().map(field).collect())
+}
+
+/// A lobe that scatters more light than falls on it, by arguments that are the same all over the surface.
+#[derive(Clone, Debug)]
+pub struct Excess {
+    /// Its bsdf.
+    pub bsdf: String,
+    /// Where it was written.
+    pub span: Span,
+    /// The albedo of the brightest channel.
+    pub albedo: f64,
+    /// The parameters of the material among its arguments that exceed one, by number.
+    pub params: Vec<usize>,
+}
+
+/// The lobes of a material that scatter too much with values for its parameters.
+pub fn excesses(module: &Module, m: &Material, values: &[Const]) -> Vec<Excess> {
+    let lobes = surface_lobes(m);
+    let found = lobes
+        .iter()
+        .filter_map(|path| excess(module, m, path.lobe, values));
+    found.collect()
+}
+
+fn excess(module: &Module, m: &Material, lobe: &Lobe, values: &[Const]) -> Option<Excess> {
+    let def = &module.closures[lobe.def.index()];
+    let Methods::Bsdf { albedo, .. } = def.methods else {
+        return None;
+    };
+    let above = |c: &Const| matches!(c, Const::Float(v) if v.iter().any(|x| *x > 1.0));
+    let mut args = Vec::with_capacity(lobe.args.len() + 1);
+    let mut params = Vec::new();
+    let mut is_bright = false;
+    for arg in &lobe.args {
+        let value = match &m.body.expr(*arg).kind {
+            ExprKind::Const(value) => value,
+            ExprKind::MaterialParam(p) => {
+                let value = values.get(*p as usize)?;
+                if above(value) {
+                    params.push(*p as usize);
+                }
+                value
+            }
+            // It differs from point to point.
+            _ => return None,
+        };
+        is_bright |= above(value);
+        args.push(Value::constant(value));
+    }
+    if !is_bright {
+        return None;
+    }
+    args.push(Value::vector(&[0.6, 0.0, 0.8]));
+    let method = &module.functions[albedo.index()];
+    let found = Interpreter::<f64>::new(module, FUEL)
+        .run(method, args)
+        .ok()?;
+    let albedo = found.to_f64().into_iter().fold(0.0, f64::max);
+    (albedo > SLACK).then(|| Excess {
+        bsdf: def.name.clone(),
+        span: lobe.span,
+        albedo,
+        params,
+    })
 }

@@ -23,7 +23,7 @@ mod view;
 
 pub use emission::{emission, emission_kind};
 pub use evaluate::evaluate;
-pub use gain::{Gain, gain};
+pub use gain::{Excess, Gain, excesses, gain};
 pub use looks::Looks;
 pub use opacity::cut_out;
 pub use probe::{Probe, ProbedLobe, probe};

@@ -210,6 +210,7 @@ impl<'c, 'l> Body<'c, 'l> {
         let id = match (from, to) {
             (Ty::Int, Ty::Float) => self.promote(id, span),
             (Ty::Int, Ty::Color) => {
+                self.note_hexadecimal(span);
                 let float = self.promote(id, span);
                 self.builder.compose(ir::Type::Vec3, &[float], span)
             }
@@ -217,6 +218,20 @@ impl<'c, 'l> Body<'c, 'l> {
             _ => id,
         };
         Some(Operand::Value(id, to))
+    }
+
+    /// Warns of a hexadecimal number as a color, which is a grey of that brightness.
+    fn note_hexadecimal(&mut self, span: Span) {
+        let source = self.cx.sources.file(span.file);
+        let text = source.text.get(span.range()).unwrap_or_default().to_owned();
+        if !text.starts_with("0x") && !text.starts_with("0X") {
+            return;
+        }
+        let message = format!("the number {text} as a color is a grey of that brightness");
+        let grey = Diagnostic::new(Code::AboveOne, span, message)
+            .expected("a color")
+            .hint(format!("write `srgb({text})`"));
+        self.report::<()>(grey);
     }
 
     /// An int as a float.

@@ -30,6 +30,7 @@ impl Body<'_, '_> {
                     .iter()
                     .all(|t| matches!(t, Ty::Int | Ty::Float)) =>
             {
+                self.note_bytes(&[*r, *g, *b], span);
                 let parts = [(*r, *rt), (*g, *gt), (*b, *bt)].map(|(id, ty)| {
                     if ty == Ty::Int {
                         self.promote(id, span)
@@ -45,6 +46,31 @@ impl Body<'_, '_> {
             self.builder.op(Op::SrgbDecode, &[encoded], span),
             Ty::Color,
         ))
+    }
+
+    /// Warns of components of `srgb` above 1, which are bytes as a rule.
+    fn note_bytes(&mut self, components: &[ExprId], span: Span) {
+        let number = |id: &ExprId| match self.builder.function().constant(*id)? {
+            Const::Int(i) => Some(f64::from(*i)),
+            Const::Float(x) => x.first().copied(),
+            Const::Bool(_) => None,
+        };
+        let numbers: Option<Vec<f64>> = components.iter().map(number).collect();
+        let Some(numbers) = numbers.filter(|n| n.iter().any(|x| *x > 1.0)) else {
+            return;
+        };
+        let above = Diagnostic::new(Code::AboveOne, span, "a component of `srgb` is above 1")
+            .expected("three floats from 0 to 1, or one hexadecimal number");
+        let above = if numbers.iter().all(|x| (0.0..=255.0).contains(x)) {
+            let hex: String = numbers
+                .iter()
+                .map(|x| format!("{:02x}", *x as u8))
+                .collect();
+            above.hint(format!("bytes are written `srgb(0x{hex})`"))
+        } else {
+            above
+        };
+        self.report::<()>(above);
     }
 
     fn wrong_srgb<T>(&mut self, span: Span) -> Option<T> {
