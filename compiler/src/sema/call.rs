@@ -278,6 +278,15 @@ impl Body<'_, '_> {
         if any_unsigned && let Some(found) = self.unsigned_function(op, values, span) {
             return Some(found);
         }
+        let is_int = |ty: Ty| matches!(ty, Ty::Int | Ty::Uint);
+        if any_unsigned
+            && matches!(op.info().shape, Shape::Number(_))
+            && values.iter().all(|v| is_int(v.1))
+        {
+            // Neither as floats, which are not exact, nor as one of the two.
+            let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
+            return self.no_overload(op, &types, span);
+        }
         let all_ints = values.iter().all(|v| v.1 == Ty::Int);
         let takes_ints = match op.info().shape {
             Shape::Int(_) | Shape::IntToFloat => true,
