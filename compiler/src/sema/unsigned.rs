@@ -39,7 +39,8 @@ impl Body<'_, '_> {
     ) -> Option<Operand> {
         use BinaryOp as B;
         let shifts = matches!(op, B::Shl | B::Shr);
-        if !shifts && !(self.is_unsigned(a, a_ty) && self.is_unsigned(b, b_ty)) {
+        let both = self.is_unsigned(a, a_ty) && self.is_unsigned(b, b_ty);
+        if !shifts && !both {
             return None;
         }
         let (op, ty) = match op {
