@@ -292,6 +292,8 @@ pub enum ExprKind {
     Bool(bool),
     /// `12`, `0xff8800`
     Int(i64),
+    /// `12u`, `0xffu`
+    Uint(u32),
     /// `1.5`, `2e-3`
     Float(f64),
     /// `0.6 mm`, `30 deg`: a number and its unit

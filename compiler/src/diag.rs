@@ -78,7 +78,7 @@ codes! {
     UnknownName = "E0201", Error, "unknown name",
         "No variable, parameter, function or closure of that name is in scope. Names from other modules need a `use`.";
     UnknownType = "E0202", Error, "unknown type",
-        "Types are bool, int, float, length, angle, vec2, vec3, vec4, color, point, vector, normal, mat3, texture, bsdf, edf, medium and structs in scope.";
+        "Types are bool, int, uint, float, length, angle, vec2, vec3, vec4, color, point, vector, normal, mat2, mat3, texture, bsdf, edf, medium and structs in scope.";
     UnknownModule = "E0203", Error, "unknown module",
         "A `use` names a folder of the standard library (`std::bsdf`, `std::noise`, ...) or a file beside the importing one.";
     UnknownImport = "E0204", Error, "nothing of that name in the module",

@@ -62,8 +62,8 @@ pub fn irs() -> Corpus {
 const SOURCE_WORDS: &str = "
     material private none label soft group unit param let var fn bsdf edf delta struct const use if else for in while limit return
     break continue true false surface emission interior opacity layer mix medium position normal
-    uv tangent exterior_ior bool int float length angle vec2 vec3 vec4 color point vector mat3
-    texture std :: ; , . .. : = == != < <= > >= + - * / % & | ^ << >> && || ! += -= *= /= -> ( )
+    uv tangent exterior_ior bool int uint float length angle vec2 vec3 vec4 color point vector mat2 mat3
+    texture std :: ; , . .. : = == != < <= > >= + - * / % & | ^ << >> && || ! += -= *= /= %= &= |= ^= <<= >>= 7u 0xffu -> ( )
     { } [ ] /// //! /* */ // \" \" when diffuse mirror specular blinn_phong uniform flakes perlin
     sample eval pdf albedo emit wo wi u 0 1 2 0.5 1e38 1e-45 -1 65536 2147483648 0xff 1 mm 30 deg
     srgb( gradient( filter_width( image( hash( clamp( select( normalize( x y z xyz r g b _ a b m é \u{0}";
@@ -74,5 +74,5 @@ const IR_WORDS: &str = "
     layer mix weight add select normal tangent as turns bool int float vec2 vec3 vec4 mat3 %0 %1 %2
     %3 $0 $1 @0.x @1.i @0 : = .. . , ( ) { } -> 0 1 -1 2147483647 0.0 1.0 1e38 1e-300 (0.0,0.0,0.0)
     (1.0,2.0) .xyz .x .w neg add sub mul div rem mod min max clamp sqrt pow exp log hash dot cross
-    normalize transform select lt eq and or not bit_and shift_left to_float to_int image
+    normalize transform select lt eq and or not bit_and shift_left unsigned_shift_right unsigned_div unsigned_rem unsigned_to_float to_unsigned to_float to_int image
     filter_width image_data point wo a b x // \" \u{0}";

@@ -119,6 +119,7 @@ fn argument(ty: &str) -> String {
     let text = match ty {
         "bool" => "position.x > 0.0",
         "int" => "int(position.y)",
+        "uint" => "uint(position.y)",
         "float" => "position.z",
         "length" => "position.x * 1 m",
         "angle" => "position.y * 1 rad",
@@ -127,6 +128,7 @@ fn argument(ty: &str) -> String {
         "vector" | "normal" => "normal",
         "vec4" => "vec4(position, 1.0)",
         "color" => "color(position)",
+        "mat2" => "mat2(uv, 2.0 * uv)",
         "mat3" => "mat3(tangent, normal, geometric_normal)",
         "texture" => "\"probe.png\"",
         "bsdf" => "probe_diffuse(0.5)",
@@ -147,11 +149,12 @@ fn structure(name: &str) -> String {
 fn color_of(value: &str, ty: &str) -> String {
     match ty {
         "bool" => format!("color(select({value}, 1.0, 0.0))"),
-        "int" | "float" | "length" | "angle" => format!("color(float({value}))"),
+        "int" | "uint" | "float" | "length" | "angle" => format!("color(float({value}))"),
         "vec2" => format!("color({value}.x + {value}.y)"),
         "vec3" | "point" | "vector" | "normal" => format!("color({value})"),
         "vec4" => format!("color({value}.xyz)"),
         "color" => value.into(),
+        "mat2" => format!("color({value}.x.x + {value}.y.y)"),
         "mat3" => format!("color({value} * normal)"),
         name => {
             let fields = fields(name);

@@ -95,7 +95,13 @@ impl<'t> Layout<'t> {
                 | Token::AddAssign
                 | Token::SubAssign
                 | Token::MulAssign
-                | Token::DivAssign,
+                | Token::DivAssign
+                | Token::RemAssign
+                | Token::AndAssign
+                | Token::OrAssign
+                | Token::XorAssign
+                | Token::ShiftLeftAssign
+                | Token::ShiftRightAssign,
             ) => {
                 parts.push(Doc::space());
                 self.assigned(&mut parts);

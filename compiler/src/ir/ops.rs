@@ -283,6 +283,15 @@ ops! {
         |a| int2(a, |x, y| x.wrapping_shl(y as u32)), zero;
     ShiftRight "shift_right" operator Int(2), Integer(1), Helper("shift_right", "(a: T, b: T) -> T { return a >> (u32(b) & 31u); }"), None,
         |a| int2(a, |x, y| x.wrapping_shr(y as u32)), zero;
+    UnsignedShiftRight "unsigned_shift_right" operator Int(2), Integer(1),
+        Helper("unsigned_shift_right", "(a: T, b: T) -> T { return bitcast<i32>(bitcast<u32>(a) >> (u32(b) & 31u)); }"), None,
+        |a| int2(a, |x, y| (x as u32).wrapping_shr(y as u32) as i32), zero;
+    UnsignedDiv "unsigned_div" operator Int(2), Special(1),
+        Helper("unsigned_div", "(a: T, b: T) -> T { let d = bitcast<u32>(b); return select(bitcast<i32>(bitcast<u32>(a) / select(d, 1u, d == 0u)), 0, d == 0u); }"), None,
+        |a| int2(a, |x, y| (x as u32).checked_div(y as u32).unwrap_or(0) as i32), zero;
+    UnsignedRem "unsigned_rem" operator Int(2), Special(2),
+        Helper("unsigned_rem", "(a: T, b: T) -> T { let d = bitcast<u32>(b); return select(bitcast<i32>(bitcast<u32>(a) % select(d, 1u, d == 0u)), 0, d == 0u); }"), None,
+        |a| int2(a, |x, y| (x as u32).checked_rem(y as u32).unwrap_or(0) as i32), zero;
     Hash1 "hash" function Int(1), Integer(8), Helper("hash", HASH1), None,
         |a| hash(a, 1), zero;
     Hash2 "hash" function Int(2), Integer(16), Helper("hash2", HASH2), None,
@@ -294,6 +303,12 @@ ops! {
     ToInt "to_int" operator FloatToInt, Integer(1),
         Helper("to_int", "(x: T) -> i32 { return i32(clamp(x, -2147483648.0, 2147483520.0)); }"), None,
         |a| to_int(a, |x| x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32), zero;
+    UnsignedToFloat "unsigned_to_float" operator IntToFloat, Integer(1),
+        Helper("unsigned_to_float", "(i: T) -> f32 { return f32(bitcast<u32>(i)); }"), None,
+        |a| to_float(a, |i| f64::from(i as u32)), zero;
+    ToUnsigned "to_unsigned" operator FloatToInt, Integer(1),
+        Helper("to_unsigned", "(x: T) -> i32 { return bitcast<i32>(u32(clamp(x, 0.0, 4294967040.0))); }"), None,
+        |a| to_int(a, |x| x.clamp(0.0, 4_294_967_040.0) as u32 as i32), zero;
     UnitFloat "unit_float" function IntToFloat, Integer(2),
         Helper("unit_float", "(i: T) -> f32 { return f32(bitcast<u32>(i) >> 8u) * 5.9604645e-8; }"), None,
         |a| to_float(a, |i| f64::from(i as u32 >> 8) / 16_777_216.0), zero;

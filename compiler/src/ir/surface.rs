@@ -9,6 +9,8 @@ use super::{StructId, Type};
 pub enum Ty {
     Bool,
     Int,
+    /// 32 bits from 0 to 4294967295; the machine stores them as an int.
+    Uint,
     Float,
     Length,
     Angle,
@@ -19,6 +21,7 @@ pub enum Ty {
     Point,
     Vector,
     Normal,
+    Mat2,
     Mat3,
     Texture,
     Struct(StructId),
@@ -32,9 +35,10 @@ pub enum Ty {
 }
 
 /// The types that can be named, with their names.
-pub const NAMED: [(&str, Ty); 17] = [
+pub const NAMED: [(&str, Ty); 19] = [
     ("bool", Ty::Bool),
     ("int", Ty::Int),
+    ("uint", Ty::Uint),
     ("float", Ty::Float),
     ("length", Ty::Length),
     ("angle", Ty::Angle),
@@ -45,6 +49,7 @@ pub const NAMED: [(&str, Ty); 17] = [
     ("point", Ty::Point),
     ("vector", Ty::Vector),
     ("normal", Ty::Normal),
+    ("mat2", Ty::Mat2),
     ("mat3", Ty::Mat3),
     ("texture", Ty::Texture),
     ("bsdf", Ty::Bsdf),
@@ -65,11 +70,12 @@ impl Ty {
     pub fn ir(self) -> Option<Type> {
         Some(match self {
             Ty::Bool => Type::Bool,
-            Ty::Int | Ty::Texture => Type::Int,
+            Ty::Int | Ty::Uint | Ty::Texture => Type::Int,
             Ty::Float | Ty::Length | Ty::Angle => Type::Float,
             Ty::Vec2 => Type::Vec2,
             Ty::Vec3 | Ty::Color | Ty::Point | Ty::Vector | Ty::Normal => Type::Vec3,
-            Ty::Vec4 => Type::Vec4,
+            // A matrix of two columns lies in a vec4, one after the other.
+            Ty::Vec4 | Ty::Mat2 => Type::Vec4,
             Ty::Mat3 => Type::Mat3,
             Ty::Struct(id) => Type::Struct(id),
             Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => return None,

@@ -7,6 +7,8 @@ use super::Token;
 pub(crate) enum Number {
     /// An integer of at most 32 bits.
     Int(i64),
+    /// An unsigned int: one that ends in `u`.
+    Uint(u32),
     /// A float that is finite in 32-bit precision.
     Float(f64),
 }
@@ -21,9 +23,11 @@ pub(crate) fn read(
     text: &str,
     negated: bool,
 ) -> Result<Number, (String, &'static str)> {
-    match token {
-        Token::Hex => read_hex(text).map(Number::Int),
-        Token::Int => read_int(text, negated).map(Number::Int),
+    match (token, text.strip_suffix('u')) {
+        (Token::Hex, Some(digits)) => read_hex(digits).map(|i| Number::Uint(i as u32)),
+        (Token::Int, Some(digits)) => read_unsigned(digits).map(Number::Uint),
+        (Token::Hex, None) => read_hex(text).map(Number::Int),
+        (Token::Int, None) => read_int(text, negated).map(Number::Int),
         _ => read_float(text).map(Number::Float),
     }
 }
@@ -45,9 +49,19 @@ fn read_int(text: &str, negated: bool) -> Result<i64, (String, &'static str)> {
                 "{} does not fit a 32-bit int, whose largest value is 2147483647",
                 shown(text)
             ),
-            "write a float, as in `4e9`, or the bits in hexadecimal",
+            "write a float, as in `4e9`, or an unsigned int, as in `4000000000u`",
         )),
     }
+}
+
+fn read_unsigned(digits: &str) -> Result<u32, (String, &'static str)> {
+    digits.parse::<u32>().map_err(|_| {
+        let number = shown(digits);
+        (
+            format!("{number} does not fit a uint, whose largest value is 4294967295"),
+            "write a float, as in `4e9`",
+        )
+    })
 }
 
 fn read_hex(text: &str) -> Result<i64, (String, &'static str)> {

@@ -29,10 +29,10 @@ macro_rules! tokens {
             /// A name that is not a keyword.
             #[regex("[A-Za-z_][A-Za-z0-9_]*")]
             Ident,
-            /// `12`
+            /// `12`, `12u`
             #[regex("[0-9]+", number)]
             Int,
-            /// `0xff8800`
+            /// `0xff8800`, `0xffu`
             #[regex("0x[0-9A-Za-z_]*")]
             Hex,
             /// `1.5`, `.5`, `2.`, `1e-3`
@@ -92,6 +92,7 @@ tokens! {
         Comma "," Semicolon ";" Colon ":" PathSeparator "::" Dot "." Range ".." Arrow "->"
         LeftParen "(" RightParen ")" LeftBracket "[" RightBracket "]" LeftBrace "{" RightBrace "}"
         Assign "=" AddAssign "+=" SubAssign "-=" MulAssign "*=" DivAssign "/="
+        RemAssign "%=" AndAssign "&=" OrAssign "|=" XorAssign "^=" ShiftLeftAssign "<<=" ShiftRightAssign ">>="
         OrOr "||" AndAnd "&&" EqEq "==" NotEq "!=" Less "<" LessEq "<=" Greater ">" GreaterEq ">="
         Pipe "|" Caret "^" Ampersand "&" ShiftLeft "<<" ShiftRight ">>"
         Plus "+" Minus "-" Star "*" Slash "/" Percent "%" Not "!"
@@ -148,12 +149,22 @@ fn number(lexer: &mut Lexer<'_, Token>) -> Token {
         }
     }
     length += exponent_length(&rest[length..]);
+    if length == 0 && has_suffix(rest) {
+        lexer.bump(1);
+        return Token::Int;
+    }
     lexer.bump(length);
     if length == 0 {
         Token::Int
     } else {
         Token::Float
     }
+}
+
+/// Is the next letter the suffix of an unsigned int, and no name?
+fn has_suffix(rest: &[u8]) -> bool {
+    let goes_on = |b: &u8| *b == b'_' || b.is_ascii_alphanumeric();
+    rest.first() == Some(&b'u') && !rest.get(1).is_some_and(goes_on)
 }
 
 /// Continues `.5` with its exponent.

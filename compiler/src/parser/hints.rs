@@ -315,6 +315,8 @@ fn is_type(word: &str) -> bool {
             | "vector"
             | "normal"
             | "color"
+            | "mat2"
+            | "uint"
             | "mat3"
             | "texture"
     )

@@ -42,10 +42,14 @@ fn number<'t>(text: &'t str) -> impl Parse<'t, Expr> {
         // A number that has no value was reported by the lexer.
         let slice = text.get(span.range()).unwrap_or("");
         let number = read_number(token, slice, true).unwrap_or(Number::Int(0));
+        if let Number::Uint(value) = number {
+            let kind = ExprKind::Uint(value);
+            return Ok(Expr { kind, span });
+        }
         let kind = match (unit(text, span, inp), number) {
             (UnitAfter::None, Number::Int(value)) => ExprKind::Int(value),
             (UnitAfter::None, Number::Float(value)) => ExprKind::Float(value),
-            (UnitAfter::Unknown, _) => ExprKind::Error,
+            (UnitAfter::Unknown, _) | (_, Number::Uint(_)) => ExprKind::Error,
             (UnitAfter::Unit(unit), Number::Int(value)) => ExprKind::Quantity(value as f64, unit),
             (UnitAfter::Unit(unit), Number::Float(value)) => ExprKind::Quantity(value, unit),
         };
@@ -100,7 +104,10 @@ fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic 
     {
         return diagnostic.hint("ints are written in decimal or, with `0x`, in hexadecimal");
     }
-    if matches!(name, "f" | "u" | "i" | "h" | "f32" | "u32" | "i32" | "lf") {
+    if matches!(name, "u" | "U" | "u32") {
+        return diagnostic.hint("an unsigned int ends in `u`, right after its digits: `12u`");
+    }
+    if matches!(name, "f" | "i" | "h" | "f32" | "i32" | "lf") {
         return diagnostic.hint("numbers have no suffix for their type; a float has a point");
     }
     let units = Unit::ALL.iter().map(|(_, name, _)| *name);

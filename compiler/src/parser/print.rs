@@ -249,6 +249,7 @@ fn expr(value: &Expr) -> Tree {
     match &value.kind {
         ExprKind::Bool(value) => word(value.to_string()),
         ExprKind::Int(value) => word(value.to_string()),
+        ExprKind::Uint(value) => word(format!("{value}u")),
         ExprKind::Float(value) => word(format!("{value:?}")),
         ExprKind::Quantity(value, unit) => word(format!("{value:?}{}", unit.node.name())),
         ExprKind::Str(text) => word(format!("{text:?}")),

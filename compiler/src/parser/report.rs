@@ -257,7 +257,19 @@ fn words(expected: Expected) -> Vec<String> {
         .with(expression)
         .with(Expected::want(Want::Name));
     let operator = Expected::want(Want::Operator).with(Expected::tokens(&[Dot, LeftParen]));
-    let assign = Expected::tokens(&[Assign, AddAssign, SubAssign, MulAssign, DivAssign]);
+    let assign = Expected::tokens(&[
+        Assign,
+        AddAssign,
+        SubAssign,
+        MulAssign,
+        DivAssign,
+        RemAssign,
+        AndAssign,
+        OrAssign,
+        XorAssign,
+        ShiftLeftAssign,
+        ShiftRightAssign,
+    ]);
     if rest.has(definition) {
         words.push("a definition, such as `material`, `bsdf` or `fn`".to_owned());
         rest = rest.without(definition.with(Expected::tokens(&[Private, Use])));

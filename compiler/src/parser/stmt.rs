@@ -235,12 +235,22 @@ fn whole_material<'t>(text: &'t str) -> impl Parse<'t, Expr> {
     })
 }
 
+/// Assignments that combine with the old value.
+const COMPOUND: [(Token, BinaryOp); 10] = [
+    (Token::AddAssign, BinaryOp::Add),
+    (Token::SubAssign, BinaryOp::Sub),
+    (Token::MulAssign, BinaryOp::Mul),
+    (Token::DivAssign, BinaryOp::Div),
+    (Token::RemAssign, BinaryOp::Rem),
+    (Token::AndAssign, BinaryOp::BitAnd),
+    (Token::OrAssign, BinaryOp::BitOr),
+    (Token::XorAssign, BinaryOp::BitXor),
+    (Token::ShiftLeftAssign, BinaryOp::Shl),
+    (Token::ShiftRightAssign, BinaryOp::Shr),
+];
+
 fn is_assignment(token: Token) -> bool {
-    use Token::*;
-    matches!(
-        token,
-        Assign | AddAssign | SubAssign | MulAssign | DivAssign
-    )
+    COMPOUND.iter().any(|(t, _)| *t == token) || token == Token::Assign
 }
 
 /// `place = value;`, or the value of a block.
@@ -249,13 +259,8 @@ fn expression_piece<'t>(
     place: Rule<'t, Expr>,
     expression: Rule<'t, Expr>,
 ) -> impl Parse<'t, Piece> {
-    let operator = choice((
-        just(Token::Assign).to(None),
-        just(Token::AddAssign).to(Some(BinaryOp::Add)),
-        just(Token::SubAssign).to(Some(BinaryOp::Sub)),
-        just(Token::MulAssign).to(Some(BinaryOp::Mul)),
-        just(Token::DivAssign).to(Some(BinaryOp::Div)),
-    ));
+    let compound = COMPOUND.map(|(token, op)| just(token).to(Some(op)));
+    let operator = choice((just(Token::Assign).to(None), choice(compound)));
     let assign = operator
         .then(required(expression))
         .then_ignore(semicolon(text))

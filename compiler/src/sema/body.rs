@@ -201,6 +201,11 @@ impl<'c, 'l> Body<'c, 'l> {
     /// Gives a value the type that a place needs; what does not convert is reported.
     pub fn coerce(&mut self, operand: Operand, to: Ty, span: Span, place: &str) -> Option<Operand> {
         let from = operand.ty();
+        if let (Operand::Value(id, Ty::Int), Ty::Uint) = (operand, to)
+            && self.is_unsigned(id, from)
+        {
+            return Some(Operand::Value(id, to));
+        }
         if !from.converts_to(to) {
             return self.mismatch(from, to, span, place);
         }
@@ -208,10 +213,10 @@ impl<'c, 'l> Body<'c, 'l> {
             return Some(operand);
         };
         let id = match (from, to) {
-            (Ty::Int, Ty::Float) => self.promote(id, span),
-            (Ty::Int, Ty::Color) => {
+            (Ty::Int | Ty::Uint, Ty::Float) => self.promoted(id, from, span),
+            (Ty::Int | Ty::Uint, Ty::Color) => {
                 self.note_hexadecimal(span);
-                let float = self.promote(id, span);
+                let float = self.promoted(id, from, span);
                 self.builder.compose(ir::Type::Vec3, &[float], span)
             }
             (Ty::Float, Ty::Color) => self.builder.compose(ir::Type::Vec3, &[id], span),
@@ -242,7 +247,7 @@ impl<'c, 'l> Body<'c, 'l> {
     fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: &str) -> Option<T> {
         let (found, wanted) = (self.cx.type_text(from), self.cx.type_text(to));
         let (a_found, a_wanted) = (self.cx.a_type(from), self.cx.a_type(to));
-        let number = matches!(from, Ty::Int | Ty::Float);
+        let number = matches!(from, Ty::Int | Ty::Uint | Ty::Float);
         let code = match to {
             _ if to.is_dimension() && number => Code::NeedsUnit,
             _ if from.is_closure() && !to.is_closure() => Code::ClosureUse,
@@ -264,6 +269,11 @@ impl<'c, 'l> Body<'c, 'l> {
             (v, Ty::Float) if v.is_vector() => {
                 wrong.hint("take a component, as in `.x`, or `luminance(...)` of a color")
             }
+            (Ty::Int, Ty::Uint) => {
+                wrong.hint("`uint(...)` takes its 32 bits; a literal ends in `u`")
+            }
+            (Ty::Uint, Ty::Int) => wrong.hint("`int(...)` takes its 32 bits"),
+            (Ty::Float, Ty::Uint) => wrong.hint("`uint(...)` drops the fraction"),
             (Ty::Float, Ty::Int) => wrong.hint("`int(...)` drops the fraction"),
             (Ty::Material, _) => wrong
                 .hint("take an output of it: `.surface`, `.emission`, `.interior` or `.opacity`"),

@@ -8,6 +8,7 @@ use crate::source::Span;
 
 use super::body::{Body, Operand};
 use super::inputs;
+use super::matrix::FUNCTIONS;
 use super::types::{NAMED, Ty};
 use super::{Checked, Param};
 
@@ -73,6 +74,7 @@ impl Body<'_, '_> {
             name if inputs::FUNCTIONS.contains(&name) => {
                 self.function_of_surface(callee, args, span)
             }
+            name if FUNCTIONS.contains(&name) => self.matrix_function(callee, args, span),
             name => match NAMED.iter().find(|(n, _)| *n == name) {
                 // `length(v)` is the function; lengths are made with units.
                 Some((_, ty)) if *ty != Ty::Length => self.convert(*ty, args, span),
@@ -276,6 +278,19 @@ impl Body<'_, '_> {
     }
 
     fn apply(&mut self, op: Op, values: &[(ExprId, Ty, Span)], span: Span) -> Option<Operand> {
+        let any_unsigned = values.iter().any(|v| v.1 == Ty::Uint);
+        if any_unsigned && let Some(found) = self.unsigned_function(op, values, span) {
+            return Some(found);
+        }
+        let is_int = |ty: Ty| matches!(ty, Ty::Int | Ty::Uint);
+        if any_unsigned
+            && matches!(op.info().shape, Shape::Number(_))
+            && values.iter().all(|v| is_int(v.1))
+        {
+            // Neither as floats, which are not exact, nor as one of the two.
+            let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
+            return self.no_overload(op, &types, span);
+        }
         let all_ints = values.iter().all(|v| v.1 == Ty::Int);
         let takes_ints = match op.info().shape {
             Shape::Int(_) | Shape::IntToFloat => true,
@@ -285,13 +300,19 @@ impl Body<'_, '_> {
         let mut ids = Vec::new();
         let mut types = Vec::new();
         for &(id, ty, at) in values {
-            let promote = !takes_ints && ty == Ty::Int;
-            ids.push(if promote { self.promote(id, at) } else { id });
+            let promote = !takes_ints && matches!(ty, Ty::Int | Ty::Uint) && op != Op::Select;
+            ids.push(if promote {
+                self.promoted(id, ty, at)
+            } else {
+                id
+            });
             types.push(if promote { Ty::Float } else { ty });
         }
         let machine: Vec<ir::Type> = ids.iter().map(|&id| self.builder.ty(id)).collect();
         match (op.result(&machine), result_type(op, &types)) {
-            (Some(_), Some(ty)) => Some(Operand::Value(self.builder.op(op, &ids, span), ty)),
+            (Some(_), Some(ty)) if fits(op, &types) => {
+                Some(Operand::Value(self.builder.op(op, &ids, span), ty))
+            }
             _ => self.no_overload(op, &types, span),
         }
     }
@@ -324,6 +345,7 @@ impl Body<'_, '_> {
                 .map(|op| op.info().text.to_owned()),
         );
         names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
+        names.extend(FUNCTIONS.map(String::from));
         names.extend(["filter_width", "gradient", "layer", "medium", "srgb"].map(String::from));
         names.extend(inputs::FUNCTIONS.map(String::from));
         let unknown = Diagnostic::new(
@@ -345,6 +367,12 @@ impl Body<'_, '_> {
         };
         self.report(unknown)
     }
+}
+
+/// Are these operands to which an op applies as they are stored? Matrices and uints are only chosen between.
+fn fits(op: Op, types: &[Ty]) -> bool {
+    let as_stored = |ty: &Ty| *ty != Ty::Uint && ty.order().is_none();
+    op == Op::Select || types.iter().all(as_stored)
 }
 
 /// The surface type of an op's result; `None` where the kinds of vectors do not mix.

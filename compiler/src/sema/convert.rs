@@ -28,16 +28,11 @@ impl Body<'_, '_> {
             [(r, rt, _), (g, gt, _), (b, bt, _)]
                 if [rt, gt, bt]
                     .iter()
-                    .all(|t| matches!(t, Ty::Int | Ty::Float)) =>
+                    .all(|t| matches!(t, Ty::Int | Ty::Uint | Ty::Float)) =>
             {
                 self.note_bytes(&[*r, *g, *b], span);
-                let parts = [(*r, *rt), (*g, *gt), (*b, *bt)].map(|(id, ty)| {
-                    if ty == Ty::Int {
-                        self.promote(id, span)
-                    } else {
-                        id
-                    }
-                });
+                let parts = [(*r, *rt), (*g, *gt), (*b, *bt)];
+                let parts = parts.map(|(id, ty)| self.promoted(id, ty, span));
                 self.builder.compose(ir::Type::Vec3, &parts, span)
             }
             _ => return self.wrong_srgb(span),
@@ -86,25 +81,23 @@ impl Body<'_, '_> {
         let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
         let id = match (to, values.as_slice()) {
             (_, &[(id, ty, _)]) if ty == to => Some(id),
-            (Ty::Float, &[(id, Ty::Int, _)]) => Some(self.promote(id, span)),
+            (Ty::Float, &[(id, ty @ (Ty::Int | Ty::Uint), _)]) => Some(self.promoted(id, ty, span)),
             (Ty::Float, &[(id, ty, _)]) if ty.is_dimension() => Some(id),
             (Ty::Float, &[(id, Ty::Bool, _)]) => {
                 let (one, zero) = (self.builder.float(1.0, span), self.builder.float(0.0, span));
                 Some(self.builder.op(Op::Select, &[id, one, zero], span))
             }
             (Ty::Int, &[(id, Ty::Float, _)]) => Some(self.builder.op(Op::ToInt, &[id], span)),
-            (Ty::Int, &[(id, Ty::Bool, _)]) => {
+            (Ty::Uint, &[(id, Ty::Float, _)]) => Some(self.builder.op(Op::ToUnsigned, &[id], span)),
+            (Ty::Int, &[(id, Ty::Uint, _)]) | (Ty::Uint, &[(id, Ty::Int, _)]) => Some(id),
+            (Ty::Int | Ty::Uint, &[(id, Ty::Bool, _)]) => {
                 let (one, zero) = (
                     self.constant(Const::Int(1), span),
                     self.constant(Const::Int(0), span),
                 );
                 Some(self.builder.op(Op::Select, &[id, one, zero], span))
             }
-            (Ty::Mat3, &[(x, a, _), (y, b, _), (z, c, _)])
-                if [a, b, c].iter().all(|t| t.is_geometric()) =>
-            {
-                Some(self.builder.compose(ir::Type::Mat3, &[x, y, z], span))
-            }
+            (Ty::Mat2 | Ty::Mat3, values) => self.compose_matrix(to, values, span),
             (_, &[(id, ty, _)])
                 if to.ir() == Some(ir::Type::Vec3) && ty.ir() == Some(ir::Type::Vec3) =>
             {
@@ -142,12 +135,8 @@ impl Body<'_, '_> {
         let mut parts = Vec::new();
         let mut width = 0;
         for &(id, ty, at) in values {
-            let id = if ty == Ty::Int {
-                self.promote(id, at)
-            } else {
-                id
-            };
-            width += if ty.is_vector() || ty == Ty::Int || ty == Ty::Float {
+            let id = self.promoted(id, ty, at);
+            width += if ty.is_vector() || matches!(ty, Ty::Int | Ty::Uint | Ty::Float) {
                 self.builder.ty(id).width()?
             } else {
                 return None;
@@ -161,11 +150,13 @@ impl Body<'_, '_> {
 
 fn conversion_help(to: Ty) -> &'static str {
     match to {
-        Ty::Float => "an int, a bool, a length (in metres) or an angle (in radians)",
-        Ty::Int => "a float or a bool",
+        Ty::Float => "an int, a uint, a bool, a length (in metres) or an angle (in radians)",
+        Ty::Int => "a float, a uint or a bool",
+        Ty::Uint => "a float, an int or a bool",
         Ty::Vec2 => "one float for both components, or two",
         Ty::Vec4 => "one float, or parts with four components together",
-        Ty::Mat3 => "three columns",
+        Ty::Mat2 => "two columns, four numbers, or one number for the diagonal",
+        Ty::Mat3 => "three columns, nine numbers, or one number for the diagonal",
         Ty::Angle => "a number with a unit, as in `30 deg`",
         Ty::Texture => "a file name where a texture parameter is declared",
         Ty::Bool => "a comparison",

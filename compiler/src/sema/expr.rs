@@ -56,6 +56,7 @@ impl Body<'_, '_> {
             ExprKind::Error => None,
             ExprKind::Bool(b) => value(self.constant(Const::Bool(*b), span), Ty::Bool),
             ExprKind::Int(i) => value(self.int(*i, span)?, Ty::Int),
+            ExprKind::Uint(u) => value(self.constant(Const::Int(*u as i32), span), Ty::Uint),
             ExprKind::Float(x) => value(self.finite(*x, span)?, Ty::Float),
             ExprKind::Quantity(x, unit) => {
                 let ty = if unit.node.is_angle() {
@@ -213,6 +214,14 @@ impl Body<'_, '_> {
                 .did_you_mean(&part.node, names.iter().map(String::as_str));
             return self.report(unknown);
         }
+        if let Some(order) = ty.order()
+            && let Some(column) = "xyz"[..order]
+                .find(&part.node)
+                .filter(|_| part.node.len() == 1)
+        {
+            let ty = swizzled(ty, order);
+            return Some(Operand::Value(self.column(id, order, column, span), ty));
+        }
         let letters: Option<Vec<u8>> = part
             .node
             .chars()
@@ -234,11 +243,13 @@ impl Body<'_, '_> {
                     format!("{ty_text} has no `.{}`", part.node),
                 );
                 let width = ty.ir().and_then(ir::Type::width).unwrap_or(0);
-                let unknown = if width > 1 {
+                let unknown = if width > 1 && ty.is_vector() {
                     unknown.expected(format!(
                         "one to four of the letters {}",
                         &letters[..width.min(letters.len())]
                     ))
+                } else if let Some(order) = ty.order() {
+                    unknown.expected(format!("a column: one of the letters {}", &"xyz"[..order]))
                 } else {
                     unknown.expected("a vector, color or struct before the dot")
                 };
@@ -262,9 +273,16 @@ impl Body<'_, '_> {
                 Some(Operand::Value(self.builder.op(Op::Not, &[id], span), ty))
             }
             UnaryOp::Neg
-                if matches!(ty, Ty::Int | Ty::Float) || ty.is_dimension() || ty.is_vector() =>
+                if matches!(ty, Ty::Int | Ty::Uint | Ty::Float)
+                    || ty.is_dimension()
+                    || ty.is_vector() =>
             {
                 Some(Operand::Value(self.builder.op(Op::Neg, &[id], span), ty))
+            }
+            UnaryOp::Neg if ty.order().is_some() => {
+                let minus_one = self.builder.float(-1.0, span);
+                let times = ast::BinaryOp::Mul;
+                self.matrix_operator(times, (id, ty), (minus_one, Ty::Float), span)
             }
             _ => {
                 let (symbol, wanted) = if op == UnaryOp::Not {
@@ -341,7 +359,7 @@ impl Body<'_, '_> {
 }
 
 /// The type of `n` components of a `ty`.
-fn swizzled(ty: Ty, n: usize) -> Ty {
+pub fn swizzled(ty: Ty, n: usize) -> Ty {
     match (ty, n) {
         (_, 1) => Ty::Float,
         (_, 2) => Ty::Vec2,

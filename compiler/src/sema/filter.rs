@@ -46,7 +46,7 @@ impl Body<'_, '_> {
         let wrong = Diagnostic::new(Code::TypeMismatch, at, message)
             .expected("a float, length, angle, vector, point, normal or color");
         let wrong = match ty {
-            Ty::Int | Ty::Bool => {
+            Ty::Int | Ty::Uint | Ty::Bool => {
                 wrong.hint("it changes in steps; take the width of what it is made from")
             }
             Ty::Struct(_) => wrong.hint("take the width of one of its fields"),

@@ -29,6 +29,7 @@ mod imports;
 mod inline;
 mod inputs;
 mod material;
+mod matrix;
 mod medium;
 mod metadata;
 mod modules;
@@ -40,6 +41,7 @@ mod stmt;
 mod texture;
 mod tree;
 pub mod types;
+mod unsigned;
 mod varying;
 
 use called::MaterialSignature;
@@ -417,10 +419,13 @@ impl<'a> Checker<'a> {
 fn foreign_type(name: &str) -> Option<&'static str> {
     Some(match name {
         "f32" | "f64" | "double" | "half" | "real" => "float",
-        "i32" | "u32" | "uint" | "integer" => "int",
+        "i32" | "integer" => "int",
+        "u32" | "unsigned" | "uint32_t" => "uint",
         "vec3f" | "float3" | "Vec3" => "vec3",
         "vec2f" | "float2" | "Vec2" => "vec2",
         "vec4f" | "float4" | "Vec4" => "vec4",
+        "mat2x2" | "mat2x2f" | "mat2f" | "float2x2" | "half2x2" => "mat2",
+        "mat3x3" | "mat3x3f" | "mat3f" | "float3x3" | "half3x3" => "mat3",
         "rgb" | "spectrum" | "Color" | "colour" | "color3" => "color",
         "boolean" => "bool",
         "closure" | "BSDF" | "brdf" => "bsdf",

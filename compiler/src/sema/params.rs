@@ -28,7 +28,7 @@ impl Checker<'_> {
         let ty = self.type_name(module, &p.ty)?;
         let Some((surface_type, _)) = NAMED
             .iter()
-            .find(|(_, t)| *t == ty && !ty.is_closure() && ty != Ty::Mat3)
+            .find(|(_, t)| *t == ty && !ty.is_closure() && ty != Ty::Uint && ty.order().is_none())
         else {
             let wrong = Diagnostic::new(
                 Code::Unsupported,

@@ -7,6 +7,7 @@ use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
+use super::expr::swizzled;
 use super::outputs::WHOLE;
 use super::types::{Ty, arithmetic};
 
@@ -117,13 +118,16 @@ impl Body<'_, '_> {
                     return self.not_assignable(place.span, "this");
                 };
                 let (local, ty) = self.variable(name, base.span)?;
-                let component = component(ty, &part.node).filter(|_| part.node.len() == 1);
-                let Some(component) = component else {
-                    return self.not_assignable(place.span, "only single components of vectors");
-                };
-                let new = self.assigned(local, ty, Some(component), op, value, span)?;
-                self.builder
-                    .stmt(ir::Stmt::Store(local, Some(component), new));
+                let parts = self.assigned_parts(ty, part)?;
+                let new = self.assigned(local, ty, Some(&parts), op, value, span)?;
+                for (k, component) in (0..).zip(&parts) {
+                    let one = match parts.len() {
+                        1 => new,
+                        _ => self.builder.swizzle(new, &[k], span),
+                    };
+                    let store = ir::Stmt::Store(local, Some(*component), one);
+                    self.builder.stmt(store);
+                }
                 Some(())
             }
             _ => self.not_assignable(place.span, "this"),
@@ -135,19 +139,19 @@ impl Body<'_, '_> {
         &mut self,
         local: LocalId,
         ty: Ty,
-        part: Option<u8>,
+        parts: Option<&[u8]>,
         op: Option<BinaryOp>,
         value: &ast::Expr,
         span: Span,
     ) -> Option<ExprId> {
-        let place_ty = if part.is_some() { Ty::Float } else { ty };
+        let place_ty = parts.map_or(ty, |parts| swizzled(ty, parts.len()));
         let new = self.expr(value)?;
         let new = match op {
             None => new,
             Some(op) => {
                 let whole = self.builder.load(local, span);
-                let old = match part {
-                    Some(c) => self.builder.swizzle(whole, &[c], span),
+                let old = match parts {
+                    Some(parts) => self.builder.swizzle(whole, parts, span),
                     None => whole,
                 };
                 self.binary(op, Operand::Value(old, place_ty), new, span)?
@@ -157,6 +161,27 @@ impl Body<'_, '_> {
             Operand::Value(id, _) => Some(id),
             _ => None,
         }
+    }
+
+    /// The components that an assignment to `place.part` is to, none of them twice.
+    fn assigned_parts(&mut self, ty: Ty, part: &ast::Name) -> Option<Vec<u8>> {
+        let letter = |c: char| component(ty, c.encode_utf8(&mut [0; 4]));
+        let parts: Option<Vec<u8>> = part.node.chars().map(letter).collect();
+        let Some(parts) = parts.filter(|parts| (1..=4).contains(&parts.len())) else {
+            return self.not_assignable(
+                part.span,
+                &format!("`.{}` of {}", part.node, self.cx.a_type(ty)),
+            );
+        };
+        let twice = |k: &usize| parts[..*k].contains(&parts[*k]);
+        let Some(again) = (0..parts.len()).find(twice) else {
+            return Some(parts);
+        };
+        let letter = &part.node[again..=again];
+        let message = format!("`.{}` assigns `{letter}` twice", part.node);
+        let wrong = Diagnostic::new(Code::NotAssignable, part.span, message)
+            .expected("each component at most once, as in `v.xz = ...`");
+        self.report(wrong)
     }
 
     fn variable(&mut self, name: &str, span: Span) -> Option<(LocalId, Ty)> {
@@ -198,7 +223,7 @@ impl Body<'_, '_> {
             span,
             format!("{what} cannot be assigned"),
         )
-        .expected("a `var`, or a component of one such as `v.x`");
+        .expected("a `var`, or components of one such as `v.x` or `v.xz`");
         self.report(wrong)
     }
 
@@ -377,11 +402,20 @@ impl Body<'_, '_> {
         let (Operand::Value(x, xt), Operand::Value(y, yt)) = (a, b) else {
             return None;
         };
-        let (x, xt, y, yt) = match (xt, yt) {
-            (Ty::Int, t) if t != Ty::Int => (self.promote(x, span), Ty::Float, y, t),
-            (t, Ty::Int) if t != Ty::Int => (x, t, self.promote(y, span), Ty::Float),
+        let is_int = |ty: Ty| matches!(ty, Ty::Int | Ty::Uint);
+        if is_int(xt) && is_int(yt) && (xt, yt) != (Ty::Int, Ty::Int) {
+            let found = self.unsigned_operator(op, (x, xt), (y, yt), span);
+            return found.or_else(|| self.no_operator(op, xt, yt, span));
+        }
+        let (x, xt, y, yt) = match (is_int(xt), is_int(yt)) {
+            (true, false) => (self.promoted(x, xt, span), Ty::Float, y, yt),
+            (false, true) => (x, xt, self.promoted(y, yt, span), Ty::Float),
             _ => (x, xt, y, yt),
         };
+        if xt.order().is_some() || yt.order().is_some() {
+            let product = self.matrix_operator(op, (x, xt), (y, yt), span);
+            return product.or_else(|| self.no_operator(op, xt, yt, span));
+        }
         let (ir_op, ty) = operator(op, xt, yt).or_else(|| self.no_operator(op, xt, yt, span))?;
         Some(Operand::Value(self.builder.op(ir_op, &[x, y], span), ty))
     }
@@ -400,6 +434,12 @@ impl Body<'_, '_> {
             (d, e) if d.is_dimension() || e.is_dimension() => wrong
                 .expected("sums of the same dimension, and products with plain numbers")
                 .hint("`float(...)` gives the plain number in metres or radians"),
+            (Ty::Uint, Ty::Int) | (Ty::Int, Ty::Uint) => wrong
+                .expected("two uints or two ints")
+                .hint("convert one of them: `uint(...)` or `int(...)`; a literal ends in `u`"),
+            (m, n) if m.order().is_some() || n.order().is_some() => wrong
+                .expected("a matrix times a vector, a float or a matrix of its size")
+                .hint("`v * m` is written `transpose(m) * v`"),
             (Ty::Bool, Ty::Bool) => wrong.expected("`&&`, `||`, `==` or `!=` between bools"),
             _ => wrong
                 .expected("operands of types that combine")
@@ -416,7 +456,6 @@ fn operator(op: BinaryOp, a: Ty, b: Ty) -> Option<(Op, Ty)> {
     let ir_op = match op {
         B::Add => Op::Add,
         B::Sub => Op::Sub,
-        B::Mul if a == Ty::Mat3 => Op::MatVec,
         B::Mul => Op::Mul,
         B::Div => Op::Div,
         B::Rem => Op::Rem,
@@ -447,7 +486,7 @@ fn operator(op: BinaryOp, a: Ty, b: Ty) -> Option<(Op, Ty)> {
 /// The index of a component by its letter.
 pub fn component(ty: Ty, letter: &str) -> Option<u8> {
     let letters = if ty == Ty::Color { "rgb" } else { "xyzw" };
-    let width = ty.ir()?.width()?;
+    let width = ty.ir().filter(|_| ty.is_vector())?.width()?;
     let index = letters
         .find(letter)
         .or_else(|| "xyz".find(letter).filter(|_| ty == Ty::Color))?;

@@ -32,7 +32,7 @@ impl Ty {
         self == to
             || self == Ty::Error
             || to == Ty::Error
-            || (self == Ty::Int && matches!(to, Ty::Float | Ty::Color))
+            || (matches!(self, Ty::Int | Ty::Uint) && matches!(to, Ty::Float | Ty::Color))
             || (self == Ty::Float && to == Ty::Color)
             || (self.is_geometric() && to.is_geometric())
     }
@@ -58,7 +58,6 @@ pub fn arithmetic(op: BinaryOp, a: Ty, b: Ty) -> Option<Ty> {
     match (a, b) {
         (Ty::Error, _) | (_, Ty::Error) => Some(Ty::Error),
         (Ty::Int, Ty::Int) | (Ty::Float, Ty::Float) => Some(a),
-        (Ty::Mat3, v) if op == Mul && v.is_geometric() => Some(v),
         // A dimension scales and divides; it adds to its own kind only.
         (d, e) if d.is_dimension() && d == e => match op {
             Add | Sub | Rem => Some(d),

@@ -9,7 +9,7 @@ use impasto_compiler::{MemoryLoader, check, diag};
 
 use super::HERE;
 
-fn module(text: &str) -> Module {
+pub(super) fn module(text: &str) -> Module {
     let mut files = MemoryLoader::default();
     files.add("t.impasto", text);
     let checked = check("t.impasto", &mut files);
@@ -23,7 +23,7 @@ fn id(module: &Module, name: &str) -> FunctionId {
     FunctionId(found.expect("the function") as u32)
 }
 
-fn call(module: &Module, name: &str, args: Vec<Value<f64>>) -> Value<f64> {
+pub(super) fn call(module: &Module, name: &str, args: Vec<Value<f64>>) -> Value<f64> {
     let mut run = Interpreter::new(module, 1 << 20);
     run.call(id(module, name), args).expect("enough fuel")
 }

@@ -7,6 +7,7 @@ use impasto_compiler::source::{FileId, Span};
 
 mod flow;
 mod meanings;
+mod types;
 
 /// The origin of what is built here.
 const HERE: Span = Span {

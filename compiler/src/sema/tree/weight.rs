@@ -94,7 +94,7 @@ impl Body<'_, '_> {
 
     fn weight(&mut self, w: ExprId, wt: Ty, c: ClosureId, ty: Ty, span: Span) -> Option<Operand> {
         let w = match wt {
-            Ty::Int => self.promote(w, span),
+            Ty::Int | Ty::Uint => self.promoted(w, wt, span),
             Ty::Float | Ty::Color => w,
             _ => {
                 let message = format!("a closure cannot be weighted by {}", self.cx.a_type(wt));

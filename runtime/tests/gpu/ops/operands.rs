@@ -113,7 +113,10 @@ fn floats(op: Op) -> &'static [f32] {
 fn defined_everywhere(op: Op) -> bool {
     use Op::*;
     let one = matches!(op.info().shape, Shape::Float(1) | Shape::Number(1));
-    let selecting = matches!(op, Min | Max | Clamp | Step | Select | Pow | Atan2 | ToInt);
+    let selecting = matches!(
+        op,
+        Min | Max | Clamp | Step | Select | Pow | Atan2 | ToInt | ToUnsigned
+    );
     let testing = matches!(op.info().shape, Shape::Compare | Shape::Equal);
     one || selecting || testing
 }
