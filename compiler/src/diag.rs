@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::source::Span;
 
 pub mod examples;
+pub mod foreign;
 pub mod render;
 
 macro_rules! codes {

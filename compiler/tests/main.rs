@@ -9,6 +9,7 @@ mod common;
 mod cost;
 mod effort;
 mod explain;
+mod foreign;
 mod format;
 mod inspect;
 mod instances;

@@ -15,6 +15,7 @@ pub(crate) use number::{Number, read as read_number};
 use token::LexError;
 pub use token::Token;
 
+use crate::diag::foreign::{self, Use};
 use crate::diag::{Code, Diagnostic};
 use crate::source::{FileId, MAX_SOURCE_BYTES, Span};
 
@@ -203,8 +204,21 @@ fn unknown_characters(file: FileId, text: &str, run: Range<usize>) -> Diagnostic
         1 => format!("`{shown}` is not a character of the language"),
         _ => format!("`{shown}{more}` are not characters of the language"),
     };
-    let diagnostic = Diagnostic::new(Code::UnknownCharacter, Span::new(file, run), message);
-    match slice.chars().next().and_then(character_hint) {
+    let diagnostic = Diagnostic::new(
+        Code::UnknownCharacter,
+        Span::new(file, run.clone()),
+        message,
+    );
+    let word = text[run.end..].trim_start_matches([' ', '\t']);
+    let word = word.split(|c: char| !c.is_alphanumeric()).next();
+    let directive = word
+        .filter(|_| slice == "#")
+        .and_then(|word| foreign::hint(word, &[Use::Directive]));
+    let hint = || {
+        let own = slice.chars().next().and_then(character_hint)?;
+        Some(own.to_owned())
+    };
+    match directive.or_else(hint) {
         Some(hint) => diagnostic.hint(hint),
         None => diagnostic,
     }

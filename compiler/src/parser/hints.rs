@@ -2,6 +2,7 @@
 
 use super::error::{Expected, SyntaxError, Want};
 use super::report::Source;
+use crate::diag::foreign::{self, Use};
 use crate::diag::nearest;
 use crate::lexer::Token;
 
@@ -75,8 +76,11 @@ impl<'t> Slip<'_, 't> {
         let keywords = [
             "material", "bsdf", "delta", "edf", "fn", "struct", "const", "private", "use",
         ];
+        if let Some(hint) = foreign::hint(self.text(), &[Use::Definition]) {
+            return Some(hint);
+        }
         let hint = match self.text() {
-            "func" | "function" | "def" | "fun" | "shader" | "void" | "float" | "vec3" => {
+            "func" | "function" | "def" | "fun" | "float" | "vec3" => {
                 "functions are written `fn name(a: float) -> float { ... }`"
             }
             "import" | "include" | "from" | "using" | "require" => {
@@ -160,16 +164,16 @@ impl<'t> Slip<'_, 't> {
         if start >= self.at || self.source.token(start) != Some(Token::Ident) {
             return None;
         }
+        if let Some(hint) = foreign::hint(self.source.slice(start), &[Use::Statement]) {
+            return Some(hint);
+        }
         let hint = match self.source.slice(start) {
-            "return" => "there is no `return`; the last expression of a block is its value",
             "elif" | "elsif" | "elseif" | "elseIf" => "write `else if`",
             "switch" | "match" | "case" => "write a chain of `if` and `else if`",
             "loop" | "do" | "foreach" | "repeat" => {
                 "loops are written `for i in 0 .. n { ... }` or `while condition limit n { ... }`"
             }
-            "discard" | "print" | "printf" | "assert" | "goto" | "yield" => {
-                "there is no such statement"
-            }
+            "print" | "printf" | "assert" | "goto" | "yield" => "there is no such statement",
             "const" | "auto" | "val" | "mut" | "local" => "values are named by `let name = value;`",
             output @ ("surface" | "emission") if start + 1 == self.at => {
                 return Some(format!("write `{output} = ...;`"));

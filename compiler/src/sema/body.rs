@@ -287,6 +287,14 @@ impl<'c, 'l> Body<'c, 'l> {
             (f, t) if f.ir().is_some() && t.ir().is_some() && f.ir() == t.ir() => {
                 wrong.hint(format!("convert it: `{wanted}(...)`"))
             }
+            (Ty::Float | Ty::Length, Ty::Vector) => {
+                wrong.hint("the slope of a value along the surface is `gradient(height)`")
+            }
+            (Ty::Float | Ty::Int | Ty::Color, Ty::Edf) => wrong
+                .hint("light that leaves evenly is `uniform(3.0)`, after `use std::edf::uniform;`"),
+            (Ty::Float | Ty::Int | Ty::Color, Ty::Bsdf) => {
+                wrong.hint("a matte surface is `diffuse(0.5)`, after `use std::bsdf::diffuse;`")
+            }
             (Ty::Float | Ty::Int, t) if t.is_vector() => {
                 wrong.hint(format!("`{wanted}(x)` fills all components with x"))
             }

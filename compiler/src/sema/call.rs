@@ -1,7 +1,8 @@
 //! Checking calls: of built-in functions, functions, structs and closures.
 
-use crate::ast::{Arg, ItemKind, Name};
-use crate::diag::{self, Code, Diagnostic};
+use crate::ast::{Arg, ExprKind, ItemKind, Name};
+use crate::diag::foreign::Use;
+use crate::diag::{self, Code, Diagnostic, foreign};
 use crate::ir::ops::{Op, Shape};
 use crate::ir::{self, ExprId};
 use crate::source::Span;
@@ -85,8 +86,10 @@ impl Body<'_, '_> {
 
     /// Checks the arguments of a call that means nothing, for their errors.
     pub fn discard<T>(&mut self, args: &[Arg]) -> Option<T> {
-        for arg in args {
-            self.expr(&arg.value);
+        // Texts are no values anywhere; what is wrong is the call, as of `microfacet("ggx", ..)`.
+        let values = args.iter().map(|arg| &arg.value);
+        for value in values.filter(|v| !matches!(v.kind, ExprKind::Str(_))) {
+            self.expr(value);
         }
         None
     }
@@ -333,6 +336,31 @@ impl Body<'_, '_> {
         self.report(wrong)
     }
 
+    /// Says what is meant by an unknown `name`: an exact name of the library, a word of another
+    /// language, something near in scope or in the library, in this order.
+    pub fn suggest<'n>(
+        &self,
+        unknown: Diagnostic,
+        name: &str,
+        in_scope: impl IntoIterator<Item = &'n str>,
+        places: &[Use],
+    ) -> Diagnostic {
+        let import = |path| format!("import it: `{path}`");
+        let exact = self.cx.in_library(name).map(import);
+        let foreign = || foreign::hint(name, places);
+        let near = || diag::nearest(name, in_scope).map(|best| format!("did you mean `{best}`?"));
+        let importable = || self.cx.importable(name).map(import);
+        let is_called = places.contains(&Use::Call);
+        let hint = exact
+            .or_else(foreign)
+            .or_else(near)
+            .or_else(|| is_called.then(importable).flatten());
+        match hint {
+            Some(hint) => unknown.hint(hint),
+            None => unknown,
+        }
+    }
+
     fn unknown_function<T>(&mut self, callee: &Name, args: &[Arg]) -> Option<T> {
         self.discard::<()>(args);
         let mut names = self.cx.visible(self.module, |k| {
@@ -354,17 +382,8 @@ impl Body<'_, '_> {
             format!("unknown function `{}`", callee.node),
         )
         .expected("a built-in function, or one defined or imported in this file");
-        let visible = diag::nearest(&callee.node, names.iter().map(String::as_str));
-        let unknown = match (
-            foreign_function(&callee.node),
-            visible,
-            self.cx.importable(&callee.node),
-        ) {
-            (Some(own), ..) => unknown.hint(format!("here this is `{own}`")),
-            (_, Some(best), _) => unknown.hint(format!("did you mean `{best}`?")),
-            (_, _, Some(import)) => unknown.hint(format!("import it: `{import}`")),
-            _ => unknown,
-        };
+        let names = names.iter().map(String::as_str);
+        let unknown = self.suggest(unknown, &callee.node, names, &[Use::Call]);
         self.report(unknown)
     }
 }
@@ -417,19 +436,4 @@ fn expected_operands(op: Op) -> &'static str {
         Shape::Select => "a bool and two values of one type",
         _ => "floats or vectors of one kind",
     }
-}
-
-/// What a function of another shading language is called here.
-fn foreign_function(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "lerp" => "mix(a, b, t)",
-        "frac" => "fract(x)",
-        "rsqrt" | "inverseSqrt" | "inversesqrt" => "inverse_sqrt(x)",
-        "fmod" => "mod(x, y)",
-        "texture" | "tex2D" | "textureSample" | "sample" => "image(texture, uv)",
-        "rgb" => "color(r, g, b)",
-        "noise" => "perlin(p), after `use std::noise::perlin;`",
-        "filterwidth" | "fwidth" => "filter_width(x)",
-        _ => return None,
-    })
 }

@@ -1,6 +1,6 @@
 //! Checking calls of types: conversion, composition of vectors, and colors from sRGB.
 
-use crate::ast::Arg;
+use crate::ast::{Arg, ExprKind};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId};
@@ -77,6 +77,20 @@ impl Body<'_, '_> {
     /// A call of a type: conversion and composition.
     pub fn convert(&mut self, to: Ty, args: &[Arg], span: Span) -> Option<Operand> {
         let name = self.cx.type_text(to);
+        if let Some(arg) = args
+            .iter()
+            .find(|a| matches!(a.value.kind, ExprKind::Str(_)))
+        {
+            let message = format!("a {name} is not made from a text");
+            let wrong = Diagnostic::new(Code::TypeMismatch, arg.value.span, message)
+                .expected(conversion_help(to));
+            return self.report(match to {
+                Ty::Color => wrong.hint(
+                    "components are linear RGB, `color(1.0, 0.0, 0.0)`; those of a picker are `srgb(0x8c1010)`",
+                ),
+                _ => wrong,
+            });
+        }
         let values = self.positional(&name, args)?;
         let types: Vec<Ty> = values.iter().map(|v| v.1).collect();
         let id = match (to, values.as_slice()) {
@@ -119,7 +133,12 @@ impl Body<'_, '_> {
                 };
                 let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
                     .expected(conversion_help(to));
-                self.report(wrong)
+                self.report(match to {
+                    Ty::Texture => wrong.hint(
+                        "declare `param map: texture = \"file.png\";` and write `image(map, uv)`",
+                    ),
+                    _ => wrong,
+                })
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Checking expressions.
 
 use crate::ast::{self, Expr, ExprKind, UnaryOp};
+use crate::diag::foreign::Use;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId};
@@ -180,9 +181,9 @@ impl Body<'_, '_> {
         if self.place == Place::Material {
             names.extend(inputs::names().map(String::from));
         }
-        let unknown = unknown
-            .expected("a name in scope")
-            .did_you_mean(name, names.iter().map(String::as_str));
+        let unknown = unknown.expected("a name in scope");
+        let names = names.iter().map(String::as_str);
+        let unknown = self.suggest(unknown, name, names, &[Use::Value]);
         self.report(unknown)
     }
 

@@ -148,6 +148,15 @@ impl Checker<'_> {
         names
     }
 
+    /// The `use` that brings the definition of the standard library whose name is `name`.
+    pub(super) fn in_library(&self, name: &str) -> Option<String> {
+        let files = impasto_stdlib::files();
+        let file = files
+            .iter()
+            .find(|f| f.name == name && f.folder != "core")?;
+        Some(format!("use std::{}::{};", file.folder, file.name))
+    }
+
     /// The `use` that brings the definition of the standard library whose name is `name`, or
     /// near it.
     pub(super) fn importable(&self, name: &str) -> Option<String> {

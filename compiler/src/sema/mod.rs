@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::ast::{self, ItemKind, TypeName};
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{Code, Diagnostic, foreign};
 use crate::ir::verify::MAX_FIELDS;
 use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
 use crate::loader::Loader;
@@ -379,8 +379,8 @@ impl<'a> Checker<'a> {
             format!("unknown type `{}`", name.node),
         )
         .expected("a type such as float, color, vec3, length or a struct");
-        let unknown = match foreign_type(&name.node) {
-            Some(own) => unknown.hint(format!("the type is called `{own}` here")),
+        let unknown = match foreign::hint(&name.node, &[foreign::Use::Type]) {
+            Some(hint) => unknown.hint(hint),
             None => unknown.did_you_mean(&name.node, known),
         };
         self.report(unknown);
@@ -413,23 +413,4 @@ impl<'a> Checker<'a> {
                 .map_or(String::new(), |(n, _)| (*n).into()),
         }
     }
-}
-
-/// What a type of another shading language is called here.
-fn foreign_type(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "f32" | "f64" | "double" | "half" | "real" => "float",
-        "i32" | "integer" => "int",
-        "u32" | "unsigned" | "uint32_t" => "uint",
-        "vec3f" | "float3" | "Vec3" => "vec3",
-        "vec2f" | "float2" | "Vec2" => "vec2",
-        "vec4f" | "float4" | "Vec4" => "vec4",
-        "mat2x2" | "mat2x2f" | "mat2f" | "float2x2" | "half2x2" => "mat2",
-        "mat3x3" | "mat3x3f" | "mat3f" | "float3x3" | "half3x3" => "mat3",
-        "rgb" | "spectrum" | "Color" | "colour" | "color3" => "color",
-        "boolean" => "bool",
-        "closure" | "BSDF" | "brdf" => "bsdf",
-        "sampler2D" | "texture_2d" | "texture2D" => "texture",
-        _ => return None,
-    })
 }

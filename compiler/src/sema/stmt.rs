@@ -1,6 +1,7 @@
 //! Checking statements.
 
 use crate::ast::{self, BinaryOp, ExprKind, Stmt, StmtKind};
+use crate::diag::foreign::Use;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
@@ -210,8 +211,9 @@ impl Body<'_, '_> {
                 let names = self.local_names();
                 let unknown =
                     Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"))
-                        .expected("a name declared with `var`")
-                        .did_you_mean(name, names.iter().map(String::as_str));
+                        .expected("a name declared with `var`");
+                let names = names.iter().map(String::as_str);
+                let unknown = self.suggest(unknown, name, names, &[Use::Value]);
                 self.report(unknown)
             }
         }
@@ -431,6 +433,9 @@ impl Body<'_, '_> {
             (d, Ty::Float) | (Ty::Float, d) if d.is_dimension() => wrong
                 .expected(format!("two values of type {}", self.cx.type_text(d)))
                 .hint("give the number a unit, or take the plain number with `float(...)`"),
+            (Ty::Point, Ty::Length) | (Ty::Length, Ty::Point) if op == BinaryOp::Mul => wrong
+                .expected("a point over a length, which is a plain vec3")
+                .hint("divide by the size of a feature: `position / 3 cm`"),
             (d, e) if d.is_dimension() || e.is_dimension() => wrong
                 .expected("sums of the same dimension, and products with plain numbers")
                 .hint("`float(...)` gives the plain number in metres or radians"),
@@ -440,6 +445,9 @@ impl Body<'_, '_> {
             (m, n) if m.order().is_some() || n.order().is_some() => wrong
                 .expected("a matrix times a vector, a float or a matrix of its size")
                 .hint("`v * m` is written `transpose(m) * v`"),
+            _ if op == BinaryOp::BitXor => wrong
+                .expected("two ints; `^` flips bits")
+                .hint("powers are written `pow(a, b)`"),
             (Ty::Bool, Ty::Bool) => wrong.expected("`&&`, `||`, `==` or `!=` between bools"),
             _ => wrong
                 .expected("operands of types that combine")

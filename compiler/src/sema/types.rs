@@ -66,6 +66,8 @@ pub fn arithmetic(op: BinaryOp, a: Ty, b: Ty) -> Option<Ty> {
         },
         (d, Ty::Float) if d.is_dimension() && product => Some(d),
         (Ty::Float, d) if d.is_dimension() && op == Mul => Some(d),
+        // A place times a length has no meaning; `position / 3 cm` was meant.
+        (Ty::Point, Ty::Length) | (Ty::Length, Ty::Point) if op == Mul => None,
         (v, Ty::Length) if v.is_geometric() => match op {
             Mul => Some(v),
             Div | Rem => Some(Ty::Vec3),

@@ -30,6 +30,10 @@ pub(super) const FORMAT: Format = Format {
 /// Reads an OBJ file and cuts its faces into triangles.
 fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
+    if let Some(other) = other_format(name) {
+        let error = SceneError::in_file(path, format!("{other} files are not read"));
+        return Err(error.hint("export the geometry as OBJ"));
+    }
     let bytes = input::read(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
     if bytes.contains(&0) {
@@ -72,6 +76,21 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         .into_iter()
         .flatten()
         .collect(),
+    })
+}
+
+/// The format of geometry that the extension of `name` tells, if it is one that nothing here reads.
+fn other_format(name: &str) -> Option<&'static str> {
+    let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
+    Some(match extension.as_str() {
+        "gltf" | "glb" => "glTF",
+        "ply" => "PLY",
+        "fbx" => "FBX",
+        "usd" | "usda" | "usdc" | "usdz" => "USD",
+        "stl" => "STL",
+        "abc" => "Alembic",
+        "blend" => "Blender",
+        _ => return None,
     })
 }
 
