@@ -34,6 +34,7 @@ pub mod ir;
 pub mod lexer;
 mod loader;
 pub mod oracle;
+mod moment;
 mod parameter_value;
 pub mod parameters;
 pub mod parser;
@@ -50,5 +51,6 @@ pub use driver::{
     compile_with_looks, compile_with_progress,
 };
 pub use loader::{Loader, MemoryLoader, library_text};
+pub use moment::Moment;
 pub use parameter_value::ParameterValue;
 pub use program::Program;

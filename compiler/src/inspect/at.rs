@@ -22,6 +22,10 @@ pub struct At {
     pub uv: [f64; 2],
     /// Index of refraction of the medium outside.
     pub exterior_ior: f64,
+    /// Seconds since frame 0.
+    pub time: f64,
+    /// The number of the frame.
+    pub frame: f64,
     /// The diameter of what a ray sees, in metres, for `filter_width`. Along the tangent and across
     /// it, u and v grow by as much.
     pub footprint: f64,
@@ -42,6 +46,8 @@ impl Default for At {
             tangent: [1.0, 0.0, 0.0],
             uv: [0.25, 0.75],
             exterior_ior: 1.0,
+            time: 0.0,
+            frame: 0.0,
             footprint: 0.0,
             wo: [0.6, 0.0, 0.8],
             wi: [-0.48, 0.36, 0.8],
@@ -51,13 +57,15 @@ impl Default for At {
 }
 
 /// The keys in the order they are shown, each with how many numbers it takes.
-const KEYS: [(&str, usize); 10] = [
+const KEYS: [(&str, usize); 12] = [
     ("position", 3),
     ("normal", 3),
     ("geometric_normal", 3),
     ("tangent", 3),
     ("uv", 2),
     ("exterior_ior", 1),
+    ("time", 1),
+    ("frame", 1),
     ("footprint", 1),
     ("wo", 3),
     ("wi", 3),
@@ -66,14 +74,16 @@ const KEYS: [(&str, usize); 10] = [
 
 impl At {
     /// Every key with its numbers.
-    pub fn entries(&self) -> [(&'static str, &[f64]); 10] {
-        let numbers: [&[f64]; 10] = [
+    pub fn entries(&self) -> [(&'static str, &[f64]); 12] {
+        let numbers: [&[f64]; 12] = [
             &self.position,
             &self.normal,
             &self.geometric_normal,
             &self.tangent,
             &self.uv,
             std::slice::from_ref(&self.exterior_ior),
+            std::slice::from_ref(&self.time),
+            std::slice::from_ref(&self.frame),
             std::slice::from_ref(&self.footprint),
             &self.wo,
             &self.wi,
@@ -109,6 +119,8 @@ impl At {
             "tangent" => &mut self.tangent,
             "uv" => &mut self.uv,
             "exterior_ior" => std::slice::from_mut(&mut self.exterior_ior),
+            "time" => std::slice::from_mut(&mut self.time),
+            "frame" => std::slice::from_mut(&mut self.frame),
             "footprint" => std::slice::from_mut(&mut self.footprint),
             "wo" => &mut self.wo,
             "wi" => &mut self.wi,

@@ -113,6 +113,10 @@ pub struct Body<'c, 'l> {
     pub called: Vec<[Option<Operand>; OUTPUTS.len()]>,
     /// The ranges of a material's parameters, by their numbers.
     pub ranges: Vec<Option<(f64, f64)>>,
+    /// The numbers of the parameters that `time` and `frame` are, where a material names them.
+    pub moment: [Option<u32>; 2],
+    /// These parameters, which come after those that it declares.
+    pub inputs: Vec<ir::MaterialParam>,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -134,6 +138,8 @@ impl<'c, 'l> Body<'c, 'l> {
             outputs: Vec::new(),
             called: Vec::new(),
             ranges: Vec::new(),
+            moment: [None; 2],
+            inputs: Vec::new(),
         }
     }
 

@@ -27,6 +27,15 @@ pub const INPUTS: [&str; 6] = [
     "exterior_ior",
 ];
 
+/// Names of a material that are the same at every point: when it is seen. They are parameters that whoever renders
+/// gives, so that all that depends on nothing else is computed by the host. Names of the author's own go before them.
+pub const MOMENT: [&str; 2] = ["time", "frame"];
+
+/// Is it the name of something that a material is told?
+pub fn is_input(name: &str) -> bool {
+    INPUTS.contains(&name) || MOMENT.contains(&name)
+}
+
 impl Body<'_, '_> {
     /// Checks an expression that must be a `ty`.
     pub fn expr_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<Operand> {
@@ -150,7 +159,15 @@ impl Body<'_, '_> {
         if self.place == Place::Material && INPUTS.contains(&name) {
             return self.input(name, span);
         }
-        let Some(item) = self.cx.lookup(self.module, name) else {
+        let item = self.cx.lookup(self.module, name);
+        let is_const = |item| matches!(self.cx.item(item).kind, ast::ItemKind::Const(_));
+        if MOMENT.contains(&name) && !item.is_some_and(is_const) {
+            return match self.place {
+                Place::Material => self.input(name, span),
+                _ => self.unknown_name(name, span),
+            };
+        }
+        let Some(item) = item else {
             return match (name, self.place) {
                 (NO_MEDIUM, Place::Material | Place::Closures) => {
                     Some(Operand::Nothing(Ty::Medium))
@@ -170,8 +187,11 @@ impl Body<'_, '_> {
         }
     }
 
-    /// A field of the surface point, the only parameter of a material's body.
+    /// A field of the surface point, the only parameter of a material's body, or one of [`MOMENT`].
     pub fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
+        if let Some(which) = MOMENT.iter().position(|n| *n == name) {
+            return Some(self.moment(which, span));
+        }
         let point = self.builder.param(0, span);
         let ir::Type::Struct(id) = self.builder.ty(point) else {
             return None;
@@ -185,9 +205,33 @@ impl Body<'_, '_> {
         ))
     }
 
+    /// The parameter that one of [`MOMENT`] is, which a material has once it names it.
+    fn moment(&mut self, which: usize, span: Span) -> Operand {
+        let index = self.moment[which].unwrap_or_else(|| {
+            self.ranges.push(None);
+            let index = self.ranges.len() as u32 - 1;
+            self.inputs.push(ir::MaterialParam {
+                name: MOMENT[which].to_owned(),
+                docs: Vec::new(),
+                surface_type: "float",
+                ty: ir::Type::Float,
+                default: Const::Float(vec![0.0]),
+                range: None,
+                is_input: true,
+                span,
+            });
+            index
+        });
+        self.moment[which] = Some(index);
+        let kind = ir::ExprKind::MaterialParam(index);
+        let id = self.builder.add(kind, ir::Type::Float, span);
+        self.builder.name(id, MOMENT[which]);
+        Operand::Value(id, Ty::Float)
+    }
+
     fn unknown_name<T>(&mut self, name: &str, span: Span) -> Option<T> {
         let unknown = Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"));
-        if self.place != Place::Material && INPUTS.contains(&name) {
+        if self.place != Place::Material && is_input(name) {
             let unknown = unknown
                 .expected("a parameter, variable or constant")
                 .hint(format!(
@@ -202,6 +246,7 @@ impl Body<'_, '_> {
         );
         if self.place == Place::Material {
             names.extend(INPUTS.map(String::from));
+            names.extend(MOMENT.map(String::from));
         }
         let unknown = unknown
             .expected("a name in scope")
