@@ -304,7 +304,11 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
             moving: if baked || request.moment.is_none() {
                 Vec::new()
             } else {
-                let inputs = material.params.iter().enumerate().filter(|(_, p)| p.is_input);
+                let inputs = material
+                    .params
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, p)| p.is_input);
                 inputs.map(|(index, _)| index).collect()
             },
         };

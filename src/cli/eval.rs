@@ -98,8 +98,14 @@ fn json(query: &Query, found: &Inspection) -> serde_json::Value {
 fn text(query: &Query, found: &Inspection) -> String {
     let mut out = String::new();
     if !found.answers.is_empty() {
-        let entries = query.at.entries();
+        // Few materials ask when they are seen.
+        let is_shown = |key: &str, numbers: &[f64]| {
+            !matches!(key, "time" | "frame") || numbers.iter().any(|x| *x != 0.0)
+        };
+        let entries = query.at.entries().into_iter();
+        let entries = entries.filter(|(key, numbers)| is_shown(key, numbers));
         let entries = entries.map(|(key, numbers)| format!("{key}={}", Shown::floats(numbers)));
+        let entries: Vec<String> = entries.collect();
         section(&mut out, "", "at", &entries);
     }
     for answer in &found.answers {

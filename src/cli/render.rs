@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
-use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::diag::{Code, Diagnostic};
+use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
@@ -20,8 +20,8 @@ use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
-    Device, FileLoader, MaterialRequest, Plan, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene,
-    Strategy, files, plan, shot,
+    Device, FileLoader, MaterialRequest, Plan, Program, RenderOptions, Renderer, Rendering,
+    RuntimeError, Scene, Strategy, files, plan, shot,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -283,12 +283,14 @@ pub(super) fn compile_requests(
     let is_material = shot::is_material(&args.scene);
     for request in requests {
         let file = &request.file;
-        loader.load(file).map_err(|why| match (&request.name, is_material) {
-            (_, true) => format!("cannot read `{file}`: {why}"),
-            (name, false) => format!(
-                "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
-            ),
-        })?;
+        loader
+            .load(file)
+            .map_err(|why| match (&request.name, is_material) {
+                (_, true) => format!("cannot read `{file}`: {why}"),
+                (name, false) => format!(
+                    "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
+                ),
+            })?;
     }
     let looks = ask_for_looks(&args.aov);
     let compiled = compiler::compile_until(requests, loader, looks, stop);

@@ -112,11 +112,7 @@ impl RenderArgs {
     }
 
     /// The scene of one picture, at the size that was asked for.
-    pub(super) fn scene_of(
-        &self,
-        subject: &Subject,
-        asked: &Asked,
-    ) -> Result<Scene, Failure> {
+    pub(super) fn scene_of(&self, subject: &Subject, asked: &Asked) -> Result<Scene, Failure> {
         let scene = subject.scene(asked);
         let mut scene = scene.map_err(|e| Failure::Error(e.to_string()))?;
         if let Some((width, height)) = self.size {
@@ -375,14 +371,19 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
         };
         match picture() {
             Err(Failure::Interrupted) => {
-                global.note(&format!("interrupted: {done} of {count} frames are written"));
+                global.note(&format!(
+                    "interrupted: {done} of {count} frames are written"
+                ));
                 return Err(Failure::Interrupted);
             }
             other => other?,
         }
         done += 1;
     }
-    let (from, seconds) = (frames.path(&out, frames.numbers().next().unwrap_or(0)), begin.elapsed());
+    let (from, seconds) = (
+        frames.path(&out, frames.numbers().next().unwrap_or(0)),
+        begin.elapsed(),
+    );
     global.note(&format!(
         "wrote {} from {} on ({:.1} s)",
         super::count(done, "frame"),
@@ -429,7 +430,9 @@ fn watch(args: &RenderArgs, global: &Global) -> Outcome {
         watched.add(read);
         match outcome {
             Ok(()) => note_written(&outputs, begin, global),
-            Err(Failure::Interrupted) if interrupt::requested() => return Err(Failure::Interrupted),
+            Err(Failure::Interrupted) if interrupt::requested() => {
+                return Err(Failure::Interrupted);
+            }
             // Something was saved meanwhile.
             Err(Failure::Interrupted) => continue,
             Err(failure) => {

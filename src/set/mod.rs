@@ -82,7 +82,9 @@ impl Set {
         };
         let object = format!("file = \"{}.set\"\n", self.name());
         let turned = match sample.turntable {
-            Some(frames) => format!("{object}turntable = {{ frames = {frames}, about = [0, 0, 0] }}\n"),
+            Some(frames) => {
+                format!("{object}turntable = {{ frames = {frames}, about = [0, 0, 0] }}\n")
+            }
             None => object.clone(),
         };
         let text = text.replace(&object, &turned);
@@ -143,7 +145,11 @@ fn surroundings() -> Environment {
         let (u, v) = (at(index % width, width), at(index / width, height));
         let (phi, theta) = ((u - 0.5) * std::f32::consts::TAU, v * std::f32::consts::PI);
         // The centre column is -z, and +x is right of that.
-        let (x, y, z) = (theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
+        let (x, y, z) = (
+            theta.sin() * phi.sin(),
+            theta.cos(),
+            -theta.sin() * phi.cos(),
+        );
         radiance(Vec3::new(x, y, z))
     };
     let texels = (0..width * height).map(texel).collect();
@@ -190,7 +196,10 @@ mod tests {
             let scene = open.scene(&Asked::default()).expect("it is a scene");
             assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
             let bound = scene.materials.iter().find(|b| b.name == SAMPLE);
-            assert_eq!(bound.map(|b| b.file.as_str()), Some("std::surface::open_pbr"));
+            assert_eq!(
+                bound.map(|b| b.file.as_str()),
+                Some("std::surface::open_pbr")
+            );
             assert_eq!(scene.mesh.uvs.len(), scene.mesh.len());
             let lowest = scene.mesh.bounds()[0].y;
             assert!(lowest >= 0.0, "{set:?} reaches below the ground: {lowest}");

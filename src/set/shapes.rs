@@ -59,10 +59,10 @@ pub(super) fn ball() -> Geometry {
     let mut out = empty();
     let tilt = DQuat::from_rotation_y(0.62) * DQuat::from_rotation_x(0.88);
     let place = DAffine3::from_rotation_translation(tilt, dvec3(0.0, CENTRE, 0.0));
-    turned(&mut out, &body(), 160, 3.0, SAMPLE, &place);
-    turned(&mut out, &foot(), 96, 2.0, SAMPLE, &DAffine3::IDENTITY);
+    turned(&mut out, &body(), 112, 3.0, SAMPLE, &place);
+    turned(&mut out, &foot(), 72, 2.0, SAMPLE, &DAffine3::IDENTITY);
     let up = place * DAffine3::from_translation(dvec3(0.0, CORE_AT, 0.0));
-    turned(&mut out, &circle(CORE_RADIUS, 32), 64, 1.0, CORE, &up);
+    turned(&mut out, &circle(CORE_RADIUS, 20), 40, 1.0, CORE, &up);
     out
 }
 
@@ -96,13 +96,13 @@ fn body() -> Vec<DVec2> {
         }));
     };
     // A groove around the ball with beveled edges.
-    arc(-87.0, -5.0, BALL, 44);
+    arc(-87.0, -5.0, BALL, 30);
     arc(-4.0, -4.0, BALL - 0.0008, 0);
     arc(-3.4, -3.4, BALL - 0.0045, 0);
     arc(-2.2, 2.2, BALL - 0.0052, 4);
     arc(3.4, 3.4, BALL - 0.0045, 0);
     arc(4.0, 4.0, BALL - 0.0008, 0);
-    arc(5.0, 52.5, BALL, 26);
+    arc(5.0, 52.5, BALL, 18);
     let last = at(52.5, BALL);
     let rim = last.y;
     outline.push(dvec2(last.x - 0.5 * BEVEL, rim));
@@ -110,8 +110,8 @@ fn body() -> Vec<DVec2> {
     // The cup: half of an ellipsoid down to just under the core.
     let low = CORE_AT - CORE_RADIUS - GAP;
     let depth = rim - BEVEL - low;
-    outline.extend((0..=24).map(|i| {
-        let (sin, cos) = (f64::from(i) / 24.0 * 0.25 * TAU).sin_cos();
+    outline.extend((0..=18).map(|i| {
+        let (sin, cos) = (f64::from(i) / 18.0 * 0.25 * TAU).sin_cos();
         dvec2(CUP * cos.max(0.0), low + depth * (1.0 - sin))
     }));
     if let Some(bottom) = outline.last_mut() {
@@ -137,8 +137,8 @@ fn foot() -> Vec<DVec2> {
     ]
     .map(|(r, y)| dvec2(r, y))
     .to_vec();
-    outline.extend((1..=12).map(|i| {
-        let r = rim * (1.0 - f64::from(i) / 12.0);
+    outline.extend((1..=8).map(|i| {
+        let r = rim * (1.0 - f64::from(i) / 8.0);
         dvec2(r, CENTRE - (hollow * hollow - r * r).sqrt())
     }));
     outline
@@ -199,7 +199,7 @@ const BELOW: f64 = 0.048;
 /// A round cloth (`sample`) that hangs down around a ball (`core`).
 pub(super) fn cloth() -> Geometry {
     let mut out = empty();
-    let (rows, columns) = (96, 288);
+    let (rows, columns) = (56, 180);
     let profile = profile(rows);
     let height = 0.004 - profile[rows].y;
     let at = |row: f64, u: f64| {
@@ -269,10 +269,8 @@ pub(super) fn plane() -> Geometry {
     let (side, depth, lean) = (0.2, 0.01, 0.30f64);
     // Turned about its lower edge at the back, which stays on the ground.
     let up = depth * lean.sin() + 0.0001;
-    let place = DAffine3::from_rotation_translation(
-        DQuat::from_rotation_x(-lean),
-        dvec3(0.0, up, 0.02),
-    );
+    let place =
+        DAffine3::from_rotation_translation(DQuat::from_rotation_x(-lean), dvec3(0.0, up, 0.02));
     let half = 0.5 * side;
     let mut face = |origin: DVec3, right: DVec3, up: DVec3| {
         let normal = right.cross(up).normalize();
@@ -280,10 +278,19 @@ pub(super) fn plane() -> Geometry {
             let uv = dvec2(u * right.length(), v * up.length()) * UV;
             (origin + u * right + v * up, normal, uv)
         };
-        let corners = [corner(0., 0.), corner(1., 0.), corner(1., 1.), corner(0., 1.)];
+        let corners = [
+            corner(0., 0.),
+            corner(1., 0.),
+            corner(1., 1.),
+            corner(0., 1.),
+        ];
         quad(&mut out, corners, SAMPLE, &place);
     };
-    let (x, y, z) = (dvec3(side, 0.0, 0.0), dvec3(0.0, side, 0.0), dvec3(0.0, 0.0, depth));
+    let (x, y, z) = (
+        dvec3(side, 0.0, 0.0),
+        dvec3(0.0, side, 0.0),
+        dvec3(0.0, 0.0, depth),
+    );
     let low = dvec3(-half, 0.0, -depth);
     face(low + z, x, y);
     face(low + x, -x, y);

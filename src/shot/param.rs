@@ -113,14 +113,22 @@ fn check_steps(count: u64) -> Result<(), String> {
 /// The values of `FROM:TO:COUNT`.
 fn steps(text: &str, parts: &[&str]) -> Result<Vec<ParameterValue>, String> {
     let [from, to, count] = parts else {
-        return Err(format!("`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"));
+        return Err(format!(
+            "`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"
+        ));
     };
     if from.is_empty() || to.is_empty() {
-        return Err(format!("`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"));
+        return Err(format!(
+            "`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"
+        ));
     }
     let digits = !count.is_empty() && count.chars().all(|c| c.is_ascii_digit());
     let number = count.parse::<u64>().ok();
-    let number = if digits { Some(number.unwrap_or(u64::MAX)) } else { None };
+    let number = if digits {
+        Some(number.unwrap_or(u64::MAX))
+    } else {
+        None
+    };
     let count = number.ok_or_else(|| format!("`{count}` is no number of steps"))?;
     check_steps(count)?;
     Ok((0..count)
@@ -263,8 +271,23 @@ mod tests {
     #[test]
     fn what_is_no_value_is_refused() {
         for text in [
-            "", "a", "=1", "a=", ".a=1", "a.=1", "a b=1", "a=0:1", "a=0:1:2:3", "a=0:1:x", "a=0:1:1",
-            "a=:1:3", "a=0:1:1000000", "a=0:1:99999999999999999999", "a=0:1:-3", "a=1,,2", "a=)",
+            "",
+            "a",
+            "=1",
+            "a=",
+            ".a=1",
+            "a.=1",
+            "a b=1",
+            "a=0:1",
+            "a=0:1:2:3",
+            "a=0:1:x",
+            "a=0:1:1",
+            "a=:1:3",
+            "a=0:1:1000000",
+            "a=0:1:99999999999999999999",
+            "a=0:1:-3",
+            "a=1,,2",
+            "a=)",
         ] {
             assert!(parse(text).is_err(), "`{text}` is taken");
         }

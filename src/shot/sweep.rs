@@ -82,9 +82,8 @@ impl Sweep {
 
     /// What is written below a picture, a line a parameter.
     pub fn label(&self, index: usize) -> Vec<String> {
-        let of = |(axis, step): (&Axis, usize)| {
-            format!("{} = {}", axis.label, axis.steps[step].value)
-        };
+        let of =
+            |(axis, step): (&Axis, usize)| format!("{} = {}", axis.label, axis.steps[step].value);
         self.axes.iter().zip(self.place(index)).map(of).collect()
     }
 

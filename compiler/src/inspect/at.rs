@@ -186,7 +186,7 @@ fn check(key: &str, values: &mut [f64]) -> Result<(), String> {
         "exterior_ior" => Err("`exterior_ior` must be above 0; air has 1".into()),
         "footprint" if values.iter().all(|x| *x >= 0.0) => Ok(()),
         "footprint" => Err("`footprint` is a diameter and cannot be below 0".into()),
-        "position" | "uv" | "u" => Ok(()),
+        "position" | "uv" | "u" | "time" | "frame" => Ok(()),
         _ => {
             let longest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             if longest > 0.0 {

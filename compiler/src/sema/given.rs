@@ -29,7 +29,11 @@ impl Checker<'_> {
             let (own, value) = value.origin();
             let named = own.map_or_else(|| format!("{origin}, parameter {name}"), str::to_owned);
             let origin = own.unwrap_or(origin);
-            let Some(index) = material.params.iter().position(|p| p.name == *name && !p.is_input) else {
+            let Some(index) = material
+                .params
+                .iter()
+                .position(|p| p.name == *name && !p.is_input)
+            else {
                 if self.only_callers_give(module, material, name, origin) {
                     ok = false;
                     continue;
@@ -74,8 +78,8 @@ impl Checker<'_> {
             let now = if param.name == "frame" { frame } else { time };
             if !(now as f32).is_finite() {
                 let message = format!("the {} is {now}", param.name);
-                let wrong = Diagnostic::without_span(Code::OutOfRange, message)
-                    .expected("a finite number");
+                let wrong =
+                    Diagnostic::without_span(Code::OutOfRange, message).expected("a finite number");
                 self.report(wrong);
                 return None;
             }

@@ -103,7 +103,10 @@ impl Checker<'_> {
         Some(Material {
             name: item.name.node.clone(),
             docs: item.docs.clone(),
-            params: called::settable(declared)?.into_iter().chain(inputs).collect(),
+            params: called::settable(declared)?
+                .into_iter()
+                .chain(inputs)
+                .collect(),
             body: function,
             closures,
             surface: outputs.surface,

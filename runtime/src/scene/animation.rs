@@ -106,7 +106,9 @@ impl Moment {
         for (frame, item) in pairs(value)? {
             if keys.last().is_some_and(|(last, _)| *last >= frame) {
                 let message = format!("{frame} does not come after the frame before it");
-                return Err(item.error(message).hint("keys are in the order of their frames"));
+                return Err(item
+                    .error(message)
+                    .hint("keys are in the order of their frames"));
             }
             keys.push((frame, read(&item)?));
         }
@@ -153,11 +155,7 @@ pub(super) fn mix_places(a: &DVec3, b: &DVec3, t: f64) -> DVec3 {
 }
 
 /// Between two values of a parameter, the components of numbers apart. What needs the language is left to it.
-pub(super) fn mix_values(
-    a: &ParameterValue,
-    b: &ParameterValue,
-    t: f64,
-) -> Option<ParameterValue> {
+pub(super) fn mix_values(a: &ParameterValue, b: &ParameterValue, t: f64) -> Option<ParameterValue> {
     let float = |value: &ParameterValue| match value {
         ParameterValue::Int(i) => Some(*i as f64),
         ParameterValue::Float(x) => Some(*x),

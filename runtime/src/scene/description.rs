@@ -198,10 +198,13 @@ impl<'f> Description<'f> {
     /// The files that it names, materials apart.
     pub(super) fn files(&self, base: &Path) -> Vec<PathBuf> {
         let geometry = self.geometry.iter().map(|entry| &entry.file);
-        let places = self.geometry.iter().filter_map(|entry| match &entry.places {
-            PlacesSpec::File(file) => Some(file),
-            PlacesSpec::Listed(_) => None,
-        });
+        let places = self
+            .geometry
+            .iter()
+            .filter_map(|entry| match &entry.places {
+                PlacesSpec::File(file) => Some(file),
+                PlacesSpec::Listed(_) => None,
+            });
         let environment = self.environment.iter().filter_map(|e| match &e.source {
             EnvironmentSpecSource::File(file) => Some(file),
             EnvironmentSpecSource::Color(_) => None,
@@ -211,10 +214,7 @@ impl<'f> Description<'f> {
     }
 }
 
-fn camera(
-    root: &mut Table,
-    moment: Moment,
-) -> Result<(CameraSpec, Vec<MaterialName>), SceneError> {
+fn camera(root: &mut Table, moment: Moment) -> Result<(CameraSpec, Vec<MaterialName>), SceneError> {
     let hint = "add a [camera] table with `position`, `look_at` and `fov`";
     let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
     let mut table = value.table("[camera]")?;

@@ -186,7 +186,9 @@ impl<'f> SceneFile<'f> {
 
 impl fmt::Debug for SceneFile<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SceneFile").field("path", &self.path).finish_non_exhaustive()
+        f.debug_struct("SceneFile")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
     }
 }
 

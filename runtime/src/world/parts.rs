@@ -83,7 +83,13 @@ impl SceneParts {
         technique: &Technique,
     ) -> Result<SceneParts, SceneError> {
         let inputs = (materials, instances, textures);
-        let (parts, _) = Self::recording(scene, inputs, technique, Layers::default(), &Trees::default())?;
+        let (parts, _) = Self::recording(
+            scene,
+            inputs,
+            technique,
+            Layers::default(),
+            &Trees::default(),
+        )?;
         Ok(parts)
     }
 

@@ -38,7 +38,14 @@ const CRATES: &[Crate] = &[
         name: "impasto-compiler",
         folder: "compiler/src",
         layers: &[
-            &["abi", "moment", "parameter_value", "random", "source", "stages"],
+            &[
+                "abi",
+                "moment",
+                "parameter_value",
+                "random",
+                "source",
+                "stages",
+            ],
             &["ast", "diag", "ir"],
             &["closure", "lexer", "loader", "parameters"],
             &["parser", "passes", "program"],
