@@ -306,7 +306,13 @@ pub(super) fn compile_requests(
     } else {
         global.report(&compiled.sources, &compiled.diagnostics);
     }
-    let is_one_of_several = |d: &Diagnostic| d.code == Code::NoMaterial && d.expected.is_some();
+    let is_one_of_several = |d: &Diagnostic| {
+        let names = d
+            .expected
+            .as_deref()
+            .is_some_and(|e| e.starts_with("one of"));
+        d.code == Code::NoMaterial && names
+    };
     if is_material && compiled.diagnostics.iter().any(is_one_of_several) {
         global.note("hint: `--material NAME` says which");
     }

@@ -165,7 +165,6 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     }
     let outputs = sheet_outputs(args)?;
     let device = args.device.open(global)?;
-    let mut loader = FileLoader::default();
     let stop = || interrupt::requested();
     let made = Making {
         args,
@@ -174,7 +173,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         stop: &stop,
     };
     let begin = Instant::now();
-    made.sheet(&args.shot()?, &outputs, &mut loader)?;
+    made.sheet(&args.shot()?, &outputs, &mut Vec::new())?;
     note_written(&outputs, begin, global);
     Ok(())
 }
@@ -248,34 +247,29 @@ impl Making<'_> {
         &self,
         requests: &[MaterialRequest],
         scene: &Scene,
-        loader: &mut FileLoader,
+        read: &mut Vec<PathBuf>,
     ) -> Result<Program, Failure> {
-        *loader = FileLoader::new(&scene.base);
-        render::compile_requests(requests, loader, self.args, self.global, self.stop)
+        let mut loader = FileLoader::new(&scene.base);
+        let (args, global) = (self.args, self.global);
+        let program = render::compile_requests(requests, &mut loader, args, global, self.stop);
+        read.extend(loader.asked());
+        if let Ok(program) = &program {
+            read.extend(shot::textures(scene, program));
+        }
+        program
     }
 
-    /// One picture.
-    fn picture(
-        &self,
-        shot: &Shot,
-        outputs: &Outputs,
-        loader: &mut FileLoader,
-    ) -> Result<Vec<PathBuf>, Failure> {
+    /// One picture; the files of its materials are `read`.
+    fn picture(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
         let scene = self.args.scene_of(&shot.subject, &shot.asked)?;
         note_warnings(&scene, self.global);
-        let program = self.compile(&shot::open_requests(&scene), &scene, loader)?;
+        let program = self.compile(&shot::open_requests(&scene), &scene, read)?;
         let rendering = self.rendering(&scene, &program, 0, "")?;
-        outputs.write(&rendering.film, &rendering.sums, self.args.exposure)?;
-        Ok(shot::textures(&scene, &program))
+        outputs.write(&rendering.film, &rendering.sums, self.args.exposure)
     }
 
-    /// A sheet of pictures; the files of their textures.
-    fn sheet(
-        &self,
-        shot: &Shot,
-        outputs: &Outputs,
-        loader: &mut FileLoader,
-    ) -> Result<Vec<PathBuf>, Failure> {
+    /// A sheet of pictures; the files of their materials are `read`.
+    fn sheet(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
         let Shot {
             subject,
             asked,
@@ -288,7 +282,7 @@ impl Making<'_> {
         let cell = sweep::cell_size(self.args.size, scene.film);
         let mut sheet = sweep.layout(cell)?.sheet();
         let (requests, counts) = sweep.requests(subject, asked).map_err(failed)?;
-        let program = self.compile(&requests, &scene, loader)?;
+        let program = self.compile(&requests, &scene, read)?;
         let exposure = self.args.exposure;
         for (index, first) in sweep::firsts(&counts).into_iter().enumerate() {
             let mut scene = subject.scene(&sweep.asked(asked, index)).map_err(failed)?;
@@ -297,8 +291,7 @@ impl Making<'_> {
             let rendering = self.rendering(&scene, &program, first, &message)?;
             sheet.put(index, &rendering.film, &sweep.label(index), exposure);
         }
-        outputs.write_film(&sheet.film, exposure)?;
-        Ok(shot::textures(&scene, &program))
+        outputs.write_film(&sheet.film, exposure)
     }
 }
 
@@ -363,7 +356,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
             for request in &mut requests {
                 request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
             }
-            let program = made.compile(&requests, &scene, &mut FileLoader::default())?;
+            let program = made.compile(&requests, &scene, &mut Vec::new())?;
             let message = format!("frame {frame} ({} of {count}): ", index + 1);
             let shown = Making { global, ..made };
             let rendering = shown.rendering(&scene, &program, 0, &message)?;
@@ -475,14 +468,11 @@ impl Making<'_> {
             Err(failure) => return (Err(failure), read),
         };
         read.extend_from_slice(shot.subject.files());
-        let mut loader = FileLoader::default();
-        let made = if shot.axes.is_empty() {
-            self.picture(&shot, outputs, &mut loader)
+        let outcome = if shot.axes.is_empty() {
+            self.picture(&shot, outputs, &mut read)
         } else {
-            self.sheet(&shot, outputs, &mut loader)
+            self.sheet(&shot, outputs, &mut read)
         };
-        read.extend(loader.asked());
-        let outcome = made.map(|textures| read.extend(textures));
         (outcome, read)
     }
 }

@@ -51,7 +51,7 @@ fn a_material_file_makes_a_picture_on_each_set() {
     }
     let out = folder.path().join("std.png");
     render("std::bsdf::diffuse", &out, &[]).exits(1);
-    render("std::surface::clear_glass", &out, &[]).exits(0);
+    render("std::surface::gltf_pbr", &out, &[]).exits(0);
 }
 
 #[test]
@@ -216,10 +216,17 @@ fn sheets_that_cannot_be_are_refused_before_anything_is_rendered() {
         &["--param", a, "--param", b, "--param", c],
         "at most two parameters",
     );
-    refused(
-        &["--param", "wear=0:1:250", "--size", "4000x4000"],
-        "ask for fewer or for smaller",
-    );
+    let large = [
+        "render",
+        &file,
+        "--size",
+        "4000x4000",
+        "--param",
+        "wear=0:1:250",
+    ];
+    impasto(&large)
+        .exits(2)
+        .says("ask for fewer or for smaller");
     refused(&["--param", c, "--aov", "albedo"], "no place for --aov");
     refused(
         &["--param", c, "--frames", "1-2"],
@@ -490,7 +497,7 @@ mod watching {
     #[test]
     fn scenes_are_watched_with_all_that_they_name() {
         let folder = folder();
-        write(folder.path(), "lib.impasto", "const LEVEL = 0.5;\n");
+        write(folder.path(), "lib.impasto", "const LEVEL: float = 0.5;\n");
         let user = "use lib::LEVEL;\nuse std::edf::uniform;\n\
             material paint { param wear: float = 0.0; param color: color = color(LEVEL); \
             emission = uniform(color * (1.0 - wear)); }\n";
@@ -500,7 +507,7 @@ mod watching {
         let out = folder.path().join("p.png");
         let watcher = Watcher::of(&scene, &out, &["--param", "wall.wear=0.1"]);
         watcher.says("wrote");
-        write(folder.path(), "lib.impasto", "const LEVEL = 0.75;\n");
+        write(folder.path(), "lib.impasto", "const LEVEL: float = 0.75;\n");
         watcher.says("wrote");
         write(
             folder.path(),
