@@ -113,7 +113,8 @@ fn other_values_and_other_times_need_no_other_code() {
     let (worn, later) = (of(&worn, now), of(&worn, Some(Moment::of_frame(30.0, 24.0))));
     assert!(worn.0 == first.0 && later.0 == first.0 && worn.1 != later.1);
     // Other code is other code.
-    assert!(of(&PAINT.replace("0.6 *", "0.6 * 0.5 *"), now).0 != first.0);
+    let placed = PAINT.replace("sin(time)", "sin(time + position.x)");
+    assert!(of(&placed, now).0 != first.0);
 }
 
 #[test]
