@@ -69,7 +69,10 @@ fn rendered(
     };
     let renderer = studio.renderer(scene, program, first, &options);
     let mut renderer = renderer.expect("it is built");
-    let kernels = renderer.kernels().map(|(_, wgsl)| wgsl.to_owned()).collect();
+    let kernels = renderer
+        .kernels()
+        .map(|(_, wgsl)| wgsl.to_owned())
+        .collect();
     let rendering = renderer.render(&mut |_| std::ops::ControlFlow::Continue(()));
     (kernels, rendering.expect("it renders").film.pixels)
 }
@@ -102,7 +105,9 @@ fn other_values_and_other_times_need_no_other_code() {
     let scene = scene(&subject, &Asked::default());
     let of = |text: &str, moment: Option<Moment>| {
         let mut requests = open_requests(&scene);
-        requests.iter_mut().for_each(|request| request.moment = moment);
+        requests
+            .iter_mut()
+            .for_each(|request| request.moment = moment);
         rendered(&studio, &scene, &compiled(&requests, text), 0)
     };
     let now = Some(Moment::of_frame(0.0, 24.0));
@@ -110,7 +115,10 @@ fn other_values_and_other_times_need_no_other_code() {
     let rough = of(&PAINT.replace("0.25", "0.75"), now);
     assert!(first.0 == rough.0 && first.1 != rough.1);
     let worn = PAINT.replace("wear: float = 0.0", "wear: float = 0.5");
-    let (worn, later) = (of(&worn, now), of(&worn, Some(Moment::of_frame(30.0, 24.0))));
+    let (worn, later) = (
+        of(&worn, now),
+        of(&worn, Some(Moment::of_frame(30.0, 24.0))),
+    );
     assert!(worn.0 == first.0 && later.0 == first.0 && worn.1 != later.1);
     // Other code is other code.
     let placed = PAINT.replace("sin(time)", "sin(time + position.x)");
