@@ -26,14 +26,15 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
     bindings
         .map(|binding| MaterialRequest {
             apart: false,
+            moment: None,
             name: binding.name,
             file: binding.file,
             material: binding.material,
             params: binding.params,
-            parameters: if binding.bake {
-                Parameters::Baked
-            } else {
-                Parameters::Agreed
+            parameters: match (binding.bake, binding.has_keys) {
+                (_, true) => Parameters::Table,
+                (true, false) => Parameters::Baked,
+                (false, false) => Parameters::Agreed,
             },
         })
         .collect()

@@ -13,6 +13,8 @@ use impasto_runtime::film::output;
 use impasto_runtime::input;
 pub use impasto_runtime::input::reason;
 
+use crate::set;
+
 /// The name by which standard input is asked for.
 pub const STDIN: &str = "-";
 
@@ -37,6 +39,11 @@ impl FileLoader {
         }
     }
 
+    /// The files that were asked for, whether they were there or not; those of the library are none.
+    pub fn asked(&self) -> impl Iterator<Item = PathBuf> {
+        self.loaded.keys().map(|path| self.base.join(path))
+    }
+
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         if path == STDIN {
             read_source(io::stdin().lock())
@@ -50,6 +57,9 @@ impl Loader for FileLoader {
     fn load(&mut self, path: &str) -> Result<Vec<u8>, String> {
         if let Some(text) = library_text(path) {
             return Ok(text?.as_bytes().to_vec());
+        }
+        if let Some((_, text)) = set::SOURCES.iter().find(|(name, _)| *name == path) {
+            return Ok(text.as_bytes().to_vec());
         }
         if !self.loaded.contains_key(path) {
             let bytes = self.read(path).map_err(|error| reason(&error));
@@ -83,6 +93,12 @@ fn read_source(reader: impl Read) -> io::Result<Vec<u8>> {
         .take(MAX_SOURCE_BYTES as u64 + 1)
         .read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+/// Checks that there is a file at `path` that can be read.
+pub fn check_readable(path: &Path) -> Result<(), String> {
+    let opened = input::open(path).map(drop);
+    opened.map_err(|error| format!("cannot read `{}`: {}", path.display(), reason(&error)))
 }
 
 /// Checks that a file could be created at `path`, so that one learns it before the work and not

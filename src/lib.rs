@@ -55,5 +55,7 @@ mod ir_text;
 pub mod measure;
 pub mod plan;
 pub mod plot;
+pub mod set;
+pub mod shot;
 pub mod starter;
 pub mod trace;

@@ -11,6 +11,7 @@ mod plans;
 mod probe;
 mod processor;
 mod render;
+mod shot;
 mod snapshots;
 mod spaces;
 mod textures;

@@ -278,6 +278,7 @@ fn compile(file: &str, loader: &mut dyn Loader) -> Program {
         .iter()
         .map(|name| MaterialRequest {
             apart: false,
+            moment: None,
             name: name.clone(),
             file: file.into(),
             material: Some(name.clone()),

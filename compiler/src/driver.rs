@@ -7,6 +7,7 @@ use crate::build::{ProgramBuilder, Setting};
 use crate::diag::{self, Code, Diagnostic};
 use crate::ir::{self, Module};
 use crate::loader::Loader;
+use crate::moment::Moment;
 use crate::parameter_value::ParameterValue;
 use crate::passes::MaterialState;
 use crate::program::Program;
@@ -30,6 +31,9 @@ pub struct MaterialRequest {
     pub parameters: Parameters,
     /// Does it have code of its own even among many materials, of which some are equal up to constants?
     pub apart: bool,
+    /// When it is seen: then `time` and `frame` are in the table, unless all is in the code. Where nobody says, it is
+    /// frame 0 for good.
+    pub moment: Option<Moment>,
 }
 
 /// Where the values of an instance's parameters go.
@@ -54,6 +58,7 @@ impl MaterialRequest {
             params: Vec::new(),
             parameters: Parameters::default(),
             apart: false,
+            moment: None,
         }
     }
 }
@@ -211,6 +216,7 @@ fn generate_all(
             name: m.name.clone(),
             values: defaults,
             open: false,
+            moving: Vec::new(),
         };
         builder.add(checker, m.clone(), &[setting]);
     }
@@ -277,6 +283,8 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
         let Some(material) = material else { continue };
         let origin = format!("material `{}`", request.name);
         let values = checker.parameter_values(module, material, &request.params, &origin);
+        let moment = request.moment.unwrap_or_default();
+        let values = values.and_then(|v| checker.values_at(material, v, moment));
         let Some(values) = values else { continue };
         // Requests for constants share code with those for the same constants.
         let baked = request.parameters == Parameters::Baked;
@@ -293,6 +301,16 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
             name: request.name.clone(),
             values,
             open: request.parameters == Parameters::Table,
+            moving: if baked || request.moment.is_none() {
+                Vec::new()
+            } else {
+                let inputs = material
+                    .params
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, p)| p.is_input);
+                inputs.map(|(index, _)| index).collect()
+            },
         };
         found[at].settings.push((place, setting));
     }

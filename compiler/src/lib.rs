@@ -33,6 +33,7 @@ pub mod interface;
 pub mod ir;
 pub mod lexer;
 mod loader;
+mod moment;
 pub mod oracle;
 mod parameter_value;
 pub mod parameters;
@@ -50,5 +51,6 @@ pub use driver::{
     compile_with_looks, compile_with_progress,
 };
 pub use loader::{Loader, MemoryLoader, library_text};
+pub use moment::Moment;
 pub use parameter_value::ParameterValue;
 pub use program::Program;

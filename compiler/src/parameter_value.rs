@@ -21,6 +21,18 @@ pub enum ParameterValue {
     Texture(String),
     /// A constant expression of the language, such as `0.6 mm`.
     Text(String),
+    /// Any of these, from somewhere else than the scene, which diagnostics name instead: `--param wall.roughness`.
+    From(String, Box<ParameterValue>),
+}
+
+impl ParameterValue {
+    /// The value, and who gave it if that is not the scene.
+    pub fn origin(&self) -> (Option<&str>, &ParameterValue) {
+        match self {
+            Self::From(origin, value) => (Some(origin), value.origin().1),
+            value => (None, value),
+        }
+    }
 }
 
 /// The value as a constant expression, which is what diagnostics show. Three components are called
@@ -42,6 +54,7 @@ impl fmt::Display for ParameterValue {
             }
             Self::Texture(path) => write!(f, "\"{path}\""),
             Self::Text(text) => f.write_str(text),
+            Self::From(_, value) => value.fmt(f),
         }
     }
 }

@@ -41,6 +41,7 @@ pub fn scene(palette: &Palette, coherence: Coherence, side: u32) -> Scene {
         material: Some(material.clone()),
         params: Vec::new(),
         bake: false,
+        has_keys: false,
     };
     let mut scene = Scene {
         name: format!("{} {name}", palette.name),

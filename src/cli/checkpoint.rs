@@ -35,6 +35,11 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 type OnProgress<'a> = &'a mut dyn FnMut(&Progress) -> std::ops::ControlFlow<()>;
 
 impl CheckpointArgs {
+    /// Is one to be kept?
+    pub(super) fn is_given(&self) -> bool {
+        self.checkpoint.is_some()
+    }
+
     /// Keeps the checkpoint to this process. Two renders that go on from one would each undo what the other kept.
     pub(super) fn lock(&self) -> Result<Option<Lock>, Failure> {
         let Some(path) = &self.checkpoint else {

@@ -10,7 +10,9 @@ use super::render::RenderArgs;
 pub(super) fn warnings(report: &Report, args: &RenderArgs) -> Vec<String> {
     let found: u64 = report.dropped.iter().map(Dropped::samples).sum();
     let warnings = report.dropped.iter().map(|entry| {
-        let replay = entry.example.as_ref();
+        // What traces paths takes scenes as they are.
+        let replay = entry.example.as_ref().filter(|_| args.shot.is_plain());
+        let replay = replay.filter(|_| !impasto::shot::is_material(&args.scene));
         let replay = replay.map(|example| replay_hint(example, report, args));
         format!("warning: {}{}", sentence(entry), replay.unwrap_or_default())
     });

@@ -34,6 +34,7 @@ mod plan;
 mod profile;
 mod rays;
 mod render;
+mod shot;
 mod strategy;
 mod technique;
 mod trace;
@@ -95,7 +96,7 @@ enum Command {
     Plan(Box<plan::PlanCommandArgs>),
     /// Evaluate a material, closure or function at one point
     Eval(Box<eval::EvalArgs>),
-    /// Render a scene
+    /// Render a scene, or a material file on a built-in set
     Render(Box<render::RenderArgs>),
     /// Measure how fast renders converge: error against run time
     Converge(Box<converge::ConvergeArgs>),

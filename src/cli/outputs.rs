@@ -54,6 +54,14 @@ impl Outputs {
         }
     }
 
+    /// Writes a picture that is not of one render.
+    pub(super) fn write_film(&self, film: &Film, exposure: f32) -> Result<(), Failure> {
+        for path in &self.pictures {
+            output::write(film, path, exposure).map_err(super::runtime)?;
+        }
+        Ok(())
+    }
+
     /// Fails if outputs beside the picture are asked for that do not exist, or that no file would hold.
     pub(super) fn check_aov(&self, names: &[String]) -> Result<(), String> {
         names

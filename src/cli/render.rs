@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
+use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
 use impasto::runtime::film::file::FilmFile;
@@ -17,11 +18,10 @@ use impasto::runtime::options::Progress;
 use impasto::runtime::render::Replanning;
 use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::render::until::{Check, Ending, Goals};
-use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
-    Device, FileLoader, Plan, Program, RenderOptions, Renderer, Rendering, RuntimeError, Scene,
-    Strategy, files, plan,
+    Device, FileLoader, MaterialRequest, Plan, Program, RenderOptions, Renderer, Rendering,
+    RuntimeError, Scene, Strategy, files, plan, shot,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -30,6 +30,7 @@ use super::dropped;
 use super::info::DeviceArgs;
 use super::outputs::{Outputs, aov_help, parse_exposure};
 use super::profile::Profile;
+use super::shot::ShotArgs;
 use super::strategy::{PlanArgs, Source, replaced};
 use super::technique::TechniqueArgs;
 use super::until::{self, UntilArgs};
@@ -37,24 +38,24 @@ use super::{Failure, Global, Outcome, interrupt, print, runtime};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
-    /// The scene, a TOML file
+    /// The scene, a TOML file; or a material file or module of the library, to be seen on a built-in set
     pub(super) scene: PathBuf,
     /// The picture: `.exr` (linear radiance; a `.png` is written beside it), `.png` alone, or `.film`
-    /// for a part that `impasto merge` takes
+    /// for a part that `impasto merge` takes; by default a `.png` of the same name in the working directory
     #[arg(short, long, value_name = "FILE")]
-    out: PathBuf,
+    pub(super) out: Option<PathBuf>,
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', help = aov_help())]
-    aov: Vec<String>,
+    pub(super) aov: Vec<String>,
     /// Samples per pixel; 64 by default
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
     #[command(flatten)]
-    until: UntilArgs,
+    pub(super) until: UntilArgs,
     /// Index of the first sample; disjoint ranges can be rendered separately and merged
     #[arg(long, value_name = "INDEX", default_value_t = 0)]
     samples_from: u32,
     #[command(flatten)]
-    checkpoint: CheckpointArgs,
+    pub(super) checkpoint: CheckpointArgs,
     /// Width and height in pixels, as in 640x480; the scene's own by default
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(super) size: Option<(u32, u32)>,
@@ -69,17 +70,19 @@ pub(super) struct RenderArgs {
     device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     /// Brighten the PNG by this many stops; the EXR stays as it is
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
-    exposure: f32,
+    pub(super) exposure: f32,
     /// Paths in flight; by default chosen by the size of the picture
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
     pool: Option<u32>,
     #[command(flatten)]
-    device: DeviceArgs,
+    pub(super) device: DeviceArgs,
     #[command(flatten)]
     technique: TechniqueArgs,
+    #[command(flatten)]
+    pub(super) shot: ShotArgs,
 }
 
 pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -102,7 +105,11 @@ const MAX_SIDE: u32 = 65_536;
 
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     args.device.check()?;
-    let outputs = Outputs::of(&args.out)?;
+    if args.is_many() {
+        interrupt::install()?;
+        return super::shot::run(args, global);
+    }
+    let outputs = Outputs::of(&args.out())?;
     outputs.check_aov(&args.aov)?;
     if let Some(report) = &args.report {
         files::check_writable(report)?;
@@ -220,7 +227,7 @@ impl RenderArgs {
         }
     }
 
-    fn options(&self, count_hits: bool, until: bool) -> RenderOptions {
+    pub(super) fn options(&self, count_hits: bool, until: bool) -> RenderOptions {
         let limit = if until { until::LIMIT } else { SAMPLES };
         RenderOptions {
             samples: self.spp.unwrap_or(limit),
@@ -246,12 +253,10 @@ fn write_report(report: &Report, args: &RenderArgs) -> Result<(), Failure> {
 
 /// The scene, at the size that was asked for. What is odd about it is noted.
 fn load(args: &RenderArgs, global: &Global) -> Result<Scene, Failure> {
-    let mut scene = impasto::load(&args.scene).map_err(|e| Failure::Error(e.to_string()))?;
+    let shot = args.shot()?;
+    let scene = args.scene_of(&shot.subject, &shot.asked)?;
     for warning in &scene.warnings {
         global.note(&format!("warning: {warning}"));
-    }
-    if let Some((width, height)) = args.size {
-        scene.film = FilmSettings { width, height };
     }
     Ok(scene)
 }
@@ -260,17 +265,37 @@ fn load(args: &RenderArgs, global: &Global) -> Result<Scene, Failure> {
 fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program, Failure> {
     let mut loader = FileLoader::new(&scene.base);
     let requests = impasto::requests(scene);
-    for request in &requests {
+    let stop = || interrupt::requested();
+    compile_requests(&requests, &mut loader, args, global, &stop).map_err(|failure| match failure {
+        Failure::Interrupted => interrupted_early(global),
+        other => other,
+    })
+}
+
+/// The program of some requests, unless nobody waits for it any more.
+pub(super) fn compile_requests(
+    requests: &[MaterialRequest],
+    loader: &mut FileLoader,
+    args: &RenderArgs,
+    global: &Global,
+    stop: &dyn Fn() -> bool,
+) -> Result<Program, Failure> {
+    let is_material = shot::is_material(&args.scene);
+    for request in requests {
         let file = &request.file;
-        loader.load(file).map_err(|why| {
-            let name = &request.name;
-            format!("cannot read `{file}`, which the scene names for the material `{name}`: {why}")
-        })?;
+        loader
+            .load(file)
+            .map_err(|why| match (&request.name, is_material) {
+                (_, true) => format!("cannot read `{file}`: {why}"),
+                (name, false) => format!(
+                    "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
+                ),
+            })?;
     }
     let looks = ask_for_looks(&args.aov);
-    let compiled = compiler::compile_until(&requests, &mut loader, looks, &interrupt::requested);
-    if interrupt::requested() {
-        return Err(interrupted_early(global));
+    let compiled = compiler::compile_until(requests, loader, looks, stop);
+    if stop() {
+        return Err(Failure::Interrupted);
     }
     if global.json() {
         let found = super::json(&compiled.sources, &compiled.diagnostics);
@@ -280,6 +305,16 @@ fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program,
         ))?;
     } else {
         global.report(&compiled.sources, &compiled.diagnostics);
+    }
+    let is_one_of_several = |d: &Diagnostic| {
+        let names = d
+            .expected
+            .as_deref()
+            .is_some_and(|e| e.starts_with("one of"));
+        d.code == Code::NoMaterial && names
+    };
+    if is_material && compiled.diagnostics.iter().any(is_one_of_several) {
+        global.note("hint: `--material NAME` says which");
     }
     compiled.program.ok_or(Failure::Diagnostics)
 }
@@ -361,7 +396,7 @@ fn tick(bar: &ProgressBar, progress: &Progress) -> ControlFlow<()> {
 }
 
 /// Was everything done that was asked for?
-fn is_complete(rendering: &Rendering) -> bool {
+pub(super) fn is_complete(rendering: &Rendering) -> bool {
     let report = &rendering.report;
     if let Some(ending) = report.ended_by {
         return ending != Ending::Interrupt;

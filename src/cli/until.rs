@@ -72,6 +72,11 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 impl UntilArgs {
+    /// Is there a goal?
+    pub(super) fn is_given(&self) -> bool {
+        !self.until.is_empty()
+    }
+
     /// The goals, if there are any and `spp` and the files to be written go with them.
     pub(super) fn goals(
         &self,

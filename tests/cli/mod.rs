@@ -22,6 +22,7 @@ mod plan;
 mod plans;
 mod rays;
 mod render;
+mod shot;
 #[cfg(unix)]
 mod streams;
 mod trace;

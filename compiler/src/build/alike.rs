@@ -126,6 +126,7 @@ fn instances(group: Vec<Requested>) -> Option<Requested> {
             ty: expr.ty,
             default,
             range: None,
+            is_input: false,
             span: expr.span,
         });
     }

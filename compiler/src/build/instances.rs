@@ -19,6 +19,8 @@ pub(crate) struct Setting {
     pub values: Vec<Const>,
     /// Must the code hold for other values as well?
     pub open: bool,
+    /// Parameters that have other values at other times.
+    pub moving: Vec<usize>,
 }
 
 /// The values of the parameters on which all settings agree for good.
@@ -28,7 +30,7 @@ pub(super) fn agreed(settings: &[Setting]) -> Vec<Option<Const>> {
     };
     let same = |(i, value): (usize, &Const)| {
         let agree = others.iter().all(|s| s.values.get(i) == Some(value));
-        (agree && !settings.iter().any(|s| s.open)).then(|| value.clone())
+        (agree && !settings.iter().any(|s| s.open || s.moving.contains(&i))).then(|| value.clone())
     };
     first.values.iter().enumerate().map(same).collect()
 }

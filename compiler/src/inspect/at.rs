@@ -22,6 +22,10 @@ pub struct At {
     pub uv: [f64; 2],
     /// Index of refraction of the medium outside.
     pub exterior_ior: f64,
+    /// Seconds since frame 0.
+    pub time: f64,
+    /// The number of the frame.
+    pub frame: f64,
     /// The diameter of what a ray sees, in metres, for `filter_width`. Along the tangent and across
     /// it, u and v grow by as much.
     pub footprint: f64,
@@ -54,6 +58,8 @@ impl Default for At {
             tangent: [1.0, 0.0, 0.0],
             uv: [0.25, 0.75],
             exterior_ior: 1.0,
+            time: 0.0,
+            frame: 0.0,
             footprint: 0.0,
             object_position: None,
             instance_id: None,
@@ -67,13 +73,15 @@ impl Default for At {
 }
 
 /// The keys in the order they are shown, each with how many numbers it takes.
-const KEYS: [(&str, usize); 14] = [
+const KEYS: [(&str, usize); 16] = [
     ("position", 3),
     ("normal", 3),
     ("geometric_normal", 3),
     ("tangent", 3),
     ("uv", 2),
     ("exterior_ior", 1),
+    ("time", 1),
+    ("frame", 1),
     ("footprint", 1),
     ("object_position", 3),
     ("instance_id", 1),
@@ -94,6 +102,9 @@ impl At {
                 "instance_id" => self.instance_id.is_some(),
                 "uv1" => self.uv1.is_some(),
                 "vertex_color" => self.vertex_color.is_some(),
+                // Few materials ask when they are seen.
+                "time" => self.time != 0.0,
+                "frame" => self.frame != 0.0,
                 _ => true,
             };
             let numbers = copy.numbers(key).filter(|_| is_there)?;
@@ -137,6 +148,8 @@ impl At {
             "tangent" => &mut self.tangent,
             "uv" => &mut self.uv,
             "exterior_ior" => std::slice::from_mut(&mut self.exterior_ior),
+            "time" => std::slice::from_mut(&mut self.time),
+            "frame" => std::slice::from_mut(&mut self.frame),
             "footprint" => std::slice::from_mut(&mut self.footprint),
             "wo" => &mut self.wo,
             "wi" => &mut self.wi,
@@ -209,9 +222,8 @@ fn check(key: &str, values: &mut [f64]) -> Result<(), String> {
         {
             Err("`instance_id` is a whole number from 0".into())
         }
-        "position" | "uv" | "u" | "object_position" | "instance_id" | "uv1" | "vertex_color" => {
-            Ok(())
-        }
+        "position" | "uv" | "u" | "time" | "frame" | "object_position" | "instance_id" | "uv1"
+        | "vertex_color" => Ok(()),
         _ => {
             let longest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             if longest > 0.0 {

@@ -11,6 +11,7 @@ use crate::driver::{MaterialRequest, Parameters, check, compile};
 use crate::ir::Module;
 use crate::ir::ops::Counts;
 use crate::loader::{Loader, MemoryLoader, library_text};
+use crate::moment::Moment;
 use crate::passes;
 use crate::source::{FileId, SourceMap};
 use crate::{lexer, parser};
@@ -420,6 +421,10 @@ fn material(
     let name = if own { &answer.name } else { items::NAME };
     let request = MaterialRequest {
         apart: false,
+        moment: Some(Moment {
+            frame: query.at.frame,
+            time: query.at.time,
+        }),
         name: answer.name.clone(),
         file: query.file.clone(),
         material: Some(name.to_owned()),

@@ -430,6 +430,8 @@ pub struct MaterialParam {
     pub default: Const,
     /// Least and greatest allowed value (by component).
     pub range: Option<(f64, f64)>,
+    /// It is an input that has one value everywhere (`time`, `frame`): who renders gives it, and no scene.
+    pub is_input: bool,
     /// Where it is declared.
     pub span: Span,
 }

@@ -115,6 +115,10 @@ pub struct Body<'c, 'l> {
     pub ranges: Vec<Option<(f64, f64)>>,
     /// How many expressions were added to evaluate slopes.
     pub slopes: usize,
+    /// The numbers of the parameters that `time` and `frame` are, where a material names them.
+    pub moment: [Option<u32>; 2],
+    /// These parameters, which come after those that it declares.
+    pub inputs: Vec<ir::MaterialParam>,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -137,6 +141,8 @@ impl<'c, 'l> Body<'c, 'l> {
             called: Vec::new(),
             ranges: Vec::new(),
             slopes: 0,
+            moment: [None; 2],
+            inputs: Vec::new(),
         }
     }
 

@@ -143,7 +143,15 @@ impl Body<'_, '_> {
         if self.place == Place::Material && inputs::is_input(name) {
             return self.input(name, span);
         }
-        let Some(item) = self.cx.lookup(self.module, name) else {
+        let item = self.cx.lookup(self.module, name);
+        let is_const = |item| matches!(self.cx.item(item).kind, ast::ItemKind::Const(_));
+        if inputs::MOMENT.contains(&name) && !item.is_some_and(is_const) {
+            return match self.place {
+                Place::Material => self.input(name, span),
+                _ => self.unknown_name(name, span),
+            };
+        }
+        let Some(item) = item else {
             return match (name, self.place) {
                 (NO_MEDIUM, Place::Material | Place::Closures) => {
                     Some(Operand::Nothing(Ty::Medium))
@@ -165,7 +173,7 @@ impl Body<'_, '_> {
 
     fn unknown_name<T>(&mut self, name: &str, span: Span) -> Option<T> {
         let unknown = Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"));
-        if self.place != Place::Material && inputs::is_input(name) {
+        if self.place != Place::Material && inputs::is_told(name) {
             let unknown = unknown
                 .expected("a parameter, variable or constant")
                 .hint(format!(
@@ -180,6 +188,7 @@ impl Body<'_, '_> {
         );
         if self.place == Place::Material {
             names.extend(inputs::names().map(String::from));
+            names.extend(inputs::MOMENT.map(String::from));
         }
         let unknown = unknown.expected("a name in scope");
         let names = names.iter().map(String::as_str);

@@ -4,6 +4,7 @@ use crate::ast::{self, ItemKind};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::const_type;
 use crate::ir::{Const, Material, MaterialParam};
+use crate::moment::Moment;
 use crate::parameter_value::ParameterValue;
 use crate::parser;
 use crate::source::{FileId, Span};
@@ -25,12 +26,20 @@ impl Checker<'_> {
         let mut values: Vec<Const> = material.params.iter().map(|p| p.default.clone()).collect();
         let mut ok = true;
         for (name, value) in given {
-            let Some(index) = material.params.iter().position(|p| p.name == *name) else {
+            let (own, value) = value.origin();
+            let named = own.map_or_else(|| format!("{origin}, parameter {name}"), str::to_owned);
+            let origin = own.unwrap_or(origin);
+            let Some(index) = material
+                .params
+                .iter()
+                .position(|p| p.name == *name && !p.is_input)
+            else {
                 if self.only_callers_give(module, material, name, origin) {
                     ok = false;
                     continue;
                 }
-                let names: Vec<&str> = material.params.iter().map(|p| p.name.as_str()).collect();
+                let settable = material.params.iter().filter(|p| !p.is_input);
+                let names: Vec<&str> = settable.map(|p| p.name.as_str()).collect();
                 let message = format!(
                     "{origin}: material `{}` has no parameter `{name}`",
                     material.name
@@ -46,12 +55,37 @@ impl Checker<'_> {
                 ok = false;
                 continue;
             };
-            match self.parameter_value(module, &material.params[index], value, origin) {
+            match self.parameter_value(module, &material.params[index], value, &named) {
                 Some(value) => values[index] = value,
                 None => ok = false,
             }
         }
         ok.then_some(values)
+    }
+
+    /// The same when a material is seen at some time; refuses times that are no numbers.
+    pub fn values_at(
+        &mut self,
+        material: &Material,
+        mut values: Vec<Const>,
+        moment: Moment,
+    ) -> Option<Vec<Const>> {
+        for (param, value) in material.params.iter().zip(&mut values) {
+            if !param.is_input {
+                continue;
+            }
+            let Moment { frame, time } = moment;
+            let now = if param.name == "frame" { frame } else { time };
+            if !(now as f32).is_finite() {
+                let message = format!("the {} is {now}", param.name);
+                let wrong =
+                    Diagnostic::without_span(Code::OutOfRange, message).expected("a finite number");
+                self.report(wrong);
+                return None;
+            }
+            *value = Const::Float(vec![now]);
+        }
+        Some(values)
     }
 
     /// Reports a setting of a parameter that is an input, if `name` is one.
@@ -86,13 +120,11 @@ impl Checker<'_> {
         module: ModuleId,
         param: &MaterialParam,
         given: &ParameterValue,
-        origin: &str,
+        named: &str,
     ) -> Option<Const> {
         let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
         let text = given.to_string();
-        let file = self
-            .sources
-            .add(format!("{origin}, parameter {}", param.name), text.as_str());
+        let file = self.sources.add(named.to_owned(), text.as_str());
         let (value, span) = match self.plain(given, *ty) {
             Some(value) => (value, Span::new(file, 0..text.len())),
             None => self.evaluated(module, param, *ty, file, &text)?,

@@ -29,9 +29,22 @@ pub fn is_input(name: &str) -> bool {
     names().any(|input| input == name)
 }
 
+/// Names of a material that are the same at every point: when it is seen. They are parameters that whoever
+/// renders gives, so that all that depends on nothing else is computed by the host. Names of the author's own
+/// go before them.
+pub const MOMENT: [&str; 2] = ["time", "frame"];
+
+/// Is it the name of something that a material is told?
+pub fn is_told(name: &str) -> bool {
+    is_input(name) || MOMENT.contains(&name)
+}
+
 impl Body<'_, '_> {
-    /// An input of the surface.
+    /// An input of the surface, or one of [`MOMENT`].
     pub fn input(&mut self, name: &str, span: Span) -> Option<Operand> {
+        if let Some(which) = MOMENT.iter().position(|n| *n == name) {
+            return Some(self.moment(which, span));
+        }
         match name {
             "facing" => self.facing(span),
             "object_normal" => {
@@ -57,6 +70,30 @@ impl Body<'_, '_> {
         let ty = fields[index].ty;
         let field = self.builder.field(&self.cx.ir, point, index, span);
         Some((field, ty))
+    }
+
+    /// The parameter that one of [`MOMENT`] is, which a material has once it names it.
+    fn moment(&mut self, which: usize, span: Span) -> Operand {
+        let index = self.moment[which].unwrap_or_else(|| {
+            self.ranges.push(None);
+            let index = self.ranges.len() as u32 - 1;
+            self.inputs.push(ir::MaterialParam {
+                name: MOMENT[which].to_owned(),
+                docs: Vec::new(),
+                surface_type: "float",
+                ty: ir::Type::Float,
+                default: Const::Float(vec![0.0]),
+                range: None,
+                is_input: true,
+                span,
+            });
+            index
+        });
+        self.moment[which] = Some(index);
+        let kind = ir::ExprKind::MaterialParam(index);
+        let id = self.builder.add(kind, ir::Type::Float, span);
+        self.builder.name(id, MOMENT[which]);
+        Operand::Value(id, Ty::Float)
     }
 
     /// The cosine between the shading normal and the view, of either side.

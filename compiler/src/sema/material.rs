@@ -94,6 +94,7 @@ impl Checker<'_> {
         }
         let outputs = body.take_outputs(&item.name)?;
         let closures = std::mem::take(&mut body.closures);
+        let inputs = std::mem::take(&mut body.inputs);
         let value = body.builder.float(0.0, item.span);
         let function = body.builder.finish(value);
         if let Some(interior) = &outputs.interior {
@@ -102,7 +103,10 @@ impl Checker<'_> {
         Some(Material {
             name: item.name.node.clone(),
             docs: item.docs.clone(),
-            params: called::settable(declared)?,
+            params: called::settable(declared)?
+                .into_iter()
+                .chain(inputs)
+                .collect(),
             body: function,
             closures,
             surface: outputs.surface,

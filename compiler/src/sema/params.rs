@@ -40,7 +40,7 @@ impl Checker<'_> {
             return None;
         };
         if let ast::ExprKind::Name(input) = &p.default.kind
-            && inputs::is_input(input)
+            && inputs::is_told(input)
         {
             return self.connected_param(module, p, ty, input);
         }
@@ -59,6 +59,7 @@ impl Checker<'_> {
             ty: ty.ir()?,
             default,
             range,
+            is_input: false,
             span: p.span,
         };
         let fits = self.in_range(&param, &param.default, p.default.span, "the default");

@@ -102,6 +102,7 @@ impl Room {
         let scene = crate::world::load(&path).unwrap_or_else(|e| panic!("{e}"));
         let requests = scene.materials.iter().cloned().map(|b| MaterialRequest {
             apart: false,
+            moment: None,
             name: b.name,
             file: b.file,
             material: b.material,

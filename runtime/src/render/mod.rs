@@ -100,6 +100,12 @@ impl<'g> Renderer<'g> {
             .map(|k| (k.desc.name.as_str(), k.wgsl.as_str()))
     }
 
+    /// Says what the scene is called that it renders.
+    pub fn named(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.facts.name);
+        self
+    }
+
     /// Renders. `progress` is called after each submission; when it breaks, the samples that
     /// were begun by then are finished for every pixel, and make the picture.
     pub fn render(

@@ -188,6 +188,7 @@ impl<'d> Bindings<'d> {
             material: item,
             params,
             bake: spec.bake,
+            has_keys: spec.has_keys,
         });
         index
     }

@@ -1,14 +1,20 @@
 //! What a scene file says, before any file that it names is read. `docs/scenes.md` describes the
 //! format.
 
+use std::path::{Path, PathBuf};
+
 use glam::{DVec3, Vec3};
 use impasto_compiler::ParameterValue;
+use impasto_compiler::diag::nearest;
 use toml::de::DeValue;
 
-use super::document::{Document, Table, Value, number, numbers};
+use super::animation::{Animation, Moment, mix_places, mix_values, turntable};
+use super::document::{Document, Table, Value, list, number, numbers};
 use super::formats::{self, FileValue, Format};
 use super::placements::{self, PlacesSpec};
-use super::{Camera, FilmSettings, Integrator, Light, LightReader, MAX_NESTED, Transform};
+use super::{
+    Camera, FilmSettings, GivenParam, Integrator, Light, LightReader, MAX_NESTED, Transform,
+};
 use crate::error::SceneError;
 
 /// Pixels a side of the largest film.
@@ -27,6 +33,7 @@ pub(super) struct Description<'f> {
     pub(super) materials: Vec<MaterialSpec>,
     pub(super) lights: Vec<LightSpec>,
     pub(super) environment: Option<EnvironmentSpec>,
+    pub(super) animation: Animation,
 }
 
 /// The camera, and where it is and looks at in the world.
@@ -117,6 +124,8 @@ pub(super) struct MaterialSpec {
     pub(super) file: String,
     pub(super) material: Option<String>,
     pub(super) params: Vec<(String, ParamSpec)>,
+    /// Do keys give some of them?
+    pub(super) has_keys: bool,
     pub(super) bake: bool,
     /// The group that its light is in, if it emits.
     pub(super) group: Option<String>,
@@ -146,48 +155,113 @@ pub(super) enum EnvironmentSpecSource {
 }
 
 impl<'f> Description<'f> {
-    /// Reads a scene whose geometry is of some of the given formats, with `readers` for its lights.
+    /// Reads a scene whose geometry is of some of the given formats, with `readers` for its lights, as it is at a
+    /// `frame`.
     pub(super) fn read(
         document: &Document,
         formats: &'f [Format],
         readers: &[LightReader],
+        frame: f64,
     ) -> Result<Description<'f>, SceneError> {
         let parsed = document.parse()?;
         let mut root = Table::new(document, "the scene", &parsed);
         let name = root.get("name").map(|v| v.string().map(str::to_owned));
-        let (camera, camera_media) = camera(&mut root)?;
+        let animation = Animation::read(&mut root)?;
+        let smooth = animation.smooth;
+        let moment = Moment { frame, smooth };
+        let (camera, camera_media) = camera(&mut root, moment)?;
         let description = Description {
             name: name.transpose()?,
             camera,
             camera_media,
             film: film(&mut root)?,
             integrator: integrator(&mut root)?,
-            geometry: geometry(&mut root, formats)?,
-            materials: materials(&mut root, formats)?,
+            geometry: geometry(&mut root, formats, moment)?,
+            materials: materials(&mut root, formats, moment)?,
             lights: lights(&mut root, readers)?,
             environment: environment(&mut root)?,
+            animation,
         };
         root.finish()?;
         Ok(description)
     }
+
+    /// Puts values into the parameters of bindings.
+    ///
+    /// # Errors
+    /// If there is no binding of a name.
+    pub(super) fn give(&mut self, given: &[GivenParam]) -> Result<(), SceneError> {
+        for GivenParam {
+            binding,
+            param,
+            value,
+            origin,
+        } in given
+        {
+            let Some(spec) = self.materials.iter_mut().find(|m| m.name == *binding) else {
+                let names = || self.materials.iter().map(|m| m.name.as_str());
+                let message = format!("{origin}: the scene has no material `{binding}`");
+                let hint = match nearest(binding, names()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("its materials are {}", list(names())),
+                };
+                return Err(SceneError::new(message).hint(hint));
+            };
+            spec.params.retain(|(name, _)| name != param);
+            let value = ParameterValue::From(origin.clone(), Box::new(value.clone()));
+            spec.params.push((param.clone(), ParamSpec::Given(value)));
+        }
+        Ok(())
+    }
+
+    /// The files that it names, materials apart.
+    pub(super) fn files(&self, base: &Path) -> Vec<PathBuf> {
+        let geometry = self.geometry.iter().map(|entry| &entry.file);
+        let places = self
+            .geometry
+            .iter()
+            .filter_map(|entry| match &entry.places {
+                PlacesSpec::File(file) => Some(file),
+                PlacesSpec::Listed(_) => None,
+            });
+        let environment = self.environment.iter().filter_map(|e| match &e.source {
+            EnvironmentSpecSource::File(file) => Some(file),
+            EnvironmentSpecSource::Color(_) => None,
+        });
+        let all = geometry.chain(places).chain(environment);
+        all.map(|file| base.join(file)).collect()
+    }
 }
 
-fn camera(root: &mut Table) -> Result<(CameraSpec, Vec<MaterialName>), SceneError> {
+fn camera(root: &mut Table, moment: Moment) -> Result<(CameraSpec, Vec<MaterialName>), SceneError> {
     let hint = "add a [camera] table with `position`, `look_at` and `fov`";
     let value = root.require("camera").map_err(|e| e.or_hint(hint))?;
     let mut table = value.table("[camera]")?;
-    let position = table.require("position")?.place()?;
-    let look_at = table.require("look_at")?.place()?;
+    let mut keys = Moment::keys(&mut table, "[camera]")?;
+    let mut place = |table: &mut Table, name: &'static str| {
+        let given = table.require(name)?.place()?;
+        moment.keyed(&mut keys, name, Value::place, mix_places, given)
+    };
+    let position = place(&mut table, "position")?;
+    let look_at = place(&mut table, "look_at")?;
+    let turn = turntable(&mut table, moment, look_at)?;
+    let (position, look_at) = (turn.place(position), turn.place(look_at));
     let up = optional(&mut table, "up", Value::vector, Vec3::Y)?;
     let fov = table.require("fov")?;
-    let fov = fov.float_where("an angle in degrees between 0 and 180", |v| {
-        v > 0.0 && v < 180.0
-    })?;
+    let angle = |v: &Value| {
+        let expected = "an angle in degrees between 0 and 180";
+        v.float_where(expected, |v| v > 0.0 && v < 180.0)
+    };
+    let mix = |a: &f32, b: &f32, t: f64| (f64::from(*a) * (1.0 - t) + f64::from(*b) * t) as f32;
+    let fov = moment.keyed(&mut keys, "fov", angle, mix, angle(&fov)?)?;
     let aperture = |v: &Value| v.float_where("a diameter, 0 or more", |v| v >= 0.0);
-    let aperture = optional(&mut table, "aperture", aperture, 0.0)?;
+    let given = optional(&mut table, "aperture", aperture, 0.0)?;
+    let aperture = moment.keyed(&mut keys, "aperture", aperture, mix, given)?;
     let focus = |v: &Value| v.float_where("a distance above 0", |v| v > 0.0);
     let distance = position.distance(look_at) as f32;
-    let focus = optional(&mut table, "focus", focus, distance)?;
+    let given = optional(&mut table, "focus", focus, distance)?;
+    let focus = moment.keyed(&mut keys, "focus", focus, mix, given)?;
+    keys.map_or(Ok(()), Table::finish)?;
     let media = table.get("medium").map(|v| camera_media(&v)).transpose()?;
     let spec = CameraSpec {
         camera: Camera {
@@ -269,6 +343,7 @@ fn integrator(root: &mut Table) -> Result<Integrator, SceneError> {
 fn geometry<'f>(
     root: &mut Table,
     formats: &'f [Format],
+    moment: Moment,
 ) -> Result<Vec<GeometrySpec<'f>>, SceneError> {
     let Some(value) = root.get("geometry") else {
         return Ok(Vec::new());
@@ -284,9 +359,9 @@ fn geometry<'f>(
             file,
             format,
             uv1: second_uvs(&mut table, formats)?,
-            transform: placements::transform(&mut table)?,
+            transform: placements::transform(&mut table, moment)?,
             material: optional(&mut table, "material", named, None)?,
-            places: placements::places(&mut table)?,
+            places: placements::places(&mut table, moment)?,
             share: optional(&mut table, "share", |v| v.boolean().map(Some), None)?,
         };
         table.finish()?;
@@ -340,18 +415,27 @@ fn unreadable(value: &Value, name: &str, formats: &[Format]) -> SceneError {
         ))
 }
 
-fn materials(root: &mut Table, formats: &[Format]) -> Result<Vec<MaterialSpec>, SceneError> {
+fn materials(
+    root: &mut Table,
+    formats: &[Format],
+    moment: Moment,
+) -> Result<Vec<MaterialSpec>, SceneError> {
     let Some(value) = root.get("materials") else {
         return Ok(Vec::new());
     };
     let table = value.table("[materials]")?;
     let entries = table.named().into_iter();
     entries
-        .map(|(name, value)| material(name, &value, formats))
+        .map(|(name, value)| material(name, &value, formats, moment))
         .collect()
 }
 
-fn material(name: &str, value: &Value, formats: &[Format]) -> Result<MaterialSpec, SceneError> {
+fn material(
+    name: &str,
+    value: &Value,
+    formats: &[Format],
+    moment: Moment,
+) -> Result<MaterialSpec, SceneError> {
     let title = format!("[materials.{name:?}]");
     let mut table = value.table(&title)?;
     let file = table.require("file")?.string()?.to_owned();
@@ -365,12 +449,20 @@ fn material(name: &str, value: &Value, formats: &[Format]) -> Result<MaterialSpe
             params.push((key.to_owned(), param(&value, formats)?));
         }
     }
+    let keys = Moment::keys(&mut table, &title)?;
+    let has_keys = keys.is_some();
+    for (key, value) in keys.map(|keys| keys.named()).unwrap_or_default() {
+        let given = keyed_param(&value, formats, moment)?;
+        params.retain(|(name, _)| name != key);
+        params.push((key.to_owned(), ParamSpec::Given(given)));
+    }
     table.finish()?;
     Ok(MaterialSpec {
         name: name.to_owned(),
         file,
         material: item.transpose()?,
         params,
+        has_keys,
         bake,
         group,
     })
@@ -388,6 +480,25 @@ fn group(table: &mut Table) -> Result<Option<String>, SceneError> {
         }
     };
     optional(table, "group", name, None)
+}
+
+/// The value of a parameter with keys.
+fn keyed_param(
+    value: &Value,
+    formats: &[Format],
+    moment: Moment,
+) -> Result<ParameterValue, SceneError> {
+    let read = |item: &Value| match param(item, formats)? {
+        ParamSpec::Given(given) => Ok(given),
+        ParamSpec::OfFile(_) => Err(item.mismatch("a value that does not come from a file")),
+    };
+    moment.of_keys(value, read, |a, b, t| {
+        mix_values(a, b, t).ok_or_else(|| {
+            let message = format!("there is nothing between `{a}` and `{b}`");
+            let hint = "keys are numbers, arrays of as many numbers, or constant expressions";
+            value.error(message).hint(hint)
+        })
+    })
 }
 
 /// A parameter's value, or where it comes from.

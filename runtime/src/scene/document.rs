@@ -171,6 +171,16 @@ impl<'d> Value<'d> {
         self.item.get_ref()
     }
 
+    /// The items of a list.
+    pub(super) fn items(&self) -> Option<Vec<Value<'d>>> {
+        let item = |item: &'d Spanned<DeValue<'d>>| Value {
+            document: self.document,
+            name: format!("a part of {}", self.name),
+            item,
+        };
+        Some(self.item().as_array()?.iter().map(item).collect())
+    }
+
     pub(crate) fn string(&self) -> Result<&'d str, SceneError> {
         let text = self.item().as_str();
         text.ok_or_else(|| self.mismatch("a string in quotes"))

@@ -1,11 +1,14 @@
 //! From a scene file to a [`Scene`].
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use glam::Vec3;
+use impasto_compiler::ParameterValue;
 use rayon::prelude::*;
 
+use super::animation::Animation;
 use super::assemble::assemble;
 use super::description::{
     Description, EnvironmentSpec, EnvironmentSpecSource, GeometrySpec, SourceName,
@@ -32,39 +35,165 @@ pub fn load_with(
     formats: &[Format],
     lights: &[LightReader],
 ) -> Result<Scene, SceneError> {
-    let text = input::read(path)
-        .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
-    let text = String::from_utf8(text)
-        .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
-    let description = Description::read(&Document::new(path, &text), formats, lights)?;
-    let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    let mut warnings = Vec::new();
-    let sources = load_sources(&base, &description.geometry)?;
-    let assembled = assemble(path, formats, &description, &sources, &mut warnings)?;
-    drop(sources);
-    let environment = description.environment.as_ref();
-    let environment = environment
-        .map(|e| load_environment(e, &base, &mut warnings))
-        .transpose()?;
-    Ok(Scene {
-        name: description.name.unwrap_or_else(|| default_name(path)),
-        base,
-        origin: assembled.origin,
-        camera: description.camera.seen_from(assembled.origin),
-        camera_media: assembled.camera_media,
-        film: description.film,
-        integrator: description.integrator,
-        mesh: assembled.mesh,
-        objects: assembled.objects,
-        placements: assembled.placements,
-        places: assembled.places,
-        object_places: assembled.object_places,
-        materials: assembled.materials,
-        lights: assembled.lights,
-        environment,
-        labels: assembled.labels,
-        warnings,
-    })
+    SceneFile::read_with(path, formats, lights)?.into_scene()
+}
+
+/// What is asked of a scene file beside what it says.
+#[derive(Clone, Debug, Default)]
+pub struct Asked {
+    /// Parameters of bindings.
+    pub given: Vec<GivenParam>,
+    /// The frame, in which keys and turntables put things somewhere; 0 where the file itself has them.
+    pub frame: f64,
+}
+
+/// A value for a parameter of a binding, in place of what the file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenParam {
+    /// The binding's name.
+    pub binding: String,
+    /// The parameter's name.
+    pub param: String,
+    /// The value.
+    pub value: ParameterValue,
+    /// Who gives it, for messages: `--param wall.roughness`.
+    pub origin: String,
+}
+
+/// A scene file that was read, with the geometry and the environment that it names: scenes can be made of it at any
+/// frame and with other values of parameters.
+pub struct SceneFile<'f> {
+    path: PathBuf,
+    text: String,
+    formats: &'f [Format],
+    lights: Vec<LightReader>,
+    sources: BTreeMap<SourceName, Source<'f>>,
+    environment: Option<Environment>,
+    warnings: Vec<String>,
+    files: Vec<PathBuf>,
+    animation: Animation,
+}
+
+impl<'f> SceneFile<'f> {
+    /// Reads the file at `path` and what it names. Its geometry is of some of the `formats`, and the kinds of its
+    /// lights are those that `lights` read.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn read_with(
+        path: &Path,
+        formats: &'f [Format],
+        lights: &[LightReader],
+    ) -> Result<Self, SceneError> {
+        let text = input::read(path)
+            .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
+        let text = String::from_utf8(text)
+            .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
+        Self::of_text(path, text, formats, lights)
+    }
+
+    /// The same of a text that messages call `path`, and whose own paths are relative to its folder.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn of_text(
+        path: &Path,
+        text: String,
+        formats: &'f [Format],
+        lights: &[LightReader],
+    ) -> Result<Self, SceneError> {
+        let frame = Asked::default().frame;
+        let description = Description::read(&Document::new(path, &text), formats, lights, frame)?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        let sources = load_sources(base, &description.geometry)?;
+        let mut warnings = Vec::new();
+        let environment = description.environment.as_ref();
+        let environment = environment
+            .map(|e| load_environment(e, base, &mut warnings))
+            .transpose()?;
+        let mut files = vec![path.to_owned()];
+        files.extend(description.files(base));
+        let libraries = sources.values().flat_map(|s| &s.geometry.libraries);
+        files.extend(libraries.cloned());
+        Ok(Self {
+            path: path.to_owned(),
+            formats,
+            lights: lights.to_vec(),
+            sources,
+            environment,
+            warnings,
+            files,
+            animation: description.animation,
+            text,
+        })
+    }
+
+    /// Every file that was read: the scene, geometry and its libraries of materials, places and environment.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// What it says of time.
+    pub fn animation(&self) -> Animation {
+        self.animation
+    }
+
+    /// The scene as it is asked for.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn scene(&self, asked: &Asked) -> Result<Scene, SceneError> {
+        self.assembled(asked, self.environment.clone())
+    }
+
+    /// The scene as the file says, which nobody asks again.
+    fn into_scene(mut self) -> Result<Scene, SceneError> {
+        let environment = self.environment.take();
+        self.assembled(&Asked::default(), environment)
+    }
+
+    fn assembled(
+        &self,
+        asked: &Asked,
+        environment: Option<Environment>,
+    ) -> Result<Scene, SceneError> {
+        let path = &self.path;
+        let document = Document::new(path, &self.text);
+        let mut description =
+            Description::read(&document, self.formats, &self.lights, asked.frame)?;
+        description.give(&asked.given)?;
+        let mut warnings = Vec::new();
+        let formats = self.formats;
+        let assembled = assemble(path, formats, &description, &self.sources, &mut warnings)?;
+        warnings.extend(self.warnings.iter().cloned());
+        Ok(Scene {
+            name: description.name.unwrap_or_else(|| default_name(path)),
+            base: path.parent().unwrap_or(Path::new("")).to_path_buf(),
+            origin: assembled.origin,
+            camera: description.camera.seen_from(assembled.origin),
+            camera_media: assembled.camera_media,
+            film: description.film,
+            integrator: description.integrator,
+            mesh: assembled.mesh,
+            objects: assembled.objects,
+            placements: assembled.placements,
+            places: assembled.places,
+            object_places: assembled.object_places,
+            materials: assembled.materials,
+            lights: assembled.lights,
+            environment,
+            labels: assembled.labels,
+            warnings,
+        })
+    }
+}
+
+impl fmt::Debug for SceneFile<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SceneFile")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
 }
 
 /// The folder of `examples/kitchen/scene.toml`; the file's own name where there is no folder.

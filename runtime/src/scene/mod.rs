@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use impasto_compiler::ParameterValue;
 
+mod animation;
 mod assemble;
 mod bindings;
 mod bound;
@@ -24,12 +25,13 @@ mod origin;
 mod placements;
 mod transform;
 
+pub use animation::{Animation, MAX_FRAME};
 pub(crate) use description::optional;
 pub(crate) use document::{Table, Value};
 pub use labels::Labels;
 pub(crate) use lights::ReadLight;
 pub use lights::{Light, LightReader, SceneLight};
-pub use load::load_with;
+pub use load::{Asked, GivenParam, SceneFile, load_with};
 pub(crate) use mesh::{MAX_TRIANGLES, has_area};
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use transform::Transform;
@@ -159,6 +161,8 @@ pub struct MaterialBinding {
     pub params: Vec<(String, ParameterValue)>,
     /// Is it compiled to code of its own, with its parameters as constants?
     pub bake: bool,
+    /// Do keys give some parameters, so that their values differ from frame to frame?
+    pub has_keys: bool,
 }
 
 /// Radiance that comes from infinitely far away in all directions.

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use toml::de::DeValue;
 
 use super::Transform;
+use super::animation::{Moment, mix_places, turntable};
 use super::description::MaterialName;
 use super::document::{Table, Value, list};
 use crate::error::SceneError;
@@ -69,12 +70,13 @@ impl Places {
 }
 
 /// The transform that a table's keys describe.
-pub(super) fn transform(table: &mut Table) -> Result<Transform, SceneError> {
+pub(super) fn transform(table: &mut Table, moment: Moment) -> Result<Transform, SceneError> {
     let matrix = table.get("matrix");
     let parts = ["scale", "rotate", "translate"].map(|key| table.get(key));
     let [scale_value, rotate_value, translate_value] = &parts;
+    let mut keys = Moment::keys(table, "a placed object")?;
     let transform = match &matrix {
-        Some(_) if parts.iter().any(Option::is_some) => {
+        Some(_) if keys.is_some() || parts.iter().any(Option::is_some) => {
             let error = table.error("`matrix` leaves no room for `scale`, `rotate` or `translate`");
             return Err(error.hint("write either the matrix or its parts"));
         }
@@ -87,11 +89,21 @@ pub(super) fn transform(table: &mut Table) -> Result<Transform, SceneError> {
                     .as_ref()
                     .map_or(Ok(DVec3::ZERO), |value| value.place())
             };
-            let scale = scale_value.as_ref().map_or(Ok(Vec3::ONE), scale)?;
-            let rotate = vector(rotate_value)?.as_vec3();
-            Transform::new(scale, rotate, Vec3::ZERO).moved(vector(translate_value)?)
+            let given = scale_value.as_ref().map_or(Ok(Vec3::ONE), scale)?;
+            let mix = |a: &Vec3, b: &Vec3, t: f64| a.lerp(*b, t as f32);
+            let scale = moment.keyed(&mut keys, "scale", scale, mix, given)?;
+            let mut keyed = |name, value| {
+                let given = vector(value)?;
+                moment.keyed(&mut keys, name, Value::place, mix_places, given)
+            };
+            let rotate = keyed("rotate", rotate_value)?.as_vec3();
+            let translate = keyed("translate", translate_value)?;
+            Transform::new(scale, rotate, Vec3::ZERO).moved(translate)
         }
     };
+    keys.map_or(Ok(()), Table::finish)?;
+    let turn = turntable(table, moment, transform.translation)?;
+    let transform = transform.then(&turn);
     if transform.is_invertible() {
         return Ok(transform);
     }
@@ -113,7 +125,7 @@ fn scale(value: &Value) -> Result<Vec3, SceneError> {
 }
 
 /// The `placements` of an entry: a list, or the name of a file.
-pub(super) fn places(table: &mut Table) -> Result<PlacesSpec, SceneError> {
+pub(super) fn places(table: &mut Table, moment: Moment) -> Result<PlacesSpec, SceneError> {
     let Some(value) = table.get("placements") else {
         return Ok(PlacesSpec::Listed(Places::here()));
     };
@@ -123,7 +135,7 @@ pub(super) fn places(table: &mut Table) -> Result<PlacesSpec, SceneError> {
     let expected = "a list of tables, or the name of a file";
     let mut places = Places::default();
     for mut table in value.list_of_tables("a placement", expected)? {
-        let transform = transform(&mut table)?;
+        let transform = transform(&mut table, moment)?;
         let material = match table.get("material") {
             Some(value) => Some(places.material(value.string()?, |m| value.error(m))),
             None => None,

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::lights::{LIGHT_KINDS, readers};
 use crate::error::SceneError;
-use crate::scene::formats::FORMATS;
-use crate::scene::{Scene, load_with};
+use crate::scene::formats::{FORMATS, Format};
+use crate::scene::{Scene, SceneFile, load_with};
 
 /// [`load_with`] every format of geometry and every kind of light.
 ///
@@ -13,6 +13,27 @@ use crate::scene::{Scene, load_with};
 /// The first thing that is wrong, with its place.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     load_with(path, FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
+}
+
+/// Reads a scene file with every format of geometry and every kind of light, for scenes at any frame and with other
+/// values of parameters.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn open(path: &Path) -> Result<SceneFile<'static>, SceneError> {
+    SceneFile::read_with(path, FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
+}
+
+/// The same of the text of a scene, whose geometry is of the `formats`.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn open_text<'f>(
+    path: &Path,
+    text: String,
+    formats: &'f [Format],
+) -> Result<SceneFile<'f>, SceneError> {
+    SceneFile::of_text(path, text, formats, &readers(LIGHT_KINDS))
 }
 
 /// The folder of an example whose files are too large to be kept with it.

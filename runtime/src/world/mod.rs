@@ -19,7 +19,7 @@ mod split;
 pub mod surface;
 pub mod texture;
 
-pub use load::load;
+pub use load::{load, open, open_text};
 pub use parts::{KernelParts, SceneParts};
 pub use placed::Placed;
 pub use split::{GeometryCounts, Split};
@@ -32,6 +32,7 @@ use crate::error::SceneError;
 use crate::film::layers::Layers;
 use crate::scene::Scene;
 use crate::technique::Technique;
+use crate::world::bvh::Trees;
 use crate::world::camera::CameraFrame;
 use crate::world::needs::{Decision, NeedInputs, Needs, OutputTraits};
 use crate::world::outputs::Recorded;
@@ -79,9 +80,33 @@ impl World {
         outputs: &[String],
     ) -> Result<Self, SceneError> {
         let instances = MaterialSource::instances(program);
-        let layers = outputs::layers(outputs, scene, &instances, program.has_looks())?;
+        Self::of_instances(
+            scene,
+            program,
+            &instances,
+            technique,
+            outputs,
+            &Trees::default(),
+        )
+    }
+
+    /// The same where the scene's bindings compiled to `instances` of the program's materials, and `trees` may be
+    /// there already.
+    ///
+    /// # Errors
+    /// If the scene has what cannot be rendered, or an output cannot be had of it.
+    pub fn of_instances(
+        scene: &Scene,
+        program: &Program,
+        instances: &[InstanceInfo],
+        technique: &Technique,
+        outputs: &[String],
+        trees: &Trees,
+    ) -> Result<Self, SceneError> {
+        let layers = outputs::layers(outputs, scene, instances, program.has_looks())?;
         let (infos, textures) = (program.infos(), program.textures());
-        Self::recording(scene, &infos, &instances, &textures, technique, layers)
+        let compiled = (&infos[..], instances, &textures[..]);
+        Self::recording(scene, compiled, technique, layers, trees)
     }
 
     /// The plan that gives a kernel to each of `materials` that is on some surface.
@@ -100,20 +125,19 @@ impl World {
         technique: &Technique,
     ) -> Result<Self, SceneError> {
         let none = Layers::default();
-        Self::recording(scene, materials, instances, textures, technique, none)
+        let compiled = (materials, instances, textures);
+        Self::recording(scene, compiled, technique, none, &Trees::default())
     }
 
     fn recording(
         scene: &Scene,
-        materials: &[MaterialInfo],
-        instances: &[InstanceInfo],
-        textures: &[TextureRef],
+        compiled: (&[MaterialInfo], &[InstanceInfo], &[TextureRef]),
         technique: &Technique,
         layers: Layers,
+        trees: &Trees,
     ) -> Result<Self, SceneError> {
-        lights::check(scene, instances)?;
-        let inputs = (materials, instances, textures);
-        let (parts, outputs) = SceneParts::recording(scene, inputs, technique, layers)?;
+        lights::check(scene, compiled.1)?;
+        let (parts, outputs) = SceneParts::recording(scene, compiled, technique, layers, trees)?;
         let (width, height) = (scene.film.width, scene.film.height);
         Ok(Self {
             width,

@@ -21,7 +21,7 @@ use crate::film::outputs::Ask;
 use crate::scene::Scene;
 use crate::technique::{Stack, Technique};
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::bvh::Bvh;
+use crate::world::bvh::Trees;
 use crate::world::lights::{Kinds, Lights};
 use crate::world::media::{self, Media};
 use crate::world::needs::{Need, Needs};
@@ -84,16 +84,23 @@ impl SceneParts {
         technique: &Technique,
     ) -> Result<SceneParts, SceneError> {
         let inputs = (materials, instances, textures);
-        let (parts, _) = Self::recording(scene, inputs, technique, Layers::default())?;
+        let (parts, _) = Self::recording(
+            scene,
+            inputs,
+            technique,
+            Layers::default(),
+            &Trees::default(),
+        )?;
         Ok(parts)
     }
 
-    /// The same for a film with some outputs, and what these look up.
+    /// The same for a film with some outputs, and what these look up; `trees` may be there already.
     pub(crate) fn recording(
         scene: &Scene,
         (materials, instances, textures): (&[MaterialInfo], &[InstanceInfo], &[TextureRef]),
         technique: &Technique,
         layers: Layers,
+        trees: &Trees,
     ) -> Result<(SceneParts, Recorded), SceneError> {
         let texture = texture::part(textures, &scene.base)?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
@@ -107,7 +114,7 @@ impl SceneParts {
         };
         let (geometry, bvh, corners, lights, objects) = if split.placements.is_empty() {
             let mesh = &*split.world;
-            let bvh = Bvh::build(mesh, technique.traversal);
+            let bvh = trees.over(mesh, technique.traversal);
             let lights = lights(bvh.order());
             let of_triangle = lights.of_triangle(mesh.len());
             (
@@ -124,7 +131,7 @@ impl SceneParts {
             )
         } else {
             check_stack(technique.stack)?;
-            let placed = Placed::build(&split, instances.len(), technique.traversal)?;
+            let placed = Placed::build(&split, instances.len(), technique.traversal, trees)?;
             let lights = lights(placed.world_order());
             let of_triangle = lights.of_triangle(split.world.len());
             (

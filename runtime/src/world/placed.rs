@@ -14,7 +14,7 @@ use crate::scene::{Mesh, NO_MATERIAL, Placement, Scene, Transform};
 use crate::technique::Traversal;
 use crate::wgsl;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::bvh::{Levels, ObjectTree};
+use crate::world::bvh::{Levels, ObjectTree, Trees};
 use crate::world::lights::NO_LIGHT;
 
 /// The largest number that may stand for a primitive, and the one that leaves room for
@@ -41,6 +41,7 @@ impl<'s> Placed<'s> {
         split: &'s Split,
         materials: usize,
         traversal: Traversal,
+        trees: &Trees,
     ) -> Result<Placed<'s>, SceneError> {
         let has_world = !split.world.is_empty();
         let world = has_world.then_some(&*split.world).into_iter();
@@ -68,7 +69,7 @@ impl<'s> Placed<'s> {
             .map(|p| (p.object as usize, p.transform))
             .collect();
         Ok(Placed {
-            levels: Levels::build(&meshes, &places, traversal),
+            levels: Levels::build(&meshes, &places, traversal, trees),
             meshes,
             placements,
             blocks,

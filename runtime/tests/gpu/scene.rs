@@ -109,6 +109,7 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
         .unwrap_or_else(|e| panic!("{e}"));
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
         apart: false,
+        moment: None,
         name: binding.name.clone(),
         file: binding.file.clone(),
         material: binding.material.clone(),

@@ -8,7 +8,7 @@ use impasto_cpu::interpret::{Host, Machine};
 use impasto_runtime::scene::{Mesh, Placement, Transform};
 use impasto_runtime::technique::{Technique, Traversal};
 use impasto_runtime::wgsl::ShaderPart;
-use impasto_runtime::world::bvh::{Bvh, Caster, Hit};
+use impasto_runtime::world::bvh::{Bvh, Caster, Hit, Trees};
 use impasto_runtime::world::surface::geometry_part;
 use impasto_runtime::world::{Placed, Split};
 
@@ -93,7 +93,7 @@ fn two_levels(random: &mut Random) -> [ShaderPart; 2] {
         placements: (0..14).map(|index| placement(index, random)).collect(),
         first_objects: vec![0; 14],
     };
-    let placed = Placed::build(&split, 1, Traversal::Cwbvh).expect("it fits");
+    let placed = Placed::build(&split, 1, Traversal::Cwbvh, &Trees::default()).expect("it fits");
     let geometry = placed.geometry_part(&[u32::MAX; 12], &[0]);
     [geometry, placed.levels().part(&Technique::default())]
 }

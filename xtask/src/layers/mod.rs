@@ -38,7 +38,14 @@ const CRATES: &[Crate] = &[
         name: "impasto-compiler",
         folder: "compiler/src",
         layers: &[
-            &["abi", "parameter_value", "random", "source", "stages"],
+            &[
+                "abi",
+                "moment",
+                "parameter_value",
+                "random",
+                "source",
+                "stages",
+            ],
             &["ast", "diag", "ir"],
             &["closure", "lexer", "loader", "parameters"],
             &["parser", "passes", "program"],
@@ -100,9 +107,10 @@ const CRATES: &[Crate] = &[
         name: "impasto",
         folder: "src",
         layers: &[
+            &["set"],
             &["error", "files", "ir_text", "cost", "plot", "docs", "trace"],
             &["driver", "plan", "starter"],
-            &["converge", "measure"],
+            &["converge", "measure", "shot"],
             &["calibrate"],
             &["cli"],
         ],

@@ -73,7 +73,7 @@ fn with_value(mut f: Function, name: String, span: Span) -> Function {
 }
 
 impl Body<'_> {
-    /// `uniform $0 name: type as surface_type = default in low .. high`
+    /// `uniform $0 name: type as surface_type = default in low .. high input`, the last three words only where they are so
     fn uniform(&mut self, next: usize) -> Result<MaterialParam> {
         self.p.next();
         let start = self.p.here();
@@ -102,6 +102,7 @@ impl Body<'_> {
             ty: local.ty,
             default,
             range,
+            is_input: self.p.eat_word("input"),
             span: self.p.since(start),
         })
     }

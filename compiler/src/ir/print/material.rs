@@ -42,7 +42,7 @@ pub(super) fn named(names: &Names<'_>, m: &Material) -> String {
     out
 }
 
-/// `scale: float as length = 0.1 in 0.0 .. 1.0`
+/// `scale: float as length = 0.1 in 0.0 .. 1.0`, `time: float = 0.0 input`
 fn uniform(names: &Names<'_>, p: &MaterialParam) -> String {
     let ty = names.ty(p.ty);
     let surface = if p.surface_type == ty {
@@ -54,7 +54,8 @@ fn uniform(names: &Names<'_>, p: &MaterialParam) -> String {
         format!(" in {low:?} .. {high:?}")
     });
     let default = constant(&p.default);
-    format!("{}: {ty}{surface} = {default}{range}", p.name)
+    let input = if p.is_input { " input" } else { "" };
+    format!("{}: {ty}{surface} = {default}{range}{input}", p.name)
 }
 
 struct Tree<'a> {

@@ -4,7 +4,7 @@
 //! nothing else in the crate knows which format that came from. CONTRIBUTING.md has an example.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec2, Vec3};
 use impasto_compiler::ParameterValue;
@@ -68,6 +68,8 @@ pub struct Geometry {
     pub missing: Option<SceneError>,
     /// Oddities that do not keep it from being rendered.
     pub warnings: Vec<Warning>,
+    /// Files of materials that belong to it, whether they are there or not.
+    pub libraries: Vec<PathBuf>,
 }
 
 /// A triangle as a file has it.

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3, Vec3};
 use impasto_compiler::ParameterValue;
@@ -63,6 +63,7 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         materials: scan.materials.into_iter().map(of_faces).collect(),
         parts: scan.parts,
         missing: library.missing,
+        libraries: library.files,
         warnings: [
             counted(
                 "faces of fewer than three corners, left out",
@@ -108,6 +109,8 @@ struct Library {
     materials: HashMap<String, Vec<(&'static str, ParameterValue)>>,
     /// The first MTL file that could not be read.
     missing: Option<SceneError>,
+    /// All of them.
+    files: Vec<PathBuf>,
 }
 
 impl Library {
@@ -121,6 +124,7 @@ impl Library {
             let is_one = base.join(folder).join(line).exists();
             let several: Vec<&str> = line.split_whitespace().collect();
             for file in if is_one { &whole[..] } else { &several[..] } {
+                library.files.push(base.join(folder).join(file));
                 match mtl::load(base, &folder.join(file)) {
                     Ok(materials) => {
                         let named = materials.into_iter().map(|m| (m.name, m.values));

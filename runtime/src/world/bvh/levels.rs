@@ -3,11 +3,13 @@
 //! The nodes of all lie in one buffer, and the triangles of all objects in one list, so that
 //! `placed.wgsl` goes from one tree to the other by a reference to its root.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
-use super::{Bvh, bounds, tree_over};
+use super::{Bvh, Trees, bounds, tree_over};
 use crate::scene::{Mesh, Transform};
 use crate::technique::{Technique, Traversal};
 use crate::wgsl::ShaderPart;
@@ -40,15 +42,16 @@ pub struct ObjectTree {
 
 impl Levels {
     /// Builds the trees that `traversal` names over `objects`, none of them empty, and over their
-    /// placements: each the index of an object, and where it is.
+    /// placements: each the index of an object, and where it is. Trees over objects may be kept.
     pub fn build(
         objects: &[&Mesh],
         placements: &[(usize, Transform)],
         traversal: Traversal,
+        trees: &Trees,
     ) -> Levels {
-        let trees: Vec<Bvh> = objects
+        let trees: Vec<Arc<Bvh>> = objects
             .par_iter()
-            .map(|mesh| Bvh::build(mesh, traversal))
+            .map(|mesh| trees.over(mesh, traversal))
             .collect();
         let hulls: Vec<Vec<Aabb>> = objects
             .par_iter()
@@ -61,12 +64,13 @@ impl Levels {
             .collect();
         // A placement is much to enter for a box that holds three of them.
         let mut upper = tree_over(&boxes, traversal, 1);
-        let below = trees.iter().map(Bvh::depth).max().unwrap_or(0);
+        let below = trees.iter().map(|tree| tree.depth()).max().unwrap_or(0);
         upper.depth += below;
         let mut first_triangle = 0;
         let objects = trees
             .into_iter()
-            .map(|mut tree| {
+            .map(|tree| {
+                let mut tree = Arc::unwrap_or_clone(tree);
                 let root = upper.append(&mut tree, first_triangle);
                 let first = first_triangle;
                 first_triangle += tree.order.len() as u32;

@@ -7,6 +7,7 @@
 mod binary;
 mod build;
 mod cluster;
+mod kept;
 mod levels;
 mod native;
 mod reinsert;
@@ -21,6 +22,7 @@ use crate::technique::{Stack, Technique, Traversal};
 use crate::wgsl::{BufferData, ShaderPart};
 
 pub(crate) use build::binary_tree;
+pub use kept::Trees;
 pub use levels::{Levels, ObjectTree};
 pub use native::{Caster, Hit, Instructions, NO_PRIMITIVE, Rays};
 pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};

@@ -1,0 +1,478 @@
+//! What `render` is asked for beside one picture of a scene: material files on sets, values of parameters, sweeps,
+//! frames, and pictures at each save.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use impasto::compiler::Program;
+use impasto::runtime::options::Progress;
+use impasto::runtime::scene::{Asked, FilmSettings};
+use impasto::set::{Sample, Set};
+use impasto::shot::frames::Frames;
+use impasto::shot::param::{self, ParamOption};
+use impasto::shot::sweep::{self, Axis, Sweep};
+use impasto::shot::watch::{EVERY, Watched};
+use impasto::shot::{self, Studio, Subject};
+use impasto::{FileLoader, MaterialRequest, Rendering, Scene, files, requests};
+
+use super::outputs::Outputs;
+use super::render::{self, RenderArgs, progress_bar};
+use super::{Failure, Global, Outcome, interrupt};
+
+#[derive(Args)]
+pub(super) struct ShotArgs {
+    /// What a material file is put on; a ball by default
+    #[arg(long, value_enum, value_name = "SET")]
+    on: Option<On>,
+    /// Which material of the file, if it defines several
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    /// Give a parameter a value, as scenes take it: `roughness=0.2`, or of a scene's binding
+    /// `wall.roughness=0.2`. FROM:TO:COUNT or A,B,C is a sweep: a contact sheet, with a second sweep a grid
+    #[arg(long = "param", value_name = "NAME=VALUE", value_parser = param::parse)]
+    params: Vec<ParamOption>,
+    /// Render frames, as in `1-120`, `5` or `1-120x2`, to numbered files
+    #[arg(long, value_name = "FRAMES", value_parser = Frames::parse)]
+    frames: Option<Frames>,
+    /// Turn what a material file is put on once in so many frames; renders these unless `--frames` says which
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    turntable: Option<u32>,
+    /// Leave out frames whose picture is there
+    #[arg(long)]
+    skip_existing: bool,
+    /// Render again at each save of a file that the picture is made from, until Ctrl-C
+    #[arg(long, conflicts_with_all = ["frames", "turntable", "checkpoint", "until", "report"])]
+    watch: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum On {
+    /// A shader ball of 10 cm with a groove, an edge and a cup
+    Ball,
+    /// A cloth with folds
+    Cloth,
+    /// A board of 20 cm
+    Plane,
+}
+
+impl From<On> for Set {
+    fn from(on: On) -> Set {
+        match on {
+            On::Ball => Set::Ball,
+            On::Cloth => Set::Cloth,
+            On::Plane => Set::Plane,
+        }
+    }
+}
+
+/// What is rendered, and with which values.
+pub(super) struct Shot {
+    pub(super) subject: Subject,
+    pub(super) asked: Asked,
+    axes: Vec<Axis>,
+}
+
+impl RenderArgs {
+    /// The picture's file.
+    pub(super) fn out(&self) -> PathBuf {
+        let default = || shot::default_out(&self.scene);
+        self.out.clone().unwrap_or_else(default)
+    }
+
+    /// Reads what is to be rendered, and gives parameters their values.
+    pub(super) fn shot(&self) -> Result<Shot, Failure> {
+        let args = &self.shot;
+        let error = |e: impasto::SceneError| Failure::Error(e.to_string());
+        let subject = if shot::is_material(&self.scene) {
+            let sample = Sample {
+                file: self.scene.to_string_lossy().into_owned(),
+                material: args.material.clone(),
+                turntable: args.turntable,
+            };
+            Subject::on(args.on.map_or(Set::default(), Set::from), &sample)
+        } else {
+            args.check_scene()?;
+            Subject::of_scene(&self.scene)
+        };
+        let subject = subject.map_err(error)?;
+        let mut asked = Asked::default();
+        let mut axes = Vec::new();
+        if !args.params.is_empty() {
+            let scene = subject.scene(&asked).map_err(error)?;
+            let bindings: Vec<String> = scene.materials.into_iter().map(|b| b.name).collect();
+            (asked.given, axes) = param::given(&args.params, &subject, &bindings)?;
+        }
+        Ok(Shot {
+            subject,
+            asked,
+            axes,
+        })
+    }
+
+    /// The scene of one picture, at the size that was asked for.
+    pub(super) fn scene_of(&self, subject: &Subject, asked: &Asked) -> Result<Scene, Failure> {
+        let scene = subject.scene(asked);
+        let mut scene = scene.map_err(|e| Failure::Error(e.to_string()))?;
+        if let Some((width, height)) = self.size {
+            scene.film = FilmSettings { width, height };
+        }
+        Ok(scene)
+    }
+
+    /// Is a sweep, are frames or pictures at each save asked for?
+    pub(super) fn is_many(&self) -> bool {
+        let args = &self.shot;
+        let sweeps = args.params.iter().any(|p| p.values.len() > 1);
+        sweeps || args.watch || args.all_frames().is_some()
+    }
+}
+
+impl ShotArgs {
+    /// Does it ask for nothing but the scene as it is?
+    pub(super) fn is_plain(&self) -> bool {
+        self.on.is_none() && self.params.is_empty()
+    }
+
+    fn all_frames(&self) -> Option<Frames> {
+        self.frames.or(self.turntable.map(Frames::up_to))
+    }
+
+    /// Fails if something is asked for that only material files have.
+    fn check_scene(&self) -> Result<(), Failure> {
+        let given = [
+            ("--on", self.on.is_some()),
+            ("--material", self.material.is_some()),
+            ("--turntable", self.turntable.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => Err(Failure::Error(format!(
+                "`{option}` is for material files (`impasto render brick.impasto`), and this is a scene"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Renders more than one picture.
+pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
+    if let Some(frames) = args.shot.all_frames() {
+        return render_frames(args, frames, global);
+    }
+    if args.shot.watch {
+        return watch(args, global);
+    }
+    let outputs = sheet_outputs(args)?;
+    let device = args.device.open(global)?;
+    let stop = || interrupt::requested();
+    let made = Making {
+        args,
+        studio: &Studio::new(&device),
+        global,
+        stop: &stop,
+    };
+    let begin = Instant::now();
+    made.sheet(&args.shot()?, &outputs, &mut Vec::new())?;
+    note_written(&outputs, begin, global);
+    Ok(())
+}
+
+fn note_written(outputs: &Outputs, begin: Instant, global: &Global) {
+    let seconds = begin.elapsed().as_secs_f64();
+    global.note(&format!("wrote {} ({seconds:.2} s)", outputs.names()));
+}
+
+/// Where a sheet goes. What only one picture can have is refused.
+fn sheet_outputs(args: &RenderArgs) -> Result<Outputs, Failure> {
+    let outputs = Outputs::of(&args.out())?;
+    let refused = [
+        ("--aov", !args.aov.is_empty()),
+        ("--report", args.report.is_some()),
+        ("--until", args.until.is_given()),
+        ("--checkpoint", args.checkpoint.is_given()),
+        ("a .film file", outputs.is_film()),
+    ];
+    match refused.into_iter().find(|(_, is_there)| *is_there) {
+        Some((what, _)) => Err(Failure::Error(format!(
+            "a sheet of several pictures has no place for {what}"
+        ))),
+        None => Ok(outputs),
+    }
+}
+
+/// Makes pictures on one device.
+struct Making<'a> {
+    args: &'a RenderArgs,
+    studio: &'a Studio<'a>,
+    global: &'a Global,
+    /// Does nobody wait for the picture any more?
+    stop: &'a dyn Fn() -> bool,
+}
+
+impl Making<'_> {
+    /// The samples of one picture, or nothing if it was stopped before all were taken.
+    fn rendering(
+        &self,
+        scene: &Scene,
+        program: &Program,
+        first: usize,
+        message: &str,
+    ) -> Result<Rendering, Failure> {
+        let options = self.args.options(false, false);
+        let renderer = self.studio.renderer(scene, program, first, &options);
+        let mut renderer = renderer.map_err(super::runtime)?;
+        let bar = progress_bar(self.global);
+        bar.set_message(message.to_owned());
+        let mut progress = |progress: &Progress| {
+            bar.set_length(progress.total);
+            bar.set_position(progress.paths);
+            if (self.stop)() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let rendering = renderer.render(&mut progress);
+        bar.finish_and_clear();
+        let rendering = rendering.map_err(super::runtime)?;
+        if render::is_complete(&rendering) {
+            Ok(rendering)
+        } else {
+            Err(Failure::Interrupted)
+        }
+    }
+
+    fn compile(
+        &self,
+        requests: &[MaterialRequest],
+        scene: &Scene,
+        read: &mut Vec<PathBuf>,
+    ) -> Result<Program, Failure> {
+        let mut loader = FileLoader::new(&scene.base);
+        let (args, global) = (self.args, self.global);
+        let program = render::compile_requests(requests, &mut loader, args, global, self.stop);
+        read.extend(loader.asked());
+        if let Ok(program) = &program {
+            read.extend(shot::textures(scene, program));
+        }
+        program
+    }
+
+    /// One picture; the files of its materials are `read`.
+    fn picture(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
+        let scene = self.args.scene_of(&shot.subject, &shot.asked)?;
+        note_warnings(&scene, self.global);
+        let program = self.compile(&shot::open_requests(&scene), &scene, read)?;
+        let rendering = self.rendering(&scene, &program, 0, "")?;
+        outputs.write(&rendering.film, &rendering.sums, self.args.exposure)
+    }
+
+    /// A sheet of pictures; the files of their materials are `read`.
+    fn sheet(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
+        let Shot {
+            subject,
+            asked,
+            axes,
+        } = shot;
+        let failed = |e: impasto::SceneError| Failure::Error(e.to_string());
+        let sweep = Sweep::new(axes.clone())?;
+        let scene = subject.scene(asked).map_err(failed)?;
+        note_warnings(&scene, self.global);
+        let cell = sweep::cell_size(self.args.size, scene.film);
+        let mut sheet = sweep.layout(cell)?.sheet();
+        let (requests, counts) = sweep.requests(subject, asked).map_err(failed)?;
+        let program = self.compile(&requests, &scene, read)?;
+        let exposure = self.args.exposure;
+        for (index, first) in sweep::firsts(&counts).into_iter().enumerate() {
+            let mut scene = subject.scene(&sweep.asked(asked, index)).map_err(failed)?;
+            scene.film = cell;
+            let message = format!("picture {} of {}: ", index + 1, sweep.len());
+            let rendering = self.rendering(&scene, &program, first, &message)?;
+            sheet.put(index, &rendering.film, &sweep.label(index), exposure);
+        }
+        outputs.write_film(&sheet.film, exposure)
+    }
+}
+
+fn note_warnings(scene: &Scene, global: &Global) {
+    for warning in &scene.warnings {
+        global.note(&format!("warning: {warning}"));
+    }
+}
+
+/// Renders frames one after another. What is done stays when it is interrupted.
+fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome {
+    let (out, count) = (args.out(), frames.count());
+    let refused = [
+        ("--report", args.report.is_some()),
+        ("--until", args.until.is_given()),
+        ("--checkpoint", args.checkpoint.is_given()),
+    ];
+    if let Some((option, _)) = refused.into_iter().find(|(_, is_there)| *is_there) {
+        let message = format!("`{option}` is for one picture, and not for frames");
+        return Err(Failure::Error(message));
+    }
+    let Shot {
+        subject,
+        mut asked,
+        axes,
+    } = args.shot()?;
+    if !axes.is_empty() {
+        return Err(Failure::Error(
+            "a sweep makes one sheet, and not frames\n  hint: let keys of the scene change the parameter".into(),
+        ));
+    }
+    let first = Outputs::of(&frames.path(&out, frames.numbers().next().unwrap_or(0)))?;
+    first.check_aov(&args.aov)?;
+    let device = args.device.open(global)?;
+    let studio = Studio::new(&device);
+    let quiet = Global {
+        quiet: true,
+        verbose: 0,
+        ..*global
+    };
+    let stop = || interrupt::requested();
+    let rate = subject.animation().frames_per_second;
+    let (begin, mut done) = (Instant::now(), 0);
+    for (index, frame) in frames.numbers().enumerate() {
+        let path = frames.path(&out, frame);
+        if args.shot.skip_existing && path.exists() {
+            continue;
+        }
+        asked.frame = frame.into();
+        let made = Making {
+            args,
+            studio: &studio,
+            // What is odd about all frames is said once.
+            global: if done == 0 { global } else { &quiet },
+            stop: &stop,
+        };
+        let picture = || {
+            let outputs = Outputs::of(&path)?;
+            let scene = args.scene_of(&subject, &asked)?;
+            note_warnings(&scene, made.global);
+            let mut requests = requests(&scene);
+            for request in &mut requests {
+                request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
+            }
+            let program = made.compile(&requests, &scene, &mut Vec::new())?;
+            let message = format!("frame {frame} ({} of {count}): ", index + 1);
+            let shown = Making { global, ..made };
+            let rendering = shown.rendering(&scene, &program, 0, &message)?;
+            outputs.write(&rendering.film, &rendering.sums, args.exposure)
+        };
+        match picture() {
+            Err(Failure::Interrupted) => {
+                global.note(&format!(
+                    "interrupted: {done} of {count} frames are written"
+                ));
+                return Err(Failure::Interrupted);
+            }
+            other => other?,
+        }
+        done += 1;
+    }
+    let (from, seconds) = (
+        frames.path(&out, frames.numbers().next().unwrap_or(0)),
+        begin.elapsed(),
+    );
+    global.note(&format!(
+        "wrote {} from {} on ({:.1} s)",
+        super::count(done, "frame"),
+        from.display(),
+        seconds.as_secs_f64()
+    ));
+    Ok(())
+}
+
+/// Renders at each save.
+fn watch(args: &RenderArgs, global: &Global) -> Outcome {
+    let outputs = if args.shot.params.iter().any(|p| p.values.len() > 1) {
+        sheet_outputs(args)?
+    } else {
+        let outputs = Outputs::of(&args.out())?;
+        outputs.check_aov(&args.aov)?;
+        outputs
+    };
+    if !args.scene.exists() && !args.scene.to_string_lossy().starts_with("std::") {
+        // That is a slip, and nothing to wait for.
+        files::check_readable(&args.scene)?;
+    }
+    let device = args.device.open(global)?;
+    let studio = Studio::new(&device);
+    let mut watched = Watched::new([args.scene.clone()]);
+    loop {
+        watched.changed();
+        let begin = Instant::now();
+        let looked = std::cell::Cell::new(begin);
+        let is_old = || {
+            let due = looked.get().elapsed() >= EVERY;
+            if due {
+                looked.set(Instant::now());
+            }
+            interrupt::requested() || (due && watched.has_changed())
+        };
+        let making = Making {
+            args,
+            studio: &studio,
+            global,
+            stop: &is_old,
+        };
+        let (outcome, read) = making.attempt(&outputs);
+        watched.add(read);
+        match outcome {
+            Ok(()) => note_written(&outputs, begin, global),
+            Err(Failure::Interrupted) if interrupt::requested() => {
+                return Err(Failure::Interrupted);
+            }
+            // Something was saved meanwhile.
+            Err(Failure::Interrupted) => continue,
+            Err(failure) => {
+                if let Failure::Error(message) = failure {
+                    super::say(&format!("{}: {message}", global.error_word()));
+                }
+                global.note("the last picture stays; waiting for a save");
+            }
+        }
+        wait(&mut watched)?;
+    }
+}
+
+/// Waits until a file has changed, and then is left alone for a moment: editors save in several steps.
+fn wait(watched: &mut Watched) -> Outcome {
+    /// How long a file is left alone that is saved.
+    const SETTLED: Duration = Duration::from_millis(20);
+    loop {
+        if interrupt::requested() {
+            return Err(Failure::Interrupted);
+        }
+        if watched.changed() {
+            loop {
+                std::thread::sleep(SETTLED);
+                if !watched.changed() {
+                    return Ok(());
+                }
+            }
+        }
+        std::thread::sleep(EVERY);
+    }
+}
+
+impl Making<'_> {
+    /// A picture of the files as they are now, and the files that it was made from as far as they are known.
+    fn attempt(&self, outputs: &Outputs) -> (Outcome, Vec<PathBuf>) {
+        let mut read = vec![self.args.scene.clone()];
+        let shot = match self.args.shot() {
+            Ok(shot) => shot,
+            Err(failure) => return (Err(failure), read),
+        };
+        read.extend_from_slice(shot.subject.files());
+        let outcome = if shot.axes.is_empty() {
+            self.picture(&shot, outputs, &mut read)
+        } else {
+            self.sheet(&shot, outputs, &mut read)
+        };
+        (outcome, read)
+    }
+}

@@ -1,0 +1,116 @@
+//! Files that may change: what `--watch` waits for.
+//!
+//! They are looked at again and again, which works on every file system, for files that editors replace by others, and
+//! for such as are not there yet.
+
+use std::collections::BTreeMap;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// How often files are looked at.
+pub const EVERY: Duration = Duration::from_millis(50);
+
+/// Files, and how each of them was when it was looked at last.
+#[derive(Clone, Debug, Default)]
+pub struct Watched {
+    files: BTreeMap<PathBuf, Option<Look>>,
+}
+
+/// What tells one version of a file from the next.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Look {
+    modified: Option<SystemTime>,
+    length: u64,
+    /// Which file it is, since one that replaces another may be as old and as long.
+    number: u64,
+    is_folder: bool,
+}
+
+impl Watched {
+    /// The files at `paths`, as they are now.
+    pub fn new(paths: impl IntoIterator<Item = PathBuf>) -> Self {
+        let mut watched = Self::default();
+        watched.add(paths);
+        watched
+    }
+
+    /// Watches more files, as they are now.
+    pub fn add(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
+        for path in paths {
+            self.files.entry(path).or_insert_with_key(|path| look(path));
+        }
+    }
+
+    /// The files.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.files.keys().map(PathBuf::as_path)
+    }
+
+    /// Has a file changed since it was looked at last? Everything is looked at.
+    pub fn changed(&mut self) -> bool {
+        let mut changed = false;
+        for (path, last) in &mut self.files {
+            let now = look(path);
+            changed |= now != *last;
+            *last = now;
+        }
+        changed
+    }
+
+    /// The same, while others are still looking.
+    pub fn has_changed(&self) -> bool {
+        let mut files = self.files.iter();
+        files.any(|(path, last)| look(path) != *last)
+    }
+}
+
+fn look(path: &Path) -> Option<Look> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some(Look {
+        modified: metadata.modified().ok(),
+        length: metadata.len(),
+        number: number(&metadata),
+        is_folder: metadata.is_dir(),
+    })
+}
+
+#[cfg(unix)]
+fn number(metadata: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::ino(metadata)
+}
+
+#[cfg(not(unix))]
+fn number(_: &Metadata) -> u64 {
+    0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_come_go_and_change_are_seen_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.impasto");
+        let mut watched = Watched::new([path.clone()]);
+        assert!(!watched.changed());
+        let seen = |watched: &mut Watched| {
+            assert!(watched.has_changed());
+            assert!(watched.changed());
+            assert!(!watched.changed());
+        };
+        std::fs::write(&path, "a").expect("written");
+        seen(&mut watched);
+        std::fs::write(&path, "ab").expect("written");
+        seen(&mut watched);
+        let other = folder.path().join("b");
+        std::fs::write(&other, "ba").expect("written");
+        std::fs::rename(&other, &path).expect("renamed");
+        seen(&mut watched);
+        std::fs::remove_file(&path).expect("removed");
+        seen(&mut watched);
+        std::fs::create_dir(&path).expect("a folder");
+        seen(&mut watched);
+    }
+}
