@@ -3,7 +3,8 @@
 //!
 //! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
 //! `stdlib/core/material.impasto`, and printed into every generated module. Fields that only
-//! `filter_width` needs are left out of modules that read none of them ([`InputSet::declares`]).
+//! `filter_width` needs are left out of modules that read none of them ([`InputSet::declares`]), and those
+//! of walks below surfaces of modules without any ([`MaterialInfo::walks`]).
 //!
 //! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
 //! `evaluate_`, `emission_`, `albedo_` or `normal_`; kernels must not define such names.
@@ -203,6 +204,8 @@ pub struct MaterialInfo {
     pub crosses: bool,
     /// It crosses into an interior: paths change their medium.
     pub transmissive: bool,
+    /// Light walks below it: some lobe has the method `walk`.
+    pub walks: bool,
     /// Some instance emits [`Emission::Varying`] light.
     pub varying_emission: bool,
     /// Which fields of `SurfacePoint` it reads.
@@ -227,6 +230,12 @@ pub struct InputSet {
     pub footprint: bool,
     /// How texture coordinates do: `footprint_uv_x` and `footprint_uv_y`.
     pub footprint_uv: bool,
+}
+
+/// Whether `MaterialSample` has a field in generated code: all but those that only walks below surfaces need
+/// always are there.
+pub fn sample_declares(field: &str, walks: bool) -> bool {
+    walks || !field.starts_with("below")
 }
 
 impl InputSet {

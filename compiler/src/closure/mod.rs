@@ -136,6 +136,14 @@ pub fn delta_only(module: &Module, lobes: &[Path<'_>]) -> bool {
         .all(|p| module.closures[p.lobe.def.index()].delta)
 }
 
+/// Does light walk below the surface by some lobe?
+pub fn walks(module: &Module, lobes: &[Path<'_>]) -> bool {
+    let methods = |p: &Path<'_>| &module.closures[p.lobe.def.index()].methods;
+    lobes
+        .iter()
+        .any(|p| matches!(methods(p), Methods::Bsdf { walk: Some(_), .. }))
+}
+
 /// Could a lobe scatter to the other side? Found by drawing directions from it, over a fixed grid
 /// of numbers, with its own arguments where these are constant and with one half where not.
 pub fn transmissive(module: &Module, material: &Material, lobes: &[Path<'_>]) -> bool {
