@@ -12,6 +12,7 @@ mod probe;
 mod processor;
 mod render;
 mod snapshots;
+mod subsurface;
 mod textures;
 mod trace;
 mod until;

@@ -155,6 +155,9 @@ pairs! {
     "index outside of surfaces", also &[], "functions +exterior_index +media_outside",
         thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
+    "walks below surfaces", also &[], "+32 bytes; functions +chosen +ended +extension +fly_through +free_flight \
+         +keep_flight +leave_surface_diffusely",
+        thing("surface = translucent(color(0.3));") => thing("surface = random_walk(color(0.3));");
     "emission that varies", also &[], "functions +checked_emission +material_emission +needs_last_evaluation",
         thing(SHADE) => thing("surface = diffuse(color(0.3)); emission = uniform(color(0.5 + 0.5 * normal.y));");
     "positions", also &[], "", thing(SHADE) => thing("surface = diffuse(color(0.4 + 0.2 * sin(position.x)));");

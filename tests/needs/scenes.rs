@@ -191,6 +191,7 @@ fn material(name: &str, body: &str) -> String {
         "blinn_phong",
         "dielectric",
         "diffuse",
+        "random_walk",
         "smooth_dielectric",
         "specular",
         "translucent",

@@ -66,7 +66,8 @@ fn fly_through(path: vec3<u32>, matter: Matter, begun: Flight, skip: u32) -> Fli
         }
         flight.carried.throughput *= met.scattering * kept / dot(shares, extinction * kept);
         flight.carried.bsdf_pdf = 0.0;
-        let survival = min(max_component(flight.carried.throughput), 1.0);
+        let least = select(1.0, 0.25, matter.coarsens);
+        let survival = min(max_component(flight.carried.throughput) / least, 1.0);
         if unit_numbers(turn_bits(path, flight.turns, 1u)).x >= survival {
             return ended(flight);
         }
