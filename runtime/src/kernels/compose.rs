@@ -83,10 +83,7 @@ impl Composer<'_> {
             ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
             ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
             ("fetched", self.fetches(stage)),
-            (
-                "flights",
-                needs.any(&[Need::Scattering, Need::Subsurface]),
-            ),
+            ("flights", needs.any(&[Need::Scattering, Need::Subsurface])),
         ];
         needs.flags().chain(derived).collect()
     }

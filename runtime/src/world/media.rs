@@ -12,8 +12,8 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo, Medium};
 
 use crate::error::SceneError;
 use crate::scene::MAX_NESTED;
-use crate::wgsl::{constant_u32, constants_u32};
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::wgsl::{constant_u32, constants_u32};
 use crate::world::needs::{MediaTraits, Need, Needs};
 
 /// How many distinct media, and how many priorities, a scene can have: a word's halves hold them.
@@ -29,8 +29,8 @@ const MAX_ANISOTROPY: f32 = 0.99;
 /// How often light is turned on its way from one surface to the next before it is given up.
 pub(crate) const MAX_TURNS: u32 = 4096;
 /// How often light is turned below a surface until its steps become longer, and how often until they double again.
-const COARSE_TURNS: u32 = 64;
-const COARSER_TURNS: u32 = 32;
+const COARSE_TURNS: u32 = 256;
+const COARSER_TURNS: u32 = 128;
 
 /// What paths have to know of media. Empty if nothing depends on the medium that a path is in.
 #[derive(Clone, Debug, Default, PartialEq)]
