@@ -148,7 +148,7 @@ impl<'m> View<'m> {
         let passed = passes.map(|passes| self.share_of_light(passes, &args));
         Some(ViewedLobe {
             path,
-            delta: def.delta,
+            delta: def.delta || walk.is_some(),
             methods: [sample, eval, pdf, albedo],
             walk,
             frame,

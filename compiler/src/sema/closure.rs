@@ -19,7 +19,7 @@ const BSDF_METHODS: [(&str, &[Ty], Ty); 5] = [
 ];
 /// The method that a bsdf may leave out: all that it does not reflect passes then.
 const PASSES: &str = "passes";
-/// The method of a discrete bsdf whose light walks below the surface: what it meets there.
+/// The method of a bsdf whose light walks below the surface: what it meets there.
 const WALK: &str = "walk";
 /// The struct of `std::core` that `walk` gives.
 const RANDOM_WALK: &str = "RandomWalk";
@@ -38,7 +38,7 @@ impl Checker<'_> {
             ClosureKind::Bsdf | ClosureKind::DeltaBsdf => BSDF_METHODS.to_vec(),
             ClosureKind::Edf => EDF_METHODS.to_vec(),
         };
-        if def.kind == ClosureKind::DeltaBsdf {
+        if def.kind == ClosureKind::Bsdf {
             let walk = self.core_struct(RANDOM_WALK)?;
             methods.push((WALK, &[], Ty::Struct(walk)));
         }

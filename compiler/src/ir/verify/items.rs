@@ -123,7 +123,7 @@ fn walk(module: &Module, def: &ClosureDef, id: FunctionId) -> Result<(), Problem
         let types = fields.map(|fields| fields.iter().map(|(_, ty)| *ty).collect::<Vec<_>>());
         f.params.iter().map(|p| p.ty).eq(own()) && types == Some(vec![Vec3, Vec3, Float])
     });
-    if fits && def.delta {
+    if fits && !def.delta {
         return Ok(());
     }
     let message = format!("{}: `walk` has other parameters or another value", def.name);
