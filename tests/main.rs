@@ -14,6 +14,7 @@ mod render;
 mod shot;
 mod snapshots;
 mod spaces;
+mod subsurface;
 mod textures;
 mod trace;
 mod until;

@@ -3,7 +3,8 @@
 //!
 //! The structs themselves (`SurfacePoint`, `MaterialSample`) are declared once, in
 //! `stdlib/core/material.impasto`, and printed into every generated module. Fields that few materials
-//! need are left out of modules that read none of them ([`InputSet::declares`]).
+//! need are left out of modules that read none of them ([`InputSet::declares`]), as are
+//! those of walks below surfaces in modules without any ([`MaterialInfo::walks`]).
 //!
 //! Generated names begin with `core_`, `bsdf_`, `edf_`, `noise_`, `pattern_`, `user_`, `op_`,
 //! `evaluate_`, `emission_`, `albedo_` or `normal_`; kernels must not define such names.
@@ -207,6 +208,8 @@ pub struct MaterialInfo {
     pub crosses: bool,
     /// It crosses into an interior: paths change their medium.
     pub transmissive: bool,
+    /// Light walks below it: some lobe has the method `walk`.
+    pub walks: bool,
     /// Some instance emits [`Emission::Varying`] light.
     pub varying_emission: bool,
     /// Which fields of `SurfacePoint` it reads.
@@ -215,4 +218,10 @@ pub struct MaterialInfo {
     pub textures: Vec<usize>,
     /// Number of lobes after layering.
     pub lobes: usize,
+}
+
+/// Whether `MaterialSample` has a field in generated code: all but those that only walks below surfaces need
+/// always are there.
+pub fn sample_declares(field: &str, walks: bool) -> bool {
+    walks || !field.starts_with("below")
 }

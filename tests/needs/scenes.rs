@@ -202,6 +202,7 @@ fn material(name: &str, body: &str) -> String {
         "blinn_phong",
         "dielectric",
         "diffuse",
+        "random_walk",
         "smooth_dielectric",
         "specular",
         "translucent",

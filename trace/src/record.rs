@@ -39,12 +39,14 @@ pub(super) enum Hook {
     FilmAdd,
     MaterialEmission,
     EvaluateMaterial,
+    /// Where a walk below a surface ends, in the place of the material there.
+    LeaveSurface,
     /// The sample of a light of this kind.
     SampleKind(&'static str),
 }
 
 /// Each by its name, but for those of kinds of light.
-const HOOKS: [(Hook, &str); 24] = [
+const HOOKS: [(Hook, &str); 25] = [
     (Hook::CameraRay, "camera_ray"),
     (Hook::Logic, "logic"),
     (Hook::Material, "material"),
@@ -67,6 +69,7 @@ const HOOKS: [(Hook, &str); 24] = [
     (Hook::GeometricNormal, "hit_geometric_normal"),
     (Hook::CountDropped, "count_dropped"),
     (Hook::FilmAdd, "film_add"),
+    (Hook::LeaveSurface, "leave_surface_diffusely"),
     // Materials answer these.
     (Hook::MaterialEmission, "material_emission"),
     (Hook::EvaluateMaterial, "evaluate_material"),
@@ -340,7 +343,7 @@ impl<'r, 'p, F: Float> Recorder<'r, 'p, F> {
                     });
                 }
             }
-            Hook::EvaluateMaterial => {
+            Hook::EvaluateMaterial | Hook::LeaveSurface => {
                 let u = of.arguments.numbers::<F>("u", arguments);
                 let scattering = Scattering {
                     u: u.try_into().unwrap_or_default(),

@@ -249,10 +249,12 @@ impl ProgramBuilder {
         let read: Vec<&Function> = read.map(|(_, f)| f).collect();
         let lobes = closure::surface_lobes(&state.material);
         let crosses = closure::transmissive(module, &state.material, &lobes);
+        let walks = closure::walks(module, &lobes);
         let info = MaterialInfo {
             name,
-            delta_only: closure::delta_only(module, &lobes),
+            delta_only: closure::delta_only(module, &lobes) && !walks,
             crosses,
+            walks,
             transmissive: crosses && instances.iter().any(|i| i.info.medium.is_some()),
             varying_emission: varying,
             inputs: codegen::inputs(&module.structs, &read),

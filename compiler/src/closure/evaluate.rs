@@ -1,9 +1,9 @@
 //! Builds a material's `evaluate` function: patterns, lobe weights, sampling, value and density.
 
 use super::view::{View, ViewedLobe};
-use super::{Core, Path, delta_only};
+use super::{Core, Path, delta_only, walks};
 use crate::ir::ops::Op;
-use crate::ir::{Const, ExprId, Function, LocalId, Material, Module, Stmt, Type};
+use crate::ir::{Const, ExprId, Function, FunctionId, LocalId, Material, Module, Stmt, Type};
 
 /// Parameters of the function after `point` and `wo`.
 const WL: usize = 2;
@@ -32,8 +32,19 @@ struct Results {
     throughput: LocalId,
     light_pdf: LocalId,
     light_throughput: LocalId,
-    /// 0 if the path went where there is no surface, else 1; absent where nothing asks.
+    /// 0 if the path went where there is no surface, or below it, else 1; absent where nothing asks.
     met: Option<LocalId>,
+    /// What the path meets below the surface; absent where none goes there.
+    below: Option<Below>,
+}
+
+/// The same as the fields of `RandomWalk`, and whether the path goes there.
+#[derive(Clone, Copy)]
+struct Below {
+    taken: LocalId,
+    albedo: LocalId,
+    extinction: LocalId,
+    anisotropy: LocalId,
 }
 
 impl View<'_> {
@@ -47,6 +58,7 @@ impl View<'_> {
             met: self
                 .asks_for_gaps(paths)
                 .then(|| self.b.local("met", Type::Float)),
+            below: walks(self.module, paths).then(|| self.below()),
         };
         if let Some(met) = results.met {
             let one = self.float(1.0);
@@ -64,13 +76,24 @@ impl View<'_> {
         self.result(&results)
     }
 
-    /// Must going through a gap of the surface be told from going through the surface?
+    fn below(&mut self) -> Below {
+        Below {
+            taken: self.b.local("below", Type::Float),
+            albedo: self.b.local("below_albedo", Type::Vec3),
+            extinction: self.b.local("below_extinction", Type::Vec3),
+            anisotropy: self.b.local("below_anisotropy", Type::Float),
+        }
+    }
+
+    /// Must going elsewhere be told from going through the surface into its interior?
     fn asks_for_gaps(&self, paths: &[Path<'_>]) -> bool {
         self.m.interior.is_some() && paths.iter().any(|p| self.is_gap(p))
     }
 
+    /// Does the lobe lead through a gap of the surface, or below it on a walk?
     fn is_gap(&self, path: &Path<'_>) -> bool {
-        self.core.transparent == Some(path.lobe.def)
+        let walks = walks(self.module, std::slice::from_ref(path));
+        walks || self.core.transparent == Some(path.lobe.def)
     }
 
     /// The sum of all shares; nothing without lobes.
@@ -138,13 +161,21 @@ impl View<'_> {
             let zero = self.float(0.0);
             self.b.store(met, zero);
         }
+        if let (Some(walk), Some(below)) = (lobe.walk, results.below) {
+            self.go_below(lobe.path, walk, below);
+        }
         if lobe.delta {
             args.pop();
             args.push(local);
-            let (value, mass) = (self.call(eval, &args), self.call(pdf, &args));
-            let weighted = self.op(Op::Mul, &[lobe.weight, value]);
-            // The probability of the choice and of the direction: share / total * mass.
-            let chance = self.op(Op::Mul, &[lobe.share, mass]);
+            let (weighted, chance) = if lobe.walk.is_some() {
+                // What comes back of it, the walk finds out.
+                (lobe.weight, lobe.share)
+            } else {
+                let (value, mass) = (self.call(eval, &args), self.call(pdf, &args));
+                let weighted = self.op(Op::Mul, &[lobe.weight, value]);
+                // The probability of the choice and of the direction: share / total * mass.
+                (weighted, self.op(Op::Mul, &[lobe.share, mass]))
+            };
             let throughput = self.op(Op::Mul, &[weighted, total]);
             let throughput = self.op(Op::Div, &[throughput, chance]);
             let valid = self.valid(lobe, local, wi);
@@ -157,6 +188,18 @@ impl View<'_> {
             self.b.store(results.pdf, due);
         }
         self.at_material();
+    }
+
+    /// Keeps what the path meets below the surface.
+    fn go_below(&mut self, path: &Path<'_>, walk: FunctionId, below: Below) {
+        let met = self.call(walk, &path.lobe.args);
+        let fields = [below.albedo, below.extinction, below.anisotropy];
+        for (index, local) in fields.into_iter().enumerate() {
+            let value = self.b.field(self.module, met, index, self.span);
+            self.b.store(local, value);
+        }
+        let one = self.float(1.0);
+        self.b.store(below.taken, one);
     }
 
     /// Do the lobe's frame and the geometry agree on reflection or transmission?
@@ -305,6 +348,16 @@ impl View<'_> {
             light_throughput,
             transmitted,
         ];
+        let below = match results.below {
+            Some(b) => [b.taken, b.albedo, b.extinction, b.anisotropy]
+                .map(|local| self.b.load(local, self.span)),
+            None => {
+                let zero = self.float(0.0);
+                let black = self.b.constant(Const::Float(vec![0.0; 3]), self.span);
+                [zero, black, black, zero]
+            }
+        };
+        let fields: Vec<ExprId> = fields.into_iter().chain(below).collect();
         self.b.make(self.core.material_sample, &fields, self.span)
     }
 }

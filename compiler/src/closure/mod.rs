@@ -131,11 +131,20 @@ fn is_constant(f: &Function, id: ExprId, value: f64) -> bool {
     matches!(f.constant(id), Some(Const::Float(v)) if v.iter().all(|&x| x == value))
 }
 
-/// Are all lobes discrete?
+/// Are all lobes discrete? Those that walk are as good as discrete: no direction of a light is one of theirs.
 pub fn delta_only(module: &Module, lobes: &[Path<'_>]) -> bool {
+    lobes.iter().all(|p| {
+        let def = &module.closures[p.lobe.def.index()];
+        def.delta || walks(module, std::slice::from_ref(p))
+    })
+}
+
+/// Does light walk below the surface by some lobe?
+pub fn walks(module: &Module, lobes: &[Path<'_>]) -> bool {
+    let methods = |p: &Path<'_>| &module.closures[p.lobe.def.index()].methods;
     lobes
         .iter()
-        .all(|p| module.closures[p.lobe.def.index()].delta)
+        .any(|p| matches!(methods(p), Methods::Bsdf { walk: Some(_), .. }))
 }
 
 /// Could a lobe scatter to the other side? Found by drawing directions from it, over a fixed grid

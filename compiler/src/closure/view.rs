@@ -28,6 +28,8 @@ pub(super) struct ViewedLobe<'a> {
     pub delta: bool,
     /// Sample, eval, pdf and albedo.
     pub methods: [FunctionId; 4],
+    /// What light meets that it sends below the surface.
+    pub walk: Option<FunctionId>,
     pub frame: ExprId,
     /// `wo` in the frame.
     pub wo: ExprId,
@@ -132,6 +134,7 @@ impl<'m> View<'m> {
             pdf,
             albedo,
             passes,
+            walk,
         } = def.methods
         else {
             return None;
@@ -145,8 +148,9 @@ impl<'m> View<'m> {
         let passed = passes.map(|passes| self.share_of_light(passes, &args));
         Some(ViewedLobe {
             path,
-            delta: def.delta,
+            delta: def.delta || walk.is_some(),
             methods: [sample, eval, pdf, albedo],
+            walk,
             frame,
             wo,
             albedo: value,

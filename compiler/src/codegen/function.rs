@@ -10,7 +10,7 @@ use std::fmt::Write;
 use super::helpers::Helpers;
 use super::walk::{counters, stored, table_values};
 use super::{inliner, type_name};
-use crate::abi::{self, PARAMETERS, TextureSpace};
+use crate::abi::{self, PARAMETERS, TextureSpace, sample_declares};
 use crate::ir::ops::{Op, Shape, Wgsl};
 use crate::ir::{Block, Const, ExprId, ExprKind, Function, LocalId, Stmt, Type};
 use crate::parameters::{Place, TableLayout};
@@ -337,7 +337,13 @@ impl Printer<'_> {
                 self.list(args)
             ),
             ExprKind::Make(s, args) => {
-                format!("{}({})", self.program.names.structure(*s), self.list(args))
+                let fields = &self.program.module.structs[s.index()].fields;
+                let of_sample = *s == self.program.core.material_sample;
+                let walks = self.helpers.walks || !of_sample;
+                let declared = fields.iter().zip(args);
+                let declared = declared.filter(|((name, _), _)| sample_declares(name, walks));
+                let args: Vec<ExprId> = declared.map(|(_, arg)| *arg).collect();
+                format!("{}({})", self.program.names.structure(*s), self.list(&args))
             }
             ExprKind::Field(v, i) => match f.ty(*v) {
                 Type::Struct(s) => {

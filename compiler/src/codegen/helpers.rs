@@ -13,6 +13,8 @@ use crate::program::Program;
 #[derive(Default)]
 pub struct Helpers {
     used: BTreeSet<(Op, Type)>,
+    /// Does light walk below some material?
+    pub walks: bool,
     /// How textures are read that are chosen at run time.
     pub texture_slots: BTreeSet<TextureSpace>,
 }

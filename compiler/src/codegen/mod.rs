@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use crate::abi::{Input, InputSet};
+use crate::abi::{Input, InputSet, sample_declares};
 use crate::ir::{ExprKind, Function, StructId, Type};
 use crate::parameters::TableLayout;
 use crate::program::{Program, identifier};
@@ -54,6 +54,7 @@ pub fn module(program: &Program, members: &[usize]) -> String {
     let roots = roots(program, members);
     let functions = reachable(program, &roots);
     let mut helpers = Helpers::default();
+    helpers.walks = members.iter().any(|&m| program.materials[m].info.walks);
     let mut body = String::new();
     for &id in &functions {
         let f = &program.module.functions[id];
@@ -78,7 +79,7 @@ pub fn module(program: &Program, members: &[usize]) -> String {
         );
     }
     let mut out = String::new();
-    structs(program, &functions, &roots, &mut out);
+    structs(program, &functions, &roots, helpers.walks, &mut out);
     helpers.print(program, &mut out);
     out.push_str(&body);
     dispatch::dispatch(program, members, &mut out);
@@ -180,7 +181,13 @@ fn reachable(program: &Program, roots: &[Root<'_>]) -> BTreeSet<usize> {
 }
 
 /// The structs of the ABI, and those that the functions use, in order of definition.
-fn structs(program: &Program, functions: &BTreeSet<usize>, roots: &[Root<'_>], out: &mut String) {
+fn structs(
+    program: &Program,
+    functions: &BTreeSet<usize>,
+    roots: &[Root<'_>],
+    walks: bool,
+    out: &mut String,
+) {
     let mut used = BTreeSet::from([program.core.surface_point, program.core.material_sample]);
     let all = functions
         .iter()
@@ -200,7 +207,12 @@ fn structs(program: &Program, functions: &BTreeSet<usize>, roots: &[Root<'_>], o
     for id in used {
         let s = &program.module.structs[id.index()];
         let _ = writeln!(out, "struct {} {{", program.names.structure(id));
-        let declared = |name: &str| id != program.core.surface_point || read.declares(name);
+        let declared = |name: &str| {
+            if id == program.core.material_sample {
+                return sample_declares(name, walks);
+            }
+            id != program.core.surface_point || read.declares(name)
+        };
         for (name, ty) in s.fields.iter().filter(|(name, _)| declared(name)) {
             let _ = writeln!(
                 out,

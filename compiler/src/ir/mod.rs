@@ -356,6 +356,8 @@ pub enum Methods {
         albedo: FunctionId,
         /// What it lets through to what lies under it, where that is not all that it leaves.
         passes: Option<FunctionId>,
+        /// What light meets below the surface, where it walks there from the direction sampled.
+        walk: Option<FunctionId>,
     },
     Edf {
         emit: FunctionId,
@@ -372,9 +374,11 @@ impl Methods {
                 pdf,
                 albedo,
                 passes,
+                walk,
             } => [sample, eval, pdf, albedo]
                 .into_iter()
                 .chain(passes)
+                .chain(walk)
                 .collect(),
             Methods::Edf { emit } => vec![emit],
         }

@@ -19,6 +19,10 @@ const BSDF_METHODS: [(&str, &[Ty], Ty); 5] = [
 ];
 /// The method that a bsdf may leave out: all that it does not reflect passes then.
 const PASSES: &str = "passes";
+/// The method of a bsdf whose light walks below the surface: what it meets there.
+const WALK: &str = "walk";
+/// The struct of `std::core` that `walk` gives.
+const RANDOM_WALK: &str = "RandomWalk";
 const EDF_METHODS: [(&str, &[Ty], Ty); 1] = [("emit", &[Ty::Vector], Ty::Color)];
 
 impl Checker<'_> {
@@ -30,36 +34,47 @@ impl Checker<'_> {
         def: &ast::ClosureDef,
     ) -> Option<Checked> {
         let params = self.params(module, &def.params)?;
-        let methods = match def.kind {
-            ClosureKind::Bsdf | ClosureKind::DeltaBsdf => &BSDF_METHODS[..],
-            ClosureKind::Edf => &EDF_METHODS[..],
+        let mut methods = match def.kind {
+            ClosureKind::Bsdf | ClosureKind::DeltaBsdf => BSDF_METHODS.to_vec(),
+            ClosureKind::Edf => EDF_METHODS.to_vec(),
         };
-        let known = self.known_methods(item, def, methods);
+        if def.kind == ClosureKind::Bsdf {
+            let walk = self.core_struct(RANDOM_WALK)?;
+            methods.push((WALK, &[], Ty::Struct(walk)));
+        }
+        let known = self.known_methods(item, def, &methods);
         let mut ids = Vec::new();
-        let mut optional = 0;
-        for (name, types, result) in methods {
+        let (mut passes, mut walk) = (None, None);
+        let mut complete = true;
+        for (name, types, result) in &methods {
             let Some(method) = def.methods.iter().find(|m| m.name.node == *name) else {
-                if *name == PASSES {
-                    optional += 1;
-                } else {
+                if *name != PASSES && *name != WALK {
                     self.missing_method(item, name, types.len());
+                    complete = false;
                 }
                 continue;
             };
-            ids.extend(self.method(module, item, def, &params, method, types, *result));
+            let id = self.method(module, item, def, &params, method, types, *result);
+            complete &= id.is_some();
+            match *name {
+                PASSES => passes = id,
+                WALK => walk = id,
+                _ => ids.extend(id),
+            }
         }
-        if !known || ids.len() + optional != methods.len() {
+        if !known || !complete {
             return None;
         }
         let (ty, methods) = match ids.as_slice() {
-            [sample, eval, pdf, albedo, passes @ ..] => (
+            [sample, eval, pdf, albedo] => (
                 Ty::Bsdf,
                 Methods::Bsdf {
                     sample: *sample,
                     eval: *eval,
                     pdf: *pdf,
                     albedo: *albedo,
-                    passes: passes.first().copied(),
+                    passes,
+                    walk,
                 },
             ),
             [emit] => (Ty::Edf, Methods::Edf { emit: *emit }),

@@ -238,6 +238,7 @@ fn build(name: &str, documented: &Documented, calls: &[String]) -> Bsdf {
         pdf,
         albedo,
         passes,
+        walk: _,
     } = def.methods
     else {
         panic!("`{name}` is no bsdf")

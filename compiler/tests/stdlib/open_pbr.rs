@@ -122,6 +122,7 @@ fn slabs_are_mixed_by_their_weights() {
         ("base_metalness", "0.3"),
         ("transmission_weight", "0.6"),
         ("subsurface_weight", "0.4"),
+        ("subsurface_radius", "0 m"),
         ("subsurface_color", "color(0.9, 0.5, 0.3)"),
         ("subsurface_scatter_anisotropy", "0.2"),
         ("specular_color", "color(0.9, 0.8, 0.7)"),

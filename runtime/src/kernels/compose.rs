@@ -22,6 +22,7 @@ use crate::wgsl;
 use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::media;
 use crate::world::needs::Need;
 
 /// A buffer as a kernel binds it, in group 0.
@@ -83,6 +84,7 @@ impl Composer<'_> {
             ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
             ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
             ("fetched", self.fetches(stage)),
+            ("flights", needs.any(&[Need::Scattering, Need::Subsurface])),
         ];
         needs.flags().chain(derived).collect()
     }
@@ -135,6 +137,7 @@ impl Composer<'_> {
             Part::Lights => parts.lights.wgsl.clone(),
             Part::Media => text(parts.media.as_ref()),
             Part::Order => order::bins(self.technique.ray_order, world.parts.bounds),
+            Part::Flights => media::flights(self.layout.needs),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
             Part::Fates => self.fates(),

@@ -17,6 +17,9 @@ fn logic(slot: u32) {
     let ray = load_ray_direction(slot);
     let pixel = load_ray_origin(slot).pixel;
     let vertex = path.flags & DEPTH_MASK;
+#if subsurface
+    let below = (path.flags & PATH_BELOW) != 0u;
+#endif
     var carried = load_throughput(slot);
     var instance = NOTHING;
     var hit = PathHit(0.0, 0.0, 0.0, NOTHING);
@@ -38,16 +41,27 @@ fn logic(slot: u32) {
         hit = load_hit(slot);
 #endif
 #if absorption
+#if subsurface
+        // Below a surface light is in its matter alone.
+        if !below {
+#endif
 #if scattering
         carried.throughput *= ray_transmittance(load_media(slot).stack, hit.t);
 #else
         carried.throughput *= transmittance(load_media(slot).stack, hit.t);
+#endif
+#if subsurface
+        }
 #endif
 #if !shadow_rays
         store_throughput(slot, carried);
 #endif
 #endif
         if hit.primitive != NOTHING {
+#if subsurface
+            // What emits does so to its outside.
+            if !below {
+#endif
 #if hit_lights
             path.radiance += carried.throughput
                 * light_hit(hit.primitive, hit.t, ray.direction, carried.bsdf_pdf);
@@ -56,7 +70,17 @@ fn logic(slot: u32) {
             record_light(pixel, hit_group(hit.primitive), carried.throughput * met);
 #endif
 #endif
+#if subsurface
+            }
+            // Where light leaves, it does by the material that it entered through.
+            if below {
+                instance = load_below_rates(slot).instance;
+            } else {
+                instance = primitive_instance(hit.primitive);
+            }
+#else
             instance = primitive_instance(hit.primitive);
+#endif
         }
 #if escape_lights
         if hit.primitive == NOTHING {

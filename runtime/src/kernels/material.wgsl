@@ -14,7 +14,13 @@ fn material(slot: u32, instance: u32) {
 #endif
     let side = hit_geometric_normal(hit.primitive);
     let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
+#if subsurface
+    // From below the surface light goes out as if it came from outside.
+    let leaves = (path.flags & PATH_BELOW) != 0u;
+    let wo = select(-arrived.direction, arrived.direction, leaves);
+#else
     let wo = -arrived.direction;
+#endif
 #if media
     let media = load_media(slot).stack;
     let medium = primitive_medium(hit.primitive);
@@ -49,6 +55,9 @@ fn material(slot: u32, instance: u32) {
     }
 #endif
 #if varying_emission
+#if subsurface
+    if !leaves {
+#endif
 #if light_groups
     let emitted = carried.throughput
         * checked_emission(material_emission(instance, point, wo), instance, place);
@@ -57,6 +66,9 @@ fn material(slot: u32, instance: u32) {
 #else
     path.radiance += carried.throughput
         * checked_emission(material_emission(instance, point, wo), instance, place);
+#endif
+#if subsurface
+    }
 #endif
     store_radiance(slot, path);
     if vertex >= MAX_DEPTH {
@@ -72,7 +84,25 @@ fn material(slot: u32, instance: u32) {
     }
 #endif
     let u = random_numbers(pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
+#if subsurface
+    var scattered: MaterialSample;
+    if leaves {
+        scattered = leave_surface_diffusely(point, wo, wl, u);
+    } else {
+        scattered = checked_sample(evaluate_material(instance, point, wo, wl, u), instance, place);
+    }
+    let enters = scattered.below > 0.5;
+    if enters {
+        store_below(slot, PathBelow(scattered.below_albedo, scattered.below_anisotropy));
+        store_below_rates(slot, PathBelowRates(scattered.below_extinction, instance));
+    }
+    if enters != leaves {
+        path.flags ^= PATH_BELOW;
+        store_radiance(slot, path);
+    }
+#else
     let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u), instance, place);
+#endif
 
     let weight = carried.throughput * scattered.throughput;
     store_throughput(slot, PathThroughput(weight, scattered.pdf));
@@ -145,17 +175,53 @@ fn leave_surface(position: vec3<f32>, side: vec3<f32>, direction: vec3<f32>) -> 
     return offset_origin(position, select(-side, side, dot(side, direction) > 0.0));
 }
 
+#if subsurface
+// Light from below goes out as from a Lambertian surface, whatever it has met.
+fn leave_surface_diffusely(point: SurfacePoint, wo: vec3<f32>, wl: vec3<f32>, u: vec4<f32>) -> MaterialSample {
+    let outward = select(-1.0, 1.0, dot(point.geometric_normal, wo) > 0.0);
+    let side = outward * point.geometric_normal;
+    let normal = outward * point.normal;
+    let axes = across(normal);
+    let radius = sqrt(u.y);
+    let angle = 6.2831853 * u.z;
+    let wi = radius * cos(angle) * axes.x + radius * sin(angle) * axes.y + sqrt(1.0 - u.y) * normal;
+    let pdf = lambertian(normal, side, wi);
+    let light = lambertian(normal, side, wl);
+    let whole = select(vec3<f32>(0.0), vec3<f32>(1.0), pdf > 0.0);
+    var sample = MaterialSample();
+    sample.wi = wi;
+    sample.pdf = pdf;
+    sample.throughput = whole;
+    sample.light_pdf = light;
+    sample.light_throughput = vec3<f32>(light);
+    return sample;
+}
+
+// |cos| / pi toward `wi`, if that is outside by the shading normal and by that of the geometry.
+fn lambertian(normal: vec3<f32>, side: vec3<f32>, wi: vec3<f32>) -> f32 {
+    return select(0.0, max(dot(normal, wi), 0.0) * 0.31830987, dot(side, wi) > 0.0);
+}
+
+#endif
 // A sample with a value that is no number or below zero is dropped whole, and counted for its material.
 fn checked_sample(sample: MaterialSample, instance: u32, place: vec3<u32>) -> MaterialSample {
     // What is light is finite, so that most samples are through with one test a value.
     let densities = vec3<f32>(sample.pdf, sample.light_pdf, 0.0);
     if is_light(sample.throughput) && is_light(densities) && is_light(sample.light_throughput)
+#if subsurface
+        && is_light(sample.below_albedo) && is_light(sample.below_extinction)
+        && is_finite(vec3<f32>(sample.below_anisotropy))
+#endif
         && is_finite(sample.wi) {
         return sample;
     }
     count_wrong_sample(sample, densities, instance, place);
+#if subsurface
+    return MaterialSample();
+#else
     let none = vec3<f32>(0.0);
     return MaterialSample(none, 0.0, none, 0.0, none, 0.0);
+#endif
 }
 
 // Values that are no numbers come before those below zero, as what a row counts.

@@ -36,6 +36,7 @@ fn is_missing(part: Part, parts: &KernelParts, needs: Needs) -> bool {
         | Part::Film
         | Part::Numbers
         | Part::Mis
+        | Part::Flights
         | Part::Order
         | Part::Fates => false,
         // A world has outputs only with what they look up.

@@ -217,6 +217,8 @@ impl<'f> Description<'f> {
     /// The files that it names, materials apart.
     pub(super) fn files(&self, base: &Path) -> Vec<PathBuf> {
         let geometry = self.geometry.iter().map(|entry| &entry.file);
+        let second = self.geometry.iter().filter_map(|entry| entry.uv1.as_ref());
+        let geometry = geometry.chain(second.map(|second| &second.file));
         let places = self
             .geometry
             .iter()

@@ -12,9 +12,9 @@ use impasto_compiler::abi::{Input, InstanceInfo, MaterialInfo, Medium};
 
 use crate::error::SceneError;
 use crate::scene::MAX_NESTED;
-use crate::wgsl::constant_u32;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::needs::MediaTraits;
+use crate::wgsl::{constant_u32, constants_u32};
+use crate::world::needs::{MediaTraits, Need, Needs};
 
 /// How many distinct media, and how many priorities, a scene can have: a word's halves hold them.
 const MAX_MEDIA: usize = 0xffff;
@@ -28,6 +28,9 @@ const MAX_RATE: f32 = 1e18;
 const MAX_ANISOTROPY: f32 = 0.99;
 /// How often light is turned on its way from one surface to the next before it is given up.
 pub(crate) const MAX_TURNS: u32 = 4096;
+/// How often light is turned below a surface until its steps become longer, and how often until they double again.
+const COARSE_TURNS: u32 = 256;
+const COARSER_TURNS: u32 = 128;
 
 /// What paths have to know of media. Empty if nothing depends on the medium that a path is in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,6 +107,21 @@ pub(crate) fn of_empty_space() -> ShaderPart {
     Table::new(std::iter::empty()).part()
 }
 
+/// What ray casts know of light that is turned on its way, in media or below surfaces.
+pub(crate) fn flights(needs: Needs) -> String {
+    let constants = constants_u32(&[
+        ("MAX_TURNS", MAX_TURNS),
+        ("COARSE_TURNS", COARSE_TURNS),
+        ("COARSER_TURNS", COARSER_TURNS),
+    ]);
+    let below = if needs.has(Need::Subsurface) {
+        include_str!("subsurface.wgsl")
+    } else {
+        ""
+    };
+    constants + include_str!("flight.wgsl") + below
+}
+
 /// Every medium once.
 struct Table {
     /// In order of first use.
@@ -153,7 +171,6 @@ impl Table {
             buffers: vec![self.buffer("medium_table", row)],
         };
         if self.scatters() {
-            part.wgsl += &constant_u32("MAX_TURNS", MAX_TURNS);
             part.wgsl += include_str!("volume.wgsl");
             let row = |m: &Medium| {
                 let [r, g, b] = m.scattering;

@@ -77,6 +77,7 @@ impl MaterialSource for Solids {
                 name: format!("s{index}"),
                 delta_only: discrete || matches!(solid.surface, Surface::Glow(_)),
                 crosses,
+                walks: false,
                 transmissive: crosses && solid.medium.is_some(),
                 varying_emission: matches!(solid.surface, Surface::Glow(_)),
                 inputs: match solid.surface {

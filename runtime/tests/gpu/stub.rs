@@ -94,6 +94,7 @@ pub fn materials(kinds: &[Kind]) -> Materials {
         name: format!("m{index}"),
         delta_only: *kind == Kind::Mirror,
         crosses: false,
+        walks: false,
         transmissive: false,
         varying_emission: matches!(kind, Kind::Glowing(..) | Kind::GlowingWrong),
         inputs: InputSet::of(&[Input::Normal]),

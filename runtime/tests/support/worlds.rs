@@ -13,6 +13,7 @@ pub(crate) fn reader() -> MaterialInfo {
         name: "reader".into(),
         delta_only: false,
         crosses: false,
+        walks: false,
         transmissive: false,
         varying_emission: false,
         inputs: InputSet::of(&[

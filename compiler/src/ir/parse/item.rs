@@ -111,7 +111,7 @@ impl Parser {
         Ok(())
     }
 
-    /// `bsdf name(params) { sample = f eval = f pdf = f albedo = f [passes = f] }`
+    /// `bsdf name(params) { sample = f eval = f pdf = f albedo = f [passes = f] [walk = f] }`
     fn bsdf(&mut self, start: Span) -> Result<()> {
         let delta = self.eat_word("delta");
         self.expect_word("bsdf")?;
@@ -125,6 +125,7 @@ impl Parser {
                     .is_word("passes")
                     .then(|| p.method("passes"))
                     .transpose()?,
+                walk: p.is_word("walk").then(|| p.method("walk")).transpose()?,
             })
         })
     }

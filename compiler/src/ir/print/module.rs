@@ -154,6 +154,7 @@ fn methods(def: &ClosureDef) -> Vec<(&'static str, FunctionId)> {
             pdf,
             albedo,
             passes,
+            walk,
         } => [
             ("sample", sample),
             ("eval", eval),
@@ -162,6 +163,7 @@ fn methods(def: &ClosureDef) -> Vec<(&'static str, FunctionId)> {
         ]
         .into_iter()
         .chain(passes.map(|id| ("passes", id)))
+        .chain(walk.map(|id| ("walk", id)))
         .collect(),
     }
 }

@@ -78,6 +78,7 @@ fn closure(module: &Module, def: &ClosureDef) -> Result<(), Problem> {
             pdf,
             albedo,
             passes,
+            walk: _,
         } => [
             (sample, 2, Vec3),
             (eval, 2, Vec3),
@@ -104,7 +105,29 @@ fn closure(module: &Module, def: &ClosureDef) -> Result<(), Problem> {
             return problem(def.span, message);
         }
     }
-    Ok(())
+    match def.methods {
+        Methods::Bsdf { walk: Some(id), .. } => walk(module, def, id),
+        _ => Ok(()),
+    }
+}
+
+/// The method `walk` takes the parameters alone; it gives albedo, extinction and anisotropy.
+fn walk(module: &Module, def: &ClosureDef, id: FunctionId) -> Result<(), Problem> {
+    use Type::{Float, Vec3};
+    let own = || def.params.iter().map(|p| p.ty);
+    let fits = module.functions.get(id.index()).is_some_and(|f| {
+        let Type::Struct(s) = f.result else {
+            return false;
+        };
+        let fields = module.structs.get(s.index()).map(|s| &s.fields);
+        let types = fields.map(|fields| fields.iter().map(|(_, ty)| *ty).collect::<Vec<_>>());
+        f.params.iter().map(|p| p.ty).eq(own()) && types == Some(vec![Vec3, Vec3, Float])
+    });
+    if fits && !def.delta {
+        return Ok(());
+    }
+    let message = format!("{}: `walk` has other parameters or another value", def.name);
+    problem(def.span, message)
 }
 
 /// What is wrong with a material over `module`, if anything.

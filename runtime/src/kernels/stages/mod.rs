@@ -35,6 +35,8 @@ pub(crate) enum Part {
     Lights,
     /// The media that paths are in.
     Media,
+    /// Light that is turned on its way.
+    Flights,
     /// Ray casts.
     Traversal,
     /// What rays are ordered by.
@@ -60,6 +62,7 @@ impl Part {
             Part::Mis => "weights of light samples",
             Part::Lights => "lights",
             Part::Media => "media",
+            Part::Flights => "flights through matter",
             Part::Traversal => "ray casts",
             Part::Order => "order of rays",
             Part::Materials => "texture lookups",

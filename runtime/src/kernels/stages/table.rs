@@ -8,6 +8,7 @@ const ABSORPTION: When = when(&[Need::Absorption]);
 const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
+const SUBSURFACE: When = when(&[Need::Subsurface]);
 const SCATTERING: When = when(&[Need::Scattering]);
 const FIRST_HIT_OUTPUTS: When = when(&[Need::FirstHitOutputs]);
 const MATERIAL_OUTPUTS: When = when(&[Need::MaterialOutputs]);
@@ -53,6 +54,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "requests",
                 "light_group",
                 "media",
+                "below_rates",
             ],
         )],
         stores: &[(
@@ -143,6 +145,8 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "requests",
                 "cone",
                 "media",
+                "below",
+                "below_rates",
             ],
         )],
     },
@@ -219,7 +223,7 @@ pub(crate) static STAGES: [Stage; 7] = [
         // of a cast.
         casts: Some(When {
             all: &[],
-            none: &[Need::Overlap, Need::Scattering],
+            none: &[Need::Overlap, Need::Scattering, Need::Subsurface],
         }),
         parts: &[
             (Part::Geometry, ALWAYS),
@@ -229,6 +233,11 @@ pub(crate) static STAGES: [Stage; 7] = [
             (Part::Media, SCATTERING),
             (Part::Random, SCATTERING),
             (Part::Numbers, SCATTERING),
+            (Part::Flights, SCATTERING),
+            (Part::Surface, SUBSURFACE),
+            (Part::Random, SUBSURFACE),
+            (Part::Numbers, SUBSURFACE),
+            (Part::Flights, SUBSURFACE),
         ],
         loads: &[
             (
@@ -238,11 +247,13 @@ pub(crate) static STAGES: [Stage; 7] = [
             (OVERLAP, &["cone"]),
             // Turns have random numbers by the vertex at which the ray was cast.
             (SCATTERING, &["cone", "radiance"]),
+            (SUBSURFACE, &["cone", "radiance", "below", "below_rates"]),
         ],
         stores: &[
             (ALWAYS, &["hit", "throughput", "media"]),
             (OVERLAP, &["cone"]),
             (SCATTERING, &["cone", "ray_direction"]),
+            (SUBSURFACE, &["cone", "ray_direction"]),
         ],
     },
 ];

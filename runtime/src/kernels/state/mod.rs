@@ -64,12 +64,15 @@ pub(crate) fn constants() -> String {
          // No work is left for the slot.\n\
          const PATH_RETIRED: u32 = {}u;\n\
          // The path has ended; its first hit is asked how it looks.\n\
-         const PATH_LOOKS: u32 = {}u;\n",
+         const PATH_LOOKS: u32 = {}u;\n\
+         // The path is below a surface: its ray walks there.\n\
+         const PATH_BELOW: u32 = {}u;\n",
         bit(0) - 1,
         bit(0),
         bit(1),
         bit(2),
         bit(3),
+        bit(4),
     )
 }
 

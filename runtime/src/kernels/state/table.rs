@@ -24,7 +24,7 @@ const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 11] = [
+pub(crate) const FIELDS: [Field; 13] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -171,6 +171,23 @@ pub(crate) const FIELDS: [Field; 11] = [
             name: "media",
             components: &[("stack", Words)],
             need: when(&[Need::Media]),
+        }],
+    },
+    Field {
+        // What it meets below the surface that it entered last: the share of light that scattering leaves, and the
+        // mean cosine by which it turns.
+        uses: &[Use {
+            name: "below",
+            components: &[("albedo", Vec3), ("anisotropy", F32)],
+            need: when(&[Need::Subsurface]),
+        }],
+    },
+    Field {
+        // How often it meets something there, and the instance of a material that it entered through.
+        uses: &[Use {
+            name: "below_rates",
+            components: &[("extinction", Vec3), ("instance", U32)],
+            need: when(&[Need::Subsurface]),
         }],
     },
 ];

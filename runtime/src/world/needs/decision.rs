@@ -67,6 +67,7 @@ mod tests {
             name: "m".into(),
             delta_only: false,
             crosses: false,
+            walks: false,
             transmissive: false,
             varying_emission: false,
             inputs: InputSet::default(),

@@ -288,6 +288,11 @@ rows! {
         on &[], draws "the choice of a lobe", Never("the code of materials has it or not"), |f, _| {
             f.material("has several lobes", |m| m.lobes > 1)
         };
+    Subsurface, "walks below surfaces", "subsurface",
+        "light walks below the surface of a material",
+        on &[], draws "", Never("the code of materials has it or not"), |f, _| {
+            f.material("is walked below", |m| m.walks)
+        };
     // ---- Paths ----
     Roulette, "Russian roulette", "roulette",
         "paths are long enough to be ended at random",
@@ -334,7 +339,7 @@ rows! {
         "`--ray-data requests` asks for it, and rays neither have an order nor cross hidden boundaries nor scatter on their way",
         on &[], draws "", ASKED, |f, n| {
             let asked = f.ray_data == RayData::Requests;
-            let possible = !n.any(&[Order, Overlap, Scattering]);
+            let possible = !n.any(&[Order, Overlap, Scattering, Subsurface]);
             (asked && possible).then(|| "`--ray-data requests` asks for it".into())
         };
 }
@@ -359,6 +364,7 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
     Spaces,
     Textures,
     LobeChoice,
+    Subsurface,
 ]);
 
 /// The rows of a wavefront, that a megakernel has never.
