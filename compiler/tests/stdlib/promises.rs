@@ -66,7 +66,7 @@ fn width(ty: &str) -> Option<usize> {
         "float" | "int" | "bool" | "angle" | "length" => 1,
         "vec2" => 2,
         "vec3" | "point" | "vector" | "normal" | "color" => 3,
-        "vec4" => 4,
+        "vec4" | "mat2" => 4,
         _ => return None,
     })
 }
