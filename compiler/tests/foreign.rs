@@ -156,8 +156,5 @@ fn slips_get_what_to_write() {
         material("let h = 0.1; let _n = bump(normal, h);")
     );
     let said = said(&bump);
-    assert!(
-        said[0].contains("`gradient(height)`"),
-        "{said:?}"
-    );
+    assert!(said[0].contains("`gradient(height)`"), "{said:?}");
 }

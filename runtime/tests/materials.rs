@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{Random, Row, floats, row, run};
+use crate::support::{Random, Row, floats, points, row, run};
 use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::{Loader, MaterialRequest, Program, compile, diag};
@@ -28,7 +28,7 @@ const BODY: &str = "
     let wl = bitcast<vec4<f32>>(input[i * 5u + 3u]).xyz;
     let u = bitcast<vec4<f32>>(input[i * 5u + 4u]);
     let up = vec3<f32>(0.0, 0.0, 1.0);
-    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), q.xy, 1.0);
+    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), q.xy, 1.0REST);
     let s = evaluate_material(0u, point, wo, wl, u);
     result[i * 3u] = bitcast<vec4<u32>>(vec4<f32>(s.wi, s.pdf));
     result[i * 3u + 1u] = bitcast<vec4<u32>>(vec4<f32>(s.throughput, s.light_pdf));
@@ -87,15 +87,9 @@ fn interpreted<'a>(run: &mut Interpreter<'a, f32>, program: &'a Program, rows: &
     };
     let up = || Value::vector(&[0.0, 0.0, 1.0]);
     let along = Value::vector(&[1.0, 0.0, 0.0]);
-    let point = Value::Struct(vec![
-        wide(0, 3),
-        up(),
-        up(),
-        along,
-        wide(1, 2),
-        Value::float(1.0),
-    ]);
-    let args = vec![point, wide(2, 3), wide(3, 3), wide(4, 4)];
+    let mut point = vec![wide(0, 3), up(), up(), along, wide(1, 2), Value::float(1.0)];
+    point.extend(points::values(program, &wide(0, 3), &wide(2, 3)));
+    let args = vec![Value::Struct(point), wide(2, 3), wide(3, 3), wide(4, 4)];
     let answer = run
         .run(&program.compiled()[0].evaluate, args)
         .expect("ends");
@@ -117,7 +111,8 @@ fn gpu_and_interpreter_agree() {
             wgsl,
             buffers: Vec::new(),
         };
-        let answered = run(&[&part], BODY, &asked, QUERIES, QUERIES * ANSWERED);
+        let body = BODY.replace("REST", &points::arguments(&program));
+        let answered = run(&[&part], &body, &asked, QUERIES, QUERIES * ANSWERED);
         let mut differing = 0;
         let mut lit = 0;
         for i in 0..QUERIES {

@@ -5,6 +5,7 @@
 #![allow(dead_code)] // each test binary uses its part
 
 pub(crate) mod light_scenes;
+pub(crate) mod points;
 pub(crate) mod worlds;
 
 use std::collections::BTreeMap;

@@ -13,7 +13,7 @@ use impasto_runtime::wgsl::ShaderPart;
 
 use crate::library;
 use crate::record::{Bound, Row, effort};
-use crate::support::{Random, Row as Words, floats, row, run};
+use crate::support::{Random, Row as Words, floats, points, row, run};
 
 /// The greatest relative error that is fine where a BSDF's documentation promises nothing.
 const FINE: f64 = 1e-3;
@@ -26,7 +26,7 @@ const BODY: &str = "
     let wo = bitcast<vec4<f32>>(input[i * 3u + 1u]).xyz;
     let wl = bitcast<vec4<f32>>(input[i * 3u + 2u]).xyz;
     let up = vec3<f32>(0.0, 0.0, 1.0);
-    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), p.xy, 1.0);
+    let point = SurfacePoint(p.xyz, up, up, vec3<f32>(1.0, 0.0, 0.0), p.xy, 1.0REST);
     let s = evaluate_material(0u, point, wo, wl, vec4<f32>(0.5));
     result[i] = bitcast<vec4<u32>>(vec4<f32>(s.light_throughput, s.light_pdf));";
 
@@ -71,16 +71,21 @@ fn exact<'a>(
         Value::<f64>::vector(&values[..n])
     };
     let up = || Value::vector(&[0.0, 0.0, 1.0]);
-    let point = Value::Struct(vec![
+    let mut point = vec![
         wide(rows[0], 3),
         up(),
         up(),
         Value::vector(&[1.0, 0.0, 0.0]),
         wide(rows[0], 2),
         Value::float(1.0),
-    ]);
+    ];
+    point.extend(points::values(
+        program,
+        &wide(rows[0], 3),
+        &wide(rows[1], 3),
+    ));
     let args = vec![
-        point,
+        Value::Struct(point),
         wide(rows[1], 3),
         wide(rows[2], 3),
         Value::vector(&[0.5; 4]),
@@ -104,7 +109,8 @@ fn worst(program: &Program, asked: &[Words], near: f64) -> (f64, String, usize) 
         buffers: Vec::new(),
     };
     let count = asked.len() / 3;
-    let answers = run(&[&part], BODY, asked, count, count);
+    let body = BODY.replace("REST", &points::arguments(program));
+    let answers = run(&[&part], &body, asked, count, count);
     let mut interpreter = Interpreter::new(program.ir(), u64::MAX);
     let (mut worst, mut place, mut far) = (0.0, String::from("nowhere"), 0);
     for (rows, answer) in asked.chunks(3).zip(answers) {
