@@ -9,11 +9,23 @@ mod cli;
 const STACK_BYTES: usize = 32 << 20;
 
 fn main() -> ExitCode {
+    give_runtime_folder();
     let builder = std::thread::Builder::new().name("main".into());
     match builder.stack_size(STACK_BYTES).spawn(cli::main) {
         Ok(thread) => thread
             .join()
             .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
         Err(_) => cli::main(),
+    }
+}
+
+/// Gives the process a runtime folder where its environment names none: Mesa's drivers otherwise print an error that
+/// looks like one of ours, though rendering needs no such folder.
+#[allow(unsafe_code)]
+fn give_runtime_folder() {
+    const VARIABLE: &str = "XDG_RUNTIME_DIR";
+    if cfg!(unix) && std::env::var_os(VARIABLE).is_none() {
+        // SAFETY: no other thread runs yet that could read the environment.
+        unsafe { std::env::set_var(VARIABLE, std::env::temp_dir()) };
     }
 }

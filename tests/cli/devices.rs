@@ -253,3 +253,13 @@ fn a_picture_that_fits_no_memory_is_refused() {
         .says("the film")
         .says("`memory`");
 }
+
+/// Mesa prints an error that looks like ours where the environment names no runtime folder.
+#[test]
+fn drivers_have_a_runtime_folder() {
+    let mut command = command(&["info", "--device", "gpu"]);
+    command.env_remove("XDG_RUNTIME_DIR");
+    let run: Run = command.output().expect("the command starts").into();
+    let run = run.exits(0);
+    assert!(!run.stderr.contains("XDG"), "{}", run.stderr);
+}

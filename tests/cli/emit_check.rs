@@ -17,7 +17,7 @@ fn wrong_usage_exits_with_2() {
         (&["paint"], "paint"),
         (&["check"], "FILE"),
         (&["emit", "x.impasto", "--what", "spirv"], "wgsl"),
-        (&["render", "x.toml"], "--out"),
+        (&["render"], "Usage"),
         (&["render", "x.toml", "--out", "x.exr", "--spp", "0"], "spp"),
         (
             &["render", "x.toml", "--out", "x.exr", "--size", "0x4"],
