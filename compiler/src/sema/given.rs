@@ -166,6 +166,10 @@ impl Checker<'_> {
         file: FileId,
         text: &str,
     ) -> Option<(Const, Span)> {
+        if ty == Ty::Texture && names_a_picture(text) {
+            let path = Const::Int(self.texture("", text));
+            return Some((path, Span::new(file, 0..text.len())));
+        }
         let (expr, diagnostics) = parser::parse_expression(file, text);
         diagnostics.into_iter().for_each(|d| self.report(d));
         let expr = expr?;
@@ -175,6 +179,14 @@ impl Checker<'_> {
         };
         Some((value, expr.span))
     }
+}
+
+/// Is a text the name of a picture and no expression? Scenes need no quotes within quotes.
+fn names_a_picture(text: &str) -> bool {
+    const EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+    let extension = text.rsplit_once('.').map(|(_, extension)| extension);
+    let is_known = |e: &str| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(e));
+    extension.is_some_and(is_known) && !text.contains('"')
 }
 
 #[cfg(test)]
@@ -266,6 +278,26 @@ material m {
             let takes_some = taken > 0 && taken < values.len();
             assert!(takes_some || name == "l", "{name} takes {taken} values");
         }
+    }
+
+    /// A picture is named as any file is, with or without quotes of its own.
+    #[test]
+    fn pictures_need_no_quotes_in_quotes() {
+        for text in [
+            "ball.png",
+            "\"ball.png\"",
+            "maps/wood.<UDIM>.EXR",
+            "a b/c.jpeg",
+        ] {
+            let (values, said) = given("t", ParameterValue::Text(text.into()));
+            assert!(values.is_some() && said.is_empty(), "{text}: {said}");
+        }
+        assert_eq!(
+            given("t", ParameterValue::Text("ball.png".into())).0,
+            given("t", ParameterValue::Text("\"ball.png\"".into())).0
+        );
+        let (values, said) = given("c", ParameterValue::Text("ball.png".into()));
+        assert!(values.is_none() && said.contains("E0201"), "{said}");
     }
 
     /// Numbers reach the checker in the precision that they were written in.

@@ -16,7 +16,24 @@ pub(super) const VALUES: &[FileValue] = &[
     value("Ns", &[10.0]),
     value("Ni", &[1.5]),
     value("d", &[1.0]),
+    value("Pr", &[]),
+    value("Pm", &[]),
     value("map_Kd", &[]),
+    value("map_Ks", &[]),
+    value("map_Ke", &[]),
+    value("map_Ns", &[]),
+    value("map_d", &[]),
+    value("map_Pr", &[]),
+    value("map_Pm", &[]),
+    value("map_Bump", &[]),
+    value("norm", &[]),
+];
+
+/// Numbers that tobj does not know, as it leaves them.
+const NUMBERS: [&str; 2] = ["Pr", "Pm"];
+/// The same of pictures.
+const PICTURES: [&str; 8] = [
+    "map_Ks", "map_Ke", "map_Ns", "map_d", "map_Pr", "map_Pm", "map_Bump", "norm",
 ];
 
 const fn value(name: &'static str, fallback: &'static [f64]) -> FileValue {
@@ -45,6 +62,14 @@ fn read(material: tobj::Material, folder: &Path) -> FileMaterial {
         let path = folder.join(file?).to_str()?.to_owned();
         Some((name, ParameterValue::Texture(path)))
     };
+    let other = |name: &str| {
+        material
+            .unknown_param
+            .get(&format!("other_{name}"))
+            .cloned()
+    };
+    let numbers = NUMBERS.map(|name| float(name, other(name).and_then(|x| x.parse().ok())));
+    let pictures = PICTURES.map(|name| picture(name, other(name)));
     let values = [
         color("Kd", material.diffuse),
         color("Ks", material.specular),
@@ -56,7 +81,12 @@ fn read(material: tobj::Material, folder: &Path) -> FileMaterial {
     ];
     FileMaterial {
         name: material.name,
-        values: values.into_iter().flatten().collect(),
+        values: values
+            .into_iter()
+            .chain(numbers)
+            .chain(pictures)
+            .flatten()
+            .collect(),
     }
 }
 
@@ -81,17 +111,27 @@ fn normalise(path: &Path, text: &str) -> Result<String, SceneError> {
                 let rgb = color(rest).ok_or_else(|| error("three finite numbers"))?;
                 out += &format!("{key} {} {} {}\n", rgb[0], rgb[1], rgb[2]);
             }
-            "Ns" | "Ni" | "d" | "Tr" => {
+            "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" => {
                 let last = rest.split_whitespace().last().and_then(finite);
                 let value = last.ok_or_else(|| error("a finite number"))?;
                 match key {
                     "Tr" => out += &format!("d {}\n", 1.0 - value),
+                    "Pr" | "Pm" => out += &format!("other_{key} {value}\n"),
                     _ => out += &format!("{key} {value}\n"),
                 }
+            }
+            // The other names that programs write a bump map by.
+            "bump" | "map_bump" => {
+                let file = picture_name(rest).ok_or_else(|| error("a file"))?;
+                out += &format!("other_map_Bump {file}\n");
             }
             "map_Kd" => {
                 let file = picture_name(rest).ok_or_else(|| error("a file"))?;
                 out += &format!("map_Kd {file}\n");
+            }
+            key if PICTURES.contains(&key) => {
+                let file = picture_name(rest).ok_or_else(|| error("a file"))?;
+                out += &format!("other_{key} {file}\n");
             }
             _ => {}
         }
@@ -148,7 +188,8 @@ mod tests {
     #[test]
     fn every_form_of_a_value_is_read() {
         let text = "newmtl a b\nKd 0.5\nKs 0.1 0.2 0.3 # shiny\nKe spectral x.rfl\nNs 12\nTr 0.25\n\
-                    map_Kd -s 2 2 -clamp on -o 0.5 wood\\old oak.png\nillum 2\nnewmtl plain\n";
+                    map_Kd -s 2 2 -clamp on -o 0.5 wood\\old oak.png\nillum 2\nPr 0.3\nPm 1\n\
+                    bump -bm 0.5 dents.png\nmap_Pr rough.png\nnewmtl plain\n";
         let text = normalise(Path::new("a.mtl"), text).expect("it is valid");
         let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).expect("tobj reads it");
         let materials: Vec<FileMaterial> = materials
@@ -169,10 +210,20 @@ mod tests {
             "12.0",
             "1.5",
             "0.75",
+            "0.3",
+            "1.0",
             "\"tex/wood/old oak.png\"",
+            "",
+            "",
+            "",
+            "",
+            "\"tex/rough.png\"",
+            "",
+            "\"tex/dents.png\"",
+            "",
         ];
         assert_eq!(values(&materials[0]), expected);
         let plain = values(&materials[1]);
-        assert_eq!((&plain[0][..], &plain[6][..]), ("color(0.8, 0.8, 0.8)", ""));
+        assert_eq!((&plain[0][..], &plain[8][..]), ("color(0.8, 0.8, 0.8)", ""));
     }
 }
