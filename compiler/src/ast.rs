@@ -188,8 +188,25 @@ pub struct Const {
     pub value: Expr,
 }
 
-/// A type as written: one identifier.
-pub type TypeName = Name;
+/// A type as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TypeName {
+    /// Its text: `color`, `color[5]`, `color[]`.
+    pub node: String,
+    /// Where it is written.
+    pub span: Span,
+    /// What it is an array of.
+    pub array: Option<Box<ArrayType>>,
+}
+
+/// `element[count]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArrayType {
+    /// The type of the elements.
+    pub element: Name,
+    /// How many there are, a constant; any number where it is left out.
+    pub count: Option<Expr>,
+}
 
 /// A function body: `= expr when condition;` or a block whose last expression is the value.
 #[derive(Clone, Debug, PartialEq)]
@@ -241,7 +258,7 @@ pub enum StmtKind {
     },
     /// `place = value;`, also `+=`, `-=`, `*=`, `/=`
     Assign {
-        /// A variable, a component of one (`v.x`), or an output of a material.
+        /// A variable, an element or component of one (`a[0]`, `v.x`), or an output of a material.
         place: Expr,
         /// The operator of a compound assignment.
         op: Option<BinaryOp>,
@@ -311,6 +328,10 @@ pub enum ExprKind {
     },
     /// `value.field`: a field of a struct, or a swizzle
     Field(Box<Expr>, Name),
+    /// `[a, b, c]`
+    Array(Vec<Expr>),
+    /// `values[index]`
+    Index(Box<Expr>, Box<Expr>),
     /// `-a`, `!a`
     Unary(UnaryOp, Box<Expr>),
     /// `a + b`

@@ -62,7 +62,7 @@ pub fn irs() -> Corpus {
 const SOURCE_WORDS: &str = "
     material private none label soft group unit param let var fn bsdf edf delta struct const use if else for in while limit return
     break continue true false surface emission interior opacity layer mix medium position normal
-    uv tangent exterior_ior bool int uint float length angle vec2 vec3 vec4 color point vector mat2 mat3
+    uv tangent exterior_ior bool int uint float length angle vec2 vec3 vec4 color point vector mat2 mat3 float[2] color[] count fill [ ]
     texture std :: ; , . .. : = == != < <= > >= + - * / % & | ^ << >> && || ! += -= *= /= %= &= |= ^= <<= >>= 7u 0xffu -> ( )
     { } [ ] /// //! /* */ // \" \" when diffuse mirror specular blinn_phong uniform flakes perlin
     sample eval pdf albedo emit wo wi u 0 1 2 0.5 1e38 1e-45 -1 65536 2147483648 0xff 1 mm 30 deg

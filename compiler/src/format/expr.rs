@@ -32,7 +32,8 @@ impl<'t> Layout<'t> {
         chain(operands, operators)
     }
 
-    fn operand(&mut self) -> Doc<'t> {
+    /// An operand with its signs and parts; a type, too.
+    pub(super) fn operand(&mut self) -> Doc<'t> {
         let mut parts = Vec::new();
         while matches!(self.peek(), Some(Token::Minus | Token::Not)) {
             parts.push(self.token());
@@ -40,7 +41,8 @@ impl<'t> Layout<'t> {
         match self.peek() {
             Some(Token::If) => parts.push(self.if_chain()),
             Some(Token::LeftBrace) => parts.push(self.block(false).group()),
-            Some(Token::LeftParen) => parts.push(self.parentheses()),
+            Some(Token::LeftParen) => parts.push(self.brackets()),
+            Some(Token::LeftBracket) => parts.push(self.list(Style::TIGHT)),
             Some(Token::Int | Token::Hex | Token::Float) => {
                 parts.push(self.token());
                 if self.is(Token::Ident) {
@@ -58,14 +60,17 @@ impl<'t> Layout<'t> {
                 }
             }
         }
-        while self.is(Token::Dot) {
-            parts.push(self.token());
-            parts.push(self.token());
+        loop {
+            match self.peek() {
+                Some(Token::Dot) => parts.extend([self.token(), self.token()]),
+                Some(Token::LeftBracket) => parts.push(self.brackets()),
+                _ => break Doc::concat(parts),
+            }
         }
-        Doc::concat(parts)
     }
 
-    fn parentheses(&mut self) -> Doc<'t> {
+    /// `(a)`, `[i]`, or `[]` of a type.
+    pub(super) fn brackets(&mut self) -> Doc<'t> {
         let open = self.token();
         let value = self.expr();
         let (comments, close) = self.closer(false);

@@ -34,6 +34,7 @@ impl<'t> Layout<'t> {
             match self.peek() {
                 None => break,
                 Some(Token::LeftParen) => parts.push(self.list(Style::TIGHT)),
+                Some(Token::LeftBracket) => parts.push(self.brackets()),
                 Some(Token::LeftBrace) if is_struct => {
                     parts.extend([Doc::space(), self.list(Style::BROKEN)]);
                     break;

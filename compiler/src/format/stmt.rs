@@ -66,7 +66,7 @@ impl<'t> Layout<'t> {
     fn binding(&mut self) -> Doc<'t> {
         let mut parts = vec![self.token(), Doc::space(), self.token()];
         if self.is(Token::Colon) {
-            parts.extend([self.token(), Doc::space(), self.token()]);
+            parts.extend([self.token(), Doc::space(), self.operand()]);
         }
         parts.extend([Doc::space(), self.token()]);
         let breaks = self.breaks();

@@ -25,6 +25,10 @@ pub enum Ty {
     Mat3,
     Texture,
     Struct(StructId),
+    /// A constant number of values of one type, stored as a struct with a field for each.
+    Array(StructId),
+    /// Any number of them, as a parameter; the struct is that of one.
+    AnyCount(StructId),
     Bsdf,
     Edf,
     Medium,
@@ -77,8 +81,18 @@ impl Ty {
             // A matrix of two columns lies in a vec4, one after the other.
             Ty::Vec4 | Ty::Mat2 => Type::Vec4,
             Ty::Mat3 => Type::Mat3,
-            Ty::Struct(id) => Type::Struct(id),
-            Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => return None,
+            Ty::Struct(id) | Ty::Array(id) => Type::Struct(id),
+            Ty::AnyCount(_) | Ty::Bsdf | Ty::Edf | Ty::Medium | Ty::Material | Ty::Error => {
+                return None;
+            }
         })
+    }
+
+    /// The struct that stores an array.
+    pub fn array(self) -> Option<StructId> {
+        match self {
+            Ty::Array(id) | Ty::AnyCount(id) => Some(id),
+            _ => None,
+        }
     }
 }

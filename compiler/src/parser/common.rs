@@ -9,7 +9,7 @@ use chumsky::input::{InputRef, MappedInput};
 use chumsky::prelude::*;
 
 use super::error::{Expected, SyntaxError, Want};
-use crate::ast::Name;
+use crate::ast::{ArrayType, Expr, Name, TypeName};
 use crate::lexer::{Token, doc_text};
 use crate::source::{Span, Spanned};
 
@@ -62,10 +62,26 @@ pub(super) fn name<'t>(text: &'t str) -> impl Parse<'t, Name> + Copy {
     one(Expected::want(Want::Name), |t| t == Token::Ident).map(move |span| spell(text, span))
 }
 
-/// A type: a name, or a keyword that names a closure.
-pub(super) fn type_name<'t>(text: &'t str) -> impl Parse<'t, Name> + Copy {
+/// A type: a name or a keyword that names a closure, and `[count]` or `[]` after it for an array.
+pub(super) fn type_name<'t>(
+    text: &'t str,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, TypeName> + Clone {
     let accept = |t| matches!(t, Token::Ident | Token::Bsdf | Token::Edf);
-    one(Expected::want(Want::Type), accept).map(move |span| spell(text, span))
+    let element = one(Expected::want(Want::Type), accept).map(move |span| spell(text, span));
+    let count = just(Token::LeftBracket)
+        .ignore_then(expression.or_not())
+        .then_ignore(close(Token::RightBracket))
+        .or_not();
+    element.then(count).map_with(move |(element, count), e| {
+        let whole = spell(text, e.span());
+        let array = count.map(|count| Box::new(ArrayType { element, count }));
+        TypeName {
+            node: whole.node,
+            span: whole.span,
+            array,
+        }
+    })
 }
 
 /// The text at `span` as a name.

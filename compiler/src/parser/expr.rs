@@ -19,10 +19,10 @@ pub(super) fn expression<'t>(text: &'t str) -> Rule<'t, Expr> {
     recursive(|expression| {
         let expression = expression.boxed();
         let block = stmt::block(text, expression.clone());
-        let operand = operand(text, expression, block)
+        let operand = operand(text, expression.clone(), block)
             .recover_with(via_parser(missing()))
             .boxed();
-        let operators = operators(text, operand).boxed();
+        let operators = operators(text, operand, expression).boxed();
         before(Expected::want(Want::Expression), starts).ignore_then(operators)
     })
     .boxed()
@@ -163,6 +163,7 @@ fn starts(token: Token) -> bool {
             | True
             | False
             | LeftParen
+            | LeftBracket
             | LeftBrace
             | If
             | Minus
@@ -188,6 +189,8 @@ fn operand<'t>(
         .ignore_then(required(expression.clone()))
         .then_ignore(close(Token::RightParen))
         .map_with(move |inner: Expr, e| make(inner.kind, e.span()));
+    let array = list(Token::LeftBracket, expression.clone(), Token::RightBracket)
+        .map_with(move |elements, e| make(ExprKind::Array(elements), e.span()));
     let chosen = if_expression(text, expression.clone(), block.clone())
         .map(move |(chosen, span)| make(ExprKind::If(Box::new(chosen)), span));
     let block = block.map(move |b| {
@@ -200,6 +203,7 @@ fn operand<'t>(
         name_or_call(text, expression),
         literal(text),
         group,
+        array,
         chosen,
         block,
         unknown,
@@ -291,8 +295,12 @@ const COMPARISON: u16 = 3;
 
 /// `value op value op value`. Operators are read in a row and put in order after: asking for each
 /// binding power at each place would take most of the time of parsing.
-fn operators<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
-    let value = value(text, operand).boxed();
+fn operators<'t>(
+    text: &'t str,
+    operand: Rule<'t, Expr>,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, Expr> {
+    let value = value(text, operand, expression).boxed();
     let more = operator()
         .then(value.clone())
         .repeated()
@@ -315,9 +323,13 @@ fn operators<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr>
     })
 }
 
-/// An operand with what binds closer than infix operators: signs before it, and fields after it,
-/// which bind closest.
-fn value<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
+/// An operand with what binds closer than infix operators: signs before it, and fields and indices
+/// after it, which bind closest.
+fn value<'t>(
+    text: &'t str,
+    operand: Rule<'t, Expr>,
+    expression: Rule<'t, Expr>,
+) -> impl Parse<'t, Expr> {
     let sign = choice((
         just(Token::Minus).to(UnaryOp::Neg),
         just(Token::Not).to(UnaryOp::Not),
@@ -326,26 +338,37 @@ fn value<'t>(text: &'t str, operand: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
     let field_name = name(text)
         .map(Some)
         .recover_with(via_parser(empty().to(None)));
-    let field = just(Token::Dot).ignore_then(field_name);
-    let fields = field
-        .map_with(|name, e| (name, e.span()))
+    let field = just(Token::Dot).ignore_then(field_name).map(Part::Field);
+    let index = just(Token::LeftBracket)
+        .ignore_then(required(expression))
+        .then_ignore(close(Token::RightBracket))
+        .map(Part::Index);
+    let parts = choice((field, index))
+        .map_with(|part, e| (part, e.span()))
         .repeated()
         .collect();
     signs
         .then(operand)
-        .then(fields)
-        .map_with(with_signs_and_fields)
+        .then(parts)
+        .map_with(with_signs_and_parts)
 }
 
-type Signed = ((Vec<(UnaryOp, Span)>, Expr), Vec<(Option<Name>, Span)>);
+/// What follows an operand and names a part of it; a field's name may be missing.
+enum Part {
+    Field(Option<Name>),
+    Index(Expr),
+}
 
-fn with_signs_and_fields<'t>(parts: Signed, e: &mut Extras<'t, '_>) -> Expr {
-    let ((signs, mut value), fields) = parts;
-    for (name, at) in fields {
+type Signed = ((Vec<(UnaryOp, Span)>, Expr), Vec<(Part, Span)>);
+
+fn with_signs_and_parts<'t>(parts: Signed, e: &mut Extras<'t, '_>) -> Expr {
+    let ((signs, mut value), parts) = parts;
+    for (part, at) in parts {
         let span = value.span.to(at);
-        let kind = match name {
-            Some(name) => ExprKind::Field(Box::new(value), name),
-            None => ExprKind::Error,
+        let kind = match part {
+            Part::Field(Some(name)) => ExprKind::Field(Box::new(value), name),
+            Part::Field(None) => ExprKind::Error,
+            Part::Index(index) => ExprKind::Index(Box::new(value), Box::new(index)),
         };
         value = Expr { kind, span };
     }

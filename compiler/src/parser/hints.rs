@@ -262,7 +262,7 @@ impl<'t> Slip<'_, 't> {
     fn bracket(&self) -> Option<String> {
         match (self.found, self.before(1)?) {
             (Token::LeftBracket, _) => {
-                let hint = "there are no arrays; components are `.x .y .z .w` and `.r .g .b`";
+                let hint = "the number of elements follows the type, as in `values: float[3]`";
                 Some(hint.to_owned())
             }
             (Token::LeftParen, Token::Ident) if self.before(2) == Some(Token::Dot) => {

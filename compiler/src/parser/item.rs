@@ -25,8 +25,8 @@ pub(super) fn item<'t>(
     choice((
         material(text, expression.clone(), block),
         closure(text, expression.clone(), parameters.clone(), body.clone()),
-        function(text, parameters, body),
-        structure(text),
+        function(text, expression.clone(), parameters, body),
+        structure(text, expression.clone()),
         constant(text, expression),
     ))
 }
@@ -92,7 +92,7 @@ fn material_param<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'
     just(Token::Param)
         .ignore_then(name(text))
         .then_ignore(just(Token::Colon))
-        .then(type_name(text))
+        .then(type_name(text, expression.clone()))
         .then_ignore(just(Token::Assign))
         .then(required(expression.clone()))
         .then(range)
@@ -129,11 +129,11 @@ fn metadata<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Vec
 /// `(name: type = default, ...)`
 fn parameters<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, Vec<Param>> {
     let default = just(Token::Assign)
-        .ignore_then(required(expression))
+        .ignore_then(required(expression.clone()))
         .or_not();
     let param = name(text)
         .then_ignore(just(Token::Colon))
-        .then(type_name(text))
+        .then(type_name(text, expression.clone()))
         .then(default)
         .map(|((name, ty), default)| Param { name, ty, default });
     list(Token::LeftParen, param, Token::RightParen).boxed()
@@ -239,6 +239,7 @@ fn members<'t>(
 /// `fn name(params) -> type body`
 fn function<'t>(
     text: &'t str,
+    expression: Rule<'t, Expr>,
     parameters: Rule<'t, Vec<Param>>,
     body: Rule<'t, Body>,
 ) -> impl Parse<'t, (Name, ItemKind)> {
@@ -246,7 +247,7 @@ fn function<'t>(
         .ignore_then(name(text))
         .then(parameters)
         .then_ignore(just(Token::Arrow))
-        .then(type_name(text))
+        .then(type_name(text, expression.clone()))
         .then(body)
         .map(|(((name, params), result), body)| {
             let function = Function {
@@ -260,11 +261,11 @@ fn function<'t>(
 }
 
 /// `struct name { field: type, ... }`
-fn structure<'t>(text: &'t str) -> impl Parse<'t, (Name, ItemKind)> {
+fn structure<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, (Name, ItemKind)> {
     let field = docs(text)
         .then(name(text))
         .then_ignore(just(Token::Colon))
-        .then(type_name(text))
+        .then(type_name(text, expression.clone()))
         .map(|((docs, name), ty)| Field { docs, name, ty });
     just(Token::Struct)
         .ignore_then(name(text))
@@ -278,7 +279,7 @@ fn constant<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, (Na
     just(Token::Const)
         .ignore_then(name(text))
         .then_ignore(just(Token::Colon))
-        .then(type_name(text))
+        .then(type_name(text, expression.clone()))
         .then_ignore(just(Token::Assign))
         .then(required(expression))
         .then_ignore(semicolon(text))

@@ -4,7 +4,7 @@
 
 use crate::ast::{
     Arg, Block, Body, ClosureDef, ClosureKind, Entry, Expr, ExprKind, IfExpr, Item, ItemKind,
-    MaterialParam, Module, Name, Param, Stmt, StmtKind, UnaryOp, Use, UseName,
+    MaterialParam, Module, Name, Param, Stmt, StmtKind, TypeName, UnaryOp, Use, UseName,
 };
 
 /// The width that lists are broken to, in characters.
@@ -83,6 +83,10 @@ fn name(name: &Name) -> Tree {
     word(name.node.clone())
 }
 
+fn type_name(ty: &TypeName) -> Tree {
+    word(ty.node.clone())
+}
+
 /// A list that starts with `keyword`; `head` more entries stay on its line.
 fn list(keyword: &str, head: usize, entries: impl IntoIterator<Item = Tree>) -> Tree {
     let entries = std::iter::once(word(keyword)).chain(entries).collect();
@@ -124,19 +128,19 @@ fn item(item: &Item) -> Tree {
         ItemKind::Closure(definition) => closure(head.chain(docs), definition),
         ItemKind::Function(function) => {
             let params = function.params.iter().map(param);
-            let result = list("->", 1, [name(&function.result)]);
+            let result = list("->", 1, [type_name(&function.result)]);
             let rest = params.chain([result]).chain(body(&function.body));
             list("fn", 1, head.chain(docs).chain(rest))
         }
         ItemKind::Struct(fields) => {
             let fields = fields.iter().map(|field| {
-                let parts = [name(&field.name), name(&field.ty)];
+                let parts = [name(&field.name), type_name(&field.ty)];
                 list("field", 2, parts.into_iter().chain(self::docs(&field.docs)))
             });
             list("struct", 1, head.chain(docs).chain(fields))
         }
         ItemKind::Const(constant) => {
-            let parts = [name(&constant.ty), expr(&constant.value)];
+            let parts = [type_name(&constant.ty), expr(&constant.value)];
             list("const", 1, head.chain(docs).chain(parts))
         }
     }
@@ -162,7 +166,11 @@ fn closure(head: impl Iterator<Item = Tree>, definition: &ClosureDef) -> Tree {
 }
 
 fn material_param(param: &MaterialParam) -> Tree {
-    let parts = [name(&param.name), name(&param.ty), expr(&param.default)];
+    let parts = [
+        name(&param.name),
+        type_name(&param.ty),
+        expr(&param.default),
+    ];
     let range = param.range.as_ref();
     let range = range.map(|(low, high)| list("in", 0, [expr(low), expr(high)]));
     let metadata = param.metadata.iter().map(entry);
@@ -176,7 +184,7 @@ fn entry(entry: &Entry) -> Tree {
 }
 
 fn param(param: &Param) -> Tree {
-    let parts = [name(&param.name), name(&param.ty)];
+    let parts = [name(&param.name), type_name(&param.ty)];
     let default = param.default.as_ref().map(expr);
     list("param", 2, parts.into_iter().chain(default))
 }
@@ -211,7 +219,7 @@ fn stmt(stmt: &Stmt) -> Tree {
             value,
         } => {
             let keyword = if *mutable { "var" } else { "let" };
-            let ty = ty.as_ref().map(|ty| list(":", 1, [name(ty)]));
+            let ty = ty.as_ref().map(|ty| list(":", 1, [type_name(ty)]));
             let parts = [name(bound)].into_iter().chain(ty);
             list(keyword, 1, parts.chain([expr(value)]))
         }
@@ -259,6 +267,8 @@ fn expr(value: &Expr) -> Tree {
             list("call", 1, [name(callee)].into_iter().chain(args))
         }
         ExprKind::Field(base, field) => list(".", 0, [expr(base), name(field)]),
+        ExprKind::Array(elements) => list("array", 0, elements.iter().map(expr)),
+        ExprKind::Index(base, index) => list("at", 0, [expr(base), expr(index)]),
         ExprKind::Unary(op, value) => {
             let keyword = match op {
                 UnaryOp::Neg => "-",

@@ -245,18 +245,25 @@ fn found(source: &Source<'_>, found: Option<Token>, index: usize) -> String {
 /// The expected set in words, without what is always possible and so says nothing.
 fn words(expected: Expected) -> Vec<String> {
     use Token::*;
-    let mut rest = expected.without(Expected::tokens(&[DocOuter, DocInner, Else, Unknown]));
+    let mut rest = expected.without(Expected::tokens(&[
+        DocOuter,
+        DocInner,
+        Else,
+        Unknown,
+        LeftBracket,
+    ]));
     let mut words = Vec::new();
     let expression = Expected::want(Want::Expression);
     let definition = Expected::tokens(&[Material, Bsdf, Delta, Edf, Fn, Struct, Const]);
     let statement = Expected::tokens(&[Let, Var, For, While, Break, Continue, If]).with(expression);
     let prefix = Expected::tokens(&[Minus, Not]);
-    let operand = Expected::tokens(&[LeftParen, LeftBrace, Str, True, False, If]);
+    let operand = Expected::tokens(&[LeftParen, LeftBracket, LeftBrace, Str, True, False, If]);
     let operand = operand
         .with(prefix)
         .with(expression)
         .with(Expected::want(Want::Name));
-    let operator = Expected::want(Want::Operator).with(Expected::tokens(&[Dot, LeftParen]));
+    let operator =
+        Expected::want(Want::Operator).with(Expected::tokens(&[Dot, LeftParen, LeftBracket]));
     let assign = Expected::tokens(&[
         Assign,
         AddAssign,

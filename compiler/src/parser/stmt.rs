@@ -146,7 +146,9 @@ pub(super) fn binding<'t>(
     expression: Rule<'t, Expr>,
 ) -> impl Parse<'t, StmtKind> {
     let keyword = just(if mutable { Token::Var } else { Token::Let });
-    let ty = just(Token::Colon).ignore_then(type_name(text)).or_not();
+    let ty = just(Token::Colon)
+        .ignore_then(type_name(text, expression.clone()))
+        .or_not();
     keyword
         .ignore_then(name(text))
         .then(ty)

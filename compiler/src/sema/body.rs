@@ -6,6 +6,7 @@ use crate::ir::build::Builder;
 use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
 use crate::source::Span;
 
+use super::any_count::takes_any_count;
 use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::outputs::OUTPUTS;
@@ -97,6 +98,8 @@ pub struct Body<'c, 'l> {
     pub turns: u64,
     /// Enclosing loops.
     pub loops: usize,
+    /// Do its arrays of [`super::any_count::STAND_IN`] elements stand in for arrays of any length?
+    pub stands_in: bool,
     /// What may be said here.
     pub place: Place,
     /// Calls that were replaced by what they call.
@@ -132,6 +135,7 @@ impl<'c, 'l> Body<'c, 'l> {
             fixed_scopes: 0,
             turns: 1,
             loops: 0,
+            stands_in: false,
             place: Place::Values,
             expansion: Expansion::default(),
             closures: Vec::new(),
@@ -211,6 +215,11 @@ impl<'c, 'l> Body<'c, 'l> {
             && self.is_unsigned(id, from)
         {
             return Some(Operand::Value(id, to));
+        }
+        if let (Operand::Value(id, _), Some(_)) = (operand, from.array())
+            && let Some(array) = self.array_as(id, from, to, span)
+        {
+            return Some(array);
         }
         if !from.converts_to(to) {
             return self.mismatch(from, to, span, place);
@@ -339,21 +348,11 @@ impl Checker<'_> {
             self.report(wrong);
             return None;
         }
-        let names = f
-            .params
-            .iter()
-            .map(|p| &p.name)
-            .zip(params.iter().map(|p| p.ty));
-        let args: Vec<(Name, Ty)> = names.map(|(n, t)| (n.clone(), t)).collect();
-        let id = self.lower_function(
-            module,
-            &item.name.node,
-            item.span,
-            &args,
-            result,
-            |_| Some(()),
-            &f.body,
-        )?;
+        if takes_any_count(&params) {
+            return self.any_count(module, item, f, Signature { params, result });
+        }
+        let types: Vec<Ty> = params.iter().map(|p| p.ty).collect();
+        let id = self.lower_signature(module, item, f, &types, result, false)?;
         self.signatures.insert(id, Signature { params, result });
         Some(Checked::Function(id))
     }
@@ -370,7 +369,14 @@ impl Checker<'_> {
         }
         let mut typed: Vec<Param> = Vec::new();
         for p in params {
-            let ty = self.type_name(module, &p.ty)?;
+            let ty = self.open_type(module, &p.ty)?;
+            if let Some(default) = p.default.as_ref().filter(|_| ty.array().is_some()) {
+                let wrong =
+                    Diagnostic::new(Code::Unsupported, default.span, "an array has no default")
+                        .expected("a parameter without a default");
+                self.report(wrong);
+                return None;
+            }
             if let Some(default) = p.default.as_ref().filter(|_| ty.is_closure()) {
                 let wrong =
                     Diagnostic::new(Code::ClosureUse, default.span, "a closure has no default")

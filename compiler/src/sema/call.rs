@@ -7,6 +7,7 @@ use crate::ir::ops::{Op, Shape};
 use crate::ir::{self, ExprId};
 use crate::source::Span;
 
+use super::array;
 use super::body::{Body, Operand};
 use super::inputs;
 use super::matrix::FUNCTIONS;
@@ -31,14 +32,11 @@ impl Body<'_, '_> {
                 Some(Checked::Function(id)) => {
                     let signature = self.cx.signatures[&id].clone();
                     let args = self.value_arguments(callee, args, &signature.params)?;
-                    let turns = self
-                        .turns
-                        .saturating_mul(self.cx.ir.functions[id.index()].turns);
-                    self.check_turns(turns, span)?;
-                    Some(Operand::Value(
-                        self.builder.call(&self.cx.ir, id, &args, span),
-                        signature.result,
-                    ))
+                    let value = self.call_of(id, &args, span)?;
+                    Some(Operand::Value(value, signature.result))
+                }
+                Some(Checked::AnyCount(signature)) => {
+                    self.call_any_count(callee, item, &signature, args, span)
                 }
                 Some(Checked::Struct(id)) => {
                     let fields = self.cx.fields[id.index()].clone();
@@ -76,6 +74,7 @@ impl Body<'_, '_> {
                 self.function_of_surface(callee, args, span)
             }
             name if FUNCTIONS.contains(&name) => self.matrix_function(callee, args, span),
+            name if array::FUNCTIONS.contains(&name) => self.array_function(callee, args, span),
             name => match NAMED.iter().find(|(n, _)| *n == name) {
                 // `length(v)` is the function; lengths are made with units.
                 Some((_, ty)) if *ty != Ty::Length => self.convert(*ty, args, span),

@@ -5,6 +5,7 @@ use crate::diag::{Code, Diagnostic};
 use crate::ir::Const;
 use crate::ir::build::Builder;
 use crate::ir::interp::Interpreter;
+use crate::ir::value::Value;
 
 use super::body::{Body, Operand};
 use super::modules::ModuleId;
@@ -18,7 +19,7 @@ const FUEL: u64 = 1 << 20;
 const FUEL_IN_ALL: u64 = 1 << 22;
 
 impl Checker<'_> {
-    /// The value of a constant expression as a `ty`; `what` names it in messages.
+    /// The value of a constant expression as a `ty`, which is no array; `what` names it in messages.
     pub fn constant(
         &mut self,
         module: ModuleId,
@@ -26,6 +27,17 @@ impl Checker<'_> {
         ty: Ty,
         what: &str,
     ) -> Option<Const> {
+        self.constants(module, expr, ty, what)?.pop()
+    }
+
+    /// As [`Checker::constant`]; of an array, the values of its elements.
+    fn constants(
+        &mut self,
+        module: ModuleId,
+        expr: &ast::Expr,
+        ty: Ty,
+        what: &str,
+    ) -> Option<Vec<Const>> {
         let builder = Builder::new("constant", Vec::new(), expr.span);
         let mut body = Body::new(self, module, builder);
         let Operand::Value(id, _) = body.expr_as(expr, ty, what)? else {
@@ -33,17 +45,17 @@ impl Checker<'_> {
         };
         let function = body.builder.finish(id);
         let value = match function.constant(id) {
-            Some(value) => Some(value.clone()),
+            Some(value) => Some(vec![value.clone()]),
             None => {
                 let fuel = FUEL.min(FUEL_IN_ALL.saturating_sub(self.evaluated));
                 let mut run = Interpreter::<f64>::new(&self.ir, fuel);
                 let value = run.run(&function, Vec::new());
                 self.evaluated += run.executed();
-                value.ok().and_then(|v| v.to_const())
+                value.ok().and_then(|value| plain(&value, ty))
             }
         };
         match value {
-            Some(value) if is_finite(&value) => Some(value),
+            Some(values) if values.iter().all(is_finite) => Some(values),
             Some(_) => {
                 let message = format!("{what} is not a finite number");
                 self.report(
@@ -65,8 +77,18 @@ impl Checker<'_> {
     /// Checks a `const` item.
     pub(super) fn constant_item(&mut self, module: ModuleId, c: &ast::Const) -> Option<Checked> {
         let ty = self.type_name(module, &c.ty)?;
-        let value = self.constant(module, &c.value, ty, "the constant")?;
-        Some(Checked::Const(value, ty))
+        let values = self.constants(module, &c.value, ty, "the constant")?;
+        Some(Checked::Const(values, ty))
+    }
+}
+
+/// The constant that a value is, or those that the elements of an array are.
+fn plain(value: &Value<f64>, ty: Ty) -> Option<Vec<Const>> {
+    match value {
+        Value::Struct(elements) if ty.array().is_some() => {
+            elements.iter().map(Value::to_const).collect()
+        }
+        _ => Some(vec![value.to_const()?]),
     }
 }
 

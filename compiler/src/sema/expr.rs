@@ -32,7 +32,13 @@ impl Body<'_, '_> {
                 Ty::Texture,
             ));
         }
-        let operand = self.expr(expr)?;
+        let operand = match (&expr.kind, ty.array()) {
+            (ExprKind::Array(elements), Some(id)) => {
+                let element = self.array_type(id).map(|(element, _)| element);
+                self.array(elements, element, expr.span)?
+            }
+            _ => self.expr(expr)?,
+        };
         self.coerce(operand, ty, expr.span, what)
     }
 
@@ -78,6 +84,11 @@ impl Body<'_, '_> {
             ExprKind::Field(base, part) => {
                 let base = self.expr(base)?;
                 self.field(base, part, span)
+            }
+            ExprKind::Array(elements) => self.array(elements, None, span),
+            ExprKind::Index(values, index) => {
+                let values = self.expr(values);
+                self.index(values?, index, span)
             }
             ExprKind::Unary(op, operand) => {
                 let operand = self.expr(operand)?;
@@ -160,7 +171,15 @@ impl Body<'_, '_> {
             };
         };
         match self.cx.demand(item, Some(span))? {
-            Checked::Const(value, ty) => Some(Operand::Value(self.constant(value, span), ty)),
+            Checked::Const(values, ty) => {
+                let values = values.into_iter().map(|value| self.constant(value, span));
+                let values: Vec<ir::ExprId> = values.collect();
+                let id = match ty.array() {
+                    Some(id) => self.builder.make(id, &values, span),
+                    None => *values.first()?,
+                };
+                Some(Operand::Value(id, ty))
+            }
             _ => {
                 let message = format!("`{name}` is not a value");
                 let wrong = Diagnostic::new(Code::TypeMismatch, span, message)
@@ -196,7 +215,8 @@ impl Body<'_, '_> {
         self.report(unknown)
     }
 
-    fn field(&mut self, base: Operand, part: &ast::Name, span: Span) -> Option<Operand> {
+    /// `base.part`
+    pub fn field(&mut self, base: Operand, part: &ast::Name, span: Span) -> Option<Operand> {
         if let Operand::Material(material) = base {
             return self.called_output(material, part, span);
         }

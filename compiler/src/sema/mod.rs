@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::ast::{self, ItemKind, TypeName};
+use crate::ast::{self, ItemKind};
 use crate::diag::{Code, Diagnostic, foreign};
 use crate::ir::verify::MAX_FIELDS;
 use crate::ir::{self, ClosureDefId, Const, FunctionId, StructId};
@@ -15,6 +15,9 @@ use crate::loader::Loader;
 use crate::source::{SourceMap, Span};
 use crate::stages::{Progress, Stage};
 
+mod any_count;
+mod array;
+mod assign;
 mod body;
 mod call;
 mod called;
@@ -41,6 +44,7 @@ mod stmt;
 mod texture;
 mod tree;
 pub mod types;
+mod unroll;
 mod unsigned;
 mod varying;
 
@@ -84,6 +88,10 @@ pub struct Checker<'a> {
     fields: Vec<Vec<Param>>,
     /// Signatures of `ir.closures`.
     closure_params: Vec<Vec<Param>>,
+    /// Array types, by the structs that store them.
+    arrays: BTreeMap<StructId, array::Array>,
+    /// Functions of arrays of any length, by what they are called with.
+    instances: BTreeMap<(ItemRef, Vec<StructId>), FunctionId>,
     /// Expressions and statements that calls of closure functions were replaced by.
     expanded: u64,
     /// Errors reported.
@@ -106,13 +114,16 @@ enum Checked {
     InProgress,
     Failed,
     Function(FunctionId),
+    /// A function of arrays of any length; each call has its own, for the lengths given.
+    AnyCount(Arc<Signature>),
     Struct(StructId),
     Closure(ClosureDefId, Ty),
     /// A function that returns a closure.
     ClosureFunction(Arc<Signature>),
     /// A material, by its parameters.
     Material(MaterialSignature),
-    Const(Const, Ty),
+    /// The value of a constant; of an array, those of its elements.
+    Const(Vec<Const>, Ty),
 }
 
 /// A parameter or field with its type as seen by authors.
@@ -157,6 +168,8 @@ impl<'a> Checker<'a> {
             signatures: BTreeMap::new(),
             fields: Vec::new(),
             closure_params: Vec::new(),
+            arrays: BTreeMap::new(),
+            instances: BTreeMap::new(),
             expanded: 0,
             errors: 0,
             warnings: 0,
@@ -355,15 +368,15 @@ impl<'a> Checker<'a> {
         Some(Checked::Struct(id))
     }
 
-    /// The type that `name` means in `module`; an unknown one is reported.
-    fn type_name(&mut self, module: ModuleId, name: &TypeName) -> Option<Ty> {
-        if let Some((_, ty)) = types::NAMED.iter().find(|(n, _)| *n == name.node) {
+    /// The type called `name` in `module`; an unknown one is reported.
+    fn named_type(&mut self, module: ModuleId, name: &str, span: Span) -> Option<Ty> {
+        if let Some((_, ty)) = types::NAMED.iter().find(|(n, _)| *n == name) {
             return Some(*ty);
         }
-        if let Some(item) = self.lookup(module, &name.node)
+        if let Some(item) = self.lookup(module, name)
             && let ItemKind::Struct(_) = self.item(item).kind
         {
-            return match self.demand(item, Some(name.span))? {
+            return match self.demand(item, Some(span))? {
                 Checked::Struct(id) => Some(Ty::Struct(id)),
                 _ => None,
             };
@@ -373,15 +386,11 @@ impl<'a> Checker<'a> {
             .iter()
             .map(|(n, _)| *n)
             .chain(structs.iter().map(String::as_str));
-        let unknown = Diagnostic::new(
-            Code::UnknownType,
-            name.span,
-            format!("unknown type `{}`", name.node),
-        )
-        .expected("a type such as float, color, vec3, length or a struct");
-        let unknown = match foreign::hint(&name.node, &[foreign::Use::Type]) {
+        let unknown = Diagnostic::new(Code::UnknownType, span, format!("unknown type `{name}`"))
+            .expected("a type such as float, color, vec3, length or a struct");
+        let unknown = match foreign::hint(name, &[foreign::Use::Type]) {
             Some(hint) => unknown.hint(hint),
-            None => unknown.did_you_mean(&name.node, known),
+            None => unknown.did_you_mean(name, known),
         };
         self.report(unknown);
         None
@@ -405,6 +414,13 @@ impl<'a> Checker<'a> {
     fn type_text(&self, ty: Ty) -> String {
         match ty {
             Ty::Struct(id) => self.ir.structs[id.index()].name.clone(),
+            Ty::Array(id) | Ty::AnyCount(id) => {
+                let array = self.arrays.get(&id);
+                let count = array.filter(|_| ty == Ty::Array(id)).map(|a| a.count);
+                let element = array.map_or(Ty::Error, |a| a.element);
+                let count = count.map_or(String::new(), |count| count.to_string());
+                format!("{}[{count}]", self.type_text(element))
+            }
             Ty::Error => "unknown".into(),
             Ty::Material => "material".into(),
             named => types::NAMED

@@ -1,15 +1,12 @@
 //! Checking statements.
 
 use crate::ast::{self, BinaryOp, ExprKind, Stmt, StmtKind};
-use crate::diag::foreign::Use;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
 use crate::source::Span;
 
-use super::body::{Binding, Body, Operand, Place};
-use super::expr::swizzled;
-use super::outputs::WHOLE;
+use super::body::{Binding, Body, Operand};
 use super::types::{Ty, arithmetic};
 
 /// Most turns that nested loops may take together.
@@ -64,13 +61,17 @@ impl Body<'_, '_> {
         value: &ast::Expr,
     ) -> Option<Binding> {
         let wanted = match ty {
-            Some(ty) => Some(self.cx.type_name(self.module, ty)?),
+            Some(ty) => Some(self.cx.open_type(self.module, ty)?),
             None => None,
         };
-        let operand = self.expr(value)?;
+        let what = format!("`{}`", name.node);
         let operand = match wanted {
-            Some(ty) => self.coerce(operand, ty, value.span, &format!("`{}`", name.node))?,
-            None => operand,
+            Some(ty) if ty.array().is_some() => self.expr_as(value, ty, &what)?,
+            Some(ty) => {
+                let operand = self.expr(value)?;
+                self.coerce(operand, ty, value.span, &what)?
+            }
+            None => self.expr(value)?,
         };
         match operand {
             Operand::Value(id, ty) if mutable => {
@@ -96,139 +97,6 @@ impl Body<'_, '_> {
         }
     }
 
-    fn assign(
-        &mut self,
-        place: &ast::Expr,
-        op: Option<BinaryOp>,
-        value: &ast::Expr,
-        span: Span,
-    ) -> Option<()> {
-        match &place.kind {
-            ExprKind::Name(name) if name == WHOLE => self.whole(place.span, op, value),
-            ExprKind::Name(name) => {
-                if self.place == Place::Material && self.means_output(name) {
-                    return self.output(name, place.span, op, value);
-                }
-                let (local, ty) = self.variable(name, place.span)?;
-                let new = self.assigned(local, ty, None, op, value, span)?;
-                self.builder.store(local, new);
-                Some(())
-            }
-            ExprKind::Field(base, part) => {
-                let ExprKind::Name(name) = &base.kind else {
-                    return self.not_assignable(place.span, "this");
-                };
-                let (local, ty) = self.variable(name, base.span)?;
-                let parts = self.assigned_parts(ty, part)?;
-                let new = self.assigned(local, ty, Some(&parts), op, value, span)?;
-                for (k, component) in (0..).zip(&parts) {
-                    let one = match parts.len() {
-                        1 => new,
-                        _ => self.builder.swizzle(new, &[k], span),
-                    };
-                    let store = ir::Stmt::Store(local, Some(*component), one);
-                    self.builder.stmt(store);
-                }
-                Some(())
-            }
-            _ => self.not_assignable(place.span, "this"),
-        }
-    }
-
-    /// The value that a plain or compound assignment stores.
-    fn assigned(
-        &mut self,
-        local: LocalId,
-        ty: Ty,
-        parts: Option<&[u8]>,
-        op: Option<BinaryOp>,
-        value: &ast::Expr,
-        span: Span,
-    ) -> Option<ExprId> {
-        let place_ty = parts.map_or(ty, |parts| swizzled(ty, parts.len()));
-        let new = self.expr(value)?;
-        let new = match op {
-            None => new,
-            Some(op) => {
-                let whole = self.builder.load(local, span);
-                let old = match parts {
-                    Some(parts) => self.builder.swizzle(whole, parts, span),
-                    None => whole,
-                };
-                self.binary(op, Operand::Value(old, place_ty), new, span)?
-            }
-        };
-        match self.coerce(new, place_ty, value.span, "the value")? {
-            Operand::Value(id, _) => Some(id),
-            _ => None,
-        }
-    }
-
-    /// The components that an assignment to `place.part` is to, none of them twice.
-    fn assigned_parts(&mut self, ty: Ty, part: &ast::Name) -> Option<Vec<u8>> {
-        let letter = |c: char| component(ty, c.encode_utf8(&mut [0; 4]));
-        let parts: Option<Vec<u8>> = part.node.chars().map(letter).collect();
-        let Some(parts) = parts.filter(|parts| (1..=4).contains(&parts.len())) else {
-            return self.not_assignable(
-                part.span,
-                &format!("`.{}` of {}", part.node, self.cx.a_type(ty)),
-            );
-        };
-        let twice = |k: &usize| parts[..*k].contains(&parts[*k]);
-        let Some(again) = (0..parts.len()).find(twice) else {
-            return Some(parts);
-        };
-        let letter = &part.node[again..=again];
-        let message = format!("`.{}` assigns `{letter}` twice", part.node);
-        let wrong = Diagnostic::new(Code::NotAssignable, part.span, message)
-            .expected("each component at most once, as in `v.xz = ...`");
-        self.report(wrong)
-    }
-
-    fn variable(&mut self, name: &str, span: Span) -> Option<(LocalId, Ty)> {
-        let declared = self.scopes.find(name).map(|(scope, _)| scope);
-        match self.local(name) {
-            Some(Binding::Variable(..)) if declared.is_some_and(|s| s < self.fixed_scopes) => {
-                let message = format!("`{name}` is assigned where a closure is chosen");
-                let wrong = Diagnostic::new(Code::NotAssignable, span, message)
-                    .expected("variables of the branch itself")
-                    .hint("both branches are computed; assign it by an `if` of its own before");
-                self.report(wrong)
-            }
-            Some(Binding::Variable(local, ty)) => Some((local, ty)),
-            Some(Binding::Broken) => None,
-            Some(_) => {
-                let wrong = Diagnostic::new(
-                    Code::NotAssignable,
-                    span,
-                    format!("`{name}` cannot be assigned"),
-                )
-                .expected("a name declared with `var`")
-                .hint(format!("declare it as `var {name} = ...;`"));
-                self.report(wrong)
-            }
-            None => {
-                let names = self.local_names();
-                let unknown =
-                    Diagnostic::new(Code::UnknownName, span, format!("unknown name `{name}`"))
-                        .expected("a name declared with `var`");
-                let names = names.iter().map(String::as_str);
-                let unknown = self.suggest(unknown, name, names, &[Use::Value]);
-                self.report(unknown)
-            }
-        }
-    }
-
-    fn not_assignable<T>(&mut self, span: Span, what: &str) -> Option<T> {
-        let wrong = Diagnostic::new(
-            Code::NotAssignable,
-            span,
-            format!("{what} cannot be assigned"),
-        )
-        .expected("a `var`, or components of one such as `v.x` or `v.xz`");
-        self.report(wrong)
-    }
-
     /// An `if` whose value is not used.
     fn branch(&mut self, branch: &ast::IfExpr) -> Option<()> {
         let cond = self.value_as(&branch.cond, Ty::Bool, "the condition");
@@ -242,7 +110,7 @@ impl Body<'_, '_> {
     }
 
     /// A block whose value is not used, in a scope and an IR block of its own.
-    fn nested(&mut self, block: &ast::Block) -> (ir::Block, bool) {
+    pub fn nested(&mut self, block: &ast::Block) -> (ir::Block, bool) {
         self.builder.open();
         let ok = self.scoped(|cx| {
             let ok = cx.statements(&block.stmts);
@@ -281,6 +149,11 @@ impl Body<'_, '_> {
             .hint("write `for i in 0..min(n, 32)`");
             return self.report(unbounded);
         };
+        let exact =
+            self.upper_bound(low_id) == Some(least) && self.lower_bound(high_id) == Some(most);
+        if exact && self.unrolls(name, least, most, body) {
+            return self.unrolled(name, least, most, body);
+        }
         let turns = u64::try_from(most - least).unwrap_or(0);
         let local = self.builder.local(&name.node, ir::Type::Int);
         let (body, ok) = self.repeated(body, turns, span, Some((name, local)))?;
@@ -372,7 +245,7 @@ impl Body<'_, '_> {
     }
 
     /// A number that an int expression never exceeds, where that can be seen.
-    fn upper_bound(&self, id: ExprId) -> Option<i64> {
+    pub fn upper_bound(&self, id: ExprId) -> Option<i64> {
         let bound = |&a: &ExprId| self.upper_bound(a);
         match &self.builder.function().expr(id).kind {
             Ir::Const(Const::Int(i)) => Some(i64::from(*i)),
@@ -385,7 +258,7 @@ impl Body<'_, '_> {
     }
 
     /// A number that an int expression is never below, where that can be seen.
-    fn lower_bound(&self, id: ExprId) -> Option<i64> {
+    pub fn lower_bound(&self, id: ExprId) -> Option<i64> {
         let bound = |&a: &ExprId| self.lower_bound(a);
         match &self.builder.function().expr(id).kind {
             Ir::Const(Const::Int(i)) => Some(i64::from(*i)),

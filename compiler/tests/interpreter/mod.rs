@@ -5,6 +5,7 @@
 
 use impasto_compiler::source::{FileId, Span};
 
+mod arrays;
 mod flow;
 mod meanings;
 mod types;
