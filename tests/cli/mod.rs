@@ -20,6 +20,7 @@ mod limits;
 mod new;
 mod plan;
 mod plans;
+mod progress;
 mod rays;
 mod render;
 mod shot;
