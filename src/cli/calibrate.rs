@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::calibrate::{self, Effort, Fitted, Step};
 use impasto::files;
 use impasto::measure::{Data, Measurement};
@@ -26,6 +26,7 @@ pub(super) struct CalibrateArgs {
     #[arg(
         long,
         value_name = "NAME|FILE",
+        value_hint = ValueHint::FilePath,
         requires = "from",
         conflicts_with = "out"
     )]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::compiler::partition::{Requires, Strategy};
 use impasto::converge::data::{Convergence, Metric, Reference, SceneConvergence};
 use impasto::converge::pictures::{Pictures, ScenePictures};
@@ -14,6 +14,7 @@ use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Choice, Sampler};
 use impasto::{Device, files};
 
+use super::completions::Known;
 use super::info::DeviceArgs;
 use super::progress::{Meter, Part};
 use super::render::{COMPILING, parse_size};
@@ -25,18 +26,18 @@ pub(super) struct ConvergeArgs {
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
     /// The folder of results; an interrupted study resumes from it
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: PathBuf,
     /// How materials share kernels: names as of `impasto render --strategy`
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = parse_strategy)]
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = Known::new(parse_strategy, strategy_names), hide_possible_values = true)]
     strategies: Vec<Strategy>,
     /// Samplers: sobol, owen, independent
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = parse_sampler)]
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = Known::new(parse_sampler, sampler_names), hide_possible_values = true)]
     samplers: Vec<Sampler>,
     /// Renders of each number of samples, which differ in their seeds
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
     seeds: u32,
-    /// Maximum samples per pixel; each smaller number is a quarter of the next
+    /// Maximum samples per pixel: renders have `--min-spp` samples and 4, 16, .. times as many up to this
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     max_spp: u32,
     /// Minimum samples per pixel
@@ -51,7 +52,8 @@ pub(super) struct ConvergeArgs {
     /// Maximum samples per pixel of the reference; 4096 times those of the renders by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..1 << 32))]
     reference_spp: Option<u64>,
-    /// Time limit per scene in seconds; nothing new starts after it
+    /// Time limit per scene in seconds, half of it for the renders: after it only the first render of each series
+    /// begins, what a reference must have, and the timing of materials. What is left out is said
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time: Option<f64>,
     /// The first seed
@@ -75,9 +77,20 @@ fn parse_strategy(name: &str) -> Result<Strategy, String> {
     }
 }
 
+/// The strategies that measure nothing.
+fn strategy_names() -> Vec<&'static str> {
+    let names = super::strategy::names().into_iter();
+    let exhaustive = Strategy::EXHAUSTIVE.row().name;
+    names.filter(|name| *name != exhaustive).collect()
+}
+
+fn sampler_names() -> Vec<&'static str> {
+    Sampler::ALL.iter().map(|(_, name, _)| *name).collect()
+}
+
 fn parse_sampler(name: &str) -> Result<Sampler, String> {
-    let known: Vec<&str> = Sampler::ALL.iter().map(|(_, name, _)| *name).collect();
-    Sampler::from_name(name).ok_or_else(|| format!("expected one of {}", known.join(", ")))
+    let known = sampler_names().join(", ");
+    Sampler::from_name(name).ok_or_else(|| format!("expected one of {known}"))
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {

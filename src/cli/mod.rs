@@ -107,7 +107,7 @@ enum Command {
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
     Merge(merge::MergeArgs),
-    /// Show the GPU that renders would use, and its limits
+    /// Show the device that would render, with its limits, and the others
     Info(info::DeviceArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
     Explain(explain::ExplainArgs),

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::compiler::partition::explain::{Explanation, Subject, explain};
 use impasto::compiler::partition::{Calibrated, Plan, PlanInputs, Strategy, Workload, file, text};
 use impasto::plan::{self, OnProcessor, SceneMaterials, unused};
@@ -33,7 +33,7 @@ pub(super) struct PlanCommandArgs {
     workload: Option<PathBuf>,
     /// Device profile: a built-in one (h200, llvmpipe) or a file from `impasto calibrate`; by default the
     /// one that fits the GPU best
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     profile: Option<String>,
     /// Paths in flight; by default as in a render, or as in the workload
     #[arg(long, value_name = "PATHS", value_parser = clap::value_parser!(u32).range(1..))]
@@ -48,9 +48,10 @@ pub(super) struct PlanCommandArgs {
     #[arg(long, value_name = "FILE")]
     save_workload: Option<PathBuf>,
     #[command(flatten)]
-    exhaustive: ExhaustiveArgs,
-    #[command(flatten)]
     device: DeviceArgs,
+    // Last, since its heading is that of all options after it.
+    #[command(flatten)]
+    exhaustive: ExhaustiveArgs,
 }
 
 /// The share of the time in which materials are evaluated: 0.4 of 8.3 s for `examples/swatches` on llvmpipe.

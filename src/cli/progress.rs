@@ -8,6 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use impasto::runtime::options::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Global;
@@ -147,6 +148,17 @@ impl Part<'_> {
         let share = done as f64 / all.max(1) as f64;
         self.show(share, format!("{what} ({done} of {all})"));
     }
+}
+
+/// How much of a render is done.
+pub(super) fn share(progress: &Progress) -> f64 {
+    progress.paths as f64 / progress.total.max(1) as f64
+}
+
+/// How many of its samples are taken, in words.
+pub(super) fn samples_taken(progress: &Progress, samples: u32) -> String {
+    let taken = (share(progress) * f64::from(samples)).min(f64::from(samples));
+    format!("{taken:.0} of {samples} samples a pixel")
 }
 
 /// A bar that is not drawn before it has something to show.

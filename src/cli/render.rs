@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use clap::Args;
+use clap::builder::StringValueParser;
+use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
@@ -26,11 +27,12 @@ use impasto::{
 };
 
 use super::checkpoint::CheckpointArgs;
+use super::completions::Known;
 use super::dropped;
 use super::info::DeviceArgs;
-use super::outputs::{Outputs, aov_help, parse_exposure};
+use super::outputs::{Outputs, aov_help, aov_names, parse_exposure};
 use super::profile::Profile;
-use super::progress::Meter;
+use super::progress::{Meter, samples_taken, share};
 use super::shot::ShotArgs;
 use super::strategy::{PlanArgs, Source, replaced};
 use super::technique::TechniqueArgs;
@@ -45,7 +47,7 @@ pub(super) struct RenderArgs {
     /// for a part that `impasto merge` takes; by default a `.png` of the same name in the working directory
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    #[arg(long, value_name = "NAME,..", value_delimiter = ',', help = aov_help())]
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', value_parser = Known::new(StringValueParser::new(), aov_names), hide_possible_values = true, help = aov_help())]
     pub(super) aov: Vec<String>,
     /// Samples per pixel; 64 by default
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
@@ -67,12 +69,13 @@ pub(super) struct RenderArgs {
     plan: PlanArgs,
     /// Device profile for the automatic plan: a built-in one (h200, llvmpipe) or a file from
     /// `impasto calibrate`; by default the one that fits the GPU best
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
-    /// Brighten the PNG by this many stops; the EXR stays as it is
+    /// Brighten the PNG by this many stops; the EXR stays as it is. There is no tone curve: the PNG is the radiance
+    /// in sRGB, cut at 1 (docs/outputs.md, "The PNG")
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     pub(super) exposure: f32,
     /// Paths in flight; by default chosen by the size of the picture
@@ -81,9 +84,10 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) device: DeviceArgs,
     #[command(flatten)]
-    technique: TechniqueArgs,
-    #[command(flatten)]
     pub(super) shot: ShotArgs,
+    // Last, since its heading is that of all options after it.
+    #[command(flatten)]
+    technique: TechniqueArgs,
 }
 
 pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -404,17 +408,6 @@ fn sample_until(
     };
     let rendering = renderer.render_until(goals, &mut look, &mut progress);
     rendering.map_err(runtime)
-}
-
-/// How much of a render is done.
-pub(super) fn share(progress: &Progress) -> f64 {
-    progress.paths as f64 / progress.total.max(1) as f64
-}
-
-/// How many of its samples are taken, in words.
-pub(super) fn samples_taken(progress: &Progress, samples: u32) -> String {
-    let taken = (share(progress) * f64::from(samples)).min(f64::from(samples));
-    format!("{taken:.0} of {samples} samples a pixel")
 }
 
 /// Breaks what is done after Ctrl-C.

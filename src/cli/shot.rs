@@ -18,7 +18,7 @@ use impasto::shot::{self, Studio, Subject};
 use impasto::{FileLoader, MaterialRequest, Rendering, Scene, files, requests};
 
 use super::outputs::Outputs;
-use super::progress::{Meter, Part};
+use super::progress::{Meter, Part, samples_taken, share};
 use super::render::{self, COMPILING, RenderArgs};
 use super::{Failure, Global, Outcome, interrupt};
 
@@ -227,8 +227,8 @@ impl Making<'_> {
         let mut renderer = renderer.map_err(super::runtime)?;
         let samples = options.samples;
         let mut progress = |progress: &Progress| {
-            let taken = render::samples_taken(progress, samples);
-            part.show(render::share(progress), format!("{name}{taken}"));
+            let taken = samples_taken(progress, samples);
+            part.show(share(progress), format!("{name}{taken}"));
             if (self.stop)() {
                 ControlFlow::Break(())
             } else {

@@ -7,6 +7,7 @@ use impasto::runtime::render::report::Report;
 use impasto::runtime::render::until::{Check, Ending, Goals, LEAST_SAMPLES};
 
 use super::Failure;
+use super::completions::Known;
 use super::outputs::Outputs;
 
 /// Samples a pixel after which a render ends that was given no limit.
@@ -20,7 +21,7 @@ pub(super) struct UntilArgs {
     /// (ms, s, min, h). May be given several times: what is reached first ends the render. Errors are
     /// estimated while rendering, by two halves of the samples (see docs/until.md); --spp is the limit,
     /// otherwise 1048576 samples
-    #[arg(long, value_name = "GOAL", value_parser = parse, conflicts_with = "checkpoint")]
+    #[arg(long, value_name = "GOAL", value_parser = Known::new(parse, kinds), hide_possible_values = true, conflicts_with = "checkpoint")]
     until: Vec<Goal>,
 }
 
@@ -30,6 +31,11 @@ enum Goal {
     Relmse(f64),
     Rmse(f64),
     Time(Duration),
+}
+
+/// How goals begin.
+fn kinds() -> Vec<&'static str> {
+    vec!["relmse=", "rmse=", "time="]
 }
 
 fn parse(text: &str) -> Result<Goal, String> {

@@ -4,6 +4,7 @@
 mod aov;
 mod calibrate;
 mod common;
+mod completions;
 mod converge;
 mod cost;
 mod cost_lines;
