@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use impasto::runtime::options::Progress;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::Global;
 
@@ -164,9 +164,18 @@ pub(super) fn samples_taken(progress: &Progress, samples: u32) -> String {
 /// A bar that is not drawn before it has something to show.
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden());
-    let template = "{msg} {wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
+    let template = "{msg} {wide_bar} {percent:>3} %, {elapsed} gone{rest}";
+    // Nothing is known of the rest before anything is done.
+    let rest = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        let left = state.eta().as_secs();
+        // It goes into memory, which takes it.
+        let _ = match left {
+            0 => Ok(()),
+            left => write!(out, ", {left}s left"),
+        };
+    };
     if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
+        bar.set_style(style.with_key("rest", rest));
     }
     bar
 }
@@ -231,7 +240,7 @@ struct State {
 }
 
 /// What is not done yet is not shown as done.
-const MOST: f64 = 0.999;
+const MOST: f64 = 0.99;
 
 impl State {
     fn advance(&mut self, now: Duration, share: f64, what: String) {
