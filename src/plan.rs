@@ -26,7 +26,7 @@ use impasto_compiler::partition::{
     DeviceProfile, Organisation, Plan, PlanInputs, PlanKernel, Strategy, Workload,
 };
 use impasto_runtime::gpu::DeviceInfo;
-use impasto_runtime::render::{Planner, profile_workload};
+use impasto_runtime::render::{NOBODY, Planner, Watch, profile_workload};
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
 use serde::Serialize;
@@ -51,7 +51,17 @@ impl SceneMaterials {
     /// The materials of `scene`, which compiled to `program`; each is evaluated at `samples` points of the
     /// scene's surfaces, or at fewer if it takes so long that its budget is spent before.
     pub fn new(scene: &Scene, program: &Program, samples: usize) -> Self {
-        let costs = crate::cost::of_scene(scene, program, samples);
+        Self::new_watched(scene, program, samples, &mut |_, _| ())
+    }
+
+    /// The same; `watch` is told before each material how many of how many are done.
+    pub fn new_watched(
+        scene: &Scene,
+        program: &Program,
+        samples: usize,
+        watch: &mut dyn FnMut(usize, usize),
+    ) -> Self {
+        let costs = crate::cost::of_scene_watched(scene, program, samples, watch);
         Self {
             names: program.materials().map(|m| m.name.clone()).collect(),
             unused: unused(scene, program),
@@ -110,9 +120,23 @@ pub fn workload(
     program: &Program,
     pool: Option<u32>,
 ) -> Result<Workload, RuntimeError> {
+    workload_watched(gpu, scene, program, pool, NOBODY)
+}
+
+/// The same under the eyes of `watch`, which hears of every kernel and iteration, and can break it off.
+///
+/// # Errors
+/// Also [`RuntimeError::Interrupted`] if `watch` did.
+pub fn workload_watched(
+    gpu: &Gpu,
+    scene: &Scene,
+    program: &Program,
+    pool: Option<u32>,
+    watch: Watch<'_>,
+) -> Result<Workload, RuntimeError> {
     let technique = Technique::default();
     let world = World::of_program(scene, program, &technique)?;
-    profile_workload(gpu, &world, program, pool, technique, ITERATIONS)
+    profile_workload(gpu, &world, program, pool, technique, ITERATIONS, watch)
 }
 
 /// What there is to say of a plan on the processor, whose times no model predicts.

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::calibrate::{self, Effort, Fitted, Step};
 use impasto::files;
 use impasto::measure::{Data, Measurement};
 
 use super::info::GpuArgs;
 use super::profile::Profile;
+use super::progress::Meter;
 use super::{Failure, Global, Outcome, print};
 
 #[derive(Args)]
@@ -25,6 +26,7 @@ pub(super) struct CalibrateArgs {
     #[arg(
         long,
         value_name = "NAME|FILE",
+        value_hint = ValueHint::FilePath,
         requires = "from",
         conflicts_with = "out"
     )]
@@ -87,16 +89,19 @@ fn measure(args: &CalibrateArgs, global: &Global) -> Result<Vec<Measurement>, Fa
         effort.pools.clone_from(&args.pool);
     }
     effort.repetitions = args.repetitions.unwrap_or(effort.repetitions);
-    let bar = super::render::progress_bar(global);
+    let meter = Meter::new(global);
+    meter.show(0.0, "opening the GPU");
     let mut progress = |step: &Step<'_>| {
         let (scene, scenes) = step.at;
-        bar.set_length((scenes * step.kernels.all) as u64);
-        bar.set_position((scene * step.kernels.all + step.kernels.done) as u64);
-        global.detail(&format!("{}: {} kernels", step.scene, step.kernels.all));
+        let (done, all) = (step.kernels.done, step.kernels.all);
+        let what = format!("`{}`, scene {} of {scenes}: kernels", step.scene, scene + 1);
+        let part = meter.part(scene as f64 / scenes as f64, 1.0 / scenes as f64);
+        part.count(done, all, &what);
+        global.detail(&format!("{}: {all} kernels", step.scene));
     };
     let mut warn = |why: &str| global.note(&format!("warning: {why}"));
     let sets = calibrate::measure(&gpu, &effort, &mut progress, &mut warn);
-    bar.finish_and_clear();
+    drop(meter);
     let sets = sets.map_err(|error| error.to_string())?;
     if let Some(path) = &args.data {
         files::write_whole(path, Data::new(sets.clone()).text().as_bytes())?;

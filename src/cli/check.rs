@@ -1,6 +1,6 @@
 //! `impasto check`: every problem of every file, and nothing else.
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::FileLoader;
 use impasto::compiler::{self, Loader, diag};
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use super::{Failure, Global, Outcome, count, print};
 #[derive(Args)]
 pub(super) struct CheckArgs {
     /// Material files; `-` is standard input
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", value_hint = ValueHint::FilePath)]
     files: Vec<String>,
 }
 

@@ -4,19 +4,20 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::compiler::partition::{Requires, Strategy};
 use impasto::converge::data::{Convergence, Metric, Reference, SceneConvergence};
 use impasto::converge::pictures::{Pictures, ScenePictures};
 use impasto::converge::reference::{GOOD_ENOUGH, SEEDS};
-use impasto::converge::{Progress, Settings, StudyError, Subject, page, study};
+use impasto::converge::{Progress, Settings, StudyError, Subject, left_out, page, study};
 use impasto::runtime::scene::FilmSettings;
 use impasto::runtime::technique::{Choice, Sampler};
 use impasto::{Device, files};
-use indicatif::{ProgressBar, ProgressStyle};
 
+use super::completions::Known;
 use super::info::DeviceArgs;
-use super::render::{parse_size, progress_bar};
+use super::progress::{Meter, Part};
+use super::render::{COMPILING, parse_size};
 use super::{Failure, Global, Outcome, compiled_scene, interrupt, print};
 
 #[derive(Args)]
@@ -25,18 +26,18 @@ pub(super) struct ConvergeArgs {
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
     /// The folder of results; an interrupted study resumes from it
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: PathBuf,
     /// How materials share kernels: names as of `impasto render --strategy`
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = parse_strategy)]
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "auto", value_parser = Known::new(parse_strategy, strategy_names), hide_possible_values = true)]
     strategies: Vec<Strategy>,
     /// Samplers: sobol, owen, independent
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = parse_sampler)]
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "sobol", value_parser = Known::new(parse_sampler, sampler_names), hide_possible_values = true)]
     samplers: Vec<Sampler>,
     /// Renders of each number of samples, which differ in their seeds
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
     seeds: u32,
-    /// Maximum samples per pixel; each smaller number is a quarter of the next
+    /// Maximum samples per pixel: renders have `--min-spp` samples and 4, 16, .. times as many up to this
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     max_spp: u32,
     /// Minimum samples per pixel
@@ -51,7 +52,8 @@ pub(super) struct ConvergeArgs {
     /// Maximum samples per pixel of the reference; 4096 times those of the renders by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..1 << 32))]
     reference_spp: Option<u64>,
-    /// Time limit per scene in seconds; nothing new starts after it
+    /// Time limit per scene in seconds, half of it for the renders: after it only the first render of each series
+    /// begins, what a reference must have, and the timing of materials. What is left out is said
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time: Option<f64>,
     /// The first seed
@@ -75,9 +77,20 @@ fn parse_strategy(name: &str) -> Result<Strategy, String> {
     }
 }
 
+/// The strategies that measure nothing.
+fn strategy_names() -> Vec<&'static str> {
+    let names = super::strategy::names().into_iter();
+    let exhaustive = Strategy::EXHAUSTIVE.row().name;
+    names.filter(|name| *name != exhaustive).collect()
+}
+
+fn sampler_names() -> Vec<&'static str> {
+    Sampler::ALL.iter().map(|(_, name, _)| *name).collect()
+}
+
 fn parse_sampler(name: &str) -> Result<Sampler, String> {
-    let known: Vec<&str> = Sampler::ALL.iter().map(|(_, name, _)| *name).collect();
-    Sampler::from_name(name).ok_or_else(|| format!("expected one of {}", known.join(", ")))
+    let known = sampler_names().join(", ");
+    Sampler::from_name(name).ok_or_else(|| format!("expected one of {known}"))
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
@@ -103,12 +116,17 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
         scenes: Vec::new(),
     };
     let mut pictures = Pictures::default();
-    for (path, name) in args.scenes.iter().zip(names) {
-        let (found, shown) = args.study(path, name, &device, &settings, global)?;
+    let meter = Meter::new(global);
+    let width = 1.0 / args.scenes.len() as f64;
+    for (index, (path, name)) in args.scenes.iter().zip(names).enumerate() {
+        let part = meter.part(index as f64 * width, width);
+        part.show(0.0, format!("{name}: {COMPILING}"));
+        let (found, shown) = args.study(path, name, &device, &settings, global, part)?;
         summarise(&found, global);
         convergence.scenes.push(found);
         pictures.scenes.push(shown);
     }
+    drop(meter);
     page::write(&args.out, &convergence, &pictures)?;
     if global.json() {
         print(&format!("{:#}\n", serde_json::json!(convergence)))?;
@@ -169,6 +187,7 @@ impl ConvergeArgs {
         device: &Device,
         settings: &Settings,
         global: &Global,
+        part: Part<'_>,
     ) -> Result<Studied, Failure> {
         let begin = Instant::now();
         let (mut scene, program) = compiled_scene(path, global)?;
@@ -184,14 +203,13 @@ impl ConvergeArgs {
             program: &program,
             material_seconds: begin.elapsed().as_secs_f64(),
         };
-        let bar = bar(global);
+        let mut before = String::new();
         let mut progress = |progress: &Progress| {
-            bar.set_length(progress.all as u64);
-            bar.set_position(progress.done as u64);
-            if bar.message() != progress.what {
+            if before != progress.what {
                 global.detail(&progress.what);
-                bar.set_message(progress.what.clone());
+                before.clone_from(&progress.what);
             }
+            part.show(progress.share, line(progress));
             if interrupt::requested() {
                 ControlFlow::Break(())
             } else {
@@ -199,7 +217,6 @@ impl ConvergeArgs {
             }
         };
         let found = study(device.into(), &subject, &self.out, settings, &mut progress);
-        bar.finish_and_clear();
         found.map_err(|error| self.failure(error, global))
     }
 
@@ -310,9 +327,19 @@ fn summarise(found: &SceneConvergence, global: &Global) {
             series.strategy,
             series.sampler.name(),
         ));
+        if let Some(left_out) = left_out::text(series) {
+            global.note(&format!(
+                "warning: {}: {left_out}\n  {MORE_TIME}",
+                found.name
+            ));
+        }
     }
     note_reference(&found.name, &found.reference, global);
 }
+
+/// How to get what is missing.
+const MORE_TIME: &str =
+    "hint: run the command again with more `--time`; it goes on from what is there";
 
 /// Says if errors are to be taken with care, because the reference is not much better.
 fn note_reference(scene: &str, reference: &Reference, global: &Global) {
@@ -320,22 +347,27 @@ fn note_reference(scene: &str, reference: &Reference, global: &Global) {
         return;
     };
     let samples = reference.samples.unwrap_or_default();
+    let (when, hint) = if reference.cut_short {
+        (", when the time was up,", MORE_TIME)
+    } else {
+        let hint = "hint: run the command again with more `--reference-spp`; it goes on from there";
+        (",", hint)
+    };
     global.note(&format!(
         "warning: the reference of `{scene}` has {:.1} % of the smallest error shown after {samples} \
-         samples, where {:.0} % was wanted: small errors say more of it than of the renders\n  \
-         hint: run the command again with more `--time` or `--reference-spp`; it goes on from there",
+         samples{when} where {:.0} % was wanted: small errors say more of it than of the renders\n  {hint}",
         100.0 * relative,
         100.0 * GOOD_ENOUGH,
     ));
 }
 
-fn bar(global: &Global) -> ProgressBar {
-    let bar = progress_bar(global);
-    let template = "{msg} {wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
+/// What is done now, and how far it is.
+fn line(progress: &Progress) -> String {
+    if progress.part.is_empty() {
+        progress.what.clone()
+    } else {
+        format!("{} ({})", progress.what, progress.part)
     }
-    bar
 }
 
 #[cfg(test)]

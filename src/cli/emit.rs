@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clap::builder::PossibleValuesParser;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use impasto::compiler::codegen::Target;
 use impasto::compiler::interface::{self, MaterialInterface};
 use impasto::compiler::ir;
@@ -18,12 +18,13 @@ use super::{Failure, Global, Outcome, print};
 
 #[derive(Args)]
 pub(super) struct EmitArgs {
-    /// A material file; `-` is standard input
+    /// A material file or module of the library, such as `std::bsdf::diffuse`; `-` is standard input
+    #[arg(value_hint = ValueHint::FilePath)]
     file: String,
     /// Which stage to print
     #[arg(long, default_value = "wgsl")]
     what: What,
-    /// Which material of the file; needed for IR and WGSL where it has several
+    /// Only this material of the file, with IR, WGSL and parameters; by default all of them
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// With `--what ir`: materials after the first run of the passes up to this one; from `lowering`
@@ -38,7 +39,7 @@ pub(super) struct EmitArgs {
     #[arg(long)]
     table: bool,
     /// Where to write it; `-` is standard output
-    #[arg(short, long, value_name = "FILE", default_value = "-")]
+    #[arg(short, long, value_name = "FILE", default_value = "-", value_hint = ValueHint::FilePath)]
     out: String,
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use impasto::FileLoader;
 use impasto::compiler::diag;
 use impasto::compiler::inspect::{
@@ -15,6 +15,7 @@ use super::{Failure, Global, Outcome, print};
 #[derive(Args)]
 pub(super) struct EvalArgs {
     /// A material file or module of the library, such as `std::bsdf::diffuse`; `-` is standard input
+    #[arg(value_hint = ValueHint::FilePath)]
     file: String,
     /// The material, closure or function to evaluate; by default all materials, or everything if there
     /// are none

@@ -9,7 +9,11 @@ use impasto::plan::SceneMaterials;
 use impasto::runtime::lab::LabOptions;
 use impasto::{Gpu, Program, Scene};
 
-use super::{Failure, Global};
+use super::Failure;
+use super::progress::Meter;
+
+/// The share of the time in which single kernels are measured; the rest is that of whole plans.
+const KERNELS: f64 = 0.9;
 
 #[derive(Args)]
 #[command(next_help_heading = "With --strategy exhaustive")]
@@ -33,7 +37,7 @@ impl ExhaustiveArgs {
         materials: SceneMaterials,
         profile: (&str, &DeviceProfile),
         pool: Option<u32>,
-        global: &Global,
+        meter: &Meter,
     ) -> Result<Answer, Failure> {
         let options = Options {
             lab: LabOptions {
@@ -44,14 +48,10 @@ impl ExhaustiveArgs {
             },
             limit: self.limit.map(Duration::from_secs),
         };
-        let bar = super::render::progress_bar(global);
-        let mut progress = |progress: Progress| {
-            bar.set_length(progress.all as u64);
-            bar.set_position(progress.done as u64);
-        };
+        let kernels = meter.part(0.0, KERNELS);
+        let mut progress = |at: Progress| kernels.count(at.done, at.all, "measuring kernels");
         let subject = MeasuredScene::new(scene, program, materials, &options.lab);
         let answer = subject.and_then(|s| exhaustive(gpu, &s, profile, &options, &mut progress));
-        bar.finish_and_clear();
         Ok(answer.map_err(|error| error.to_string())?)
     }
 }

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::FileLoader;
 use impasto::compiler::diag::Diagnostic;
 use impasto::compiler::format::{self, Unformatted};
@@ -25,7 +25,7 @@ const MAX_DEPTH: usize = 64;
 pub(super) struct FmtArgs {
     /// Files, and folders whose `.impasto` files are formatted; `-` is standard input, formatted to
     /// standard output
-    #[arg(value_name = "PATH", default_value = ".")]
+    #[arg(value_name = "PATH", default_value = ".", value_hint = ValueHint::AnyPath)]
     paths: Vec<String>,
     /// Write nothing; exit with 1 if a file is not formatted
     #[arg(long)]

@@ -17,7 +17,7 @@ pub(super) struct MergeArgs {
     /// The picture: `.exr` (a `.png` is written beside it), `.png` alone, or `.film` to merge further
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// Brighten the PNG by this many stops; the EXR stays as it is
+    /// Brighten the PNG by this many stops; the EXR stays as it is (docs/outputs.md, "The PNG")
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
 }

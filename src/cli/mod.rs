@@ -32,6 +32,7 @@ mod new;
 mod outputs;
 mod plan;
 mod profile;
+mod progress;
 mod rays;
 mod render;
 mod shot;
@@ -106,7 +107,7 @@ enum Command {
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
     Merge(merge::MergeArgs),
-    /// Show the GPU that renders would use, and its limits
+    /// Show the device that would render, with its limits, and the others
     Info(info::DeviceArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
     Explain(explain::ExplainArgs),
@@ -225,13 +226,15 @@ fn json(sources: &SourceMap, diagnostics: &[Diagnostic]) -> Vec<serde_json::Valu
 
 /// Writes a line to standard error; there is nobody left to tell when that fails.
 fn say(message: &str) {
-    let _ = writeln!(io::stderr().lock(), "{message}");
+    let _ = progress::aside(|| writeln!(io::stderr().lock(), "{message}"));
 }
 
 /// Writes to standard output. A reader that has gone away (`impasto ... | head`) is no error.
 fn print(text: &str) -> Outcome {
-    let mut out = io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let written = progress::aside(|| {
+        let mut out = io::stdout().lock();
+        out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    });
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Error(format!(
             "cannot write to standard output: {}",

@@ -95,6 +95,13 @@ fn is_exr(path: &Path) -> bool {
     extension.eq_ignore_ascii_case("exr")
 }
 
+/// The names of outputs that `--aov` takes whatever the scene.
+pub(super) fn aov_names() -> Vec<&'static str> {
+    outputs::names()
+        .filter(|name| outputs::check_name(name).is_ok())
+        .collect()
+}
+
 /// What `--help` says of outputs.
 pub(super) fn aov_help() -> String {
     let names: Vec<&str> = outputs::names().collect();

@@ -7,6 +7,7 @@ use impasto::runtime::lab::rays::{RayOptions, RayRate, RayReport, measure, techn
 use impasto::runtime::technique::{Choice, Technique};
 
 use super::info::GpuArgs;
+use super::progress::Meter;
 use super::render::parse_size;
 use super::{Global, Outcome, print, runtime};
 
@@ -47,8 +48,18 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
         techniques: techniques(&gpu).into_iter().map(set_sizes).collect(),
         seed: args.seed,
     };
-    let mut progress = |technique: &Technique| global.detail(&names(technique).join(" "));
+    let meter = Meter::new(global);
+    meter.show(0.0, "tracing the rays that are timed");
+    let (all, mut number) = (options.techniques.len(), 0);
+    let mut progress = |technique: &Technique| {
+        let names = names(technique).join(" ");
+        global.detail(&names);
+        number += 1;
+        let share = (number - 1) as f64 / all as f64;
+        meter.show(share, format!("{names} (technique {number} of {all})"));
+    };
     let rates = measure(&gpu, &scene, &options, &mut progress).map_err(runtime)?;
+    drop(meter);
     if global.json() {
         let report = RayReport {
             adapter: gpu.info(),

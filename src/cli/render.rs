@@ -3,12 +3,14 @@
 //! Everything that can fail for a reason known beforehand (options, places to write to, the
 //! scene, its materials) is checked before the first sample is taken.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use clap::Args;
+use clap::builder::StringValueParser;
+use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
@@ -23,17 +25,18 @@ use impasto::{
     Device, FileLoader, MaterialRequest, Plan, Program, RenderOptions, Renderer, Rendering,
     RuntimeError, Scene, Strategy, files, plan, shot,
 };
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::checkpoint::CheckpointArgs;
+use super::completions::Known;
 use super::dropped;
 use super::info::DeviceArgs;
-use super::outputs::{Outputs, aov_help, parse_exposure};
+use super::outputs::{Outputs, aov_help, aov_names, parse_exposure};
 use super::profile::Profile;
+use super::progress::{Meter, samples_taken, share};
 use super::shot::ShotArgs;
 use super::strategy::{PlanArgs, Source, replaced};
 use super::technique::TechniqueArgs;
-use super::until::{self, UntilArgs};
+use super::until::{self, UntilArgs, Way};
 use super::{Failure, Global, Outcome, interrupt, print, runtime};
 
 #[derive(Args)]
@@ -44,7 +47,7 @@ pub(super) struct RenderArgs {
     /// for a part that `impasto merge` takes; by default a `.png` of the same name in the working directory
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    #[arg(long, value_name = "NAME,..", value_delimiter = ',', help = aov_help())]
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', value_parser = Known::new(StringValueParser::new(), aov_names), hide_possible_values = true, help = aov_help())]
     pub(super) aov: Vec<String>,
     /// Samples per pixel; 64 by default
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
@@ -66,12 +69,13 @@ pub(super) struct RenderArgs {
     plan: PlanArgs,
     /// Device profile for the automatic plan: a built-in one (h200, llvmpipe) or a file from
     /// `impasto calibrate`; by default the one that fits the GPU best
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
-    /// Brighten the PNG by this many stops; the EXR stays as it is
+    /// Brighten the PNG by this many stops; the EXR stays as it is. There is no tone curve: the PNG is the radiance
+    /// in sRGB, cut at 1 (docs/outputs.md, "The PNG")
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_exposure)]
     pub(super) exposure: f32,
     /// Paths in flight; by default chosen by the size of the picture
@@ -80,9 +84,10 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) device: DeviceArgs,
     #[command(flatten)]
-    technique: TechniqueArgs,
-    #[command(flatten)]
     pub(super) shot: ShotArgs,
+    // Last, since its heading is that of all options after it.
+    #[command(flatten)]
+    technique: TechniqueArgs,
 }
 
 pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -120,6 +125,8 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     interrupt::install()?;
     let scene = Arc::new(load(args, global)?);
     let started = Instant::now();
+    let meter = Meter::new(global);
+    meter.show(0.0, COMPILING);
     let program = Arc::new(compile(&scene, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
     let device = args.device.open(global)?;
@@ -130,7 +137,15 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
     let options = args.options(planned.renewed_by.is_some(), goals.is_some());
-    let mut renderer = build(&device, &scene, &program, &planned.plan, &options, global)?;
+    let mut renderer = build(
+        &device,
+        &scene,
+        &program,
+        &planned.plan,
+        &options,
+        global,
+        &meter,
+    )?;
     if let Some(strategy) = planned.renewed_by {
         let profile = given.map_or_else(|| Profile::of(&device.info()), Ok)?;
         if !profile.exact {
@@ -141,9 +156,13 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         renderer.replan(Replanning::new(program, planner));
     }
     let mut rendering = match &goals {
-        Some(goals) => sample_until(&mut renderer, goals, global)?,
-        None => sample(&mut renderer, args, start, global)?,
+        Some(goals) => {
+            let way = Way::new(goals, options.samples);
+            sample_until(&mut renderer, (goals, way), &scene, global, &meter)?
+        }
+        None => sample(&mut renderer, args, start, global, &meter)?,
     };
+    drop(meter);
     rendering.report.compile_seconds += material_seconds;
     if rendering.report.paths == 0 {
         return Err(interrupted_early(global));
@@ -159,6 +178,9 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         Err(Failure::Interrupted)
     }
 }
+
+/// What is shown before kernels are built.
+pub(super) const COMPILING: &str = "compiling materials";
 
 /// Samples per pixel where nothing is said of them.
 const SAMPLES: u32 = 64;
@@ -333,20 +355,13 @@ fn build<'g>(
     plan: &Plan,
     options: &RenderOptions,
     global: &Global,
+    meter: &Meter,
 ) -> Result<Renderer<'g>, Failure> {
-    let bar = progress_bar(global);
-    bar.set_message("building kernels: ");
     let watch = |done: usize, total: usize| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        if interrupt::requested() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        meter.show(0.0, format!("building kernels (step {done} of {total})"));
+        unless_interrupted()
     };
     let renderer = Renderer::new_watched(device, scene, program, plan, options, &watch);
-    bar.finish_and_clear();
     renderer.map_err(|error| match error {
         RuntimeError::Interrupted => interrupted_early(global),
         other => runtime(other),
@@ -359,35 +374,44 @@ fn sample(
     args: &RenderArgs,
     start: Option<FilmFile>,
     global: &Global,
+    meter: &Meter,
 ) -> Result<Rendering, Failure> {
     global.detail("samples are taken; Ctrl-C ends rendering and keeps the picture");
-    let bar = progress_bar(global);
-    let mut progress = |progress: &Progress| tick(&bar, progress);
-    let rendering = args
-        .checkpoint
-        .render(renderer, start, global, &mut progress);
-    bar.finish_and_clear();
-    rendering
+    let samples = args.options(false, false).samples;
+    let mut progress = |progress: &Progress| {
+        meter.show(share(progress), samples_taken(progress, samples));
+        unless_interrupted()
+    };
+    args.checkpoint
+        .render(renderer, start, global, &mut progress)
 }
 
 /// Takes samples until a goal is reached, or Ctrl-C, and tells the error as it falls.
 fn sample_until(
     renderer: &mut Renderer,
-    goals: &Goals,
+    (goals, way): (&Goals, Way),
+    scene: &Scene,
     global: &Global,
+    meter: &Meter,
 ) -> Result<Rendering, Failure> {
-    let bar = progress_bar(global);
-    let mut look = |check: &Check| bar.suspend(|| global.note(&until::line(check)));
-    let mut progress = |progress: &Progress| tick(&bar, progress);
+    let way = Cell::new(way);
+    let mut look = |check: &Check| {
+        way.set(way.get().seen(check));
+        global.note(&until::line(check));
+    };
+    let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
+    let mut progress = |progress: &Progress| {
+        let samples = progress.paths as f64 / pixels;
+        let share = way.get().share(samples, progress.elapsed);
+        meter.show(share, format!("{samples:.0} samples a pixel"));
+        unless_interrupted()
+    };
     let rendering = renderer.render_until(goals, &mut look, &mut progress);
-    bar.finish_and_clear();
     rendering.map_err(runtime)
 }
 
-/// Shows how far a render is; breaks it after Ctrl-C.
-fn tick(bar: &ProgressBar, progress: &Progress) -> ControlFlow<()> {
-    bar.set_length(progress.total);
-    bar.set_position(progress.paths);
+/// Breaks what is done after Ctrl-C.
+fn unless_interrupted() -> ControlFlow<()> {
     if interrupt::requested() {
         ControlFlow::Break(())
     } else {
@@ -493,17 +517,3 @@ fn material_list(report: &Report) -> String {
 
 /// How many materials the summary names.
 const LISTED: usize = 12;
-
-/// A progress bar on standard error; invisible where that is no terminal.
-pub(super) fn progress_bar(global: &Global) -> ProgressBar {
-    let bar = if global.quiet {
-        ProgressBar::hidden()
-    } else {
-        ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr())
-    };
-    let template = "{msg}{wide_bar} {percent:>3} %, {elapsed} gone, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar
-}

@@ -18,7 +18,8 @@ use impasto::shot::{self, Studio, Subject};
 use impasto::{FileLoader, MaterialRequest, Rendering, Scene, files, requests};
 
 use super::outputs::Outputs;
-use super::render::{self, RenderArgs, progress_bar};
+use super::progress::{Meter, Part, samples_taken, share};
+use super::render::{self, COMPILING, RenderArgs};
 use super::{Failure, Global, Outcome, interrupt};
 
 #[derive(Args)]
@@ -217,16 +218,17 @@ impl Making<'_> {
         scene: &Scene,
         program: &Program,
         first: usize,
-        message: &str,
+        part: Part<'_>,
+        name: &str,
     ) -> Result<Rendering, Failure> {
         let options = self.args.options(false, false);
+        part.show(0.0, format!("{name}building kernels"));
         let renderer = self.studio.renderer(scene, program, first, &options);
         let mut renderer = renderer.map_err(super::runtime)?;
-        let bar = progress_bar(self.global);
-        bar.set_message(message.to_owned());
+        let samples = options.samples;
         let mut progress = |progress: &Progress| {
-            bar.set_length(progress.total);
-            bar.set_position(progress.paths);
+            let taken = samples_taken(progress, samples);
+            part.show(share(progress), format!("{name}{taken}"));
             if (self.stop)() {
                 ControlFlow::Break(())
             } else {
@@ -234,7 +236,6 @@ impl Making<'_> {
             }
         };
         let rendering = renderer.render(&mut progress);
-        bar.finish_and_clear();
         let rendering = rendering.map_err(super::runtime)?;
         if render::is_complete(&rendering) {
             Ok(rendering)
@@ -263,8 +264,10 @@ impl Making<'_> {
     fn picture(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
         let scene = self.args.scene_of(&shot.subject, &shot.asked)?;
         note_warnings(&scene, self.global);
+        let meter = Meter::new(self.global);
+        meter.show(0.0, COMPILING);
         let program = self.compile(&shot::open_requests(&scene), &scene, read)?;
-        let rendering = self.rendering(&scene, &program, 0, "")?;
+        let rendering = self.rendering(&scene, &program, 0, meter.part(0.0, 1.0), "")?;
         outputs.write(&rendering.film, &rendering.sums, self.args.exposure)
     }
 
@@ -282,13 +285,17 @@ impl Making<'_> {
         let cell = sweep::cell_size(self.args.size, scene.film);
         let mut sheet = sweep.layout(cell)?.sheet();
         let (requests, counts) = sweep.requests(subject, asked).map_err(failed)?;
+        let meter = Meter::new(self.global);
+        meter.show(0.0, COMPILING);
         let program = self.compile(&requests, &scene, read)?;
         let exposure = self.args.exposure;
         for (index, first) in sweep::firsts(&counts).into_iter().enumerate() {
             let mut scene = subject.scene(&sweep.asked(asked, index)).map_err(failed)?;
             scene.film = cell;
-            let message = format!("picture {} of {}: ", index + 1, sweep.len());
-            let rendering = self.rendering(&scene, &program, first, &message)?;
+            let name = format!("picture {} of {}: ", index + 1, sweep.len());
+            let width = 1.0 / sweep.len() as f64;
+            let part = meter.part(index as f64 * width, width);
+            let rendering = self.rendering(&scene, &program, first, part, &name)?;
             sheet.put(index, &rendering.film, &sweep.label(index), exposure);
         }
         outputs.write_film(&sheet.film, exposure)
@@ -335,6 +342,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
     let stop = || interrupt::requested();
     let rate = subject.animation().frames_per_second;
     let (begin, mut done) = (Instant::now(), 0);
+    let meter = Meter::new(global);
     for (index, frame) in frames.numbers().enumerate() {
         let path = frames.path(&out, frame);
         if args.shot.skip_existing && path.exists() {
@@ -350,6 +358,10 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
         };
         let picture = || {
             let outputs = Outputs::of(&path)?;
+            let name = format!("frame {frame} ({} of {count}): ", index + 1);
+            let width = 1.0 / count as f64;
+            let part = meter.part(index as f64 * width, width);
+            part.show(0.0, format!("{name}{COMPILING}"));
             let scene = args.scene_of(&subject, &asked)?;
             note_warnings(&scene, made.global);
             let mut requests = requests(&scene);
@@ -357,9 +369,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
                 request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
             }
             let program = made.compile(&requests, &scene, &mut Vec::new())?;
-            let message = format!("frame {frame} ({} of {count}): ", index + 1);
-            let shown = Making { global, ..made };
-            let rendering = shown.rendering(&scene, &program, 0, &message)?;
+            let rendering = made.rendering(&scene, &program, 0, part, &name)?;
             outputs.write(&rendering.film, &rendering.sums, args.exposure)
         };
         match picture() {
@@ -373,6 +383,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
         }
         done += 1;
     }
+    drop(meter);
     let (from, seconds) = (
         frames.path(&out, frames.numbers().next().unwrap_or(0)),
         begin.elapsed(),

@@ -7,12 +7,13 @@ use impasto::compiler::partition::{PlanError, STRATEGIES, file, text};
 use impasto::{Plan, Strategy};
 
 use super::Failure;
+use super::completions::Known;
 
 /// How materials share kernels.
 #[derive(Args)]
 pub(super) struct PlanArgs {
     /// How materials share kernels
-    #[arg(long, value_name = "NAME", value_parser = parse, long_help = help())]
+    #[arg(long, value_name = "NAME", value_parser = Known::new(parse, names), hide_possible_values = true, long_help = help())]
     strategy: Option<Strategy>,
     /// Use the plan of this file, which `impasto plan --save` wrote
     #[arg(long, value_name = "P.json", conflicts_with_all = ["strategy", "partition"])]
@@ -69,6 +70,11 @@ pub(super) fn replaced(asked: &str, chosen: Strategy) -> String {
 
 fn parse(name: &str) -> Result<Strategy, String> {
     Strategy::parse(name).map_err(|error| error.to_string())
+}
+
+/// The names of all strategies.
+pub(super) fn names() -> Vec<&'static str> {
+    STRATEGIES.iter().map(|row| row.name).collect()
 }
 
 /// The table of strategies.

@@ -7,6 +7,7 @@ use impasto::runtime::render::report::Report;
 use impasto::runtime::render::until::{Check, Ending, Goals, LEAST_SAMPLES};
 
 use super::Failure;
+use super::completions::Known;
 use super::outputs::Outputs;
 
 /// Samples a pixel after which a render ends that was given no limit.
@@ -20,7 +21,7 @@ pub(super) struct UntilArgs {
     /// (ms, s, min, h). May be given several times: what is reached first ends the render. Errors are
     /// estimated while rendering, by two halves of the samples (see docs/until.md); --spp is the limit,
     /// otherwise 1048576 samples
-    #[arg(long, value_name = "GOAL", value_parser = parse, conflicts_with = "checkpoint")]
+    #[arg(long, value_name = "GOAL", value_parser = Known::new(parse, kinds), hide_possible_values = true, conflicts_with = "checkpoint")]
     until: Vec<Goal>,
 }
 
@@ -30,6 +31,11 @@ enum Goal {
     Relmse(f64),
     Rmse(f64),
     Time(Duration),
+}
+
+/// How goals begin.
+fn kinds() -> Vec<&'static str> {
+    vec!["relmse=", "rmse=", "time="]
 }
 
 fn parse(text: &str) -> Result<Goal, String> {
@@ -116,6 +122,45 @@ impl UntilArgs {
     }
 }
 
+/// How near a render is to its goals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    goals: Goals,
+    /// The most samples a pixel.
+    limit: f64,
+    /// Samples a pixel that an error takes which was asked for, by the last estimate.
+    expected: f64,
+}
+
+impl Way {
+    /// Of a render that has just begun, of `limit` samples a pixel at most.
+    pub(super) fn new(goals: &Goals, limit: u32) -> Self {
+        Self {
+            goals: *goals,
+            limit: f64::from(limit),
+            expected: f64::INFINITY,
+        }
+    }
+
+    /// After one more estimate. relMSE and the square of RMSE fall like one over the samples, or faster.
+    pub(super) fn seen(self, check: &Check) -> Self {
+        let samples = f64::from(check.samples);
+        let relmse = self.goals.relmse.map(|goal| check.relmse / goal);
+        let rmse = self.goals.rmse.map(|goal| (check.rmse / goal).powi(2));
+        let factors = relmse.into_iter().chain(rmse);
+        let expected = factors.fold(f64::INFINITY, |least, factor| least.min(samples * factor));
+        Self { expected, ..self }
+    }
+
+    /// The share that is done after so many samples a pixel and so much time, by the goal that is nearest.
+    pub(super) fn share(&self, samples: f64, elapsed: Duration) -> f64 {
+        let time = self.goals.time;
+        let time = time.map_or(0.0, |time| elapsed.as_secs_f64() / time.as_secs_f64());
+        let of_samples = samples / self.expected.min(self.limit).max(1.0);
+        time.max(of_samples)
+    }
+}
+
 /// A line for an estimate.
 pub(super) fn line(check: &Check) -> String {
     format!(
@@ -176,6 +221,38 @@ mod tests {
             let expected = Goal::Time(Duration::from_secs_f64(seconds));
             assert_eq!(parse(&format!("time={text}")), Ok(expected), "{text}");
         }
+    }
+
+    #[test]
+    fn the_nearest_goal_tells_how_far_a_render_is() {
+        let goals = Goals {
+            relmse: Some(0.01),
+            time: Some(Duration::from_secs(100)),
+            ..Goals::default()
+        };
+        let begun = Way::new(&goals, 1000);
+        let after = |way: &Way, samples, seconds| way.share(samples, Duration::from_secs(seconds));
+        assert_eq!(after(&begun, 10.0, 0), 0.01);
+        assert_eq!(after(&begun, 10.0, 25), 0.25);
+        let check = Check {
+            samples: 20,
+            seconds: 1.0,
+            gpu_seconds: 1.0,
+            relmse: 0.04,
+            rmse: 0.5,
+        };
+        let seen = begun.seen(&check);
+        assert_eq!(after(&seen, 20.0, 10), 0.25);
+        assert_eq!(after(&seen, 40.0, 10), 0.5);
+        let both = Way::new(
+            &Goals {
+                rmse: Some(0.25),
+                relmse: None,
+                time: None,
+            },
+            1000,
+        );
+        assert_eq!(after(&both.seen(&check), 20.0, 9999), 0.25);
     }
 
     #[test]

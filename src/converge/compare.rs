@@ -125,6 +125,7 @@ mod tests {
             compile_seconds: 100.0,
             points: points.iter().enumerate().map(point).collect(),
             fits: Default::default(),
+            left_out: Vec::new(),
         }
     }
 

@@ -49,6 +49,9 @@ pub struct Reference {
     pub relative_error: Option<f64>,
     /// GPU time that it took, in seconds.
     pub gpu_seconds: f64,
+    /// Whether the time was up before its own error was small enough.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cut_short: bool,
 }
 
 /// Renders by one strategy and sampler.
@@ -64,6 +67,22 @@ pub struct Series {
     pub points: Vec<Point>,
     /// What the points amount to.
     pub fits: BTreeMap<Metric, Fit>,
+    /// What a limit on time left no time for, by samples a pixel, ascending.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Renders of one number of samples a pixel that a limit on time left no time for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Samples a pixel.
+    pub samples: u32,
+    /// The seeds of those that were not made.
+    pub seeds: Vec<u32>,
+    /// Seconds that one of them was expected to take, by the render before; 0 if an earlier run made that.
+    pub seconds: f64,
+    /// Seconds that were left for the series when the first of them was left out.
+    pub seconds_left: f64,
 }
 
 /// Renders of one number of samples a pixel, which differ in their seeds.

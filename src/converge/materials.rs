@@ -82,7 +82,6 @@ fn time(
     let Some(first) = pixels.values().next() else {
         return Ok(seconds);
     };
-    watch.begin(&format!("{}: materials", stage.subject.name))?;
     let options = RenderOptions {
         pixels: Some(first.clone()),
         ..stage.options(sampler, 1 << 16)
@@ -90,7 +89,9 @@ fn time(
     let (world, program) = (&stage.world, stage.subject.program);
     let mut renderer = Renderer::from_world(stage.device, world, program, plan, &options)?;
     let mut warm = false;
-    for (material, some) in pixels {
+    for (number, (material, some)) in (1..).zip(pixels) {
+        let what = format!("{}: the times of materials", stage.subject.name);
+        watch.begin_part(&what, &format!("{number} of {}", pixels.len()))?;
         renderer.select_pixels(some.clone())?;
         let count = timed_samples(u64::from(renderer.pool()), some.len() as u64);
         let samples = Samples {

@@ -11,6 +11,7 @@ pub mod compare;
 pub mod data;
 pub mod fit;
 pub mod flip;
+pub mod left_out;
 mod materials;
 pub mod metrics;
 pub mod page;

@@ -34,6 +34,16 @@ const ROUNDING: f64 = 1e-7;
 /// Samples are at least doubled, and at most multiplied by this, between two looks at the error.
 const GROWTH: [f64; 2] = [2.0, 16.0];
 
+/// Looks that are shown as still to come beside what is expected: an estimate may be too low, and progress is
+/// never taken back.
+const MORE: f64 = 1.25;
+
+/// Samples of each half that are expected before the first look has told anything.
+fn first_expected(target: u32, goal: Goal) -> u32 {
+    let expected = GROWTH[1] * f64::from(target.max(goal.first));
+    expected.min(f64::from(goal.most)).max(f64::from(target)) as u32
+}
+
 /// How far to go.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Goal {
@@ -51,6 +61,8 @@ pub(super) struct Made {
     /// Samples a pixel, both halves together.
     pub samples: u64,
     pub gpu_seconds: f64,
+    /// Was the time up before the error was small enough?
+    pub cut_short: bool,
 }
 
 /// What makes a reference.
@@ -101,9 +113,11 @@ impl<'a> Maker<'a> {
     ) -> Result<Made, StudyError> {
         let mut target = self.done().max(goal.first.min(goal.most));
         let mut before: Option<Look> = None;
+        let mut expected = first_expected(target, goal);
         loop {
+            watch.remain(MORE * self.missing(expected));
             self.reach(target, clock, watch)?;
-            let made = self.made()?;
+            let mut made = self.made()?;
             let look = Look {
                 samples: f64::from(self.done()),
                 error: rmse(&made.half, &made.film)?,
@@ -112,11 +126,30 @@ impl<'a> Maker<'a> {
             let wanted = wanted.max(ROUNDING * root_mean_square(&made.film));
             let out_of_time = self.done() < target || clock.left() <= 0.0;
             if look.error <= wanted || self.done() >= goal.most || out_of_time {
+                made.cut_short = out_of_time && look.error > wanted;
                 return Ok(made);
             }
-            target = look.next(before, wanted).min(f64::from(goal.most)) as u32;
+            let most = f64::from(goal.most);
+            target = look.next(before, wanted).min(most) as u32;
+            let needed = look.samples * look.growth(before, wanted);
+            expected = needed.min(most).max(f64::from(target)) as u32;
             before = Some(look);
         }
+    }
+
+    /// Samples that a reference takes, as far as that can be told before there is any.
+    pub(super) fn first_guess(goal: Goal) -> f64 {
+        let first = goal.first.min(goal.most);
+        MORE * 2.0 * f64::from(first_expected(first, goal))
+    }
+
+    /// Samples that both halves together lack up to `target` each.
+    fn missing(&self, target: u32) -> f64 {
+        let missing = self.halves.each_ref().map(|half| {
+            let has = half.as_ref().map_or(0, FilmFile::samples);
+            u64::from(target).saturating_sub(has) as f64
+        });
+        missing.iter().sum()
     }
 
     /// Samples a pixel that both halves have.
@@ -133,12 +166,9 @@ impl<'a> Maker<'a> {
         clock: Clock,
         watch: &mut Watch<'_>,
     ) -> Result<(), StudyError> {
-        let missing = self.halves.each_ref().map(|half| {
-            let has = half.as_ref().map_or(0, FilmFile::samples);
-            u64::from(target).saturating_sub(has) as f64
-        });
-        watch.expect(missing.iter().sum());
-        watch.begin(&format!("{}: the reference", self.stage.subject.name))?;
+        let what = format!("{}: the reference", self.stage.subject.name);
+        let all = 2.0 * f64::from(target);
+        watch.begin_samples(&what, all - self.missing(target), all)?;
         loop {
             let level = self.level();
             let end = level.saturating_add(self.portion).min(target.max(level));
@@ -242,6 +272,7 @@ impl<'a> Maker<'a> {
             half,
             samples: a.samples() + b.samples(),
             gpu_seconds: self.record.gpu_seconds,
+            cut_short: false,
         })
     }
 }
@@ -270,14 +301,18 @@ impl Look {
     /// Samples that should bring the error down to `wanted`, by the slope since the look before; by that of
     /// independent samples without one.
     fn next(self, before: Option<Look>, wanted: f64) -> f64 {
+        // Sobol points are best in powers of two.
+        let growth = self.growth(before, wanted).clamp(GROWTH[0], GROWTH[1]);
+        (self.samples * growth).log2().ceil().exp2()
+    }
+
+    /// How many times as many samples the error that is `wanted` takes.
+    fn growth(self, before: Option<Look>, wanted: f64) -> f64 {
         let slope = before.map_or(-0.5, |before| {
             let slope = (self.error / before.error).ln() / (self.samples / before.samples).ln();
             slope.clamp(-1.0, -0.4)
         });
-        let growth = (wanted / self.error).powf(1.0 / slope);
-        // Sobol points are best in powers of two.
-        let growth = growth.clamp(GROWTH[0], GROWTH[1]);
-        (self.samples * growth).log2().ceil().exp2()
+        (wanted / self.error).powf(1.0 / slope)
     }
 }
 

@@ -10,6 +10,7 @@ use impasto_runtime::render::{Renderer, Rendering, Samples};
 use impasto_runtime::technique::{Choice, Sampler};
 
 use super::StudyError;
+use super::data::LeftOut;
 use super::store::{Record, Store};
 use super::subject::Stage;
 use super::watch::{Clock, Watch};
@@ -36,7 +37,7 @@ pub(super) struct Task<'a> {
 
 impl Task<'_> {
     /// The renders of the series, those that were kept and those that are made now. Once the time is up
-    /// no other is begun, but for the first of all.
+    /// no other is begun, but for the first of all; what is left out is told beside them.
     ///
     /// # Errors
     /// If the GPU fails, a render cannot be kept, or an end was asked for.
@@ -45,26 +46,43 @@ impl Task<'_> {
         store: &Store,
         clock: Clock,
         watch: &mut Watch<'_>,
-    ) -> Result<Vec<Record>, StudyError> {
+    ) -> Result<(Vec<Record>, Vec<LeftOut>), StudyError> {
         let mut bench = Bench::new(self);
         let mut records: Vec<Record> = Vec::new();
+        let mut left_out: Vec<LeftOut> = Vec::new();
         for (samples, seed) in self.renders() {
             let wanted = self.record(samples, seed);
+            watch.next_render();
             if let Some(kept) = store.run(&wanted) {
                 watch.skip(f64::from(samples));
                 records.push(kept);
                 continue;
             }
-            if !records.is_empty() && bench.predict(samples) > clock.left() {
+            let (seconds, seconds_left) = (bench.predict(samples), clock.left());
+            if !records.is_empty() && (seconds > seconds_left || seconds_left == 0.0) {
                 watch.skip(f64::from(samples));
+                match left_out.last_mut().filter(|left| left.samples == samples) {
+                    Some(left) => left.seeds.push(seed),
+                    None => left_out.push(LeftOut {
+                        samples,
+                        seeds: vec![seed],
+                        seconds,
+                        seconds_left,
+                    }),
+                }
                 continue;
             }
-            watch.begin(&self.title(samples))?;
+            watch.begin_render(&self.title(samples))?;
             let (record, film) = bench.measure(&wanted, watch)?;
             store.keep_run(&record, &film)?;
             records.push(record);
         }
-        Ok(records)
+        Ok((records, left_out))
+    }
+
+    /// How many renders these are.
+    pub(super) fn count(&self) -> usize {
+        self.samples.len() * self.seeds.len()
     }
 
     /// Samples a pixel of all renders together.

@@ -11,7 +11,9 @@ use impasto_runtime::film::Film;
 use impasto_runtime::film::output;
 use impasto_runtime::technique::{Choice, Sampler};
 
-use super::data::{Errors, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series};
+use super::data::{
+    Errors, LeftOut, MaterialShare, Metric, Point, Reference, Run, SceneConvergence, Series,
+};
 use super::pictures::{self, RenderPictures, ScenePictures};
 use super::reference::{Goal, Maker};
 use super::series::Task;
@@ -64,12 +66,13 @@ pub fn study(
     let folder = folder.join(&subject.name);
     let store = Store::open(&folder, &stage.key()?, settings.fresh)?;
     let clock = Clock::new(settings.time);
-    let mut watch = Watch::new(progress);
+    let mut watch = Watch::new(clock, progress);
     let study = Study {
         stage: &stage,
         store: &store,
         settings,
     };
+    watch.begin(&format!("{}: planning", subject.name))?;
     let plans = study.plans()?;
     let taken = study.renders(&plans, clock, &mut watch)?;
     let first_plan = plans.first().map(|(_, plan)| plan);
@@ -100,6 +103,7 @@ struct Taken {
     strategy: String,
     sampler: Sampler,
     records: Vec<Record>,
+    left_out: Vec<LeftOut>,
 }
 
 struct Study<'a> {
@@ -137,14 +141,22 @@ impl Study<'_> {
                 seeds: settings.seeds.clone(),
             })
             .collect();
-        watch.expect(tasks.iter().map(Task::all_samples).sum());
+        let reference = match settings.reference {
+            Some(_) => 0.0,
+            None => Maker::first_guess(self.goal()),
+        };
+        let renders = tasks.iter().map(Task::count).sum();
+        let samples: f64 = tasks.iter().map(Task::all_samples).sum();
+        watch.expect(renders, samples + reference);
         let parts = tasks.len() as f64;
         let all = tasks.iter().zip(1..).map(|(task, number)| {
             let part = clock.share(TIME_OF_RENDERS * f64::from(number) / parts);
+            let (records, left_out) = task.take(self.store, part, watch)?;
             Ok(Taken {
                 strategy: task.strategy.clone(),
                 sampler: task.sampler,
-                records: task.take(self.store, part, watch)?,
+                records,
+                left_out,
             })
         });
         all.collect()
@@ -167,22 +179,27 @@ impl Study<'_> {
             }
             Ok(smallest.sqrt())
         };
-        let most = u32::try_from(self.settings.reference_samples / 2).unwrap_or(u32::MAX - 1);
-        let goal = Goal {
-            first: self.settings.samples.last().copied().unwrap_or(1),
-            most: most.clamp(1, 1 << 31),
-        };
         let maker = Maker::new(self.stage, plan, self.store)?;
-        let made = maker.make(goal, &smallest, clock, watch)?;
+        let made = maker.make(self.goal(), &smallest, clock, watch)?;
         // As far from the mean as the mean is from the truth.
         let error = errors(&made.half, &made.film)?;
         let reference = Reference {
             samples: Some(made.samples),
             error: Some(error),
             gpu_seconds: made.gpu_seconds,
+            cut_short: made.cut_short,
             ..given_reference()
         };
         Ok((made.film, reference))
+    }
+
+    /// How far the reference goes.
+    fn goal(&self) -> Goal {
+        let most = u32::try_from(self.settings.reference_samples / 2).unwrap_or(u32::MAX - 1);
+        Goal {
+            first: self.settings.samples.last().copied().unwrap_or(1),
+            most: most.clamp(1, 1 << 31),
+        }
     }
 
     /// Of every series the pictures with the most samples, whose error is the smallest.
@@ -220,6 +237,7 @@ impl Study<'_> {
             compile_seconds: taken.records.last().map_or(0.0, |r| r.compile_seconds),
             fits: fit::fits(&points),
             points,
+            left_out: taken.left_out.clone(),
         })
     }
 
@@ -322,6 +340,7 @@ fn given_reference() -> Reference {
         error: None,
         relative_error: None,
         gpu_seconds: 0.0,
+        cut_short: false,
     }
 }
 
@@ -391,6 +410,7 @@ mod tests {
             compile_seconds: 0.0,
             points: (1..).zip(errors).map(point).collect(),
             fits: BTreeMap::new(),
+            left_out: Vec::new(),
         }
     }
 
@@ -436,6 +456,7 @@ mod tests {
                 .iter()
                 .flat_map(|n| [record(*n, 5), record(*n, 6)])
                 .collect(),
+            left_out: Vec::new(),
         };
         let shown = |all: &[u32]| -> Vec<(u32, u32)> {
             let taken = taken(all);

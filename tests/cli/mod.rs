@@ -4,6 +4,7 @@
 mod aov;
 mod calibrate;
 mod common;
+mod completions;
 mod converge;
 mod cost;
 mod cost_lines;
@@ -20,6 +21,7 @@ mod limits;
 mod new;
 mod plan;
 mod plans;
+mod progress;
 mod rays;
 mod render;
 mod shot;

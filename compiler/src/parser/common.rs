@@ -63,10 +63,7 @@ pub(super) fn name<'t>(text: &'t str) -> impl Parse<'t, Name> + Copy {
 }
 
 /// A type: a name or a keyword that names a closure, and `[count]` or `[]` after it for an array.
-pub(super) fn type_name<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, TypeName> + Clone {
+pub(super) fn type_name<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, TypeName> {
     let accept = |t| matches!(t, Token::Ident | Token::Bsdf | Token::Edf);
     let element = one(Expected::want(Want::Type), accept).map(move |span| spell(text, span));
     let count = just(Token::LeftBracket)

@@ -98,18 +98,18 @@ impl Checker<'_> {
         };
         let numbers = self.numbers(ty).saturating_mul(count);
         if count > MAX_ELEMENTS || numbers > MAX_NUMBERS {
-            let (what, most) = match count > MAX_ELEMENTS {
-                true => (
-                    format!("{count} elements"),
-                    format!("{MAX_ELEMENTS} elements"),
-                ),
-                false => (
-                    format!("{numbers} numbers"),
-                    format!("{MAX_NUMBERS} numbers"),
-                ),
+            let what = if count > MAX_ELEMENTS {
+                "elements"
+            } else {
+                "numbers"
             };
-            let large = Diagnostic::new(Code::TooLarge, span, format!("an array of {what}"))
-                .expected(format!("at most {most}"));
+            let (found, most) = match what {
+                "elements" => (count, MAX_ELEMENTS),
+                _ => (numbers, MAX_NUMBERS),
+            };
+            let large =
+                Diagnostic::new(Code::TooLarge, span, format!("an array of {found} {what}"))
+                    .expected(format!("at most {most} {what}"));
             self.report(large.hint("put tables in a texture"));
             return None;
         }

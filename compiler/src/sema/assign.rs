@@ -141,10 +141,12 @@ impl Body<'_, '_> {
                 let mut values = Vec::new();
                 for i in 0..count {
                     let kept = self.builder.field(&self.cx.ir, whole, i, new.span);
-                    values.push(match i == place {
-                        true => self.replaced(Old::Value(kept), of, rest, new)?,
-                        false => kept,
-                    });
+                    let value = if i == place {
+                        self.replaced(Old::Value(kept), of, rest, new)?
+                    } else {
+                        kept
+                    };
+                    values.push(value);
                 }
                 Some(self.builder.make(id, &values, new.span))
             }

@@ -178,7 +178,7 @@ fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Res
     file.write_all(&encoded).map_err(|e| input::reason(&e))
 }
 
-/// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1].
+/// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1]: the curve of docs/outputs.md, "The PNG".
 fn srgb_byte(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded = if linear <= 0.003_130_8 {
@@ -218,6 +218,41 @@ mod tests {
         let read = image::open(&png).expect("readable").into_rgb8();
         assert_eq!(read.as_raw(), &[0, 137, 188, 255, 255, 0]);
         assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 2);
+    }
+
+    /// The page's table is what the code does.
+    #[test]
+    fn the_curve_of_the_manual_is_that_of_the_code() {
+        let manual = include_str!("../../../docs/outputs.md");
+        let (_, section) = manual.split_once("## The PNG").expect("a section");
+        let (section, _) = section.split_once("\n## ").expect("its end");
+        let rows = section.lines().filter_map(|line| {
+            let (linear, byte) = line
+                .strip_prefix("| ")?
+                .strip_suffix(" |")?
+                .split_once(" | ")?;
+            Some((linear.parse::<f32>().ok()?, byte.parse::<u8>().ok()?))
+        });
+        let rows: Vec<(f32, u8)> = rows.collect();
+        assert!(rows.len() >= 8, "{rows:?}");
+        for (linear, byte) in rows {
+            assert_eq!(srgb_byte(linear), byte, "{linear}");
+        }
+        // Cut below as above, stops are factors of two, and a value has one byte wherever it is.
+        assert_eq!([srgb_byte(-1.0), srgb_byte(f32::INFINITY)], [0, 255]);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let flat = Film {
+            width: 64,
+            height: 64,
+            pixels: vec![[0.045, 0.09, 0.36]; 64 * 64],
+            samples: vec![1; 64 * 64],
+        };
+        for (exposure, channel) in [(2.0, 0), (1.0, 1), (-1.0, 2)] {
+            write(&flat, &path, exposure).expect("written");
+            let read = image::open(&path).expect("readable").into_rgb8();
+            assert!(read.pixels().all(|p| p.0[channel] == 118), "{exposure}");
+        }
     }
 
     #[test]

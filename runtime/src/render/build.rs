@@ -73,7 +73,7 @@ pub(crate) struct CompositionInputs<'a> {
 pub type Watch<'w> = &'w (dyn Fn(usize, usize) -> ControlFlow<()> + Sync);
 
 /// Nobody watches.
-const NOBODY: Watch<'static> = &|_, _| ControlFlow::Continue(());
+pub const NOBODY: Watch<'static> = &|_, _| ControlFlow::Continue(());
 
 /// How far the kernels of a plan are: each is built, and then run for the first time.
 struct Building<'w> {
@@ -143,7 +143,7 @@ impl<'g> Renderer<'g> {
         Self::build(device.into(), world, source, plan, options, NOBODY)
     }
 
-    fn build(
+    pub(super) fn build(
         device: DeviceRef<'g>,
         world: &World,
         source: &dyn MaterialSource,

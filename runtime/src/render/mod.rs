@@ -17,7 +17,7 @@ pub mod until;
 pub(crate) mod workload;
 
 pub(crate) use build::{CompositionInputs, build_step};
-pub use build::{Watch, identity};
+pub use build::{NOBODY, Watch, identity};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
 pub use selection::Samples;

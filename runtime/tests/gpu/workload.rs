@@ -4,7 +4,7 @@
 use impasto_compiler::partition::{Form, Hits, Plan, Strategy, Workload};
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::report::Report;
-use impasto_runtime::render::{Rendering, profile_workload};
+use impasto_runtime::render::{NOBODY, Rendering, profile_workload};
 use impasto_runtime::technique::{Append, Sampler, Technique};
 
 use crate::gpu::plans::{custom, room, surfaces};
@@ -162,7 +162,7 @@ fn a_profiling_pass_knows_a_scene_without_rendering_it() {
     let profile = |pool| {
         let technique = Technique::default();
         let world = room.world();
-        let workload = profile_workload(gpu(), &world, &surfaces, pool, technique, 16);
+        let workload = profile_workload(gpu(), &world, &surfaces, pool, technique, 16, NOBODY);
         workload.unwrap_or_else(|e| panic!("{e}"))
     };
     let small = profile(Some(512));

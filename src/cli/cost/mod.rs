@@ -6,7 +6,7 @@ mod table;
 
 use std::path::Path;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::FileLoader;
 use impasto::compiler::Loader;
 use impasto::compiler::cost::{self, Cost, Inputs, Operations};
@@ -19,12 +19,12 @@ use super::{Failure, Global, Outcome, compile, compiled_scene, print};
 #[derive(Args)]
 pub(super) struct CostArgs {
     /// A scene, or material files, of which all materials are taken with their defaults
-    #[arg(required = true, value_name = "SCENE.toml|FILE")]
+    #[arg(required = true, value_name = "SCENE.toml|FILE", value_hint = ValueHint::FilePath)]
     files: Vec<String>,
     /// At how many points each material is evaluated
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
-    /// How many expressions one evaluation may take, over all points together
+    /// How many expressions one evaluation may take, in the mean over all points
     #[arg(long, value_name = "N", default_value_t = cost::BUDGET, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     budget: u64,
     /// How many lines of each material's source are shown, those that cost most

@@ -36,6 +36,7 @@ pub(super) fn convergence() -> Convergence {
                 }),
                 relative_error: Some(0.02),
                 gpu_seconds: 655.0,
+                cut_short: false,
             },
             series: vec![
                 series("own", Sampler::Independent, 0.01, |n| 1.0 / n),
@@ -74,6 +75,7 @@ fn series(strategy: &str, sampler: Sampler, each: f64, law: impl Fn(f64) -> f64)
         sampler,
         compile_seconds: 1.5,
         fits: fits(&points),
+        left_out: Vec::new(),
         points,
     }
 }

@@ -4,6 +4,7 @@
 use super::numbers::{label, number, percent};
 use crate::converge::data::{Metric, Reference, SceneConvergence, Series};
 use crate::converge::fit::means;
+use crate::converge::left_out;
 
 /// The largest error of a reference, relative to the smallest of any render.
 const REFERENCE_SHARE: f64 = 0.05;
@@ -36,9 +37,14 @@ fn of_reference(reference: &Reference) -> Option<String> {
     match reference.relative_error {
         Some(share) if share > REFERENCE_SHARE => Some(format!(
             "The reference's own error is {} of the smallest error of a render, more than {}: errors near \
-             it are not to be trusted. A reference of more samples helps.",
+             it are not to be trusted. {}",
             percent(share),
             percent(REFERENCE_SHARE),
+            if reference.cut_short {
+                "The time was up before that; more time helps."
+            } else {
+                "A reference of more samples helps."
+            }
         )),
         Some(_) => None,
         None if reference.error.is_some() => None,
@@ -56,6 +62,7 @@ fn of_series(series: &Series, reference: &Reference) -> Vec<String> {
         .into_iter()
         .filter_map(|metric| tail(series, metric, reference))
         .collect();
+    flags.extend(left_out::text(series).map(|text| format!("{text}.")));
     if series.points.len() == 1 {
         flags.push("there is one number of samples, which has no slope.".into());
     }
@@ -119,7 +126,7 @@ fn spread(series: &Series, metric: Metric, from: u32) -> f64 {
 mod tests {
     use super::super::example;
     use super::*;
-    use crate::converge::data::Errors;
+    use crate::converge::data::{Errors, LeftOut};
 
     fn flags_with(change: impl Fn(&mut SceneConvergence)) -> Vec<String> {
         let mut scene = example::convergence().scenes.remove(0);
@@ -199,6 +206,22 @@ mod tests {
                 .for_each(|r| r.errors = Errors::default());
         });
         assert!(black[0].contains("equals the reference"), "{black:?}");
+        let late = flags_with(|s| {
+            s.reference.relative_error = Some(0.2);
+            s.reference.cut_short = true;
+            s.series[1].left_out.push(LeftOut {
+                samples: 256,
+                seeds: vec![0, 1, 2],
+                seconds: 9.0,
+                seconds_left: 1.0,
+            });
+        });
+        assert!(
+            late.len() == 2
+                && late[0].contains("The time was up")
+                && late[1].starts_with("auto, owen: no time was left for all renders of 256"),
+            "{late:?}"
+        );
         let none = flags_with(|s| s.series.clear());
         assert_eq!(none, ["There are no renders."]);
         let one = flags_with(|s| s.series[0].points.truncate(1));
