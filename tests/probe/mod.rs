@@ -116,6 +116,13 @@ fn call(item: &Item, params: &[Param]) -> String {
 
 /// Some value of a type.
 fn argument(ty: &str) -> String {
+    if let Some((element, count)) = ty.strip_suffix(']').and_then(|ty| ty.split_once('[')) {
+        let one = argument(element);
+        return match count {
+            "" => format!("[{one}, {one}, {one}]"),
+            _ => format!("fill({one}, {count})"),
+        };
+    }
     let text = match ty {
         "bool" => "position.x > 0.0",
         "int" => "int(position.y)",

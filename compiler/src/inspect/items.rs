@@ -175,6 +175,11 @@ const NESTED: usize = 4;
 
 /// An argument for a parameter of type `ty`; of the structs, those of `module` are known.
 fn stand_in(name: &str, ty: &str, module: &ast::Module, nested: usize) -> Option<String> {
+    if let Some((element, count)) = ty.strip_suffix(']').and_then(|ty| ty.split_once('[')) {
+        let element = stand_in(name, element, module, nested)?;
+        let count = if count.is_empty() { "4" } else { count };
+        return Some(format!("fill({element}, {count})"));
+    }
     let text = match (ty, name) {
         ("vector" | "vec3", "wi") => "wi",
         ("vector" | "vec3", "wo" | "w" | "v") => "wo",

@@ -98,14 +98,10 @@ impl Checker<'_> {
         };
         let numbers = self.numbers(ty).saturating_mul(count);
         if count > MAX_ELEMENTS || numbers > MAX_NUMBERS {
-            let what = if count > MAX_ELEMENTS {
-                "elements"
+            let (found, most, what) = if count > MAX_ELEMENTS {
+                (count, MAX_ELEMENTS, "elements")
             } else {
-                "numbers"
-            };
-            let (found, most) = match what {
-                "elements" => (count, MAX_ELEMENTS),
-                _ => (numbers, MAX_NUMBERS),
+                (numbers, MAX_NUMBERS, "numbers")
             };
             let large =
                 Diagnostic::new(Code::TooLarge, span, format!("an array of {found} {what}"))

@@ -4,6 +4,7 @@
 use std::sync::LazyLock;
 
 use impasto_compiler::ir::value::Real;
+use impasto_compiler::ir::{Const, Type};
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, diag};
 
 use super::cells::Measures;
@@ -62,6 +63,43 @@ pub fn point(position: [f64; 3], uv: [f64; 2]) -> Vec<f64> {
     all.map(|x| f64::from(x as f32)).collect()
 }
 
+/// The `SurfacePoint` of a program at a point as of [`point`], which is where it is in its object as
+/// well, seen from `wo`.
+fn seen<F: Real>(program: &Program, at: &[f64], wo: [f64; 3]) -> Lanes<F> {
+    let evaluate = &program.compiled()[0].evaluate;
+    let Some(Type::Struct(id)) = evaluate.params.first().map(|p| p.ty) else {
+        panic!("evaluate takes no point");
+    };
+    let fields = program.ir().structs[id.index()].fields.iter();
+    let numbers = |name: &str| -> Vec<f64> {
+        match name {
+            "position" | "object_position" => at[0..3].to_vec(),
+            "normal" => at[3..6].to_vec(),
+            "geometric_normal" => at[6..9].to_vec(),
+            "tangent" => at[9..UV].to_vec(),
+            "uv" | "uv1" => at[UV..UV_END].to_vec(),
+            "exterior_ior" => at[UV_END..15].to_vec(),
+            "footprint_x" => at[15..18].to_vec(),
+            "footprint_y" => at[18..21].to_vec(),
+            "footprint_uv_x" | "footprint_uv1_x" => at[21..23].to_vec(),
+            "footprint_uv_y" | "footprint_uv1_y" => at[23..AFTER].to_vec(),
+            "footprint_color_x" | "footprint_color_y" => vec![0.0; 3],
+            "view" => wo.to_vec(),
+            "object_scale" => vec![1.0],
+            "object_from_world" | "world_from_object" => {
+                vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+            }
+            "vertex_color" => vec![1.0; 3],
+            other => panic!("no value for the field {other}"),
+        }
+    };
+    let columns = fields.flat_map(|(name, ty)| match ty {
+        Type::Int => lanes::constant(&Const::Int(0)),
+        _ => lanes::uniform(&numbers(name)),
+    });
+    columns.collect()
+}
+
 fn columns<const N: usize>(values: &[[f64; N]]) -> Lanes {
     (0..N)
         .map(|c| lanes::floats(values.iter().map(|v| v[c]).collect()))
@@ -76,7 +114,7 @@ fn distribution<'a>(
     wo: [f64; 3],
 ) -> Distribution<'a> {
     let ask = move |wl: Lanes, u: Lanes| {
-        let args = vec![lanes::uniform(at), lanes::uniform(&wo), wl, u];
+        let args = vec![seen(program, at, wo), lanes::uniform(&wo), wl, u];
         lanes::run(program.ir(), &program.compiled()[0].evaluate, args)
     };
     let sample = move |u: &[[f64; 4]]| {
@@ -126,7 +164,7 @@ pub fn reflected(program: &Program, at: &[f64], wo: [f64; 3], samples: usize) ->
     };
     let u: Vec<[f64; 4]> = (0..samples).map(stratified).collect();
     let args = vec![
-        lanes::uniform(at),
+        seen(program, at, wo),
         lanes::uniform(&wo),
         lanes::uniform(&[0.0; 3]),
         columns(&u),
@@ -392,7 +430,7 @@ pub fn answers<F: Real>(
     u: &[[f64; 4]],
 ) -> Lanes<F> {
     let args = vec![
-        lanes::uniform(at),
+        seen(program, at, wo),
         lanes::uniform(&wo),
         lanes::vectors(wl),
         lanes::vectors(u),
