@@ -191,7 +191,7 @@ pub struct Const {
 /// A type as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TypeName {
-    /// Its text: `color`, `color[5]`, `color[]`.
+    /// Its text without spaces: `color`, `color[5]`, `color[]`.
     pub node: String,
     /// Where it is written.
     pub span: Span,

@@ -71,12 +71,12 @@ pub(super) fn type_name<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl P
         .then_ignore(close(Token::RightBracket))
         .or_not();
     element.then(count).map_with(move |(element, count), e| {
-        let whole = spell(text, e.span());
-        let array = count.map(|count| Box::new(ArrayType { element, count }));
+        let span: Span = e.span();
+        let written = text.get(span.range()).unwrap_or("");
         TypeName {
-            node: whole.node,
-            span: whole.span,
-            array,
+            node: written.split_whitespace().collect(),
+            span,
+            array: count.map(|count| Box::new(ArrayType { element, count })),
         }
     })
 }

@@ -84,7 +84,13 @@ fn name(name: &Name) -> Tree {
 }
 
 fn type_name(ty: &TypeName) -> Tree {
-    word(ty.node.clone())
+    match &ty.array {
+        None => word(ty.node.clone()),
+        Some(array) => {
+            let element = [name(&array.element)].into_iter();
+            list("[]", 1, element.chain(array.count.as_ref().map(expr)))
+        }
+    }
 }
 
 /// A list that starts with `keyword`; `head` more entries stay on its line.

@@ -32,6 +32,7 @@ mod several_facets;
 mod sheen;
 mod space;
 mod statistics;
+mod stops;
 mod subsurface;
 mod surfaces;
 mod symmetry;
