@@ -138,20 +138,35 @@ impl Body<'_, '_> {
         step: ExprId,
         span: Span,
     ) -> ExprId {
+        let total = self.sum_of_sides(POINTS, span, |cx, index| {
+            let direction = cx.axis(index, span);
+            let offset = cx.builder.op(Op::Mul, &[direction, step], span);
+            let mut args = values.to_vec();
+            args[0] = cx.builder.op(Op::Add, &[values[0], offset], span);
+            let value = cx.builder.call(&cx.cx.ir, f, &args, span);
+            cx.builder.op(Op::Mul, &[direction, value], span)
+        });
+        let two = self.builder.float(2.0, span);
+        let width = self.builder.op(Op::Mul, &[step, two], span);
+        self.builder.op(Op::Div, &[total, width], span)
+    }
+
+    /// The sum of three floats that `term` makes of 0 to below `sides`, in a loop.
+    pub(super) fn sum_of_sides(
+        &mut self,
+        sides: i32,
+        span: Span,
+        term: impl FnOnce(&mut Self, ExprId) -> ExprId,
+    ) -> ExprId {
         let zero = self.constant(Const::Float(vec![0.0; 3]), span);
         let sum = self.builder.local("gradient", ir::Type::Vec3);
         self.builder.store(sum, zero);
         let turn = self.builder.local("side", ir::Type::Int);
         let low = self.constant(Const::Int(0), span);
-        let high = self.constant(Const::Int(POINTS), span);
+        let high = self.constant(Const::Int(sides), span);
         self.builder.open();
         let index = self.builder.load(turn, span);
-        let direction = self.axis(index, span);
-        let offset = self.builder.op(Op::Mul, &[direction, step], span);
-        let mut args = values.to_vec();
-        args[0] = self.builder.op(Op::Add, &[values[0], offset], span);
-        let value = self.builder.call(&self.cx.ir, f, &args, span);
-        let term = self.builder.op(Op::Mul, &[direction, value], span);
+        let term = term(self, index);
         let so_far = self.builder.load(sum, span);
         let more = self.builder.op(Op::Add, &[so_far, term], span);
         self.builder.store(sum, more);
@@ -162,10 +177,7 @@ impl Body<'_, '_> {
             high,
             body,
         });
-        let total = self.builder.load(sum, span);
-        let two = self.builder.float(2.0, span);
-        let width = self.builder.op(Op::Mul, &[step, two], span);
-        self.builder.op(Op::Div, &[total, width], span)
+        self.builder.load(sum, span)
     }
 
     /// x, -x, y, -y, z, -z for 0 to 5.

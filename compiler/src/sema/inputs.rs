@@ -112,9 +112,7 @@ impl Body<'_, '_> {
     fn normal_by(&mut self, field: &str, normal: ExprId, span: Span) -> Option<ExprId> {
         let (matrix, _) = self.point_field(field, span)?;
         let parts = [0, 1, 2].map(|axis| {
-            let axis = (0..3).map(|i| f64::from(u8::from(i == axis))).collect();
-            let axis = self.constant(Const::Float(axis), span);
-            let column = self.builder.op(Op::MatVec, &[matrix, axis], span);
+            let column = self.column(matrix, 3, axis, span);
             self.builder.op(Op::Dot, &[column, normal], span)
         });
         let turned = self.builder.compose(ir::Type::Vec3, &parts, span);

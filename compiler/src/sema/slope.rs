@@ -12,7 +12,7 @@ use crate::abi::{Input, Tangents};
 use crate::ast::Expr;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
-use crate::ir::{self, Const, ExprId, Stmt};
+use crate::ir::{Const, ExprId};
 use crate::source::Span;
 
 use super::body::{Body, Operand, Place};
@@ -96,39 +96,20 @@ impl Body<'_, '_> {
         let turns = self.builder.function().turns;
         self.check_turns(turns.saturating_mul(POINTS as u64), span)?;
         let axes = self.axes(&inputs, span)?;
-        let zero = self.constant(Const::Float(vec![0.0; 3]), span);
-        let sum = self.builder.local("gradient", ir::Type::Vec3);
-        self.builder.store(sum, zero);
-        let turn = self.builder.local("side", ir::Type::Int);
-        let low = self.constant(Const::Int(0), span);
-        let high = self.constant(Const::Int(POINTS), span);
-        self.builder.open();
-        let index = self.builder.load(turn, span);
-        let side = self.side(index, span);
-        let moved: Vec<Moved> = axes
-            .changes
-            .iter()
-            .map(|change| self.moved(change, &axes, &side, span))
-            .collect();
-        let there = again.evaluate(&mut self.builder, &self.cx.ir, &moved, span);
-        let direction = self.builder.op(
-            Op::Select,
-            &[side.is_first, axes.directions[0], axes.directions[1]],
-            span,
-        );
-        let signed = self.builder.op(Op::Mul, &[there, side.sign], span);
-        let term = self.builder.op(Op::Mul, &[direction, signed], span);
-        let so_far = self.builder.load(sum, span);
-        let more = self.builder.op(Op::Add, &[so_far, term], span);
-        self.builder.store(sum, more);
-        let body = self.builder.close();
-        self.builder.stmt(Stmt::For {
-            local: turn,
-            low,
-            high,
-            body,
+        let sum = self.sum_of_sides(POINTS, span, |cx, index| {
+            let side = cx.side(index, span);
+            let moved: Vec<Moved> = axes
+                .changes
+                .iter()
+                .map(|change| cx.moved(change, &axes, &side, span))
+                .collect();
+            let there = again.evaluate(&mut cx.builder, &cx.cx.ir, &moved, span);
+            let [x, y] = axes.directions;
+            let direction = cx.builder.op(Op::Select, &[side.is_first, x, y], span);
+            let signed = cx.builder.op(Op::Mul, &[there, side.sign], span);
+            cx.builder.op(Op::Mul, &[direction, signed], span)
         });
-        Some(self.builder.load(sum, span))
+        Some(sum)
     }
 
     /// How the inputs change along the two axes of the footprint, and how far apart points are.
