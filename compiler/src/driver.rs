@@ -159,6 +159,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
             }
         }
         checker.report_unused_items(module);
+        checker.report_unused_imports(module);
     }
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);

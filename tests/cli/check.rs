@@ -127,6 +127,21 @@ fn errors_show_the_line_of_the_scene() {
     }
 }
 
+/// A color in bytes is brighter than any surface: `base_color = [255, 0, 0]`.
+#[test]
+fn colors_of_scenes_that_are_too_bright_are_told() {
+    let room = room();
+    let text =
+        "use std::bsdf::diffuse;\nmaterial w { param c: color = 0.5; surface = diffuse(c); }";
+    write(room.path(), "w.impasto", text);
+    let scene = scene("color = 1", "t.obj", "w.impasto", "c = [255, 0, 0]");
+    let file = write(room.path(), "scene.toml", scene);
+    impasto(&["check", &file])
+        .exits(0)
+        .says("W0005")
+        .says("1 warning");
+}
+
 #[test]
 fn folders_are_searched_for_materials_and_scenes() {
     let room = room();

@@ -11,6 +11,7 @@ use crate::source::{FileId, Span};
 use crate::written::Written;
 
 use super::Checker;
+use super::expr::PICTURES;
 use super::modules::{ModuleId, list};
 use super::types::{NAMED, Ty};
 
@@ -197,9 +198,8 @@ impl Checker<'_> {
 
 /// Is a text the name of a picture and no expression? Scenes need no quotes within quotes.
 fn names_a_picture(text: &str) -> bool {
-    const EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
     let extension = text.rsplit_once('.').map(|(_, extension)| extension);
-    let is_known = |e: &str| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(e));
+    let is_known = |e: &str| PICTURES.iter().any(|known| known.eq_ignore_ascii_case(e));
     extension.is_some_and(is_known) && !text.contains('"')
 }
 
