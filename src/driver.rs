@@ -31,6 +31,7 @@ pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
             file: binding.file,
             material: binding.material,
             params: binding.params,
+            written: binding.written,
             parameters: match (binding.bake, binding.has_keys) {
                 (_, true) => Parameters::Table,
                 (true, false) => Parameters::Baked,

@@ -279,6 +279,7 @@ fn compile(file: &str, loader: &mut dyn Loader) -> Program {
         .map(|name| MaterialRequest {
             apart: false,
             moment: None,
+            written: None,
             name: name.clone(),
             file: file.into(),
             material: Some(name.clone()),

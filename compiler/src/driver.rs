@@ -1,6 +1,7 @@
 //! Compiling from end to end: requests in, a program with diagnostics out.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::build::alike::{self, Requested};
 use crate::build::{ProgramBuilder, Setting};
@@ -11,9 +12,10 @@ use crate::moment::Moment;
 use crate::parameter_value::ParameterValue;
 use crate::passes::MaterialState;
 use crate::program::Program;
-use crate::sema::Checker;
+use crate::sema::{Checker, ModuleId};
 use crate::source::SourceMap;
 use crate::stages::{Progress, Stage};
+use crate::written::Written;
 use crate::{ast, codegen};
 
 /// A material to compile: which, under what name, with which parameters.
@@ -34,6 +36,8 @@ pub struct MaterialRequest {
     /// When it is seen: then `time` and `frame` are in the table, unless all is in the code. Where nobody says, it is
     /// frame 0 for good.
     pub moment: Option<Moment>,
+    /// Where a scene asks for it, if one does.
+    pub written: Option<Arc<Written>>,
 }
 
 /// Where the values of an instance's parameters go.
@@ -59,6 +63,7 @@ impl MaterialRequest {
             parameters: Parameters::default(),
             apart: false,
             moment: None,
+            written: None,
         }
     }
 }
@@ -154,6 +159,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
             }
         }
         checker.report_unused_items(module);
+        checker.report_unused_imports(module);
     }
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);
@@ -270,10 +276,7 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
         if checker.progress.is_stopped() {
             break;
         }
-        let Some(module) = checker.load(&request.file) else {
-            continue;
-        };
-        let Some(index) = checker.find_material(module, request.material.as_deref()) else {
+        let Some((module, index)) = asked_material(checker, request) else {
             continue;
         };
         let key = (request.file.as_str(), index);
@@ -282,7 +285,13 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
             .or_insert_with(|| checker.material(module, index));
         let Some(material) = material else { continue };
         let origin = format!("material `{}`", request.name);
-        let values = checker.parameter_values(module, material, &request.params, &origin);
+        let values = checker.parameter_values(
+            module,
+            material,
+            &request.params,
+            &origin,
+            request.written.as_deref(),
+        );
         let moment = request.moment.unwrap_or_default();
         let values = values.and_then(|v| checker.values_at(material, v, moment));
         let Some(values) = values else { continue };
@@ -313,6 +322,25 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
             },
         };
         found[at].settings.push((place, setting));
+    }
+    found
+}
+
+/// The file and material that a request names; what is wrong with the names has the scene's place.
+fn asked_material(checker: &mut Checker, request: &MaterialRequest) -> Option<(ModuleId, usize)> {
+    let before = checker.diagnostics.len();
+    let module = checker.load(&request.file);
+    let found = module.and_then(|module| {
+        let index = checker.find_material(module, request.material.as_deref())?;
+        Some((module, index))
+    });
+    if let Some(written) = &request.written {
+        let part = match (module, &written.material) {
+            (Some(_), Some(name)) => name,
+            _ => &written.file,
+        };
+        let new = &mut checker.diagnostics[before..];
+        written.place(part, &mut checker.sources, new);
     }
     found
 }

@@ -45,6 +45,7 @@ mod random;
 pub mod sema;
 pub mod source;
 pub mod stages;
+mod written;
 
 pub use driver::{
     Checked, Compilation, MaterialRequest, Parameters, after_pass, check, compile, compile_until,
@@ -54,3 +55,4 @@ pub use loader::{Loader, MemoryLoader, library_text};
 pub use moment::Moment;
 pub use parameter_value::ParameterValue;
 pub use program::Program;
+pub use written::{Written, WrittenParam};

@@ -36,6 +36,7 @@ pub fn scene(palette: &Palette, coherence: Coherence, side: u32) -> Scene {
         Coherence::Runs => "runs",
     };
     let binding = |material: &String| MaterialBinding {
+        written: None,
         name: material.clone(),
         file: FILE.into(),
         material: Some(material.clone()),

@@ -3,8 +3,7 @@
 //! A file is replaced as a whole or not at all, and only where something changes. Sources with
 //! syntax errors are reported and left alone.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, ValueHint};
 use impasto::FileLoader;
@@ -17,9 +16,6 @@ use serde_json::{Value, json};
 use similar::TextDiff;
 
 use super::{Failure, Global, Outcome, count, print};
-
-/// How deep folders are searched for sources.
-const MAX_DEPTH: usize = 64;
 
 #[derive(Args)]
 pub(super) struct FmtArgs {
@@ -51,7 +47,7 @@ pub(super) fn run(args: &FmtArgs, global: &Global) -> Outcome {
     let mut done = Done::default();
     let mut names = Vec::new();
     for path in &args.paths {
-        match sources(path) {
+        match super::sources::named(path, is_source) {
             Ok(found) => names.extend(found),
             Err(why) => done.failures.push(why),
         }
@@ -176,49 +172,6 @@ fn difference(name: &str, before: &str, after: &str) -> String {
         .to_string()
 }
 
-/// The sources that an argument names: itself, or what is below it if it is a folder.
-fn sources(path: &str) -> Result<Vec<String>, String> {
-    if path == STDIN || !Path::new(path).is_dir() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let mut found = Vec::new();
-    walk(Path::new(path), 0, &mut found)?;
-    found.sort();
-    Ok(found)
-}
-
-/// Collects the sources below `folder`. Hidden folders and links to folders are passed by.
-fn walk(folder: &Path, depth: usize, found: &mut Vec<String>) -> Result<(), String> {
-    let cannot = |error: &std::io::Error| {
-        format!(
-            "cannot read `{}`: {}",
-            folder.display(),
-            files::reason(error)
-        )
-    };
-    if depth > MAX_DEPTH {
-        return Err(format!("`{}` lies too deep", folder.display()));
-    }
-    for entry in fs::read_dir(folder).map_err(|e| cannot(&e))? {
-        let entry = entry.map_err(|e| cannot(&e))?;
-        let kind = entry.file_type().map_err(|e| cannot(&e))?;
-        let path = entry.path();
-        let hidden = entry.file_name().to_string_lossy().starts_with('.');
-        if kind.is_dir() && !hidden {
-            walk(&path, depth + 1, found)?;
-        } else if !kind.is_dir() && is_source(&path) {
-            found.push(shown(&path));
-        }
-    }
-    Ok(())
-}
-
 fn is_source(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e == "impasto") && path.is_file()
-}
-
-/// A path as people write it: without a leading `./`.
-fn shown(path: &Path) -> String {
-    let path: PathBuf = path.strip_prefix(".").unwrap_or(path).into();
-    path.display().to_string()
+    path.extension().is_some_and(|e| e == "impasto")
 }

@@ -36,6 +36,7 @@ mod progress;
 mod rays;
 mod render;
 mod shot;
+mod sources;
 mod strategy;
 mod technique;
 mod trace;
@@ -81,7 +82,7 @@ enum Format {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Check material files and report every problem
+    /// Check material files and scenes, and report every problem
     Check(check::CheckArgs),
     /// Make a material to start from
     New(new::NewArgs),

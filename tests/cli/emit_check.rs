@@ -15,7 +15,7 @@ fn wrong_usage_exits_with_2() {
     let cases: [(&[&str], &str); 9] = [
         (&[], "Usage"),
         (&["paint"], "paint"),
-        (&["check"], "FILE"),
+        (&["check"], "PATH"),
         (&["emit", "x.impasto", "--what", "spirv"], "wgsl"),
         (&["render"], "Usage"),
         (&["render", "x.toml", "--out", "x.exr", "--spp", "0"], "spp"),

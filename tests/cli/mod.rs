@@ -3,6 +3,7 @@
 
 mod aov;
 mod calibrate;
+mod check;
 mod common;
 mod completions;
 mod converge;

@@ -11,6 +11,10 @@ pub enum Use {
     Value,
     /// Called: `let a = lerp(0.0, 1.0, 0.5);`
     Call,
+    /// Assigned: `Ci = 0.5;`
+    Output,
+    /// The module of a name: `df::specular_bsdf()`
+    Module,
     /// Where a type is: `fn f(a: float3) -> float`
     Type,
     /// At the start of a statement: `return 1.0;`
@@ -102,13 +106,14 @@ table! {
         "v" | "t", "OSL and RenderMan" => "uv.y"
         "dPdu", "OSL and RenderMan" => "tangent"
         "dPdv", "OSL and RenderMan" => "cross(normal, tangent)"
+        "bitangent" | "binormal" | "Bitangent", "game engines and MaterialX" => "cross(normal, tangent)"
         "st" | "texcoord" | "vUv" | "TexCoord", "GLSL and RenderMan" => "uv"
         "gl_FragCoord" | "fragCoord" | "SV_Position", "GLSL and HLSL" => "position";
             "materials do not know the pixel; patterns stand on the surface, by `position` or `uv`"
         "I" | "wo" | "viewDir" | "viewDirection" | "Incoming" | "Vworld", "OSL, GLSL, Blender and MaterialX" => "view";
             "it points from the surface to the viewer"
         "iTime" | "u_time", "GLSL" => "time"; "in seconds; `frame` counts frames"
-        "Pobject" | "Object" | "Generated", "MaterialX and Blender" => "object_position"; "in the units of the geometry file"
+        "Pobject" | "Object" | "Generated" | "generated", "MaterialX and Blender" => "object_position"; "in the units of the geometry file"
         "Nobject", "MaterialX" => "object_normal"
         "Pworld", "MaterialX" => "position"
         "Nworld" | "worldNormal", "MaterialX and HLSL" => "normal"
@@ -143,7 +148,7 @@ table! {
         "Musgrave" | "musgrave", "Blender" => "fractal(position / 3 cm)", use ["std::noise::fractal"]
         "Voronoi", "Blender" => "voronoi(position / 3 cm)", use ["std::noise::voronoi"]
         "ColorRamp" | "color_ramp_node", "Blender" => "", use ["std::pattern::color_ramp"]; "stops are arguments"
-        "LayerWeight" | "Fresnel", "Blender" => "layer(dielectric(ior: 1.5), diffuse(0.5))",
+        "LayerWeight" | "layer_weight" | "Layer_Weight" | "Fresnel", "Blender" => "layer(dielectric(ior: 1.5), diffuse(0.5))",
             use ["std::bsdf::dielectric" "std::bsdf::diffuse"]; "`layer` weighs both by what the upper one reflects"
         "atan2d" | "atan_2", "other languages" => "atan2(1.0, 2.0)"
         "emission" | "Emission", "OSL and Blender" => "uniform(3.0)", use ["std::edf::uniform"]; "assign it to `emission`"
@@ -162,8 +167,8 @@ table! {
         "sheen_bsdf", "MaterialX and OSL" => "sheen_zeltner()", use ["std::bsdf::sheen_zeltner"]
         "diffuse_bsdf" | "lambert" | "Diffuse", "Blender and Arnold" => "diffuse(0.5)", use ["std::bsdf::diffuse"]
         "diffuse_reflection_bsdf", "MDL" => "diffuse(0.5)", use ["std::bsdf::diffuse"]
-        "principled_bsdf" | "Principled" | "PrincipledBSDF" | "principled", "Blender" => "disney_principled().surface",
-            use ["std::surface::disney_principled"]; "`open_pbr` and `standard_surface` are of the same folder"
+        "principled_bsdf" | "Principled" | "PrincipledBSDF" | "PrincipledBsdf" | "principled", "Blender" => "open_pbr().surface",
+            use ["std::surface::open_pbr"]; "its parameters are inputs of the node, and `materials/principled.impasto` has them all by Blender's names; `disney_principled` is the model of 2012"
         "material_surface" | "ND_standard_surface_surfaceshader", "MDL and MaterialX" => "";
             "assign a bsdf to `surface`, an edf to `emission`"
         "geomprop" | "geompropvalue" | "primvar", "MaterialX and USD" => "";
@@ -174,6 +179,14 @@ table! {
         "rgb" | "color3" | "Color", "MaterialX and Blender" => "color(0.5, 0.2, 0.1)"
         "mat4" | "float3x3" | "matrix", "GLSL, HLSL and OSL" => "mat3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0))";
             "from three columns; `object_from_world(position)` changes spaces"
+    }
+    Output {
+        "Ci" | "gl_FragColor" | "fragColor" | "out_surface" | "BSDF", "OSL, GLSL and Blender" => ""; "a material assigns `surface = ...;`, and `emission` where it glows"
+        "Oi" | "alpha" | "Alpha" | "cutout_opacity", "RenderMan, Blender and MDL" => ""; "a surface with holes assigns `opacity = ...;`"
+    }
+    Module {
+        "df", "MDL" => ""; "bsdfs are imported by name, as in `use std::bsdf::diffuse;`, and called without a path: `diffuse(0.5)`"
+        "math" | "state" | "base" | "tex", "MDL" => ""; "functions and inputs such as `sin(x)`, `normal` and `uv` are there without an import or a path"
     }
     Type {
         "f32" | "f64" | "double" | "half" | "real", "GLSL, HLSL and WGSL" => "float"

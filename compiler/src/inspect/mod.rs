@@ -420,6 +420,7 @@ fn material(
     let own = *kind == Kind::Material;
     let name = if own { &answer.name } else { items::NAME };
     let request = MaterialRequest {
+        written: None,
         apart: false,
         moment: Some(Moment {
             frame: query.at.frame,

@@ -27,7 +27,8 @@ pub(super) fn probed(request: &MaterialRequest, loader: &mut dyn Loader) -> Opti
     let module = checker.load(&request.file)?;
     let index = checker.find_material(module, request.material.as_deref())?;
     let mut material = checker.material(module, index)?;
-    let values = checker.parameter_values(module, &material, &request.params, &request.name)?;
+    let values =
+        checker.parameter_values(module, &material, &request.params, &request.name, None)?;
     let values = checker.values_at(&material, values, request.moment.unwrap_or_default())?;
     let opacity = material.opacity;
     if opacity.is_some() {

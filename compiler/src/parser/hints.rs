@@ -20,6 +20,7 @@ pub(super) fn hint(source: &Source<'_>, at: usize, error: &SyntaxError) -> Optio
         Slip::foreign_operator,
         Slip::declaration,
         Slip::foreign_statement,
+        Slip::foreign_module,
         Slip::module_path,
         Slip::loop_range,
         Slip::assignment,
@@ -224,6 +225,16 @@ impl<'t> Slip<'_, 't> {
             return Some(hint.to_owned());
         }
         None
+    }
+
+    /// `df::diffuse_reflection_bsdf()`, `use df::*;`
+    fn foreign_module(&self) -> Option<String> {
+        let back = match self.found {
+            Token::PathSeparator => 1,
+            Token::Star if self.before(1) == Some(Token::PathSeparator) => 2,
+            _ => return None,
+        };
+        foreign::hint(self.text_before(back), &[Use::Module])
     }
 
     fn module_path(&self) -> Option<String> {

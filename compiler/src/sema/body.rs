@@ -271,6 +271,10 @@ impl<'c, 'l> Body<'c, 'l> {
         let wrong = Diagnostic::new(code, span, format!("{place} is {a_found}, not {a_wanted}"))
             .expected(a_wanted);
         let wrong = match (from, to) {
+            (Ty::Color, Ty::Float) if place == "`opacity`" => wrong.hint(
+                "a filter of some color is a surface, `mix(transparent(color: tint), diffuse(0.5), 0.5)`, after \
+                 `use std::bsdf::transparent;`",
+            ),
             (_, Ty::Length) if number => wrong.hint(
                 "write a length with its unit, as in `0.5 mm`, or multiply by one: `x * 1 m`",
             ),

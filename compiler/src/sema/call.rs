@@ -31,7 +31,10 @@ impl Body<'_, '_> {
             return match self.cx.demand(item, Some(callee.span)) {
                 Some(Checked::Function(id)) => {
                     let signature = self.cx.signatures[&id].clone();
-                    let args = self.value_arguments(callee, args, &signature.params)?;
+                    let args = match self.taken_for_another(callee, args) {
+                        Some(wrong) => return self.report(wrong),
+                        None => self.value_arguments(callee, args, &signature.params)?,
+                    };
                     let value = self.call_of(id, &args, span)?;
                     Some(Operand::Value(value, signature.result))
                 }
@@ -81,6 +84,22 @@ impl Body<'_, '_> {
                 _ => self.built_in(callee, args, span),
             },
         }
+    }
+
+    /// What is wrong with a call of a helper of the library that is meant for the function which other languages have
+    /// by its name.
+    fn taken_for_another(&self, callee: &Name, args: &[Arg]) -> Option<Diagnostic> {
+        let is_own = self.cx.modules[self.module.0]
+            .names
+            .contains_key(&callee.node);
+        if callee.node != "refract" || args.len() != 3 || is_own {
+            return None;
+        }
+        let message = "`refract` is a helper of the library for bsdfs, and takes 2 arguments";
+        let wrong = Diagnostic::new(Code::TooManyArguments, callee.span, message)
+            .expected("`refract(wo, ior)`, of directions in the local frame, whose normal is z")
+            .hint("a surface that refracts is `dielectric(ior: 1.5)`, after `use std::bsdf::dielectric;`");
+        Some(wrong)
     }
 
     /// Checks the arguments of a call that means nothing, for their errors.
@@ -271,10 +290,12 @@ impl Body<'_, '_> {
             } else {
                 Code::TooManyArguments
             };
-            return self.report(
-                Diagnostic::new(code, span, message)
-                    .expected(format!("{} arguments", counts.join(" or "))),
-            );
+            let wrong = Diagnostic::new(code, span, message)
+                .expected(format!("{} arguments", counts.join(" or ")));
+            return self.report(match (first, values.len()) {
+                (Op::Atan, 2) => wrong.hint("the angle of a point in the plane is `atan2(y, x)`"),
+                _ => wrong,
+            });
         };
         self.apply(op, &values, span)
     }
@@ -325,8 +346,12 @@ impl Body<'_, '_> {
         let message = format!("`{name}` does not apply to {}", shown.join(", "));
         let wrong =
             Diagnostic::new(Code::NoOperator, span, message).expected(expected_operands(op));
-        let wrong = if types.iter().any(|t| t.is_dimension()) {
-            wrong.hint("`float(...)` gives the plain number in metres or radians")
+        let wrong = if name == "hash" {
+            wrong.hint("a random number of a float is `random(x)`, after `use std::noise::random;`")
+        } else if types.contains(&Ty::Length) {
+            wrong.hint("divide by a length, `x / 1 cm`, or by one another; `float(...)` gives the plain number in metres")
+        } else if types.iter().any(|t| t.is_dimension()) {
+            wrong.hint("`float(...)` gives the plain number in radians")
         } else if types.contains(&Ty::Color) && types.iter().any(|t| t.is_geometric()) {
             wrong.hint("convert one of them: `color(...)` or `vec3(...)`")
         } else {

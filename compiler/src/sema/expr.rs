@@ -19,6 +19,9 @@ pub const DEFAULT_OF_PARAMETER: &str = "the default";
 /// The medium that is none, unless the name is that of something else.
 pub const NO_MEDIUM: &str = "none";
 
+/// Extensions of the pictures that textures are read from.
+pub const PICTURES: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
+
 impl Body<'_, '_> {
     /// Checks an expression that must be a `ty`.
     pub fn expr_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<Operand> {
@@ -32,6 +35,15 @@ impl Body<'_, '_> {
                 Ty::Texture,
             ));
         }
+        if ty == Ty::Texture && self.is_bare_file(expr) {
+            let text = &self.cx.sources.file(expr.span.file).text;
+            let hint = text
+                .get(expr.span.range())
+                .map(|f| format!("write `\"{f}\"`"));
+            let bare = Diagnostic::new(Code::TypeMismatch, expr.span, "files are named in quotes")
+                .expected("a text");
+            return self.report(bare.hint(hint.unwrap_or_default()));
+        }
         let operand = match (&expr.kind, ty.array()) {
             (ExprKind::Array(elements), Some(id)) => {
                 let element = self.array_type(id).map(|(element, _)| element);
@@ -40,6 +52,16 @@ impl Body<'_, '_> {
             _ => self.expr(expr)?,
         };
         self.coerce(operand, ty, expr.span, what)
+    }
+
+    /// Is it the name of a picture without quotes, as in `ball.png`?
+    fn is_bare_file(&self, expr: &Expr) -> bool {
+        let ExprKind::Field(stem, extension) = &expr.kind else {
+            return false;
+        };
+        let is_unknown = |name: &str| self.scopes.find(name).is_none();
+        let is_stem = matches!(&stem.kind, ExprKind::Name(name) if is_unknown(name));
+        is_stem && PICTURES.contains(&extension.node.to_lowercase().as_str())
     }
 
     /// Checks an expression that must be a value of type `ty`.

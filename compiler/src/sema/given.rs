@@ -8,26 +8,31 @@ use crate::moment::Moment;
 use crate::parameter_value::ParameterValue;
 use crate::parser;
 use crate::source::{FileId, Span};
+use crate::written::Written;
 
 use super::Checker;
+use super::expr::PICTURES;
 use super::modules::{ModuleId, list};
 use super::types::{NAMED, Ty};
 
 impl Checker<'_> {
     /// The values of a material's parameters: defaults, and what a scene sets.
-    /// `origin` names the scene's setting in diagnostics.
+    /// `origin` names the scene's setting in diagnostics, and `written` is its place.
     pub fn parameter_values(
         &mut self,
         module: ModuleId,
         material: &Material,
         given: &[(String, ParameterValue)],
         origin: &str,
+        written: Option<&Written>,
     ) -> Option<Vec<Const>> {
         let mut values: Vec<Const> = material.params.iter().map(|p| p.default.clone()).collect();
         let mut ok = true;
         for (name, value) in given {
             let (own, value) = value.origin();
             let named = own.map_or_else(|| format!("{origin}, parameter {name}"), str::to_owned);
+            let place = written.filter(|_| own.is_none());
+            let place = place.and_then(|w| Some((w, w.param(name)?)));
             let origin = own.unwrap_or(origin);
             let Some(index) = material
                 .params
@@ -38,6 +43,7 @@ impl Checker<'_> {
                     ok = false;
                     continue;
                 }
+                let before = self.diagnostics.len();
                 let settable = material.params.iter().filter(|p| !p.is_input);
                 let names: Vec<&str> = settable.map(|p| p.name.as_str()).collect();
                 let message = format!(
@@ -52,12 +58,22 @@ impl Checker<'_> {
                     })
                     .did_you_mean(name, names);
                 self.report(unknown);
+                if let Some((written, param)) = place {
+                    let new = &mut self.diagnostics[before..];
+                    written.place(&param.key, &mut self.sources, new);
+                }
                 ok = false;
                 continue;
             };
-            match self.parameter_value(module, &material.params[index], value, &named) {
+            let before = self.diagnostics.len();
+            let snippet = self.sources.add(named, value.to_string());
+            match self.parameter_value(module, &material.params[index], value, snippet) {
                 Some(value) => values[index] = value,
                 None => ok = false,
+            }
+            if let Some((written, param)) = place {
+                let new = &mut self.diagnostics[before..];
+                written.take_over(param, snippet, &mut self.sources, new);
             }
         }
         ok.then_some(values)
@@ -120,11 +136,10 @@ impl Checker<'_> {
         module: ModuleId,
         param: &MaterialParam,
         given: &ParameterValue,
-        named: &str,
+        file: FileId,
     ) -> Option<Const> {
         let (_, ty) = NAMED.iter().find(|(n, _)| *n == param.surface_type)?;
         let text = given.to_string();
-        let file = self.sources.add(named.to_owned(), text.as_str());
         let (value, span) = match self.plain(given, *ty) {
             Some(value) => (value, Span::new(file, 0..text.len())),
             None => self.evaluated(module, param, *ty, file, &text)?,
@@ -183,9 +198,8 @@ impl Checker<'_> {
 
 /// Is a text the name of a picture and no expression? Scenes need no quotes within quotes.
 fn names_a_picture(text: &str) -> bool {
-    const EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
     let extension = text.rsplit_once('.').map(|(_, extension)| extension);
-    let is_known = |e: &str| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(e));
+    let is_known = |e: &str| PICTURES.iter().any(|known| known.eq_ignore_ascii_case(e));
     extension.is_some_and(is_known) && !text.contains('"')
 }
 
@@ -222,7 +236,8 @@ material m {
         let index = checker.find_material(module, None).expect("the only one");
         let material = checker.material(module, index).expect("it checks");
         checker.diagnostics.clear();
-        let values = checker.parameter_values(module, &material, &[(name.into(), value)], "m");
+        let values =
+            checker.parameter_values(module, &material, &[(name.into(), value)], "m", None);
         let said = diag::render::text(&checker.sources, &checker.diagnostics, false);
         (values, said)
     }

@@ -106,6 +106,26 @@ impl Checker<'_> {
         None
     }
 
+    /// Warns of imports of a file that nothing in it uses, once all of the file is checked.
+    pub fn report_unused_imports(&mut self, module: ModuleId) {
+        let ast = self.ast(module);
+        for wanted in ast.uses.iter().flat_map(|import| &import.names) {
+            let name = wanted.alias.as_ref().unwrap_or(&wanted.name);
+            let data = &self.modules[module.0];
+            let is_used = data.looked_up.borrow().contains(&name.node);
+            let is_meant = name.node.starts_with('_');
+            if is_used || is_meant || data.is_std || !data.names.contains_key(&name.node) {
+                continue;
+            }
+            let message = format!("the import `{}` is never used", name.node);
+            let unused = Diagnostic::new(Code::Unused, name.span, message).hint(format!(
+                "remove it, or call it `_{0}`: `{0} as _{0}`",
+                wanted.name.node
+            ));
+            self.report(unused);
+        }
+    }
+
     /// The item called `name` in a folder of the standard library; a private one only if there is
     /// no other.
     pub(super) fn find_std(&mut self, folder: &str, name: &str) -> Option<ItemRef> {

@@ -3,7 +3,8 @@
 //! A file is loaded when something imports it. The standard library is one namespace a folder;
 //! a file of it is parsed only when a name in it is asked for.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 use impasto_stdlib::StdFile;
@@ -40,6 +41,8 @@ pub struct ModuleData {
     pub is_std: bool,
     /// Names of its own and imported items.
     pub names: BTreeMap<String, ItemRef>,
+    /// Those that something in it uses; not kept of the library.
+    pub looked_up: RefCell<BTreeSet<String>>,
 }
 
 /// What became of a file that was asked for.
@@ -176,6 +179,7 @@ impl Checker<'_> {
             path: path.to_owned(),
             is_std,
             names: BTreeMap::new(),
+            looked_up: RefCell::default(),
         });
         self.loading
             .insert(path.to_owned(), Loading::InProgress(id));
@@ -193,9 +197,12 @@ impl Checker<'_> {
     /// Definitions with an error of syntax are not checked: what the parser left of them would
     /// only give errors that follow from the first.
     fn leave_out_broken(&mut self, module: ModuleId, ast: &ast::Module, found: &[Diagnostic]) {
-        let syntax = found
-            .iter()
-            .filter(|d| matches!(d.code, Code::Syntax | Code::Unclosed));
+        let syntax = found.iter().filter(|d| {
+            matches!(
+                d.code,
+                Code::Syntax | Code::Unclosed | Code::UnknownCharacter
+            )
+        });
         let places: Vec<Span> = syntax.filter_map(|d| d.span).collect();
         for (index, item) in ast.items.iter().enumerate() {
             let inside = |p: &Span| item.span.start <= p.start && p.start < item.span.end;
@@ -283,9 +290,13 @@ impl Checker<'_> {
         }
     }
 
-    /// What `name` means in `module`.
+    /// What `name` means in `module`, which uses it.
     pub(super) fn lookup(&self, module: ModuleId, name: &str) -> Option<ItemRef> {
-        let own = self.modules[module.0].names.get(name);
+        let data = &self.modules[module.0];
+        if !data.is_std && data.names.contains_key(name) {
+            data.looked_up.borrow_mut().insert(name.to_owned());
+        }
+        let own = data.names.get(name);
         own.or_else(|| self.core.get(name)).copied()
     }
 

@@ -1,6 +1,7 @@
 //! What a material assigns: its surface, emission, interior and opacity.
 
 use crate::ast::{self, Expr, Name};
+use crate::diag::foreign::{self, Use};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
 use crate::ir::{ClosureId, Const, ExprId, Interior};
@@ -130,8 +131,11 @@ impl Body<'_, '_> {
         known.extend(names.map(String::from));
         let message = format!("`{name}` is neither a variable nor an output");
         let unknown = Diagnostic::new(Code::UnknownOutput, at, message)
-            .expected(format!("one of {}, or a `var`", list(names)))
-            .did_you_mean(name, known.iter().map(String::as_str));
+            .expected(format!("one of {}, or a `var`", list(names)));
+        let unknown = match foreign::hint(name, &[Use::Output]) {
+            Some(hint) => unknown.hint(hint),
+            None => unknown.did_you_mean(name, known.iter().map(String::as_str)),
+        };
         self.report(unknown)
     }
 

@@ -146,7 +146,7 @@ impl Body<'_, '_> {
                 "the loop has no known bound",
             )
             .expected("constant bounds, or `min(n, 32)` around a value")
-            .hint("write `for i in 0..min(n, 32)`");
+            .hint("write `for i in 0..min(n, 32)`, or give a parameter its range: `param n: int = 5 in 1 .. 32;`");
             return self.report(unbounded);
         };
         let exact =
@@ -250,6 +250,7 @@ impl Body<'_, '_> {
         match &self.builder.function().expr(id).kind {
             Ir::Const(Const::Int(i)) => Some(i64::from(*i)),
             Ir::Op(Op::Min, args) => args.iter().filter_map(bound).min(),
+            Ir::MaterialParam(index) => Some(self.int_range(*index)?.1),
             Ir::Op(Op::Clamp, args) => bound(&args[2]),
             Ir::Op(Op::Add, args) => Some(bound(&args[0])? + bound(&args[1])?),
             Ir::Op(Op::Max, args) => Some(bound(&args[0])?.max(bound(&args[1])?)),
@@ -263,10 +264,17 @@ impl Body<'_, '_> {
         match &self.builder.function().expr(id).kind {
             Ir::Const(Const::Int(i)) => Some(i64::from(*i)),
             Ir::Op(Op::Max, args) => args.iter().filter_map(bound).max(),
+            Ir::MaterialParam(index) => Some(self.int_range(*index)?.0),
             Ir::Op(Op::Clamp, args) => bound(&args[1]),
             Ir::Op(Op::Min, args) => Some(bound(&args[0])?.min(bound(&args[1])?)),
             _ => None,
         }
+    }
+
+    /// The range of an int parameter of the material, which all its values are in.
+    fn int_range(&self, param: u32) -> Option<(i64, i64)> {
+        let (low, high) = (*self.ranges.get(param as usize)?)?;
+        Some((low as i64, high as i64))
     }
 
     /// An operator on two operands of any type.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 mod scene;
 
-pub use scene::SceneError;
+pub use scene::{Excerpt, SceneError};
 
 /// An error of the renderer.
 #[derive(Debug, thiserror::Error)]

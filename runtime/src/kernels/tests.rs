@@ -103,6 +103,7 @@ impl Room {
         let requests = scene.materials.iter().cloned().map(|b| MaterialRequest {
             apart: false,
             moment: None,
+            written: None,
             name: b.name,
             file: b.file,
             material: b.material,

@@ -58,7 +58,7 @@ pub(super) fn assemble(
             source: &sources[&spec.source()],
             places: match (&spec.places, file) {
                 (PlacesSpec::Listed(places), _) | (_, Some(places)) => places,
-                (PlacesSpec::File(_), None) => &NOWHERE,
+                (PlacesSpec::File(..), None) => &NOWHERE,
             },
         })
         .collect();
@@ -119,7 +119,9 @@ fn origin(entries: &[Entry], description: &Description) -> DVec3 {
 /// The places of entries that name a file of them.
 fn place_files(base: &Path, geometry: &[GeometrySpec]) -> Result<Vec<Option<Places>>, SceneError> {
     let read = |spec: &GeometrySpec| match &spec.places {
-        PlacesSpec::File(name) => placements::read_file(&base.join(name)).map(Some),
+        PlacesSpec::File(name, named) => placements::read_file(&base.join(name))
+            .map(Some)
+            .map_err(|e| e.named_at(named)),
         PlacesSpec::Listed(_) => Ok(None),
     };
     geometry.iter().map(read).collect()

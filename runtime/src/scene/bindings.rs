@@ -189,6 +189,7 @@ impl<'d> Bindings<'d> {
             params,
             bake: spec.bake,
             has_keys: spec.has_keys,
+            written: Some(spec.written.clone()),
         });
         index
     }

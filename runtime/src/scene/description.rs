@@ -2,10 +2,11 @@
 //! format.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use impasto_compiler::ParameterValue;
 use impasto_compiler::diag::nearest;
+use impasto_compiler::{ParameterValue, Written};
 use toml::de::DeValue;
 
 use super::animation::{Animation, Moment, mix_places, mix_values, turntable};
@@ -15,7 +16,7 @@ use super::placements::{self, PlacesSpec};
 use super::{
     Camera, FilmSettings, GivenParam, Integrator, Light, LightReader, MAX_NESTED, Transform,
 };
-use crate::error::SceneError;
+use crate::error::{Excerpt, SceneError};
 
 /// Pixels a side of the largest film.
 const MAX_FILM: u32 = 16_384;
@@ -90,6 +91,8 @@ pub(super) struct MaterialName {
 pub(super) struct GeometrySpec<'f> {
     pub(super) file: String,
     pub(super) format: &'f Format,
+    /// Where the scene names the file.
+    pub(super) named: Excerpt,
     /// Where its second texture coordinates are.
     pub(super) uv1: Option<SecondUvs<'f>>,
     /// From the geometry file to where its places count from.
@@ -104,6 +107,7 @@ pub(super) struct GeometrySpec<'f> {
 /// A file of the same triangles, whose texture coordinates are the second of another.
 pub(super) struct SecondUvs<'f> {
     pub(super) file: String,
+    pub(super) named: Excerpt,
     pub(super) format: &'f Format,
 }
 
@@ -129,6 +133,8 @@ pub(super) struct MaterialSpec {
     pub(super) bake: bool,
     /// The group that its light is in, if it emits.
     pub(super) group: Option<String>,
+    /// Where all this is said.
+    pub(super) written: Arc<Written>,
 }
 
 /// Where a parameter's value comes from.
@@ -150,7 +156,7 @@ pub(super) struct EnvironmentSpec {
 }
 
 pub(super) enum EnvironmentSpecSource {
-    File(String),
+    File(String, Excerpt),
     Color(Vec3),
 }
 
@@ -223,11 +229,11 @@ impl<'f> Description<'f> {
             .geometry
             .iter()
             .filter_map(|entry| match &entry.places {
-                PlacesSpec::File(file) => Some(file),
+                PlacesSpec::File(file, _) => Some(file),
                 PlacesSpec::Listed(_) => None,
             });
         let environment = self.environment.iter().filter_map(|e| match &e.source {
-            EnvironmentSpecSource::File(file) => Some(file),
+            EnvironmentSpecSource::File(file, _) => Some(file),
             EnvironmentSpecSource::Color(_) => None,
         });
         let all = geometry.chain(places).chain(environment);
@@ -356,9 +362,10 @@ fn geometry<'f>(
         Ok(Some(MaterialName { name, missing }))
     };
     let entry = |mut table: Table| {
-        let (file, format) = geometry_file(&mut table, formats)?;
+        let (file, place, format) = geometry_file(&mut table, formats)?;
         let spec = GeometrySpec {
             file,
+            named: place,
             format,
             uv1: second_uvs(&mut table, formats)?,
             transform: placements::transform(&mut table, moment)?,
@@ -372,12 +379,12 @@ fn geometry<'f>(
     value.tables("geometry")?.into_iter().map(entry).collect()
 }
 
-/// The file that an entry names, and its format. `obj` says that an extension which tells no other
+/// The file that an entry names, where it does, and its format. `obj` says that an extension which tells no other
 /// format is that of an OBJ file.
 fn geometry_file<'f>(
     table: &mut Table,
     formats: &'f [Format],
-) -> Result<(String, &'f Format), SceneError> {
+) -> Result<(String, Excerpt, &'f Format), SceneError> {
     let file = table.get("file");
     let (value, otherwise) = match file {
         None => (table.require("obj")?, formats::of_extension(formats, "obj")),
@@ -388,7 +395,7 @@ fn geometry_file<'f>(
     };
     let name = value.string()?;
     match formats::of_file(formats, name).or(otherwise) {
-        Some(format) => Ok((name.to_owned(), format)),
+        Some(format) => Ok((name.to_owned(), value.excerpt(), format)),
         None => Err(unreadable(&value, name, formats)),
     }
 }
@@ -405,7 +412,12 @@ fn second_uvs<'f>(
     let Some(format) = formats::of_file(formats, &file) else {
         return Err(unreadable(&value, &file, formats));
     };
-    Ok(Some(SecondUvs { file, format }))
+    let named = value.excerpt();
+    Ok(Some(SecondUvs {
+        file,
+        named,
+        format,
+    }))
 }
 
 fn unreadable(value: &Value, name: &str, formats: &[Format]) -> SceneError {
@@ -426,22 +438,33 @@ fn materials(
         return Ok(Vec::new());
     };
     let table = value.table("[materials]")?;
+    let text: Arc<str> = value.source().0.into();
     let entries = table.named().into_iter();
     entries
-        .map(|(name, value)| material(name, &value, formats, moment))
+        .map(|(name, value)| material(name, &value, &text, formats, moment))
         .collect()
 }
 
 fn material(
     name: &str,
     value: &Value,
+    text: &Arc<str>,
     formats: &[Format],
     moment: Moment,
 ) -> Result<MaterialSpec, SceneError> {
     let title = format!("[materials.{name:?}]");
     let mut table = value.table(&title)?;
-    let file = table.require("file")?.string()?.to_owned();
-    let item = table.get("material").map(|v| v.string().map(str::to_owned));
+    let file = table.require("file")?;
+    let item = table.get("material");
+    let mut written = Written {
+        path: value.source().1.display().to_string(),
+        text: text.clone(),
+        file: file.range(),
+        material: item.as_ref().map(Value::range),
+        params: Vec::new(),
+    };
+    let file = file.string()?.to_owned();
+    let item = item.map(|v| v.string().map(str::to_owned));
     let bake = optional(&mut table, "bake", Value::boolean, false)?;
     let group = group(&mut table)?;
     let mut params = Vec::new();
@@ -449,6 +472,7 @@ fn material(
         let entries = value.table(format!("{title} params"))?.named();
         for (key, value) in entries {
             params.push((key.to_owned(), param(&value, formats)?));
+            written.params.push(value.written(key));
         }
     }
     let keys = Moment::keys(&mut table, &title)?;
@@ -457,6 +481,8 @@ fn material(
         let given = keyed_param(&value, formats, moment)?;
         params.retain(|(name, _)| name != key);
         params.push((key.to_owned(), ParamSpec::Given(given)));
+        written.params.retain(|param| param.name != key);
+        written.params.push(value.written(key));
     }
     table.finish()?;
     Ok(MaterialSpec {
@@ -467,6 +493,7 @@ fn material(
         has_keys,
         bake,
         group,
+        written: Arc::new(written),
     })
 }
 
@@ -583,11 +610,13 @@ fn environment(root: &mut Table) -> Result<Option<EnvironmentSpec>, SceneError> 
     };
     let mut table = value.table("[environment]")?;
     let source = match (table.get("file"), table.get("color")) {
-        (Some(file), None) => EnvironmentSpecSource::File(file.string()?.to_owned()),
+        (Some(file), None) => {
+            EnvironmentSpecSource::File(file.string()?.to_owned(), file.excerpt())
+        }
         (None, Some(color)) => EnvironmentSpecSource::Color(color.rgb()?),
         _ => return Err(table.error("[environment] needs either `file` or `color`")),
     };
-    let is_map = matches!(source, EnvironmentSpecSource::File(_));
+    let is_map = matches!(source, EnvironmentSpecSource::File(..));
     let scale = |v: &Value| v.float_where("a number, 0 or more", |v| v >= 0.0);
     let spec = EnvironmentSpec {
         source,

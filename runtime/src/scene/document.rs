@@ -5,12 +5,13 @@ use std::ops::Range;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
+use impasto_compiler::WrittenParam;
 use impasto_compiler::diag::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::mesh::check_reach;
-use crate::error::SceneError;
+use crate::error::{Excerpt, SceneError};
 
 /// The text of a TOML file.
 pub(crate) struct Document<'d> {
@@ -32,13 +33,12 @@ impl<'d> Document<'d> {
 
     /// An error at a byte range of the text.
     pub(super) fn error(&self, place: Range<usize>, message: impl Into<String>) -> SceneError {
-        let before = self.text.get(..place.start).unwrap_or(self.text);
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        SceneError {
-            line: Some(before.matches('\n').count() + 1),
-            column: Some(before[line_start..].chars().count() + 1),
-            ..SceneError::in_file(self.path, message)
-        }
+        SceneError::at(self.excerpt(place), message)
+    }
+
+    /// What stands at a byte range of the text.
+    fn excerpt(&self, place: Range<usize>) -> Excerpt {
+        Excerpt::new(self.path, self.text, place)
     }
 }
 
@@ -105,8 +105,13 @@ impl<'d> Table<'d> {
         let mut entries: Vec<_> = self.entries.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
         let value = |(key, item): (&'d Spanned<_>, _)| {
-            let key: &'d Cow<str> = key.get_ref();
-            (key.as_ref(), self.value(key, item))
+            let name: &'d Cow<str> = key.get_ref();
+            let place = self.value(key.get_ref(), item);
+            let value = Value {
+                key: Some(key.span()),
+                ..place
+            };
+            (name.as_ref(), value)
         };
         entries.into_iter().map(value).collect()
     }
@@ -138,6 +143,7 @@ impl<'d> Table<'d> {
             document: self.document,
             name: format!("`{key}` of {}", self.name),
             item,
+            key: None,
         }
     }
 }
@@ -148,12 +154,39 @@ pub(crate) struct Value<'d> {
     /// The value in words, such as `` `fov` of [camera] ``.
     name: String,
     item: &'d Spanned<DeValue<'d>>,
+    /// The place of its key, if the key is a name of the scene's own.
+    key: Option<Range<usize>>,
 }
 
 impl<'d> Value<'d> {
     /// An error at the value.
     pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.item.span(), message)
+    }
+
+    /// What stands there.
+    pub(super) fn excerpt(&self) -> Excerpt {
+        self.document.excerpt(self.item.span())
+    }
+
+    /// Where a parameter is set.
+    pub(super) fn written(&self, name: &str) -> WrittenParam {
+        let value = self.item.span();
+        WrittenParam {
+            name: name.to_owned(),
+            key: self.key.clone().unwrap_or_else(|| value.clone()),
+            value,
+        }
+    }
+
+    /// The bytes of the text that it takes.
+    pub(super) fn range(&self) -> Range<usize> {
+        self.item.span()
+    }
+
+    /// The text of the file, and the file's name.
+    pub(super) fn source(&self) -> (&'d str, &'d Path) {
+        (self.document.text, self.document.path)
     }
 
     /// `` `fov` of [camera] must be ..., but it is ... ``
@@ -177,6 +210,7 @@ impl<'d> Value<'d> {
             document: self.document,
             name: format!("a part of {}", self.name),
             item,
+            key: None,
         };
         Some(self.item().as_array()?.iter().map(item).collect())
     }

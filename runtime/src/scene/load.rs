@@ -215,15 +215,18 @@ fn load_sources<'f>(
     base: &Path,
     entries: &[GeometrySpec<'f>],
 ) -> Result<BTreeMap<SourceName, Source<'f>>, SceneError> {
-    let formats = entries.iter().map(|entry| (entry.source(), entry));
+    // In reverse, so that the first entry of a file is the one that errors name.
+    let formats = entries.iter().rev().map(|entry| (entry.source(), entry));
     let files: BTreeMap<SourceName, &GeometrySpec<'f>> = formats.collect();
     let files: Vec<(SourceName, &GeometrySpec<'f>)> = files.into_iter().collect();
     let load = |(name, entry): &(SourceName, &GeometrySpec<'f>)| {
-        let mut geometry = (entry.format.read)(base, &entry.file)?;
+        let read = (entry.format.read)(base, &entry.file);
+        let mut geometry = read.map_err(|e| e.named_at(&entry.named))?;
         if let Some(second) = &entry.uv1 {
             let path = &base.join(&second.file);
-            let other = (second.format.read)(base, &second.file)?;
-            geometry.take_second_uvs(other, &entry.file, path)?;
+            let read = (second.format.read)(base, &second.file);
+            let taken = read.and_then(|other| geometry.take_second_uvs(other, &entry.file, path));
+            taken.map_err(|e| e.named_at(&second.named))?;
         }
         let source = Source {
             path: base.join(&entry.file),
@@ -245,8 +248,9 @@ fn load_environment(
 ) -> Result<Environment, SceneError> {
     let source = match &spec.source {
         EnvironmentSpecSource::Color(color) => EnvironmentSource::Uniform(*color * spec.scale),
-        EnvironmentSpecSource::File(file) => {
-            EnvironmentSource::Map(load_map(file, base, spec.scale, warnings)?)
+        EnvironmentSpecSource::File(file, named) => {
+            let map = load_map(file, base, spec.scale, warnings);
+            EnvironmentSource::Map(map.map_err(|e| e.named_at(named))?)
         }
     };
     Ok(Environment {

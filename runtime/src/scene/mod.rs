@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use impasto_compiler::ParameterValue;
+use impasto_compiler::{ParameterValue, Written};
 
 mod animation;
 mod assemble;
@@ -163,6 +163,8 @@ pub struct MaterialBinding {
     pub bake: bool,
     /// Do keys give some parameters, so that their values differ from frame to frame?
     pub has_keys: bool,
+    /// Where the scene binds it, if a file does.
+    pub written: Option<Arc<Written>>,
 }
 
 /// Radiance that comes from infinitely far away in all directions.

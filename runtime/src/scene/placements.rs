@@ -10,7 +10,7 @@ use super::Transform;
 use super::animation::{Moment, mix_places, turntable};
 use super::description::MaterialName;
 use super::document::{Table, Value, list};
-use crate::error::SceneError;
+use crate::error::{Excerpt, SceneError};
 use crate::input;
 
 /// Most placements of one entry, and of a scene.
@@ -40,8 +40,8 @@ pub(super) struct Place {
 /// What an entry says of its places.
 pub(super) enum PlacesSpec {
     Listed(Places),
-    /// The name of a file.
-    File(String),
+    /// The name of a file, and where the scene says it.
+    File(String, Box<Excerpt>),
 }
 
 impl Places {
@@ -130,7 +130,10 @@ pub(super) fn places(table: &mut Table, moment: Moment) -> Result<PlacesSpec, Sc
         return Ok(PlacesSpec::Listed(Places::here()));
     };
     if let DeValue::String(file) = value.item() {
-        return Ok(PlacesSpec::File(file.as_ref().to_owned()));
+        return Ok(PlacesSpec::File(
+            file.as_ref().to_owned(),
+            Box::new(value.excerpt()),
+        ));
     }
     let expected = "a list of tables, or the name of a file";
     let mut places = Places::default();

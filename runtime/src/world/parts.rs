@@ -102,7 +102,7 @@ impl SceneParts {
         layers: Layers,
         trees: &Trees,
     ) -> Result<(SceneParts, Recorded), SceneError> {
-        let texture = texture::part(textures, &scene.base)?;
+        let texture = texture::part(textures, &scene.base).map_err(|e| texture::named(e, scene))?;
         let media = Media::build(materials, instances, &scene.camera_media)?;
         let inputs = materials.iter().map(|m| m.inputs);
         let mut reads = Reads::of(inputs.fold(InputSet::default(), InputSet::or));

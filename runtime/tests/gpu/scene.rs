@@ -110,6 +110,7 @@ pub fn load_with(toml: &str, more: &[(&str, &str)]) -> (Scene, Program) {
     let request = |binding: &scene::MaterialBinding| MaterialRequest {
         apart: false,
         moment: None,
+        written: None,
         name: binding.name.clone(),
         file: binding.file.clone(),
         material: binding.material.clone(),

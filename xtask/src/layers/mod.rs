@@ -47,7 +47,7 @@ const CRATES: &[Crate] = &[
                 "stages",
             ],
             &["ast", "diag", "ir"],
-            &["closure", "lexer", "loader", "parameters"],
+            &["closure", "lexer", "loader", "parameters", "written"],
             &["parser", "passes", "program"],
             &["codegen", "format", "oracle", "sema"],
             &["build", "interface"],

@@ -11,11 +11,12 @@ use std::path::Path;
 
 use half::f16;
 use impasto_compiler::abi::{Lookups, TextureRef, TextureSpace};
-use impasto_compiler::codegen;
+use impasto_compiler::{ParameterValue, codegen};
 use rayon::prelude::*;
 
-use crate::error::SceneError;
+use crate::error::{Excerpt, SceneError};
 use crate::image_file::{self, Picture};
+use crate::scene::Scene;
 use crate::wgsl;
 use crate::wgsl::template::template;
 use crate::wgsl::{BufferData, ShaderPart};
@@ -60,6 +61,36 @@ pub fn part(textures: &[TextureRef], base: &Path) -> Result<Option<ShaderPart>, 
     }))
 }
 
+/// Reads the headers of textures, and decodes none.
+///
+/// # Errors
+/// If a picture cannot be read or is too large, or all together are.
+pub fn check(textures: &[TextureRef], base: &Path) -> Result<(), SceneError> {
+    sizes(&Slots::of(textures, base)?.pictures, base).map(drop)
+}
+
+/// The error with the line of `scene` that names the picture it is about, if a parameter does.
+pub fn named(error: SceneError, scene: &Scene) -> SceneError {
+    let is_it = |value: &ParameterValue| match value {
+        ParameterValue::Texture(name) | ParameterValue::Text(name) => {
+            let name = name.trim_matches('"');
+            error.path.as_ref() == Some(&scene.base.join(name))
+        }
+        _ => false,
+    };
+    let place = scene.materials.iter().find_map(|binding| {
+        let (name, _) = binding.params.iter().find(|(_, value)| is_it(value))?;
+        let written = binding.written.as_ref()?;
+        let value = written.param(name)?.value.clone();
+        let path = Path::new(&written.path);
+        Some(Excerpt::new(path, &written.text, value))
+    });
+    match place {
+        Some(excerpt) => error.named_at(&excerpt),
+        None => error,
+    }
+}
+
 /// The buffer: pairs of textures and tiles, tables, then texels.
 fn words(slots: &Slots, packed: Vec<Packed>) -> Vec<[u32; 2]> {
     let count = slots.slots.len();
@@ -90,9 +121,8 @@ fn words(slots: &Slots, packed: Vec<Packed>) -> Vec<[u32; 2]> {
     data
 }
 
-/// Loads textures, as many at a time as memory is meant for. Sizes are looked at first, so that too
-/// many are refused before any is decoded.
-fn load_all(textures: &[TextureRef], base: &Path) -> Result<Vec<Packed>, SceneError> {
+/// The texels of each texture by its header; too many are refused before any is decoded.
+fn sizes(textures: &[TextureRef], base: &Path) -> Result<Vec<u64>, SceneError> {
     let sizes: Vec<u64> = textures
         .par_iter()
         .map(|t| image_file::texels(&base.join(&t.path), "texture"))
@@ -103,6 +133,12 @@ fn load_all(textures: &[TextureRef], base: &Path) -> Result<Vec<Packed>, SceneEr
         let hint = format!("at most {MAX_TEXELS} fit; use smaller pictures");
         return Err(SceneError::new(message).hint(hint));
     }
+    Ok(sizes)
+}
+
+/// Loads textures, as many at a time as memory is meant for.
+fn load_all(textures: &[TextureRef], base: &Path) -> Result<Vec<Packed>, SceneError> {
+    let sizes = sizes(textures, base)?;
     let mut packed = Vec::with_capacity(textures.len());
     let mut first = 0;
     while first < textures.len() {
