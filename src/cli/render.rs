@@ -5,7 +5,7 @@
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,6 +14,7 @@ use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader};
+use impasto::runtime::error::{Excerpt, SceneError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
 use impasto::runtime::options::Progress;
@@ -307,11 +308,17 @@ pub(super) fn compile_requests(
         let file = &request.file;
         loader
             .load(file)
-            .map_err(|why| match (&request.name, is_material) {
-                (_, true) => format!("cannot read `{file}`: {why}"),
-                (name, false) => format!(
-                    "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
-                ),
+            .map_err(|why| match (&request.written, is_material) {
+                (_, true) | (None, _) => format!("cannot read `{file}`: {why}"),
+                (Some(written), false) => {
+                    let name = &request.name;
+                    let message = format!(
+                        "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
+                    );
+                    let place = written.file.clone();
+                    let excerpt = Excerpt::new(Path::new(&written.path), &written.text, place);
+                    SceneError::at(excerpt, message).to_string()
+                }
             })?;
     }
     let looks = ask_for_looks(&args.aov);

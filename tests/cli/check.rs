@@ -77,8 +77,8 @@ fn errors_show_the_line_of_the_scene() {
         ),
         (
             scene("color = 1", "t.obj", "gone.impasto", ""),
-            "E0203",
-            "11 │ file = \"gone.impasto\"\n   │        ^^^^^^^^^^^^^^\n",
+            "cannot read `gone.impasto`",
+            " file = \"gone.impasto\"\n",
         ),
         (
             with("rougness = 0.3"),

@@ -197,12 +197,14 @@ impl Checker<'_> {
     /// Definitions with an error of syntax are not checked: what the parser left of them would
     /// only give errors that follow from the first.
     fn leave_out_broken(&mut self, module: ModuleId, ast: &ast::Module, found: &[Diagnostic]) {
-        let syntax = found.iter().filter(|d| {
-            matches!(
-                d.code,
-                Code::Syntax | Code::Unclosed | Code::UnknownCharacter
-            )
-        });
+        // `a ? b : c`: what comes before the mark is no value of what is wanted.
+        let is_choice = |d: &Diagnostic| {
+            let text = |span: Span| self.sources.file(span.file).text.get(span.range());
+            d.code == Code::UnknownCharacter && d.span.and_then(text) == Some("?")
+        };
+        let syntax = found
+            .iter()
+            .filter(|d| matches!(d.code, Code::Syntax | Code::Unclosed) || is_choice(d));
         let places: Vec<Span> = syntax.filter_map(|d| d.span).collect();
         for (index, item) in ast.items.iter().enumerate() {
             let inside = |p: &Span| item.span.start <= p.start && p.start < item.span.end;
