@@ -183,10 +183,14 @@ fn source(library: &Library, folder: &str, item: &str, statement: &str) -> Strin
     format!("{imports}\n{item}material example {{ {statement} }}\n")
 }
 
-/// The identifiers of an expression.
+/// The identifiers of an expression, but the names of arguments and parameters: those before a `:`.
 fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
-        .filter(|w| !w.is_empty())
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let starts = text.split_inclusive(move |c: char| !is_part(c));
+    starts
+        .filter(|word| !word.ends_with(':'))
+        .map(move |word| word.trim_end_matches(move |c: char| !is_part(c)))
+        .filter(|word| !word.is_empty())
 }
 
 /// A length such as `2 m` or `30 cm`.
