@@ -182,7 +182,7 @@ fn pictures_of_the_tutorial_are_there_and_small() {
         .skip(1)
         .filter_map(|rest| rest.split(')').next())
         .collect();
-    assert_eq!(pictures.len(), 7);
+    assert_eq!(pictures.len(), 8);
     for picture in pictures {
         let bytes = std::fs::read(docs().join("images").join(picture)).expect("a picture");
         assert!(bytes.starts_with(b"\x89PNG"), "{picture}");
