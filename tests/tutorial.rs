@@ -30,11 +30,14 @@ fn the_tutorial_does_what_it_says() {
     for piece in &pieces {
         reader.reads(piece);
     }
+    reader.settle(0);
     assert!(reader.watching.is_none(), "nobody ends `--watch`");
     // The page did not lose what is tested.
     let done = [reader.saved, reader.edits, reader.commands, reader.outputs];
     assert!(
-        done.iter().zip([6, 3, 10, 5]).all(|(is, least)| *is >= least),
+        done.iter()
+            .zip([6, 3, 10, 5])
+            .all(|(is, least)| *is >= least),
         "files, edits, commands and outputs: {done:?}"
     );
     assert_eq!(reader.pictures, 8);
@@ -44,7 +47,10 @@ fn the_tutorial_does_what_it_says() {
 fn what_a_broken_step_prints_is_noticed() {
     let like = "wrote first.png (64 samples per pixel, 3.4 s)";
     assert!(resembles(like, "wrote first.png (16 samples per pixel)\n"));
-    assert!(!resembles(like, "wrote second.png (64 samples per pixel)\n"));
+    assert!(!resembles(
+        like,
+        "wrote second.png (64 samples per pixel)\n"
+    ));
     assert!(!resembles("a\nb", "b\na\n"));
 }
 
@@ -129,7 +135,11 @@ impl<'f> Newcomer<'f> {
     /// Saves a source where the text says so; otherwise the file is there already and reads like this.
     fn source(&mut self, block: &str) {
         let path = self.folder.join(FILE);
-        if self.before.trim_end().ends_with(&format!("Save this as `{FILE}`:")) {
+        if self
+            .before
+            .trim_end()
+            .ends_with(&format!("Save this as `{FILE}`:"))
+        {
             let seen = self.watching.as_ref().map(Watching::pictures);
             std::fs::write(path, block).expect("the source is saved");
             self.saved += 1;
@@ -155,8 +165,7 @@ impl<'f> Newcomer<'f> {
         let at = text.to_lowercase().find("eplace `").expect("an edit");
         let mut parts = text[at..].splitn(7, '`').skip(1);
         let mut next = || parts.next().expect("replace `A` by `B` in `F`");
-        let (from, by, to, within, file, rest) =
-            (next(), next(), next(), next(), next(), next());
+        let (from, by, to, within, file, rest) = (next(), next(), next(), next(), next(), next());
         assert_eq!((by.trim(), within.trim()), ("by", "in"), "{text}");
         let path = self.folder.join(file);
         let old = std::fs::read_to_string(&path).expect("the file to edit");
@@ -179,7 +188,10 @@ impl<'f> Newcomer<'f> {
             return;
         }
         let run: Run = command.output().expect("the command starts").into();
-        let wrote = run.stderr.lines().filter_map(|line| between(line, "wrote ", " "));
+        let wrote = run
+            .stderr
+            .lines()
+            .filter_map(|line| between(line, "wrote ", " "));
         if let Some(name) = wrote.filter(|name| name.ends_with(".png")).last() {
             self.picture = self.folder.join(name);
         }
@@ -199,7 +211,10 @@ impl<'f> Newcomer<'f> {
         if !self.before.contains("something like") {
             assert_eq!(printed, block, "{line}");
         } else if !(self.before.contains("Without a GPU") && !printed.contains("the processor")) {
-            assert!(resembles(block, &printed), "{line} printed\n{printed}and not\n{block}");
+            assert!(
+                resembles(block, &printed),
+                "{line} printed\n{printed}and not\n{block}"
+            );
         }
         self.outputs += 1;
         self.settle(i32::from(self.before.contains("exit code 1")));
@@ -219,7 +234,10 @@ impl<'f> Newcomer<'f> {
         let (a, b) = (small(&of_page), small(&written));
         let apart = a.iter().zip(&b).map(|(a, b)| f64::from(a.abs_diff(*b)));
         let mean = apart.sum::<f64>() / a.len() as f64;
-        assert!(mean < 3.0, "{name} is {mean:.2} of 255 away from its command's picture");
+        assert!(
+            mean < 3.0,
+            "{name} is {mean:.2} of 255 away from its command's picture"
+        );
         self.pictures += 1;
     }
 }
@@ -257,7 +275,10 @@ impl Watching {
         while self.pictures() < pictures {
             let said = self.said.lock().expect("a text").clone();
             assert!(!said.contains("error"), "{said}");
-            assert!(begun.elapsed() < Duration::from_secs(120), "no picture: {said}");
+            assert!(
+                begun.elapsed() < Duration::from_secs(120),
+                "no picture: {said}"
+            );
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -339,7 +360,9 @@ fn resembles(block: &str, printed: &str) -> bool {
         let line = line.trim_start_matches(|c: char| c == ' ' || c.is_ascii_digit());
         let start = line.split(|c: char| c == '(' || c.is_ascii_digit()).next();
         let start = start.unwrap_or(line).trim_end();
-        let start = start.strip_suffix("AMD EPYC, the processor").unwrap_or(start);
+        let start = start
+            .strip_suffix("AMD EPYC, the processor")
+            .unwrap_or(start);
         printed.any(|line| {
             let line = line.trim_start_matches(|c: char| c == ' ' || c.is_ascii_digit());
             line.starts_with(start)

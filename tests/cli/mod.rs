@@ -3,7 +3,7 @@
 
 mod aov;
 mod calibrate;
-mod common;
+pub(crate) mod common;
 mod completions;
 mod converge;
 mod cost;
