@@ -17,6 +17,7 @@ mod spaces;
 mod subsurface;
 mod textures;
 mod trace;
+mod tutorial;
 mod until;
 
 #[path = "../compiler/tests/common/listed.rs"]

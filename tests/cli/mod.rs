@@ -4,7 +4,7 @@
 mod aov;
 mod calibrate;
 mod check;
-mod common;
+pub(crate) mod common;
 mod completions;
 mod converge;
 mod cost;
