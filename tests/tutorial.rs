@@ -188,11 +188,11 @@ impl<'f> Newcomer<'f> {
             return;
         }
         let run: Run = command.output().expect("the command starts").into();
-        let wrote = run
+        let mut wrote = run
             .stderr
             .lines()
             .filter_map(|line| between(line, "wrote ", " "));
-        if let Some(name) = wrote.filter(|name| name.ends_with(".png")).next_back() {
+        if let Some(name) = wrote.rfind(|name| name.ends_with(".png")) {
             self.picture = self.folder.join(name);
         }
         self.open.push((line.to_owned(), run));
