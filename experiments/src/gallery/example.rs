@@ -183,13 +183,17 @@ fn source(library: &Library, folder: &str, item: &str, statement: &str) -> Strin
     format!("{imports}\n{item}material example {{ {statement} }}\n")
 }
 
-/// The identifiers of an expression, but the names of arguments and parameters: those before a `:`.
+/// The identifiers of an expression, but those of arguments and parameters (before a `:`) and of
+/// fields (after a `.`).
 fn words(text: &str) -> impl Iterator<Item = &str> {
-    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let starts = text.split_inclusive(move |c: char| !is_part(c));
-    starts
-        .filter(|word| !word.ends_with(':'))
-        .map(move |word| word.trim_end_matches(move |c: char| !is_part(c)))
+    let ends = |c: char| !c.is_ascii_alphanumeric() && c != '_';
+    let mut after_dot = false;
+    let named = text.split_inclusive(ends).filter(move |word| {
+        let is_field = std::mem::replace(&mut after_dot, word.ends_with('.'));
+        !is_field && !word.ends_with(':')
+    });
+    named
+        .map(move |word| word.trim_end_matches(ends))
         .filter(|word| !word.is_empty())
 }
 
