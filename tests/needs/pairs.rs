@@ -140,8 +140,8 @@ pairs! {
     "absorption", also &[], "functions +transmittance",
         thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5);")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
-    "media that scatter", also &[], "bindings +volume_table; functions +chosen +ended +extension +fly +fly_through +free_flight +keep_flight \
-         +matter_after +max_component +path_of +ray_transmittance +scattered +scatters +trace +trace_closest +trace_to_surface +turn_bits",
+    "media that scatter", also &[], "bindings +volume_table; functions +chosen +ended +extension +fly +free_flight +keep_flight +max_component \
+         +next_stop +path_of +ray_transmittance +scattered_cosine +scatters +trace +trace_closest +trace_to_surface +turn_bits +turned_from",
         thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
         => thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0), scattering: color(2.0));");
     "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary",
@@ -159,10 +159,11 @@ pairs! {
     "index outside of surfaces", also &[], "functions +exterior_index +media_outside",
         thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
-    "walks below surfaces", also &[], "+32 bytes; functions +chosen +ended +extension +fly_through +free_flight \
-         +keep_flight +lambertian +leave_surface_diffusely +load_below +load_below_rates +matter_after \
-         +max_component +path_of +scattered +store_below +store_below_rates +trace +trace_below +trace_closest \
-         +turn_bits +walk_below",
+    "walks below surfaces", also &[], "+64 bytes; kernels +below; functions +begin_below +below +decay +ended \
+         +fly_below +free_flight +lambertian +leave_surface_diffusely +load_below +load_below_plain +load_below_pulled \
+         +load_below_rates +matter_after +max_component +next_stop +pack_below +phase +request_below +resolved_rates \
+         +scattered_cosine +step_below +store_below +store_below_plain +store_below_pulled +store_below_rates +trace \
+         +trace_closest +turn_bits +turned_from +turns_so_far +unpack_below",
         thing("surface = translucent(color(0.3));") => thing("surface = random_walk(color(0.3));");
     "emission that varies", also &[], "functions +checked_emission +material_emission +needs_last_evaluation",
         thing(SHADE) => thing("surface = diffuse(color(0.3)); emission = uniform(color(0.5 + 0.5 * normal.y));");

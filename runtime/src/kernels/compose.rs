@@ -84,7 +84,7 @@ impl Composer<'_> {
             ("slot_shadows", needs.met(state::SLOT_SHADOWS)),
             ("own_shadow_origins", needs.met(state::OWN_SHADOW_ORIGINS)),
             ("fetched", self.fetches(stage)),
-            ("flights", needs.any(&[Need::Scattering, Need::Subsurface])),
+            ("wavefront", self.layout.wavefront),
         ];
         needs.flags().chain(derived).collect()
     }

@@ -40,12 +40,6 @@ fn extension(request: u32) {
     let ray = extension_request(request);
     let start = bitcast<vec3<f32>>(ray[0].xyz);
     let direction = bitcast<vec3<f32>>(ray[1].xyz);
-#if subsurface
-    if (load_radiance(request).flags & PATH_BELOW) != 0u {
-        keep_hit(request, trace_below(request, start, direction, ray[0].w));
-        return;
-    }
-#endif
 #if overlap
     keep_hit(request, trace_to_boundary(request, start, direction, ray[0].w));
 #endif
@@ -57,7 +51,7 @@ fn extension(request: u32) {
 #endif
 }
 #endif
-#if flights
+#if scattering
 
 // The pixel, sample and vertex of a path.
 fn path_of(slot: u32) -> vec3<u32> {
@@ -76,22 +70,6 @@ fn keep_flight(slot: u32, sample: u32, flight: Flight) {
 #endif
     }
 }
-
-#endif
-#if subsurface
-// The place where light leaves that goes below the surface.
-fn trace_below(slot: u32, origin: vec3<f32>, direction: vec3<f32>, entered: u32) -> Hit {
-    let path = path_of(slot);
-    let nowhere = Hit(0.0, 0.0, 0.0, NOTHING);
-    let begun = Flight(nowhere, origin, direction, load_throughput(slot), 0u);
-    let met = load_below(slot);
-    let rates = load_below_rates(slot).extinction;
-    let flight = walk_below(path, met.albedo, rates, met.anisotropy, begun, entered);
-    keep_flight(slot, path.y, flight);
-    return flight.hit;
-}
-#endif
-#if scattering
 
 // The nearest hit for light that may be turned on its way.
 fn trace_to_surface(slot: u32, origin: vec3<f32>, direction: vec3<f32>, skip: u32) -> Hit {

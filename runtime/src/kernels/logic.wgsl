@@ -32,6 +32,17 @@ fn logic(slot: u32) {
 #endif
     }
 #endif
+#if subsurface
+    let walks = below && (load_below_pulled(slot).status & BELOW_ENDED) == 0u;
+    if walks && any(carried.throughput > vec3<f32>(0.0)) {
+#if shadow_rays
+        path.flags &= ~PATH_LIT;
+        store_radiance(slot, path);
+#endif
+        request_below();
+        return;
+    }
+#endif
     // A throughput of zero says that scattering failed and no ray was cast.
     if any(carried.throughput > vec3<f32>(0.0)) {
 #if requests

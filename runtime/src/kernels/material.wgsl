@@ -95,6 +95,7 @@ fn material(slot: u32, instance: u32) {
     if enters {
         store_below(slot, PathBelow(scattered.below_albedo, scattered.below_anisotropy));
         store_below_rates(slot, PathBelowRates(scattered.below_extinction, instance));
+        store_below_pulled(slot, PathBelowPulled(vec3<f32>(0.0), 0u));
     }
     if enters != leaves {
         path.flags ^= PATH_BELOW;
@@ -114,7 +115,15 @@ fn material(slot: u32, instance: u32) {
 #if ray_cones
         store_cone(slot, PathCone(width, scattered_spread(cone.spread, scattered.pdf), 0u, 0u));
 #endif
+#if subsurface
+        if enters {
+            request_below();
+        } else {
+            request_extension(start, scattered.wi, hit.primitive);
+        }
+#else
         request_extension(start, scattered.wi, hit.primitive);
+#endif
     }
 #if changes_medium
     if scattered.transmitted > 0.5 {

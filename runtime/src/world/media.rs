@@ -31,6 +31,8 @@ pub(crate) const MAX_TURNS: u32 = 4096;
 /// How often light is turned below a surface until its steps become longer, and how often until they double again.
 const COARSE_TURNS: u32 = 256;
 const COARSER_TURNS: u32 = 128;
+/// How often a kernel of the wavefront turns light below a surface before it takes up the next walk.
+const TURNS_AT_ONCE: u32 = 8;
 
 /// What paths have to know of media. Empty if nothing depends on the medium that a path is in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -113,6 +115,7 @@ pub(crate) fn flights(needs: Needs) -> String {
         ("MAX_TURNS", MAX_TURNS),
         ("COARSE_TURNS", COARSE_TURNS),
         ("COARSER_TURNS", COARSER_TURNS),
+        ("TURNS_AT_ONCE", TURNS_AT_ONCE),
     ]);
     let below = if needs.has(Need::Subsurface) {
         include_str!("subsurface.wgsl")

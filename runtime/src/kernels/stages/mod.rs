@@ -134,10 +134,6 @@ pub(crate) struct Request {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Entry {
     /// The slot that asked.
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "all queues of the table are of rays")
-    )]
     Slot,
     /// The slot; or the ray, if rays are in buffers of their own: WGSL of its words, in terms of the parameters.
     Ray([&'static str; 2]),

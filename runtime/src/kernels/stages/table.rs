@@ -16,7 +16,7 @@ const SAMPLE_OUTPUTS: When = when(&[Need::SampleOutputs]);
 const LIGHT_GROUPS: When = when(&[Need::LightGroups]);
 
 /// Every stage, in the order of an iteration.
-pub(crate) static STAGES: [Stage; 7] = [
+pub(crate) static STAGES: [Stage; 8] = [
     // Ends or goes on with every path, and samples a light.
     Stage {
         name: "logic",
@@ -55,6 +55,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "light_group",
                 "media",
                 "below_rates",
+                "below_pulled",
             ],
         )],
         stores: &[(
@@ -147,6 +148,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "media",
                 "below",
                 "below_rates",
+                "below_pulled",
             ],
         )],
     },
@@ -180,7 +182,7 @@ pub(crate) static STAGES: [Stage; 7] = [
                 "vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(distance))",
             ]),
         }),
-        before: &["extension"],
+        before: &["extension", "below"],
         casts: Some(ALWAYS),
         parts: &[(Part::Geometry, ALWAYS), (Part::Traversal, ALWAYS)],
         loads: &[(
@@ -223,7 +225,7 @@ pub(crate) static STAGES: [Stage; 7] = [
         // of a cast.
         casts: Some(When {
             all: &[],
-            none: &[Need::Overlap, Need::Scattering, Need::Subsurface],
+            none: &[Need::Overlap, Need::Scattering],
         }),
         parts: &[
             (Part::Geometry, ALWAYS),
@@ -234,10 +236,6 @@ pub(crate) static STAGES: [Stage; 7] = [
             (Part::Random, SCATTERING),
             (Part::Numbers, SCATTERING),
             (Part::Flights, SCATTERING),
-            (Part::Surface, SUBSURFACE),
-            (Part::Random, SUBSURFACE),
-            (Part::Numbers, SUBSURFACE),
-            (Part::Flights, SUBSURFACE),
         ],
         loads: &[
             (
@@ -247,13 +245,62 @@ pub(crate) static STAGES: [Stage; 7] = [
             (OVERLAP, &["cone"]),
             // Turns have random numbers by the vertex at which the ray was cast.
             (SCATTERING, &["cone", "radiance"]),
-            (SUBSURFACE, &["cone", "radiance", "below", "below_rates"]),
         ],
         stores: &[
             (ALWAYS, &["hit", "throughput", "media"]),
             (OVERLAP, &["cone"]),
             (SCATTERING, &["cone", "ray_direction"]),
-            (SUBSURFACE, &["cone", "ray_direction"]),
         ],
+    },
+    // Takes light on below the surface that it entered.
+    Stage {
+        name: "below",
+        body: template!("../below.wgsl"),
+        arguments: "slot",
+        need: SUBSURFACE,
+        phase: Phase::Rays,
+        work: Work::Queue(Request {
+            from: &["logic", "material"],
+            parameters: "",
+            entry: Entry::Slot,
+        }),
+        before: &[],
+        casts: None,
+        parts: &[
+            (Part::Geometry, ALWAYS),
+            (Part::Traversal, ALWAYS),
+            (Part::Surface, ALWAYS),
+            (Part::Random, ALWAYS),
+            (Part::Numbers, ALWAYS),
+            (Part::Flights, ALWAYS),
+        ],
+        loads: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "ray_direction",
+                "hit",
+                "throughput",
+                "radiance",
+                "cone",
+                "below",
+                "below_rates",
+                "below_plain",
+                "below_pulled",
+            ],
+        )],
+        stores: &[(
+            ALWAYS,
+            &[
+                "ray_origin",
+                "ray_direction",
+                "hit",
+                "throughput",
+                "cone",
+                "below_rates",
+                "below_plain",
+                "below_pulled",
+            ],
+        )],
     },
 ];

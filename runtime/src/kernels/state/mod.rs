@@ -66,7 +66,9 @@ pub(crate) fn constants() -> String {
          // The path has ended; its first hit is asked how it looks.\n\
          const PATH_LOOKS: u32 = {}u;\n\
          // The path is below a surface: its ray walks there.\n\
-         const PATH_BELOW: u32 = {}u;\n",
+         const PATH_BELOW: u32 = {}u;\n\
+         // Of the status of a walk: it has left, or ended.\n\
+         const BELOW_ENDED: u32 = 0x80000000u;\n",
         bit(0) - 1,
         bit(0),
         bit(1),

@@ -24,7 +24,7 @@ const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 13] = [
+pub(crate) const FIELDS: [Field; 15] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -187,6 +187,24 @@ pub(crate) const FIELDS: [Field; 13] = [
         uses: &[Use {
             name: "below_rates",
             components: &[("extinction", Vec3), ("instance", U32)],
+            need: when(&[Need::Subsurface]),
+        }],
+    },
+    Field {
+        // With which probabilities its walk was drawn in each channel as light goes, and the primitive that it
+        // entered through.
+        uses: &[Use {
+            name: "below_plain",
+            components: &[("shares", Vec3), ("entered", U32)],
+            need: when(&[Need::Subsurface]),
+        }],
+    },
+    Field {
+        // The same of walks that are pulled back, and how far the walk has come: 0 before it, see
+        // `world/subsurface.wgsl`.
+        uses: &[Use {
+            name: "below_pulled",
+            components: &[("shares", Vec3), ("status", U32)],
             need: when(&[Need::Subsurface]),
         }],
     },
