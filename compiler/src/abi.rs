@@ -31,6 +31,7 @@
 //! binds to geometry. Instances that differ in values share the code, and the values lie in a table.
 
 mod point;
+pub mod walk;
 
 pub use point::{Input, InputSet, Tangents};
 

@@ -492,7 +492,7 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
     if report.lost_paths > 0 {
         let lost = report.lost_paths;
         global.note(&format!(
-            "warning: {lost} paths crossed too many hidden boundaries in a row and were ended"
+            "warning: {lost} paths crossed too many hidden boundaries in a row, or were turned too often in matter, and were ended"
         ));
     }
 }

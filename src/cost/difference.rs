@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use impasto_compiler::cost::{Cost, LineCost};
+use impasto_compiler::cost::{Cost, LineCost, Walks};
 use serde::Serialize;
 
 use super::MaterialCost;
@@ -29,6 +29,10 @@ pub struct Change {
     pub old: Option<Cost>,
     /// What it costs now.
     pub new: Option<Cost>,
+    /// What its light cost below the surface, if any went there.
+    pub old_walks: Option<Walks>,
+    /// What it costs there now.
+    pub new_walks: Option<Walks>,
     /// The author's lines whose cost changed, those first that changed most.
     pub lines: Vec<LineChange>,
 }
@@ -78,9 +82,11 @@ fn change(old: &MaterialCost, new: &MaterialCost) -> Change {
     let lines = line_changes(&old.lines, &new.lines);
     Change {
         name: new.name.clone(),
-        same: old.cost == new.cost,
+        same: old.cost == new.cost && old.walks == new.walks,
         old: old.cost.clone(),
         new: new.cost.clone(),
+        old_walks: old.walks,
+        new_walks: new.walks,
         lines,
     }
 }

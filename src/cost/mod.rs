@@ -1,7 +1,9 @@
 //! What the materials of a scene, or of a file, cost where they are used: operations of one
 //! evaluation at points of the scene's own surfaces.
 
-use impasto_compiler::cost::{BUDGET, Cost, Inputs, LineCost, Measured, Operations, Spent};
+use impasto_compiler::cost::{
+    BUDGET, Cost, Inputs, LineCost, Measured, Operations, Spent, Walks,
+};
 use impasto_compiler::inspect::At;
 use impasto_compiler::{Program, abi::MaterialInfo};
 use serde::Serialize;
@@ -27,6 +29,8 @@ pub struct MaterialCost {
     pub lobes: usize,
     /// What evaluating it costs; none if it is on no surface of the scene.
     pub cost: Option<Cost>,
+    /// What its light costs below the surface, if any goes there.
+    pub walks: Option<Walks>,
     /// What the lines of its source cost, those first that cost most with what they call.
     pub lines: Vec<LineCost>,
     /// What cut its evaluations short, if anything did: then the cost is that of fewer.
@@ -110,6 +114,7 @@ fn measure(
             instances: instances.filter(|i| i.info.material == material).count(),
             lobes: info.lobes,
             cost: measured.as_ref().map(Measured::cost),
+            walks: measured.as_ref().and_then(Measured::walks),
             lines: measured.as_ref().map_or(Vec::new(), Measured::lines),
             spent: measured.and_then(|m| m.spent().cloned()),
         }

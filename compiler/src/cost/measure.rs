@@ -3,6 +3,7 @@
 
 use super::size::Size;
 use super::subgroups::{BATCH, Subgroups};
+use super::walk::{WalkTally, Walks};
 use super::{BUDGET, Classes, Cost, Operations, Spent, live};
 use crate::codegen;
 use crate::inspect::{self, At};
@@ -32,6 +33,7 @@ pub struct Measured<'p> {
     least: u64,
     most: u64,
     spent: Option<Spent>,
+    walks: Option<WalkTally>,
 }
 
 impl<'p> Measured<'p> {
@@ -61,6 +63,7 @@ impl<'p> Measured<'p> {
             least: u64::MAX,
             most: 0,
             spent: None,
+            walks: WalkTally::new(program.ir()),
         };
         // Every batch takes its inputs from all over the list.
         let batches = inputs.len().div_ceil(BATCH);
@@ -121,7 +124,10 @@ impl<'p> Measured<'p> {
         let [wo, wi, u] = [&at.wo[..], &at.wi[..], &at.u[..]].map(Value::vector);
         let evaluate = &self.material.evaluate;
         let point = here(evaluate, module, at);
-        self.run.run(evaluate, vec![point, wo.clone(), wi, u])?;
+        let sample = self.run.run(evaluate, vec![point, wo.clone(), wi, u])?;
+        if let Some(walks) = &mut self.walks {
+            walks.add(&sample);
+        }
         if let Some(f) = varying(self.material) {
             self.run.run(f, vec![here(f, module, at), wo])?;
         }
@@ -142,6 +148,11 @@ impl<'p> Measured<'p> {
         self.least = self.least.min(all);
         self.most = self.most.max(all);
         times
+    }
+
+    /// What the walks of its light below the surface cost, if any go there.
+    pub fn walks(&self) -> Option<Walks> {
+        self.walks.as_ref()?.mean(self.evaluations)
     }
 
     /// What the material costs.

@@ -24,12 +24,14 @@ mod measure;
 mod size;
 mod subgroups;
 mod vector;
+mod walk;
 
 pub use inputs::Inputs;
 pub use lines::LineCost;
 pub use live::live;
 pub use measure::Measured;
 pub use vector::{Cost, LANES};
+pub use walk::Walks;
 
 /// Expressions that one evaluation of a material may take, unless more are granted: those that need more
 /// may use what others leave.

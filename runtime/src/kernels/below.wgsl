@@ -22,7 +22,8 @@ fn below(slot: u32) {
     let side = hit_geometric_normal(entered);
     var walk: Below;
     if begins {
-        walk = begin_below(path, matter, side, flight, entered);
+        let choice = random_numbers(path.x, path.y, vertex_draw(path.z - 1u, DRAW_SCATTERING)).w;
+        walk = begin_below(choice, matter, side, flight, entered);
     } else {
         walk = unpack_below(matter, side, Ways(plain.shares, pulled.shares), pulled.status);
         flight.turns = turns_so_far(pulled.status);

@@ -29,7 +29,8 @@ use crate::render::workload;
 use crate::scene::Scene;
 use crate::technique::Technique;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::needs::{Decision, Need};
+use crate::world::media;
+use crate::world::needs::{Decision, Need, Needs};
 use crate::world::{KernelParts, MaterialSource, World};
 
 /// A plan that can run: its kernels, and the buffers they work in.
@@ -319,6 +320,17 @@ impl<'a> CompositionInputs<'a> {
     }
 }
 
+/// How many iterations a path takes at most: one to begin, one to end, and those of its segments, of which a
+/// walk below a surface takes several.
+fn longest_path(max_depth: u32, needs: Needs) -> u64 {
+    let segment = if needs.has(Need::Subsurface) {
+        1 + media::MAX_TURNS.div_ceil(media::TURNS_AT_ONCE)
+    } else {
+        1
+    };
+    u64::from(max_depth) * u64::from(segment) + 2
+}
+
 impl ReportInputs {
     /// What is known before kernels are built, which takes yet unknown time.
     fn of(composer: &Composer<'_>, options: &RenderOptions) -> Self {
@@ -331,7 +343,7 @@ impl ReportInputs {
             width,
             height,
             geometry: world.parts.counts,
-            max_depth: world.max_depth,
+            longest_path: longest_path(world.max_depth, composer.layout.needs),
             identity: Identity {
                 width,
                 height,

@@ -91,11 +91,10 @@ impl Renderer<'_> {
         built.work.set_run(&pass.options(&self.options));
     }
 
-    /// Fails if `iterations` in a row finished no path, which would go on for ever. A path takes
-    /// an iteration a segment, one to begin and one to end; what the counters say is as old
-    /// as a submission is long.
+    /// Fails if `iterations` in a row finished no path, which would go on for ever. What
+    /// the counters say is as old as a submission is long.
     fn check_stall(&self, iterations: u64) -> Result<(), RuntimeError> {
-        let expected = u64::from(self.facts.max_depth) + 2;
+        let expected = self.facts.longest_path;
         if iterations <= 2 * expected + 2 * u64::from(pool::MAX_ITERATIONS) {
             return Ok(());
         }

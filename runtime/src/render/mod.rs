@@ -77,7 +77,8 @@ struct ReportInputs {
     width: u32,
     height: u32,
     geometry: GeometryCounts,
-    max_depth: u32,
+    /// Iterations that the longest path takes.
+    longest_path: u64,
     identity: Identity,
     /// The fingerprint of all pixels.
     scene: u64,

@@ -116,7 +116,8 @@ pub struct Report {
     pub queue_overflow: u64,
     /// Media that paths entered while in as many as they can follow, and then ignored.
     pub media_overflow: u64,
-    /// Paths given up because they crossed too many hidden boundaries in a row.
+    /// Paths given up because they crossed too many hidden boundaries in a row, or were turned too often in a
+    /// medium or below a surface.
     pub lost_paths: u64,
 }
 

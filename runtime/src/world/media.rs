@@ -8,12 +8,13 @@
 
 use std::collections::BTreeMap;
 
+use impasto_compiler::abi::walk::{COARSE_TURNS, COARSER_TURNS, FAINT};
 use impasto_compiler::abi::{Input, InstanceInfo, MaterialInfo, Medium};
 
 use crate::error::SceneError;
 use crate::scene::MAX_NESTED;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::wgsl::{constant_u32, constants_u32};
+use crate::wgsl::{constant_f32, constant_u32, constants_u32};
 use crate::world::needs::{MediaTraits, Need, Needs};
 
 /// How many distinct media, and how many priorities, a scene can have: a word's halves hold them.
@@ -28,11 +29,8 @@ const MAX_RATE: f32 = 1e18;
 const MAX_ANISOTROPY: f32 = 0.99;
 /// How often light is turned on its way from one surface to the next before it is given up.
 pub(crate) const MAX_TURNS: u32 = 4096;
-/// How often light is turned below a surface until its steps become longer, and how often until they double again.
-const COARSE_TURNS: u32 = 256;
-const COARSER_TURNS: u32 = 128;
 /// How often a kernel of the wavefront turns light below a surface before it takes up the next walk.
-const TURNS_AT_ONCE: u32 = 8;
+pub(crate) const TURNS_AT_ONCE: u32 = 16;
 
 /// What paths have to know of media. Empty if nothing depends on the medium that a path is in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -116,7 +114,7 @@ pub(crate) fn flights(needs: Needs) -> String {
         ("COARSE_TURNS", COARSE_TURNS),
         ("COARSER_TURNS", COARSER_TURNS),
         ("TURNS_AT_ONCE", TURNS_AT_ONCE),
-    ]);
+    ]) + &constant_f32("FAINT", FAINT);
     let below = if needs.has(Need::Subsurface) {
         include_str!("subsurface.wgsl")
     } else {

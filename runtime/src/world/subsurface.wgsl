@@ -19,6 +19,9 @@ const LEAST_FREE_PATH: f32 = 32.0;
 const PULLED: f32 = 0.75;
 // How thick that is: times the depth at which 1 / e of diffused light is left.
 const THICK: f32 = 4.0;
+// The turns whose numbers are spread evenly over the samples of a pixel, apart from all other draws of the path.
+const SPREAD_TURNS: u32 = 8;
+const SPREAD_DRAWS: u32 = 0x40000000u;
 
 // What light goes through below a surface: how much of it is met and scattered a metre, and the mean cosine
 // by which it turns.
@@ -84,9 +87,8 @@ fn resolved_rates(rates: vec3<f32>, place: vec3<f32>) -> vec3<f32> {
     return min(rates, vec3<f32>(1.0 / max(LEAST_FREE_PATH * 4e-6 * max_component(abs(place)), 1e-18)));
 }
 
-// Chooses the way of a walk. Samples of a pixel take ways by turns, as evenly as multiples of the golden ratio
-// are spread.
-fn begin_below(path: vec3<u32>, matter: Matter, side: vec3<f32>, begun: Flight, entered: u32) -> Below {
+// Chooses the way of a walk by a number in [0, 1), which is spread evenly over the samples of a pixel.
+fn begin_below(choice: f32, matter: Matter, side: vec3<f32>, begun: Flight, entered: u32) -> Below {
     let throughput = begun.carried.throughput;
     let shares = throughput / (throughput.x + throughput.y + throughput.z);
     let against = dot(side, begun.direction) < 0.0;
@@ -94,18 +96,15 @@ fn begin_below(path: vec3<u32>, matter: Matter, side: vec3<f32>, begun: Flight, 
     let rates = decay(matter);
     let reach = THICK / min(rates.x, min(rates.y, rates.z));
     let behind = trace_closest(begun.start, -outwards, min(reach, 3.0e38), entered);
-    let thickness = select(behind.t, 3.0e38, behind.primitive == NOTHING);
-    let pulls = clamp((rates * thickness - 1.0) / (THICK - 1.0), vec3<f32>(0.0), vec3<f32>(1.0));
-    let pulled = PULLED * max(1.0 - 2.0 * abs(matter.anisotropy), 0.0) * max(pulls,vec3<f32>(1.0));
-    let start = turn_bits(vec3<u32>(path.x, 0u, path.z), MAX_TURNS - 1u, 1u).x;
-    var u = unit_numbers(vec4<u32>(start + path.y * 2654435769u)).x;
+    let within = clamp((rates * behind.t - 1.0) / (THICK - 1.0), vec3<f32>(0.0), vec3<f32>(1.0));
+    let pulls = select(within, vec3<f32>(1.0), behind.primitive == NOTHING);
+    let pulled = PULLED * max(1.0 - 2.0 * abs(matter.anisotropy), 0.0) * pulls;
     let ways = Ways(shares * (1.0 - pulled), shares * pulled);
-    let all_pulled = ways.pulled.x + ways.pulled.y + ways.pulled.z;
-    let is_pulled = u < all_pulled;
-    u -= select(all_pulled, 0.0, is_pulled);
-    let among = select(ways.plain, ways.pulled, is_pulled);
-    let last = u >= among.x + among.y;
-    let channel = select(vec3<f32>(0.0, f32(!last), f32(last)), vec3<f32>(1.0, 0.0, 0.0), u < among.x);
+    let last = choice >= shares.x + shares.y;
+    let channel = select(vec3<f32>(0.0, f32(!last), f32(last)), vec3<f32>(1.0, 0.0, 0.0), choice < shares.x);
+    // What is left of the number, within its channel.
+    let u = choice - dot(channel, vec3<f32>(0.0, shares.x, shares.x + shares.y));
+    let is_pulled = u < dot(channel, ways.pulled);
     return Below(matter, outwards, rates, ways, channel, is_pulled, against, 1, false, false);
 }
 
@@ -132,7 +131,7 @@ fn step_below(path: vec3<u32>, flight: ptr<function, Flight>, walk: ptr<function
         return hit.primitive;
     }
     // Where nothing is met however far, the surface has a hole, or is none of a body.
-    let survival = min(max_component((*flight).carried.throughput) / 0.25, 1.0);
+    let survival = min(max_component((*flight).carried.throughput) / FAINT, 1.0);
     if stop.way > 1e37 || unit_numbers(turn_bits(path, turns, 1u)).x >= survival {
         *flight = ended(*flight);
         (*walk).ended = true;
@@ -147,7 +146,12 @@ fn step_below(path: vec3<u32>, flight: ptr<function, Flight>, walk: ptr<function
 fn fly_below(path: vec3<u32>, flight: ptr<function, Flight>, walk: ptr<function, Below>, skip: u32) -> Stop {
     let matter = matter_after((*walk).matter, (*flight).turns);
     let slope = clamp((*walk).decay / matter.extinction, vec3<f32>(0.1), vec3<f32>(0.999));
-    let u = unit_numbers(turn_bits(path, (*flight).turns, 0u));
+    var u: vec4<f32>;
+    if (*flight).turns < SPREAD_TURNS {
+        u = random_numbers(path.x, path.y, SPREAD_DRAWS + path.z * SPREAD_TURNS + (*flight).turns);
+    } else {
+        u = unit_numbers(turn_bits(path, (*flight).turns, 0u));
+    }
     // The density with which pulled light is turned as it was, over that of the phase function.
     var turned = vec3<f32>(1.0);
     if (*walk).turned {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use impasto::compiler::cost::Cost;
+use impasto::compiler::cost::{Cost, Walks};
 use impasto::cost::{Change, Difference, LineChange, MaterialCost, difference};
 use serde_json::json;
 
@@ -64,6 +64,8 @@ fn json(args: &CostArgs, found: &Difference) -> serde_json::Value {
             "same": m.same,
             "old": m.old,
             "new": m.new,
+            "old_walks": m.old_walks,
+            "new_walks": m.new_walks,
             "old_efficiency": efficiency(&m.old),
             "new_efficiency": efficiency(&m.new),
             "lines": m.lines,
@@ -126,6 +128,8 @@ fn material(out: &mut String, args: &CostArgs, m: &Change) {
         ("code", f64::from(old.code), f64::from(new.code)),
         ("loops", f64::from(old.loops), f64::from(new.loops)),
         ("bytes read", old.bytes, new.bytes),
+        ("walks in 100", 100.0 * share(&m.old_walks), 100.0 * share(&m.new_walks)),
+        ("ray casts a walk", casts(&m.old_walks), casts(&m.new_walks)),
     ];
     for (what, old, new) in rows.into_iter().filter(|(_, old, new)| shows(*old, *new)) {
         row(out, what, old, new);
@@ -140,6 +144,14 @@ fn material(out: &mut String, args: &CostArgs, m: &Change) {
     );
     let shown = m.lines.iter().filter(|l| shows(l.old, l.new));
     lines(out, &shown.take(args.lines).collect::<Vec<_>>());
+}
+
+fn share(walks: &Option<Walks>) -> f64 {
+    walks.map_or(0.0, |w| w.share)
+}
+
+fn casts(walks: &Option<Walks>) -> f64 {
+    walks.map_or(0.0, |w| w.casts)
 }
 
 /// Is a change large enough for a number with one decimal?

@@ -162,6 +162,7 @@ fn json(args: &CostArgs, materials: &[MaterialCost], noise: &[NoiseCost]) -> ser
             "lobes": m.lobes,
             "operations": m.operations(),
             "cost": m.cost,
+            "walks": m.walks,
             "efficiency": m.cost.as_ref().map(Cost::efficiency),
             "lines": m.lines,
             "spent": m.spent,

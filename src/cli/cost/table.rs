@@ -53,6 +53,7 @@ pub fn text(args: &CostArgs, materials: &[MaterialCost], noise: &[NoiseCost]) ->
     for n in noise {
         let _ = writeln!(out, "{}", row(width, &n.name, &n.operations));
     }
+    walks(&mut out, width, materials);
     out.push_str("\ninstructions in Laine, Karras and Aila 2013, section 3\n\n");
     for (what, count) in PAPER {
         let _ = writeln!(out, "{what:width$}  {count:>7}");
@@ -81,6 +82,22 @@ fn material(out: &mut String, width: usize, m: &MaterialCost) {
             ""
         }
     );
+}
+
+/// What light costs that walks below surfaces.
+fn walks(out: &mut String, width: usize, materials: &[MaterialCost]) {
+    let walks = materials.iter().filter_map(|m| Some((&m.name, m.walks?)));
+    for (index, (name, walks)) in walks.enumerate() {
+        if index == 0 {
+            out.push_str("\nlight that walks below the surface\n\n");
+        }
+        let share = 100.0 * walks.share;
+        let casts = walks.casts;
+        let _ = writeln!(
+            out,
+            "{name:width$}  {share:>5.0} % of evaluations, {casts:.0} ray casts each"
+        );
+    }
 }
 
 /// `93 %`: the forecast of SIMT efficiency.
