@@ -212,9 +212,10 @@ pub(super) fn cloth() -> Geometry {
         let open = ((s - 0.045) / (CLOTH - 0.045)).clamp(0.0, 1.0);
         let open = open * open * (3.0 - 2.0 * open);
         let folds = (9.0 * phi + 0.9 * (2.0 * phi).sin()).cos() + 0.45 * (3.0 * phi + 1.0).cos();
-        let r = p.x + 0.0115 * open * folds;
-        let y = p.y + height + 0.006 * open * (0.5 + 0.5 * (5.0 * phi).sin());
-        dvec3(r * phi.sin(), y, r * phi.cos())
+        let p = p + open * dvec2(0.0115 * folds, 0.006 * (0.5 + 0.5 * (5.0 * phi).sin()));
+        // No fold reaches into the ball.
+        let p = p.normalize_or(DVec2::Y) * p.length().max(BELOW);
+        dvec3(p.x * phi.sin(), p.y + height, p.x * phi.cos())
     };
     let corner = |row: usize, column: usize| {
         let (s, u) = (row as f64, column as f64 / columns as f64);
