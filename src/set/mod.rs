@@ -221,7 +221,8 @@ mod tests {
     #[test]
     fn no_fold_reaches_into_the_ball() {
         let cloth = shapes::cloth();
-        let (sample, core): (Vec<_>, Vec<_>) =
+        type Triangles<'a> = Vec<&'a impasto_runtime::scene::formats::Triangle>;
+        let (sample, core): (Triangles, Triangles) =
             cloth.triangles.iter().partition(|t| t.material == 0);
         let corners = core.iter().flat_map(|t| t.positions);
         let (low, high) = corners.fold((f64::MAX, f64::MIN), |(low, high), p| {

@@ -196,6 +196,8 @@ fn turned(
 /// Radius of the cloth's outline when it lies flat, of the ball below it, and how high that lies.
 const CLOTH: f64 = 0.17;
 const BELOW: f64 = 0.048;
+/// Within what distance of that ball the cloth bends away from it.
+const BEND: f64 = 0.006;
 
 /// A round cloth (`sample`) that hangs down around a ball (`core`).
 pub(super) fn cloth() -> Geometry {
@@ -213,8 +215,10 @@ pub(super) fn cloth() -> Geometry {
         let open = open * open * (3.0 - 2.0 * open);
         let folds = (9.0 * phi + 0.9 * (2.0 * phi).sin()).cos() + 0.45 * (3.0 * phi + 1.0).cos();
         let p = p + open * dvec2(0.0115 * folds, 0.006 * (0.5 + 0.5 * (5.0 * phi).sin()));
-        // No fold reaches into the ball.
-        let p = p.normalize_or(DVec2::Y) * p.length().max(BELOW);
+        // No fold reaches into the ball: it goes around it in a soft bend.
+        let away = p.length();
+        let near = (BEND - (away - BELOW).abs()).max(0.0);
+        let p = p.normalize_or(DVec2::Y) * (away.max(BELOW) + near * near / (4.0 * BEND));
         dvec3(p.x * phi.sin(), p.y + height, p.x * phi.cos())
     };
     let corner = |row: usize, column: usize| {
