@@ -185,6 +185,13 @@ fn parameters_of_scenes_are_those_of_bindings() {
     render(SCENE, &plain, &[]).exits(0);
     render(SCENE, &out, &["--param", "red.albedo=[0, 0, 1]"]).exits(0);
     assert_ne!(pixels(&plain), pixels(&out));
+    // Where there is one binding, its name says nothing more.
+    write(folder.path(), "paint.impasto", PAINT);
+    write(folder.path(), "quad.obj", QUAD);
+    let one = write(folder.path(), "one.toml", MOVING);
+    render(&one, &plain, &["--param", "wall.wear=0.75"]).exits(0);
+    render(&one, &out, &["--param", "wear=0.75"]).exits(0);
+    assert_eq!(pixels(&plain), pixels(&out));
 }
 
 #[test]
