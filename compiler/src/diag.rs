@@ -155,6 +155,8 @@ codes! {
         "The closure's weight is the constant zero, so it never contributes.";
     AboveOne = "W0005", Warning, "color above one",
         "Reflectances and the components of `srgb` go from 0 to 1. Above, a surface sends out more light than falls on it.";
+    PlainSize = "W0006", Warning, "size without a unit",
+        "`position` is in metres. Divided by a plain number, its features are so many metres large; a length says which size is meant, as in `position / 3 cm`.";
 }
 
 impl Code {

@@ -336,11 +336,13 @@ fn asked_material(checker: &mut Checker, request: &MaterialRequest) -> Option<(M
     });
     if let Some(written) = &request.written {
         let part = match (module, &written.material) {
-            (Some(_), Some(name)) => name,
-            _ => &written.file,
+            (Some(_), Some(name)) => Some(name),
+            _ => written.file.as_ref(),
         };
         let new = &mut checker.diagnostics[before..];
-        written.place(part, &mut checker.sources, new);
+        if let Some(part) = part {
+            written.place(part, &mut checker.sources, new);
+        }
     }
     found
 }

@@ -13,8 +13,8 @@ pub struct Written {
     pub path: String,
     /// Its text.
     pub text: Arc<str>,
-    /// Where it names the material's file.
-    pub file: Range<usize>,
+    /// Where it names the material's file, if it does: on a built-in set the command does.
+    pub file: Option<Range<usize>>,
     /// Where it names the material of the file, if it does.
     pub material: Option<Range<usize>>,
     /// Its parameters.

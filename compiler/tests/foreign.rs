@@ -212,6 +212,18 @@ fn slips_get_what_to_write() {
             "`\"ball.png\"`",
         ),
         (
+            "param tint: color = [255, 0, 0];",
+            "a color is `color(1.0, 0.5, 0.0)`, linear; one in bytes is `srgb(0xff8000)`",
+        ),
+        (
+            "let _a: vec3 = [1.0, 0.0, 0.0];",
+            "components stand in `vec3(...)`",
+        ),
+        (
+            "let _a = position / 10;",
+            "write its unit, as in `position / 10 cm`",
+        ),
+        (
             "param n: int = 5; var a = 0; for i in 0 .. n { a += i; } let _b = a;",
             "`param n: int = 5 in 1 .. 32;`",
         ),

@@ -4,7 +4,7 @@
 //! scene, its materials) is checked before the first sample is taken.
 
 use std::cell::Cell;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use clap::builder::StringValueParser;
 use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
-use impasto::compiler::{self, Loader};
+use impasto::compiler::{self, Loader, Written};
 use impasto::runtime::error::{Excerpt, SceneError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
@@ -67,11 +67,11 @@ pub(super) struct RenderArgs {
     #[arg(long, default_value_t = 0)]
     seed: u32,
     #[command(flatten)]
-    plan: PlanArgs,
+    pub(super) plan: PlanArgs,
     /// Device profile for the automatic plan: a built-in one (h200, llvmpipe) or a file from
     /// `impasto calibrate`; by default the one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
-    device_profile: Option<String>,
+    pub(super) device_profile: Option<String>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
@@ -295,6 +295,12 @@ fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program,
     })
 }
 
+/// Where a scene names the file of a material, if one does.
+fn named(request: &MaterialRequest) -> Option<(&Written, Range<usize>)> {
+    let written = request.written.as_deref()?;
+    Some((written, written.file.clone()?))
+}
+
 /// The program of some requests, unless nobody waits for it any more.
 pub(super) fn compile_requests(
     requests: &[MaterialRequest],
@@ -303,23 +309,19 @@ pub(super) fn compile_requests(
     global: &Global,
     stop: &dyn Fn() -> bool,
 ) -> Result<Program, Failure> {
-    let is_material = shot::is_material(&args.scene);
     for request in requests {
         let file = &request.file;
-        loader
-            .load(file)
-            .map_err(|why| match (&request.written, is_material) {
-                (_, true) | (None, _) => format!("cannot read `{file}`: {why}"),
-                (Some(written), false) => {
-                    let name = &request.name;
-                    let message = format!(
-                        "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
-                    );
-                    let place = written.file.clone();
-                    let excerpt = Excerpt::new(Path::new(&written.path), &written.text, place);
-                    SceneError::at(excerpt, message).to_string()
-                }
-            })?;
+        loader.load(file).map_err(|why| match named(request) {
+            None => format!("cannot read `{file}`: {why}"),
+            Some((written, place)) => {
+                let name = &request.name;
+                let message = format!(
+                    "cannot read `{file}`, which the scene names for the material `{name}`: {why}"
+                );
+                let excerpt = Excerpt::new(Path::new(&written.path), &written.text, place);
+                SceneError::at(excerpt, message).to_string()
+            }
+        })?;
     }
     let looks = ask_for_looks(&args.aov);
     let compiled = compiler::compile_until(requests, loader, looks, stop);
@@ -342,7 +344,7 @@ pub(super) fn compile_requests(
             .is_some_and(|e| e.starts_with("one of"));
         d.code == Code::NoMaterial && names
     };
-    if is_material && compiled.diagnostics.iter().any(is_one_of_several) {
+    if shot::is_material(&args.scene) && compiled.diagnostics.iter().any(is_one_of_several) {
         global.note("hint: `--material NAME` says which");
     }
     compiled.program.ok_or(Failure::Diagnostics)

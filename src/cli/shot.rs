@@ -1,11 +1,12 @@
 //! What `render` is asked for beside one picture of a scene: material files on sets, values of parameters, sweeps,
 //! frames, and pictures at each save.
 
+use std::cell::{Cell, RefCell};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use impasto::compiler::Program;
 use impasto::runtime::options::Progress;
 use impasto::runtime::scene::{Asked, FilmSettings};
@@ -15,7 +16,7 @@ use impasto::shot::param::{self, ParamOption};
 use impasto::shot::sweep::{self, Axis, Sweep};
 use impasto::shot::watch::{EVERY, Watched};
 use impasto::shot::{self, Studio, Subject};
-use impasto::{FileLoader, MaterialRequest, Rendering, Scene, files, requests};
+use impasto::{FileLoader, MaterialRequest, Rendering, Scene, SceneError, files, requests};
 
 use super::outputs::Outputs;
 use super::progress::{Meter, Part, samples_taken, share};
@@ -23,6 +24,7 @@ use super::render::{self, COMPILING, RenderArgs};
 use super::{Failure, Global, Outcome, interrupt};
 
 #[derive(Args)]
+#[command(group = ArgGroup::new("numbered").args(["frames", "turntable"]).multiple(true))]
 pub(super) struct ShotArgs {
     /// What a material file is put on; a ball by default
     #[arg(long, value_enum, value_name = "SET")]
@@ -41,7 +43,7 @@ pub(super) struct ShotArgs {
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     turntable: Option<u32>,
     /// Leave out frames whose picture is there
-    #[arg(long)]
+    #[arg(long, requires = "numbered")]
     skip_existing: bool,
     /// Render again at each save of a file that the picture is made from, until Ctrl-C
     #[arg(long, conflicts_with_all = ["frames", "turntable", "checkpoint", "until", "report"])]
@@ -68,6 +70,10 @@ impl From<On> for Set {
     }
 }
 
+fn failed(error: SceneError) -> Failure {
+    Failure::Error(error.to_string())
+}
+
 /// What is rendered, and with which values.
 pub(super) struct Shot {
     pub(super) subject: Subject,
@@ -84,26 +90,40 @@ impl RenderArgs {
 
     /// Reads what is to be rendered, and gives parameters their values.
     pub(super) fn shot(&self) -> Result<Shot, Failure> {
+        if !shot::is_material(&self.scene) {
+            self.shot.check_scene()?;
+        }
+        self.shot_of(self.subject().map_err(failed)?)
+    }
+
+    fn subject(&self) -> Result<Subject, SceneError> {
         let args = &self.shot;
-        let error = |e: impasto::SceneError| Failure::Error(e.to_string());
-        let subject = if shot::is_material(&self.scene) {
-            let sample = Sample {
-                file: self.scene.to_string_lossy().into_owned(),
-                material: args.material.clone(),
-                turntable: args.turntable,
-            };
-            Subject::on(args.on.map_or(Set::default(), Set::from), &sample)
-        } else {
-            args.check_scene()?;
-            Subject::of_scene(&self.scene)
+        if !shot::is_material(&self.scene) {
+            return Subject::of_scene(&self.scene).map_err(|error| {
+                let is_it = error.path.as_ref() == Some(&self.scene);
+                let is_named_so = self.scene.extension().is_some_and(|e| e == "toml");
+                if is_named_so || !is_it || error.hint.is_some() {
+                    return error;
+                }
+                error.hint("scenes are `.toml` files, and materials `.impasto` files")
+            });
+        }
+        let sample = Sample {
+            file: self.scene.to_string_lossy().into_owned(),
+            material: args.material.clone(),
+            turntable: args.turntable,
         };
-        let subject = subject.map_err(error)?;
+        Subject::on(args.on.map_or(Set::default(), Set::from), &sample)
+    }
+
+    fn shot_of(&self, subject: Subject) -> Result<Shot, Failure> {
+        let params = &self.shot.params;
         let mut asked = Asked::default();
         let mut axes = Vec::new();
-        if !args.params.is_empty() {
-            let scene = subject.scene(&asked).map_err(error)?;
+        if !params.is_empty() {
+            let scene = subject.scene(&asked).map_err(failed)?;
             let bindings: Vec<String> = scene.materials.into_iter().map(|b| b.name).collect();
-            (asked.given, axes) = param::given(&args.params, &subject, &bindings)?;
+            (asked.given, axes) = param::given(params, &subject, &bindings)?;
         }
         Ok(Shot {
             subject,
@@ -114,8 +134,7 @@ impl RenderArgs {
 
     /// The scene of one picture, at the size that was asked for.
     pub(super) fn scene_of(&self, subject: &Subject, asked: &Asked) -> Result<Scene, Failure> {
-        let scene = subject.scene(asked);
-        let mut scene = scene.map_err(|e| Failure::Error(e.to_string()))?;
+        let mut scene = subject.scene(asked).map_err(failed)?;
         if let Some((width, height)) = self.size {
             scene.film = FilmSettings { width, height };
         }
@@ -172,9 +191,10 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         studio: &Studio::new(&device),
         global,
         stop: &stop,
+        watched: None,
     };
     let begin = Instant::now();
-    made.sheet(&args.shot()?, &outputs, &mut Vec::new())?;
+    made.sheet(&args.shot()?, &outputs)?;
     note_written(&outputs, begin, global);
     Ok(())
 }
@@ -184,14 +204,34 @@ fn note_written(outputs: &Outputs, begin: Instant, global: &Global) {
     global.note(&format!("wrote {} ({seconds:.2} s)", outputs.names()));
 }
 
-/// Where a sheet goes. What only one picture can have is refused.
-fn sheet_outputs(args: &RenderArgs) -> Result<Outputs, Failure> {
-    let outputs = Outputs::of(&args.out())?;
-    let refused = [
-        ("--aov", !args.aov.is_empty()),
+/// An option that one picture can have and several cannot, if it is given. Several have a plan of few kernels, which
+/// are kept from one to the next.
+fn of_one_picture(args: &RenderArgs) -> Option<&'static str> {
+    let given = [
         ("--report", args.report.is_some()),
         ("--until", args.until.is_given()),
         ("--checkpoint", args.checkpoint.is_given()),
+        ("--device-profile", args.device_profile.is_some()),
+    ];
+    let found = given.into_iter().find(|(_, is_there)| *is_there);
+    found.map(|(name, _)| name).or(args.plan.given())
+}
+
+fn check_options(args: &RenderArgs, what: &str) -> Outcome {
+    match of_one_picture(args) {
+        Some(option) => Err(Failure::Error(format!(
+            "`{option}` is for one picture, and not for {what}"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Where a sheet goes.
+fn sheet_outputs(args: &RenderArgs) -> Result<Outputs, Failure> {
+    check_options(args, "a sheet of several")?;
+    let outputs = Outputs::of(&args.out())?;
+    let refused = [
+        ("--aov", !args.aov.is_empty()),
         ("a .film file", outputs.is_film()),
     ];
     match refused.into_iter().find(|(_, is_there)| *is_there) {
@@ -209,9 +249,18 @@ struct Making<'a> {
     global: &'a Global,
     /// Does nobody wait for the picture any more?
     stop: &'a dyn Fn() -> bool,
+    /// Where it is kept which files are read, if anybody waits for their next version.
+    watched: Option<&'a RefCell<Watched>>,
 }
 
 impl Making<'_> {
+    /// Notes files before anything slow is done with them, so that a save meanwhile is not missed.
+    fn reads(&self, files: impl IntoIterator<Item = PathBuf>) {
+        if let Some(watched) = self.watched {
+            watched.borrow_mut().add(files);
+        }
+    }
+
     /// The samples of one picture, or nothing if it was stopped before all were taken.
     fn rendering(
         &self,
@@ -244,41 +293,33 @@ impl Making<'_> {
         }
     }
 
-    fn compile(
-        &self,
-        requests: &[MaterialRequest],
-        scene: &Scene,
-        read: &mut Vec<PathBuf>,
-    ) -> Result<Program, Failure> {
+    fn compile(&self, requests: &[MaterialRequest], scene: &Scene) -> Result<Program, Failure> {
         let mut loader = FileLoader::new(&scene.base);
         let (args, global) = (self.args, self.global);
         let program = render::compile_requests(requests, &mut loader, args, global, self.stop);
-        read.extend(loader.asked());
+        self.reads(loader.asked());
         if let Ok(program) = &program {
-            read.extend(shot::textures(scene, program));
+            self.reads(shot::textures(scene, program));
         }
         program
     }
 
-    /// One picture; the files of its materials are `read`.
-    fn picture(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
+    fn picture(&self, shot: &Shot, outputs: &Outputs) -> Outcome {
         let scene = self.args.scene_of(&shot.subject, &shot.asked)?;
         note_warnings(&scene, self.global);
         let meter = Meter::new(self.global);
         meter.show(0.0, COMPILING);
-        let program = self.compile(&shot::open_requests(&scene), &scene, read)?;
+        let program = self.compile(&shot::open_requests(&scene), &scene)?;
         let rendering = self.rendering(&scene, &program, 0, meter.part(0.0, 1.0), "")?;
         outputs.write(&rendering.film, &rendering.sums, self.args.exposure)
     }
 
-    /// A sheet of pictures; the files of their materials are `read`.
-    fn sheet(&self, shot: &Shot, outputs: &Outputs, read: &mut Vec<PathBuf>) -> Outcome {
+    fn sheet(&self, shot: &Shot, outputs: &Outputs) -> Outcome {
         let Shot {
             subject,
             asked,
             axes,
         } = shot;
-        let failed = |e: impasto::SceneError| Failure::Error(e.to_string());
         let sweep = Sweep::new(axes.clone())?;
         let scene = subject.scene(asked).map_err(failed)?;
         note_warnings(&scene, self.global);
@@ -287,13 +328,13 @@ impl Making<'_> {
         let (requests, counts) = sweep.requests(subject, asked).map_err(failed)?;
         let meter = Meter::new(self.global);
         meter.show(0.0, COMPILING);
-        let program = self.compile(&requests, &scene, read)?;
+        let program = self.compile(&requests, &scene)?;
         let exposure = self.args.exposure;
         for (index, first) in sweep::firsts(&counts).into_iter().enumerate() {
             let mut scene = subject.scene(&sweep.asked(asked, index)).map_err(failed)?;
             scene.film = cell;
-            let name = format!("picture {} of {}: ", index + 1, sweep.len());
-            let width = 1.0 / sweep.len() as f64;
+            let name = format!("picture {} of {}: ", index + 1, sweep.count());
+            let width = 1.0 / sweep.count() as f64;
             let part = meter.part(index as f64 * width, width);
             let rendering = self.rendering(&scene, &program, first, part, &name)?;
             sheet.put(index, &rendering.film, &sweep.label(index), exposure);
@@ -311,15 +352,7 @@ fn note_warnings(scene: &Scene, global: &Global) {
 /// Renders frames one after another. What is done stays when it is interrupted.
 fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome {
     let (out, count) = (args.out(), frames.count());
-    let refused = [
-        ("--report", args.report.is_some()),
-        ("--until", args.until.is_given()),
-        ("--checkpoint", args.checkpoint.is_given()),
-    ];
-    if let Some((option, _)) = refused.into_iter().find(|(_, is_there)| *is_there) {
-        let message = format!("`{option}` is for one picture, and not for frames");
-        return Err(Failure::Error(message));
-    }
+    check_options(args, "frames")?;
     let Shot {
         subject,
         mut asked,
@@ -341,7 +374,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
     };
     let stop = || interrupt::requested();
     let rate = subject.animation().frames_per_second;
-    let (begin, mut done) = (Instant::now(), 0);
+    let (begin, mut done, mut written) = (Instant::now(), 0, None);
     let meter = Meter::new(global);
     for (index, frame) in frames.numbers().enumerate() {
         let path = frames.path(&out, frame);
@@ -355,6 +388,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
             // What is odd about all frames is said once.
             global: if done == 0 { global } else { &quiet },
             stop: &stop,
+            watched: None,
         };
         let picture = || {
             let outputs = Outputs::of(&path)?;
@@ -368,7 +402,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
             for request in &mut requests {
                 request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
             }
-            let program = made.compile(&requests, &scene, &mut Vec::new())?;
+            let program = made.compile(&requests, &scene)?;
             let rendering = made.rendering(&scene, &program, 0, part, &name)?;
             outputs.write(&rendering.film, &rendering.sums, args.exposure)
         };
@@ -382,23 +416,24 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
             other => other?,
         }
         done += 1;
+        written.get_or_insert(path);
     }
     drop(meter);
-    let (from, seconds) = (
-        frames.path(&out, frames.numbers().next().unwrap_or(0)),
-        begin.elapsed(),
-    );
-    global.note(&format!(
-        "wrote {} from {} on ({:.1} s)",
-        super::count(done, "frame"),
-        from.display(),
-        seconds.as_secs_f64()
-    ));
+    global.note(&match written {
+        None => "nothing to render: the pictures of all frames are there".into(),
+        Some(from) => format!(
+            "wrote {} from {} on ({:.1} s)",
+            super::count(done, "frame"),
+            from.display(),
+            begin.elapsed().as_secs_f64()
+        ),
+    });
     Ok(())
 }
 
 /// Renders at each save.
 fn watch(args: &RenderArgs, global: &Global) -> Outcome {
+    check_options(args, "`--watch`")?;
     let outputs = if args.shot.params.iter().any(|p| p.values.len() > 1) {
         sheet_outputs(args)?
     } else {
@@ -406,33 +441,35 @@ fn watch(args: &RenderArgs, global: &Global) -> Outcome {
         outputs.check_aov(&args.aov)?;
         outputs
     };
+    if !shot::is_material(&args.scene) {
+        args.shot.check_scene()?;
+    }
     if !args.scene.exists() && !args.scene.to_string_lossy().starts_with("std::") {
         // That is a slip, and nothing to wait for.
         files::check_readable(&args.scene)?;
     }
     let device = args.device.open(global)?;
     let studio = Studio::new(&device);
-    let mut watched = Watched::new([args.scene.clone()]);
+    let watched = RefCell::new(Watched::new([args.scene.clone()]));
     loop {
-        watched.changed();
+        watched.borrow_mut().changed();
         let begin = Instant::now();
-        let looked = std::cell::Cell::new(begin);
+        let looked = Cell::new(begin);
         let is_old = || {
             let due = looked.get().elapsed() >= EVERY;
             if due {
                 looked.set(Instant::now());
             }
-            interrupt::requested() || (due && watched.has_changed())
+            interrupt::requested() || (due && watched.borrow().has_changed())
         };
         let making = Making {
             args,
             studio: &studio,
             global,
             stop: &is_old,
+            watched: Some(&watched),
         };
-        let (outcome, read) = making.attempt(&outputs);
-        watched.add(read);
-        match outcome {
+        match making.attempt(&outputs) {
             Ok(()) => note_written(&outputs, begin, global),
             Err(Failure::Interrupted) if interrupt::requested() => {
                 return Err(Failure::Interrupted);
@@ -446,7 +483,7 @@ fn watch(args: &RenderArgs, global: &Global) -> Outcome {
                 global.note("the last picture stays; waiting for a save");
             }
         }
-        wait(&mut watched)?;
+        wait(&mut watched.borrow_mut())?;
     }
 }
 
@@ -471,19 +508,19 @@ fn wait(watched: &mut Watched) -> Outcome {
 }
 
 impl Making<'_> {
-    /// A picture of the files as they are now, and the files that it was made from as far as they are known.
-    fn attempt(&self, outputs: &Outputs) -> (Outcome, Vec<PathBuf>) {
-        let mut read = vec![self.args.scene.clone()];
-        let shot = match self.args.shot() {
-            Ok(shot) => shot,
-            Err(failure) => return (Err(failure), read),
-        };
-        read.extend_from_slice(shot.subject.files());
-        let outcome = if shot.axes.is_empty() {
-            self.picture(&shot, outputs, &mut read)
+    /// A picture of the files as they are now.
+    fn attempt(&self, outputs: &Outputs) -> Outcome {
+        let subject = self.args.subject().map_err(|error| {
+            // A file that the scene names and that is not there may yet come.
+            self.reads(error.path.clone());
+            failed(error)
+        })?;
+        self.reads(subject.files().to_vec());
+        let shot = self.args.shot_of(subject)?;
+        if shot.axes.is_empty() {
+            self.picture(&shot, outputs)
         } else {
-            self.sheet(&shot, outputs, &mut read)
-        };
-        (outcome, read)
+            self.sheet(&shot, outputs)
+        }
     }
 }

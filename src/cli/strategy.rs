@@ -33,6 +33,19 @@ pub(super) enum Source {
 }
 
 impl PlanArgs {
+    /// The option that is given, if one is.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--strategy", self.strategy.is_some()),
+            ("--plan", self.plan.is_some()),
+            ("--partition", self.partition.is_some()),
+        ];
+        given
+            .into_iter()
+            .find(|(_, given)| *given)
+            .map(|(name, _)| name)
+    }
+
     /// Is the plan found by measuring kernels?
     pub(super) fn measures(&self) -> bool {
         self.strategy == Some(Strategy::EXHAUSTIVE)

@@ -4,6 +4,7 @@
 //! Everything is in metres. Texture coordinates go from 0 to 1 within 10 cm on every set.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::Vec3;
 use impasto_runtime::error::SceneError;
@@ -113,6 +114,11 @@ impl OpenSet {
         for binding in scene.materials.iter_mut().filter(|b| b.name == SAMPLE) {
             binding.file.clone_from(&self.sample.file);
             binding.material.clone_from(&self.sample.material);
+            // The command names them, so no line of the set is to blame.
+            if let Some(written) = &mut binding.written {
+                let written = Arc::make_mut(written);
+                (written.file, written.material) = (None, None);
+            }
         }
         let stem = Path::new(&self.sample.file).file_stem();
         let name = stem.map_or(self.sample.file.as_str().into(), |s| s.to_string_lossy());
@@ -209,6 +215,33 @@ mod tests {
             };
             let turned = open.scene(&asked).expect("it turns");
             assert_ne!(turned.mesh.positions, scene.mesh.positions);
+        }
+    }
+    /// The ball below the cloth shows nowhere through it.
+    #[test]
+    fn no_fold_reaches_into_the_ball() {
+        let cloth = shapes::cloth();
+        type Triangles<'a> = Vec<&'a impasto_runtime::scene::formats::Triangle>;
+        let (sample, core): (Triangles, Triangles) =
+            cloth.triangles.iter().partition(|t| t.material == 0);
+        let corners = core.iter().flat_map(|t| t.positions);
+        let (low, high) = corners.fold((f64::MAX, f64::MIN), |(low, high), p| {
+            (low.min(p.y), high.max(p.y))
+        });
+        let (centre, radius) = (glam::DVec3::Y * 0.5 * (low + high), 0.5 * (high - low));
+        for triangle in sample {
+            let [a, b, c] = triangle.positions;
+            for p in [
+                a,
+                b,
+                c,
+                (a + b) / 2.0,
+                (b + c) / 2.0,
+                (a + c) / 2.0,
+                (a + b + c) / 3.0,
+            ] {
+                assert!(p.distance(centre) > radius + 0.0005, "{p}");
+            }
         }
     }
 }

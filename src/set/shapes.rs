@@ -196,6 +196,8 @@ fn turned(
 /// Radius of the cloth's outline when it lies flat, of the ball below it, and how high that lies.
 const CLOTH: f64 = 0.17;
 const BELOW: f64 = 0.048;
+/// Within what distance of that ball the cloth bends away from it.
+const BEND: f64 = 0.006;
 
 /// A round cloth (`sample`) that hangs down around a ball (`core`).
 pub(super) fn cloth() -> Geometry {
@@ -212,9 +214,12 @@ pub(super) fn cloth() -> Geometry {
         let open = ((s - 0.045) / (CLOTH - 0.045)).clamp(0.0, 1.0);
         let open = open * open * (3.0 - 2.0 * open);
         let folds = (9.0 * phi + 0.9 * (2.0 * phi).sin()).cos() + 0.45 * (3.0 * phi + 1.0).cos();
-        let r = p.x + 0.0115 * open * folds;
-        let y = p.y + height + 0.006 * open * (0.5 + 0.5 * (5.0 * phi).sin());
-        dvec3(r * phi.sin(), y, r * phi.cos())
+        let p = p + open * dvec2(0.0115 * folds, 0.006 * (0.5 + 0.5 * (5.0 * phi).sin()));
+        // No fold reaches into the ball: it goes around it in a soft bend.
+        let away = p.length();
+        let near = (BEND - (away - BELOW).abs()).max(0.0);
+        let p = p.normalize_or(DVec2::Y) * (away.max(BELOW) + near * near / (4.0 * BEND));
+        dvec3(p.x * phi.sin(), p.y + height, p.x * phi.cos())
     };
     let corner = |row: usize, column: usize| {
         let (s, u) = (row as f64, column as f64 / columns as f64);

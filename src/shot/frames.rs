@@ -85,8 +85,12 @@ impl Frames {
             }
             None => format!("{stem}.{frame:0digits$}"),
         };
-        let extension = out.extension().unwrap_or_default().to_string_lossy();
-        out.with_file_name(format!("{name}.{extension}"))
+        let mut path = out.with_file_name(name);
+        if let Some(extension) = out.extension() {
+            path.as_mut_os_string().push(".");
+            path.as_mut_os_string().push(extension);
+        }
+        path
     }
 }
 
@@ -133,5 +137,6 @@ mod tests {
         assert_eq!(name("a/turn.exr", 7), "a/turn.0007.exr");
         assert_eq!(name("a/turn_##.png", 7), "a/turn_007.png");
         assert_eq!(name("t#####x.png", 120), "t00120x.png");
+        assert_eq!(name("a/turn", 7), "a/turn.0007");
     }
 }

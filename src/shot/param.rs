@@ -112,24 +112,18 @@ fn check_steps(count: u64) -> Result<(), String> {
 
 /// The values of `FROM:TO:COUNT`.
 fn steps(text: &str, parts: &[&str]) -> Result<Vec<ParameterValue>, String> {
+    let wrong = || format!("`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`");
     let [from, to, count] = parts else {
-        return Err(format!(
-            "`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"
-        ));
+        return Err(wrong());
     };
     if from.is_empty() || to.is_empty() {
-        return Err(format!(
-            "`{text}` is no sweep: expected FROM:TO:COUNT, as in `0:1:5`"
-        ));
+        return Err(wrong());
     }
-    let digits = !count.is_empty() && count.chars().all(|c| c.is_ascii_digit());
-    let number = count.parse::<u64>().ok();
-    let number = if digits {
-        Some(number.unwrap_or(u64::MAX))
-    } else {
-        None
-    };
-    let count = number.ok_or_else(|| format!("`{count}` is no number of steps"))?;
+    if count.is_empty() || !count.chars().all(|c| c.is_ascii_digit()) {
+        return Err(format!("`{count}` is no number of steps"));
+    }
+    // What does not fit is too much.
+    let count = count.parse().unwrap_or(u64::MAX);
     check_steps(count)?;
     Ok((0..count)
         .map(|i| between(from, to, i, count - 1))
@@ -138,8 +132,10 @@ fn steps(text: &str, parts: &[&str]) -> Result<Vec<ParameterValue>, String> {
 
 /// Step number `step`, of which the last is `last`. Numbers, with or without a unit, stay numbers.
 fn between(from: &str, to: &str, step: u64, last: u64) -> ParameterValue {
-    if step == 0 || step == last {
-        return value(if step == 0 { from } else { to });
+    match step {
+        0 => return value(from),
+        _ if step == last => return value(to),
+        _ => {}
     }
     let t = step as f64 / last as f64;
     let ((a, unit), (b, other)) = (quantity(from), quantity(to));
@@ -199,6 +195,7 @@ pub fn given(
                 ));
             }
             (Some(binding), Subject::Scene(_)) => binding.clone(),
+            (None, Subject::Scene(_)) if bindings.len() == 1 => bindings[0].clone(),
             (None, Subject::Scene(_)) => {
                 let names: Vec<String> = bindings.iter().map(|b| format!("`{b}`")).collect();
                 let first = bindings.first().map_or("NAME", |b| b.as_str());

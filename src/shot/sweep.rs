@@ -46,7 +46,7 @@ impl Sweep {
             ));
         }
         let sweep = Self { axes };
-        let cells = sweep.len();
+        let cells = sweep.count();
         if cells > MAX_CELLS {
             return Err(format!(
                 "a sheet of {cells} pictures is too large: at most {MAX_CELLS}"
@@ -56,21 +56,16 @@ impl Sweep {
     }
 
     /// How many pictures there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.axes.iter().map(|axis| axis.steps.len()).product()
-    }
-
-    /// Is there no picture? There always is one.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Columns of the sheet: the values of the first of two parameters, or as many as make it about as high as wide.
     fn columns(&self) -> usize {
         match &self.axes[..] {
             [columns, _] => columns.steps.len(),
-            _ if self.len() <= 6 => self.len(),
-            _ => ((self.len() as f64).sqrt().ceil() as usize).min(MAX_COLUMNS),
+            _ if self.count() <= 6 => self.count(),
+            _ => ((self.count() as f64).sqrt().ceil() as usize).min(MAX_COLUMNS),
         }
     }
 
@@ -98,7 +93,7 @@ impl Sweep {
     /// # Errors
     /// If it is too large for one picture.
     pub fn layout(&self, cell: FilmSettings) -> Result<Layout, String> {
-        Layout::new(self.len(), self.columns(), self.axes.len(), cell)
+        Layout::new(self.count(), self.columns(), self.axes.len(), cell)
     }
 
     /// The materials of all pictures, to be compiled together so that they share code, and how many each has.
@@ -111,7 +106,7 @@ impl Sweep {
         asked: &Asked,
     ) -> Result<(Vec<MaterialRequest>, Vec<usize>), SceneError> {
         let (mut requests, mut counts) = (Vec::new(), Vec::new());
-        for index in 0..self.len() {
+        for index in 0..self.count() {
             let scene = subject.scene(&self.asked(asked, index))?;
             requests.extend(driver::requests(&scene));
             counts.push(scene.materials.len());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::cli::common::{GOOD, SCENE, folder, impasto, names, write};
+use crate::cli::common::{GOOD, SCENE, command, folder, impasto, names, write};
 
 /// A material of one color, which may be any.
 const PAINT: &str = "use std::bsdf::diffuse;
@@ -96,6 +96,20 @@ fn files_that_are_no_materials_are_refused() {
     render(&is_folder.display().to_string(), &out, &[])
         .exits(2)
         .says("it is a folder");
+    // The command names file and material: no line of the built-in set is to blame.
+    let whole = write(folder.path(), "whole.impasto", PAINT);
+    let missing = render(&whole, &out, &["--material", "other"]);
+    assert!(!missing.stderr.contains("ball:"), "{missing:#?}");
+    missing.exits(1).says("has no material `other`");
+    std::fs::remove_file(&whole).expect("removed");
+    render(&broken, &out, &["--skip-existing"])
+        .exits(2)
+        .says("required arguments were not provided");
+    let shader = write(folder.path(), "a.osl", "shader a() { }");
+    render(&shader, &out, &[])
+        .exits(2)
+        .says("scenes are `.toml` files, and materials `.impasto` files");
+    std::fs::remove_file(&shader).expect("removed");
     for option in [["--on", "ball"], ["--material", "m"], ["--turntable", "3"]] {
         render(SCENE, &out, &option)
             .exits(2)
@@ -171,6 +185,13 @@ fn parameters_of_scenes_are_those_of_bindings() {
     render(SCENE, &plain, &[]).exits(0);
     render(SCENE, &out, &["--param", "red.albedo=[0, 0, 1]"]).exits(0);
     assert_ne!(pixels(&plain), pixels(&out));
+    // Where there is one binding, its name says nothing more.
+    write(folder.path(), "paint.impasto", PAINT);
+    write(folder.path(), "quad.obj", QUAD);
+    let one = write(folder.path(), "one.toml", MOVING);
+    render(&one, &plain, &["--param", "wall.wear=0.75"]).exits(0);
+    render(&one, &out, &["--param", "wear=0.75"]).exits(0);
+    assert_eq!(pixels(&plain), pixels(&out));
 }
 
 #[test]
@@ -228,6 +249,14 @@ fn sheets_that_cannot_be_are_refused_before_anything_is_rendered() {
         .exits(2)
         .says("ask for fewer or for smaller");
     refused(&["--param", c, "--aov", "albedo"], "no place for --aov");
+    for more in [["--param", c], ["--frames", "1-2"], ["--on", "ball"]] {
+        let watch = (more[0] == "--on").then_some("--watch");
+        let options = more.into_iter().chain(["--strategy", "own"]).chain(watch);
+        refused(
+            &options.collect::<Vec<_>>(),
+            "`--strategy` is for one picture",
+        );
+    }
     refused(
         &["--param", c, "--frames", "1-2"],
         "a sweep makes one sheet",
@@ -315,6 +344,53 @@ fn keys_and_turntables_move_scenes() {
     assert_eq!((lit(0), lit(4)), (255, 0));
     assert!(lit(1) > lit(2), "{} and {}", lit(1), lit(2));
     assert_eq!(lit(3), 0);
+}
+
+/// A ball of marble is turned by 90 degrees, and the camera with it: the picture stays. Without the camera it changes.
+#[test]
+fn marble_turns_with_its_ball() {
+    let folder = folder();
+    let at = folder.path();
+    let mut new = command(&["new", "starter", "--scene"]);
+    assert!(
+        new.current_dir(at)
+            .output()
+            .expect("it runs")
+            .status
+            .success()
+    );
+    let marble = concat!(env!("CARGO_MANIFEST_DIR"), "/materials/marble.impasto");
+    let picture = |name: &str, camera: [f32; 3], turn: u32| {
+        let text = format!(
+            "[camera]\nposition = {camera:?}\nlook_at = [0, 0, 0]\nfov = 30\n\
+             [[geometry]]\nobj = \"starter/ball.obj\"\nrotate = [0, {turn}, 0]\nmaterial = \"ball\"\n\
+             [materials.ball]\nfile = {marble:?}\n[environment]\ncolor = 0.8\n"
+        );
+        let scene = write(at, "scene.toml", text);
+        let out = at.join(name);
+        let size = ["--size", "24x24", "--spp", "64"];
+        impasto(
+            &[
+                &["render", &scene, "--out", &out.display().to_string()],
+                &size[..],
+            ]
+            .concat(),
+        )
+        .exits(0);
+        pixels(&out)
+    };
+    let front = picture("front.png", [0.0, 0.0, 0.5], 0);
+    let with_camera = picture("with.png", [0.5, 0.0, 0.0], 90);
+    let without = picture("without.png", [0.0, 0.0, 0.5], 90);
+    let distance = |a: &image::RgbImage, b: &image::RgbImage| {
+        let each = a
+            .iter()
+            .zip(b.iter())
+            .map(|(a, b)| f64::from(a.abs_diff(*b)));
+        each.sum::<f64>() / a.len() as f64
+    };
+    let (same, other) = (distance(&front, &with_camera), distance(&front, &without));
+    assert!(same < 2.0 && other > 3.0 * same, "{same} {other}");
 }
 
 #[test]
@@ -526,6 +602,21 @@ mod watching {
         );
         watcher.says("an angle in degrees");
         write(folder.path(), "scene.toml", MOVING);
+        watcher.says("wrote");
+        assert_eq!(watcher.end(), Some(130));
+    }
+
+    /// A scene may name what comes only later.
+    #[test]
+    fn files_that_come_later_are_noticed() {
+        let folder = folder();
+        write(folder.path(), "paint.impasto", PAINT);
+        let scene = write(folder.path(), "scene.toml", MOVING);
+        let out = folder.path().join("p.png");
+        let watcher = Watcher::of(&scene, &out, &[]);
+        watcher.says("quad.obj: cannot read the OBJ file");
+        watcher.says("the last picture stays");
+        write(folder.path(), "quad.obj", QUAD);
         watcher.says("wrote");
         assert_eq!(watcher.end(), Some(130));
     }

@@ -124,6 +124,7 @@ table! {
         "Ci", "OSL and RenderMan" => ""; "a material assigns `surface = ...;`, and `emission` where it glows"
         "Cs", "RenderMan" => ""; "declare the color as `param base_color: color = 0.8;`"
         "Cd", "Houdini" => "vertex_color"; "the color of the geometry"
+        "NdotV" | "nDotV" | "ndotv", "HLSL and GLSL" => "facing"
         "M_PI" | "pi" | "Pi", "C and OSL" => "PI"
         "M_2PI", "OSL" => "2.0 * PI"
     }
@@ -131,6 +132,10 @@ table! {
         "lerp", "HLSL and MDL" => "mix(0.0, 1.0, 0.5)"
         "frac", "HLSL and MDL" => "fract(1.5)"
         "mad" | "fma", "HLSL and GLSL" => "1.0 * 2.0 + 3.0"; "the compiler fuses where it pays"
+        "radians", "GLSL, HLSL and OSL" => "90 deg"; "angles have units; `x * 1 deg` gives a number one"
+        "degrees", "GLSL, HLSL and OSL" => "PI / 2.0 * 1 rad"; "angles have units"
+        "transform", "OSL" => "object_from_world(position)"; "and back by `world_from_object`; normals and vectors alike"
+        "half" | "double" | "f32", "HLSL and WGSL" => "float(1)"
         "rsqrt" | "inversesqrt" | "inverseSqrt", "HLSL, GLSL and WGSL" => "inverse_sqrt(2.0)"
         "fmod", "C, HLSL and OSL" => "mod(5.0, 3.0)"
         "ddx" | "ddy" | "dFdx" | "dFdy" | "fwidth" | "Dx" | "Dy" | "filterwidth", "HLSL, GLSL and OSL" => "filter_width(uv)";

@@ -344,6 +344,8 @@ impl Body<'_, '_> {
         let wrong = Diagnostic::new(Code::TypeMismatch, span, message).expected("an array");
         let wrong = if ty.is_vector() {
             wrong.hint("components are `.x .y .z .w` and `.r .g .b`")
+        } else if ty.order() == Some(2) {
+            wrong.hint("columns are `.x .y`")
         } else if ty.order().is_some() {
             wrong.hint("columns are `.x .y .z`")
         } else {

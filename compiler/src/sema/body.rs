@@ -306,6 +306,12 @@ impl<'c, 'l> Body<'c, 'l> {
             (f, t) if f.ir().is_some() && t.ir().is_some() && f.ir() == t.ir() => {
                 wrong.hint(format!("convert it: `{wanted}(...)`"))
             }
+            (Ty::Array(_), Ty::Color) => wrong.hint(
+                "a color is `color(1.0, 0.5, 0.0)`, linear; one in bytes is `srgb(0xff8000)`",
+            ),
+            (Ty::Array(_), t) if t.is_vector() => {
+                wrong.hint(format!("components stand in `{wanted}(...)`, not in brackets"))
+            }
             (Ty::Float | Ty::Length, Ty::Vector) => {
                 wrong.hint("the slope of a value along the surface is `gradient(height)`")
             }

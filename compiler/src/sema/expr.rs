@@ -1,6 +1,6 @@
 //! Checking expressions.
 
-use crate::ast::{self, Expr, ExprKind, UnaryOp};
+use crate::ast::{self, BinaryOp, Expr, ExprKind, UnaryOp};
 use crate::diag::foreign::Use;
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
@@ -117,6 +117,7 @@ impl Body<'_, '_> {
                 self.unary(*op, operand, span)
             }
             ExprKind::Binary(op, a, b) => {
+                self.note_plain_size(*op, a, b, span);
                 // Both sides are checked even if the first is wrong, so that both are reported.
                 let (a, b) = (self.expr(a), self.expr(b));
                 self.binary(*op, a?, b?, span)
@@ -124,6 +125,24 @@ impl Body<'_, '_> {
             ExprKind::If(branch) => self.if_value(branch, span),
             ExprKind::Block(block) => self.scoped(|cx| Some(cx.block_value(block, span)?.0)),
         }
+    }
+
+    /// Warns of `position / 10`: noise of that has features of ten metres, which nobody means.
+    fn note_plain_size(&mut self, op: BinaryOp, a: &Expr, b: &Expr, span: Span) {
+        let is_position = matches!(&a.kind, ExprKind::Name(name) if name == "position")
+            && self.place == Place::Material
+            && self.local("position").is_none();
+        let is_number = matches!(b.kind, ExprKind::Int(_) | ExprKind::Float(_));
+        if op != BinaryOp::Div || !is_position || !is_number {
+            return;
+        }
+        let source = self.cx.sources.file(b.span.file);
+        let number = source.text.get(b.span.range()).unwrap_or_default();
+        let message = format!("`position` over a plain number: features are {number} m large");
+        let plain = Diagnostic::new(Code::PlainSize, span, message)
+            .expected("a length")
+            .hint(format!("write its unit, as in `position / {number} cm`"));
+        self.report::<()>(plain);
     }
 
     fn int(&mut self, i: i64, span: Span) -> Option<ExprId> {

@@ -406,7 +406,8 @@ impl<'a> Checker<'a> {
     /// A type with its article: `a float`, `an int`.
     fn a_type(&self, ty: Ty) -> String {
         let name = self.type_text(ty);
-        let vowel = name.starts_with(['a', 'e', 'i', 'o', 'u']);
+        // `uint` begins with the sound of `you`.
+        let vowel = name.starts_with(['a', 'e', 'i', 'o', 'u']) && !name.starts_with("uint");
         format!("{} {name}", if vowel { "an" } else { "a" })
     }
 

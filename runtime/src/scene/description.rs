@@ -459,7 +459,7 @@ fn material(
     let mut written = Written {
         path: value.source().1.display().to_string(),
         text: text.clone(),
-        file: file.range(),
+        file: Some(file.range()),
         material: item.as_ref().map(Value::range),
         params: Vec::new(),
     };

@@ -206,9 +206,11 @@ impl<'d> Value<'d> {
 
     /// The items of a list.
     pub(super) fn items(&self) -> Option<Vec<Value<'d>>> {
+        // Of a part of a part the excerpt says enough.
+        let whole = self.name.trim_start_matches("a part of ");
         let item = |item: &'d Spanned<DeValue<'d>>| Value {
             document: self.document,
-            name: format!("a part of {}", self.name),
+            name: format!("a part of {whole}"),
             item,
             key: None,
         };

@@ -94,7 +94,9 @@ fn files(path: &str, base: &Path) -> Result<Vec<(usize, String)>, SceneError> {
         let message = format!("`{MARK}` stands for a part of a file's name, not of a folder's");
         return Err(error(message));
     };
-    let entries = std::fs::read_dir(base.join(folder))
+    // An empty path is no folder, but that of a scene in the working directory is empty.
+    let folder = Path::new(".").join(base).join(folder);
+    let entries = std::fs::read_dir(folder)
         .map_err(|e| error(format!("cannot read the folder of the tiles: {e}")))?;
     let mut found = Vec::new();
     for entry in entries.flatten() {
@@ -133,3 +135,15 @@ pub(super) fn table(tiles: &[Option<usize>], slot: impl Fn(usize) -> u32) -> Vec
 
 /// Stands for a tile that there is not.
 pub(super) const NO_TILE: u32 = u32::MAX;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The base of a scene in the working directory is empty.
+    #[test]
+    fn tiles_may_be_in_the_working_directory() {
+        let none = files("tile.<UDIM>.png", Path::new("")).expect_err("there are none");
+        assert_eq!(none.message, "there are no tiles of this name");
+    }
+}
