@@ -235,8 +235,8 @@ fn a_stopped_render_is_one_of_fewer_samples() {
         };
         let stopped = renderer(way, &room(), &options).render(stop);
         let stopped = stopped.unwrap_or_else(|e| panic!("{e}"));
-        let [Range { first: 0, count }] = stopped.sums.ranges[..] else {
-            panic!("{:?}", stopped.sums.ranges);
+        let [Range { first: 0, count }] = stopped.sums.about.ranges[..] else {
+            panic!("{:?}", stopped.sums.about.ranges);
         };
         assert!((1..1 << 20).contains(&count), "{count}");
         let same = RenderOptions {

@@ -374,8 +374,8 @@ fn a_stopped_render_that_was_replanned_is_one_of_fewer_samples() {
     };
     let rendering = stopped.render(stop).unwrap_or_else(|e| panic!("{e}"));
     assert!(rendering.report.replanned.is_some());
-    let [Range { first: 0, count }] = rendering.sums.ranges[..] else {
-        panic!("{:?}", rendering.sums.ranges);
+    let [Range { first: 0, count }] = rendering.sums.about.ranges[..] else {
+        panic!("{:?}", rendering.sums.about.ranges);
     };
     let same = render(&mut renderer(&options(count as u32)));
     assert_eq!(rendering.sums, same.sums);
