@@ -13,6 +13,8 @@ pub mod merge;
 pub mod output;
 pub mod outputs;
 pub mod ranges;
+#[cfg(test)]
+mod speed;
 mod values;
 
 use accumulate::Accumulator;
