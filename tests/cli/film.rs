@@ -187,6 +187,44 @@ fn a_part_that_was_ended_early_is_known_for_it() {
     assert!(!run.stderr.contains("partial"), "{run:?}");
 }
 
+/// SIGTERM ends a render of years: the film holds what was done, and says that it is not all.
+#[cfg(unix)]
+#[test]
+fn a_part_that_a_system_ended_is_partial() {
+    use std::io::{BufRead, BufReader};
+
+    let folder = folder();
+    let at = folder.path();
+    let film = at.join("part.film").display().to_string();
+    let mut child = command(&["render", SCENE, "--size", "4x4", "--spp", "100000000"])
+        .args(["--device", "cpu", "--verbose", "--out", &film])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    let started = stderr.any(|line| line.is_ok_and(|line| line.contains("samples are taken")));
+    assert!(started, "it never started");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let ended = std::process::Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(ended.is_ok_and(|status| status.success()));
+    let rest: Vec<String> = stderr.map_while(Result::ok).collect();
+    let code = child.wait().expect("it ends").code();
+    assert_eq!(code, Some(130), "{rest:?}");
+    let done = FilmFile::read(film.as_ref()).expect("a film").samples();
+    let lacks = format!("it lacks the samples {done} to 99999999");
+    merge(at, "{}/part.film --out {}/p.png")
+        .exits(0)
+        .says("part.film` is partial: of the samples 0 to 99999999")
+        .says(&lacks);
+    merge(
+        at,
+        &format!("{{}}/part.film --samples 0..{done} --out {{}}/p.png"),
+    )
+    .exits(0);
+}
+
 /// Devices differ in the last bits of what they compute: a merge of both is worth a word.
 #[test]
 fn films_and_pictures_say_which_device_made_them() {

@@ -91,7 +91,7 @@ fn header_length(bytes: &[u8]) -> usize {
 /// A file of some version with these bytes, and the fingerprints that belong to them.
 fn sealed(header: &[u8], planes: &[u8], version: u32) -> Vec<u8> {
     let mut bytes = header.to_vec();
-    let mut seal = |bytes: &mut Vec<u8>| {
+    let seal = |bytes: &mut Vec<u8>| {
         let sum = fingerprint::of(bytes);
         bytes.extend(sum.to_le_bytes());
     };

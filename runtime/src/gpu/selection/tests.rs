@@ -395,7 +395,7 @@ fn every_device_has_ids_that_choose_it() {
     for (place, ids) in ids.iter().enumerate() {
         assert_eq!(chosen(&ids.selector, &adapters), Ok(place));
         assert_eq!(chosen(&ids.index.to_string(), &adapters), Ok(place));
-        for uuid in &ids.uuid {
+        if let Some(uuid) = &ids.uuid {
             assert_eq!(chosen(uuid, &adapters), Ok(place));
         }
     }
