@@ -48,7 +48,7 @@ impl Part<BufReader<File>> {
         let file = input::open(path).map_err(|error| input::reason(&error))?;
         let metadata = file.metadata().map_err(|error| input::reason(&error))?;
         // Other kinds have no length beforehand.
-        let length = metadata.is_file().then(|| metadata.len());
+        let length = metadata.is_file().then_some(metadata.len());
         Self::new(BufReader::new(file), length)
     }
 }
