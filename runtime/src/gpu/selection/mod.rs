@@ -211,8 +211,11 @@ pub fn select_all(
         _ => found.max(1),
     };
     if count > found {
-        let wanted = (count > 1).then(|| format!("is left after {found} of the {count} asked for"));
-        return Err(not_found(wanted, &allowed.devices, adapters));
+        let wanted = match found {
+            0 => "is left by what the environment says".to_owned(),
+            _ => format!("is left after {found} of the {count} asked for"),
+        };
+        return Err(not_found(Some(wanted), &devices(adapters), adapters));
     }
     let first = allowed.devices.iter().take(count);
     Ok(Chosen {

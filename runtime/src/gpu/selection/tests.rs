@@ -312,7 +312,12 @@ fn rubbish_is_said_and_ignored_or_hides_as_it_does_for_cuda() {
             notes.notes[0].contains("hides the GPUs of NVIDIA's"),
             "{notes:?}"
         );
-        assert!(select_all(&Several::All, &environment(&variables), &node).is_err());
+        let all = select_all(&Several::All, &environment(&variables), &node);
+        let error = all.expect_err("all are hidden").to_string();
+        assert!(
+            error.contains("left by what the environment says"),
+            "{error}"
+        );
         // It is no word on others, nor on software.
         let mixed = [nvidia(H200, "0000:00:01.0", 0), amd()];
         assert_eq!(left(&variables, &mixed).expect("chosen").0, [1]);
