@@ -44,6 +44,57 @@ pub(crate) fn of(bytes: &[u8]) -> u64 {
     fingerprint.finish()
 }
 
+/// The fingerprint of bytes that come in pieces: the same as of all of them at once, whatever the pieces.
+#[derive(Clone, Debug)]
+pub(crate) struct Running {
+    state: Fingerprint,
+    /// Bytes that do not fill a word yet.
+    begun: [u8; 8],
+    held: usize,
+    length: u64,
+}
+
+impl Running {
+    pub(crate) fn new() -> Self {
+        Self {
+            state: Fingerprint::new(),
+            begun: [0; 8],
+            held: 0,
+            length: 0,
+        }
+    }
+
+    /// Adds the next bytes.
+    pub(crate) fn add(&mut self, mut bytes: &[u8]) {
+        self.length += bytes.len() as u64;
+        if self.held > 0 {
+            let (head, rest) = bytes.split_at(bytes.len().min(8 - self.held));
+            self.begun[self.held..][..head.len()].copy_from_slice(head);
+            self.held += head.len();
+            bytes = rest;
+            if self.held < 8 {
+                return;
+            }
+            self.state.mix(u64::from_le_bytes(self.begun));
+        }
+        let (words, rest) = bytes.as_chunks::<8>();
+        for word in words {
+            self.state.mix(u64::from_le_bytes(*word));
+        }
+        self.begun = [0; 8];
+        self.begun[..rest.len()].copy_from_slice(rest);
+        self.held = rest.len();
+    }
+
+    /// The fingerprint of the bytes so far, after which more may come.
+    pub(crate) fn finish(&self) -> u64 {
+        let mut state = self.state;
+        state.mix(u64::from_le_bytes(self.begun));
+        state.mix(self.length);
+        state.finish()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +112,21 @@ mod tests {
             assert!(seen.insert(of(&text[..at])), "{at} bytes");
         }
         assert_ne!(of(&[0]), of(&[0, 0]));
+    }
+
+    #[test]
+    fn bytes_in_pieces_have_the_fingerprint_of_the_whole() {
+        let text: Vec<u8> = (0..60).collect();
+        for length in 0..text.len() {
+            for piece in [1, 2, 3, 7, 8, 9, 16, 64] {
+                let mut running = Running::new();
+                text[..length].chunks(piece).for_each(|piece| {
+                    running.add(piece);
+                    running.add(&[]);
+                });
+                assert_eq!(running.finish(), of(&text[..length]), "{length} by {piece}");
+            }
+        }
     }
 
     /// Files of one version have to be read by the next.

@@ -83,7 +83,7 @@ fn score(sets: &[Measurement], profile: &Profile, global: &Global) -> Outcome {
 
 /// Measures on the GPU, and keeps what was measured if a place is given.
 fn measure(args: &CalibrateArgs, global: &Global) -> Result<Vec<Measurement>, Failure> {
-    let gpu = args.gpu.open("`impasto calibrate`")?;
+    let gpu = args.gpu.open("`impasto calibrate`", global)?;
     let mut effort = Effort::of(&gpu, args.quick);
     if !args.pool.is_empty() {
         effort.pools.clone_from(&args.pool);

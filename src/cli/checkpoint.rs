@@ -82,6 +82,13 @@ impl CheckpointArgs {
         if let Some(film) = &start {
             let (done, name) = (film.samples(), path.display());
             global.note(&format!("going on from the {done} samples of `{name}`"));
+            let device = renderer.maker();
+            let others = film.about.makers.iter().filter(|maker| **maker != device);
+            for other in others {
+                global.note(&format!(
+                    "warning: they are of {other}, and {device} goes on: the bits may not be those of one device"
+                ));
+            }
         }
         let mut keep = |film: &FilmFile| {
             if let Err(error) = film.write(path) {

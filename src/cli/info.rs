@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use impasto::runtime::cpu::MOST_THREADS;
-use impasto::runtime::gpu::DeviceInfo;
+use impasto::runtime::gpu::{DeviceInfo, Environment, Selector};
 use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, Width};
 use serde::Serialize;
 
@@ -36,15 +36,20 @@ enum Kind {
 /// Which GPU to use, and how.
 #[derive(Args)]
 pub(super) struct GpuArgs {
-    /// Use the GPU whose name contains this; by default the most capable one
-    #[arg(long, value_name = "NAME")]
-    gpu: Option<String>,
+    /// Use this GPU: `pci:0000:00:06.0`, `uuid:GPU-...`, `minor:N`, its index from 0, or part of its name (see
+    /// `impasto info`); by default what Slurm or CUDA_VISIBLE_DEVICES says, or else the most capable one
+    #[arg(long, value_name = "GPU", allow_negative_numbers = true, value_parser = parse_selector)]
+    gpu: Option<Selector>,
     /// Keep the checks of array bounds and loops in all kernels (slower); the processor always keeps them
     #[arg(long)]
     checked: bool,
     /// Let wgpu check the arguments of indirect dispatches (slower)
     #[arg(long)]
     validate_indirect: bool,
+}
+
+fn parse_selector(text: &str) -> Result<Selector, String> {
+    text.parse()
 }
 
 impl DeviceArgs {
@@ -88,7 +93,8 @@ impl DeviceArgs {
                 },
             },
         };
-        let device = Device::open(&options).map_err(super::runtime)?;
+        let mut note = |line: &str| global.note(line);
+        let device = Device::open_noting(&options, &mut note).map_err(super::runtime)?;
         if let (Device::Gpu(gpu), Some(_)) = (&device, self.threads) {
             let name = gpu.info().name;
             global.note(&format!(
@@ -99,11 +105,11 @@ impl DeviceArgs {
     }
 
     /// A GPU, software or not, for what needs one.
-    pub(super) fn open_gpu(&self, what: &'static str) -> Result<Gpu, Failure> {
+    pub(super) fn open_gpu(&self, what: &'static str, global: &Global) -> Result<Gpu, Failure> {
         self.check()?;
         match self.device {
             Some(Kind::Cpu) => Err(super::runtime(impasto::RuntimeError::NeedsGpu(what))),
-            _ => self.gpu.open(what),
+            _ => self.gpu.open(what, global),
         }
     }
 }
@@ -112,6 +118,7 @@ impl GpuArgs {
     fn options(&self) -> GpuOptions {
         GpuOptions {
             adapter: self.gpu.clone(),
+            environment: Environment::of_process(),
             checked: self.checked,
             validate_indirect: self.validate_indirect,
             ..GpuOptions::default()
@@ -119,9 +126,20 @@ impl GpuArgs {
     }
 
     /// The GPU, for what needs one.
-    pub(super) fn open(&self, what: &'static str) -> Result<Gpu, Failure> {
+    pub(super) fn open(&self, what: &'static str, global: &Global) -> Result<Gpu, Failure> {
         let needed = |error| Failure::Error(format!("{what} needs a GPU: {error}"));
-        Gpu::new(&self.options()).map_err(needed)
+        let mut note = |line: &str| global.note(line);
+        Gpu::new_noting(&self.options(), &mut note).map_err(needed)
+    }
+}
+
+/// As a shell takes it.
+fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || ":.-_".contains(c);
+    if text.chars().all(is_plain) {
+        text.to_owned()
+    } else {
+        format!("\"{text}\"")
     }
 }
 
@@ -145,14 +163,18 @@ struct Other {
 pub(super) fn run(args: &DeviceArgs, global: &Global) -> Outcome {
     let device = args.open(global)?.info();
     let mut others = Device::found();
-    let same = |other: &DeviceInfo| (&other.name, other.kind) == (&device.name, device.kind);
+    let identity = |info: &DeviceInfo| {
+        let index = info.ids.as_ref().map(|ids| ids.index);
+        (index, info.name.clone(), info.backend.clone())
+    };
+    let same = |other: &DeviceInfo| identity(other) == identity(&device);
     if let Some(at) = others.iter().position(same) {
         others.remove(at);
     }
     let others = others.into_iter().map(|device| Other {
-        options: match device.kind {
-            "processor" => "--device cpu".into(),
-            _ => format!("--gpu \"{}\"", device.name),
+        options: match &device.ids {
+            None => "--device cpu".into(),
+            Some(ids) => format!("--gpu {}", quoted(&ids.selector)),
         },
         device,
     });
@@ -178,6 +200,13 @@ fn text(devices: &Devices) -> String {
             "  {} ({}, {}): {options}\n",
             device.name, device.kind, device.backend
         );
+        if let Some(ids) = &device.ids {
+            out += &format!(
+                "    ids {}; driver {}\n",
+                ids.all().join(", "),
+                device.driver
+            );
+        }
     }
     out
 }

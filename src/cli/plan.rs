@@ -101,9 +101,9 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
     if matches!(source, Source::Strategy(strategy) if strategy == Strategy::EXHAUSTIVE) {
         return args.measure(&scene, &program, materials, global, meter);
     }
-    let workload = args.workload(&materials, &mut gpu, &scene, &program, &meter)?;
+    let workload = args.workload(&materials, &mut gpu, &scene, &program, (global, &meter))?;
     meter.show(SEARCH, "searching a plan");
-    let profile = args.profile(&mut gpu)?;
+    let profile = args.profile(&mut gpu, global)?;
     let plan = match source {
         Source::Given(plan) => plan,
         Source::Strategy(strategy) => {
@@ -218,9 +218,9 @@ impl PlanCommandArgs {
                     .into(),
             ));
         }
-        let mut gpu = Some(self.device.open_gpu("`--strategy exhaustive`")?);
-        let profile = self.profile(&mut gpu)?;
-        let gpu = self.opened(&mut gpu)?;
+        let mut gpu = Some(self.device.open_gpu("`--strategy exhaustive`", global)?);
+        let profile = self.profile(&mut gpu, global)?;
+        let gpu = self.opened(&mut gpu, global)?;
         let answer = self.exhaustive.measure(
             gpu,
             scene,
@@ -255,10 +255,10 @@ impl PlanCommandArgs {
         gpu: &mut Option<Gpu>,
         scene: &Scene,
         program: &Program,
-        meter: &Meter,
+        (global, meter): (&Global, &Meter),
     ) -> Result<Workload, Failure> {
         let Some(path) = &self.workload else {
-            let gpu = self.opened(gpu)?;
+            let gpu = self.opened(gpu, global)?;
             let part = meter.part(COSTS, SEARCH - COSTS);
             let watch = |done: usize, all: usize| {
                 part.count(done, all, "how paths hit materials: steps");
@@ -273,20 +273,20 @@ impl PlanCommandArgs {
         Ok(workload)
     }
 
-    fn profile(&self, gpu: &mut Option<Gpu>) -> Result<Profile, Failure> {
+    fn profile(&self, gpu: &mut Option<Gpu>, global: &Global) -> Result<Profile, Failure> {
         match &self.profile {
             Some(given) => Profile::given(given),
-            None => Profile::of(&self.opened(gpu)?.info()),
+            None => Profile::of(&self.opened(gpu, global)?.info()),
         }
     }
 
     /// The GPU, which is opened when it is first asked for.
-    fn opened<'g>(&self, gpu: &'g mut Option<Gpu>) -> Result<&'g Gpu, Failure> {
+    fn opened<'g>(&self, gpu: &'g mut Option<Gpu>, global: &Global) -> Result<&'g Gpu, Failure> {
         match gpu {
             Some(gpu) => Ok(gpu),
             none => Ok(none.insert(
                 self.device
-                    .open_gpu("a plan by a GPU's profile and workload")?,
+                    .open_gpu("a plan by a GPU's profile and workload", global)?,
             )),
         }
     }

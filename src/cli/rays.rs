@@ -36,7 +36,7 @@ pub(super) struct RaysArgs {
 
 pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     let scene = impasto::load(&args.scene).map_err(|e| e.to_string())?;
-    let gpu = args.gpu.open("`impasto rays`")?;
+    let gpu = args.gpu.open("`impasto rays`", global)?;
     let set_sizes = |technique| Technique {
         workgroup: args.workgroup,
         threads: args.fetch_threads,

@@ -49,6 +49,94 @@ fn info_names_the_device_and_the_others() {
     }
 }
 
+/// Every id that is listed chooses the device, and what chooses none is refused before anything is rendered.
+#[test]
+fn gpus_are_chosen_by_what_info_lists_of_them() {
+    let info = ["info", "--device", "gpu", "--format", "json"];
+    let json = impasto(&info).exits(0).json();
+    let ids = json["ids"].as_object().expect("ids");
+    let of = |form: &str| ids.get(form).map(ToString::to_string);
+    let forms = [
+        of("index"),
+        of("pci").map(|id| format!("pci:{id}")),
+        of("minor").map(|id| format!("minor:{id}")),
+        of("uuid").map(|id| format!("uuid:{id}")),
+        of("selector"),
+    ];
+    for form in forms.into_iter().flatten() {
+        let chosen = impasto(&["info", "--format", "json", "--gpu", &form.replace('"', "")]);
+        assert_eq!(chosen.exits(0).json()["ids"], json["ids"], "{form}");
+    }
+    let text = impasto(&["info", "--device", "gpu"]).exits(0).stdout;
+    assert!(text.contains("\n  ids      "), "{text}");
+    assert!(text.contains("\n  driver   "), "{text}");
+    let refused = |selector: &str| {
+        let args = ["render", SCENE, "--out", "p.exr", "--gpu", selector];
+        impasto(&args).exits(2).prints_nothing()
+    };
+    for selector in [
+        "",
+        " ",
+        "-1",
+        "+1",
+        "pci:",
+        "pci:1",
+        "pci:0000:00:20.0",
+        "uuid:",
+        "uuid:x",
+        "minor:",
+        "minor:-1",
+        "99999999999",
+    ] {
+        refused(selector).says("--gpu").says("expected");
+    }
+    refused("uuid:MIG-1").says("MIG");
+    for (selector, said) in [
+        ("4294967295", "has the index 4294967295"),
+        ("pci:ffff:ff:1f.7", "has the PCI address `ffff:ff:1f.7`"),
+        ("minor:4294967295", "has the minor number"),
+        ("uuid:GPU-00000000-ffff", "has a UUID that begins with"),
+        (
+            "r\u{f6}ntgen \u{1f3a8}",
+            "is called `r\u{f6}ntgen \u{1f3a8}`",
+        ),
+    ] {
+        refused(selector)
+            .says(&format!("no GPU {said}"))
+            .says("there are: ")
+            .says("hint");
+    }
+}
+
+/// Whatever schedulers leave in the environment: it is followed, said, or of no consequence, and never the end.
+#[test]
+fn variables_of_schedulers_are_no_end_of_a_command() {
+    for (name, value) in [
+        ("SLURM_JOB_GPUS", "0"),
+        ("SLURM_JOB_GPUS", "rubbish"),
+        ("SLURM_JOB_GPUS", ""),
+        ("SLURM_JOB_GPUS", "-1"),
+        ("SLURM_STEP_GPUS", "0,\u{661}"),
+        ("CUDA_VISIBLE_DEVICES", ""),
+        ("CUDA_VISIBLE_DEVICES", "NoDevFiles"),
+        ("CUDA_VISIBLE_DEVICES", "-1"),
+        ("CUDA_VISIBLE_DEVICES", "0,1,rubbish"),
+        ("CUDA_VISIBLE_DEVICES", "GPU-"),
+    ] {
+        for device in [&[][..], &["--device", "cpu"]] {
+            let mut command = command(&["info"]);
+            command.args(device).env(name, value);
+            let run: Run = command.output().expect("the command starts").into();
+            assert!(!run.stderr.contains("panicked"), "{run:?}");
+            // On a machine of several GPUs, a list of others is an error.
+            assert!(run.code == 0 || run.stderr.contains(name), "{run:?}");
+            if device == ["--device", "cpu"] {
+                assert_eq!((run.code, run.stderr.as_str()), (0, ""), "{name}={value}");
+            }
+        }
+    }
+}
+
 #[test]
 fn options_that_contradict_each_other_are_refused() {
     let refused = |options: &[&str]| {

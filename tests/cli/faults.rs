@@ -231,6 +231,78 @@ fn a_limit_on_the_size_of_files_is_an_error_and_no_death() {
         .says("standard output");
 }
 
+/// A merge that cannot write says so by the name of the file, and leaves an older picture as it was.
+#[test]
+fn a_merge_without_room_leaves_what_was_there() {
+    let folder = folder();
+    let at = folder.path();
+    let film = at.join("a.film").display().to_string();
+    let size = ["--size", "64x64", "--spp", "1"];
+    let part = ["render", SCENE, "--device", "cpu", "--out", &film];
+    impasto(&[&part[..], &size].concat()).exits(0);
+    for name in ["p.exr", "p.film", "p.png"] {
+        let out = write(at, name, "old");
+        limited("ulimit -f 2", &["merge", &film, "--out", &out])
+            .exits(2)
+            .says("cannot write")
+            .says(name)
+            .says("`ulimit -f`");
+        assert_eq!(std::fs::read(at.join(name)).expect("a file"), b"old");
+    }
+    assert_eq!(names(at), ["a.film", "p.exr", "p.film", "p.png"]);
+    for place in ["/proc/self/p.exr", "/proc/self/p.film"] {
+        impasto(&["merge", &film, "--out", place])
+            .exits(2)
+            .says("cannot write")
+            .says(place);
+    }
+    // Where it is said before anything is read, films need not even be there.
+    impasto(&["merge", "none.film", "--out", "/proc/self/p.exr"])
+        .exits(2)
+        .says("/proc/self");
+}
+
+/// Merging takes the memory of one film, however many there are.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_merge_does_not_grow_with_its_films() {
+    let folder = folder();
+    let at = folder.path();
+    let mut films = Vec::new();
+    for part in 0..48u32 {
+        let film = at.join(format!("{part}.film")).display().to_string();
+        let first = part.to_string();
+        let size = ["--size", "256x256", "--spp", "1", "--samples-from", &first];
+        let render = ["render", SCENE, "--device", "cpu", "--aov", "albedo,normal"];
+        if part == 0 {
+            impasto(&[&render[..], &size, &["--out", &film]].concat()).exits(0);
+        } else {
+            // The same sums as of another sample, which is rendered faster.
+            let mut copy = FilmFile::read(&at.join("0.film")).expect("a film");
+            copy.about.ranges[0].first = part.into();
+            copy.about.asked[0].first = part.into();
+            copy.write(film.as_ref()).expect("it is written");
+        }
+        films.push(film);
+    }
+    let bytes: u64 = films
+        .iter()
+        .map(|film| std::fs::metadata(film).expect("a film").len())
+        .sum();
+    // They would not fit.
+    assert!(bytes / 1024 > PROGRAM_KIB, "{bytes} bytes");
+    let out = at.join("p.film").display().to_string();
+    let mut args = vec!["merge", "--samples", "0..48", "--out", &out];
+    args.extend(films.iter().map(String::as_str));
+    limited(&format!("ulimit -v {PROGRAM_KIB}"), &args)
+        .exits(0)
+        .says("48 samples of 48 films");
+}
+
+/// Address space for the program and a small film.
+#[cfg(target_os = "linux")]
+const PROGRAM_KIB: u64 = 160 << 10;
+
 #[test]
 fn a_small_stack_is_enough() {
     let folder = folder();

@@ -136,6 +136,8 @@ impl Cpu {
             backend: "native".into(),
             driver: native::compiler(),
             kind: "processor",
+            ids: None,
+            memory_bytes: None,
             limits: vec![("threads", self.threads() as u64), ("cores", cores as u64)],
             features_used: native::features(),
             features_missing: Vec::new(),

@@ -74,16 +74,31 @@ impl Device {
     /// Opens a device.
     ///
     /// # Errors
-    /// If there is none of that kind, or it cannot be opened.
+    /// If there is none of that kind, several are meant, or it cannot be opened.
     pub fn open(options: &DeviceOptions) -> Result<Self, RuntimeError> {
-        let gpu = || Ok(Device::Gpu(Box::new(Gpu::new(&options.gpu)?)));
+        Self::open_noting(options, &mut |_| ())
+    }
+
+    /// The same; `note` is given the lines that say what users should know of the choice.
+    ///
+    /// # Errors
+    /// As [`Device::open`].
+    pub fn open_noting(
+        options: &DeviceOptions,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, RuntimeError> {
+        let device = |gpu| Device::Gpu(Box::new(gpu));
         let cpu = || Ok(Device::Cpu(Cpu::new(&options.cpu)?));
         match options.choice {
-            Choice::Gpu => gpu(),
+            Choice::Gpu => Gpu::new_noting(&options.gpu, note).map(device),
             Choice::Cpu => cpu(),
-            Choice::Best if options.gpu.adapter.is_some() || Gpu::has_hardware() => gpu(),
-            // A driver in software is the next best where no code can be made.
-            Choice::Best => cpu().or_else(|error| gpu().map_err(|_| error)),
+            Choice::Best => match Gpu::new_hardware(&options.gpu, note)? {
+                Some(gpu) => Ok(device(gpu)),
+                // A driver in software is the next best where no code can be made.
+                None => {
+                    cpu().or_else(|error| Gpu::new(&options.gpu).map(device).map_err(|_| error))
+                }
+            },
         }
     }
 

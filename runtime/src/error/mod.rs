@@ -9,12 +9,26 @@ pub use scene::{Excerpt, SceneError};
 /// An error of the renderer.
 #[derive(Debug, thiserror::Error)]
 pub enum RuntimeError {
-    /// No GPU (or none of the wanted name) was found.
-    #[error("{}", no_adapter(wanted.as_deref(), found))]
+    /// No GPU (or none that is wanted) was found.
+    #[error("{}", no_adapter(wanted.as_deref(), found, hint))]
     NoAdapter {
-        /// What the user asked for.
+        /// What a GPU would do that is wanted: `is called ...`.
         wanted: Option<String>,
-        /// The adapters there are.
+        /// Those that there are, each with what chooses it.
+        found: Vec<String>,
+        /// What to do about it.
+        hint: &'static str,
+    },
+    /// More than one GPU is what was asked for.
+    #[error(
+        "`--gpu {wanted}` fits {} GPUs\n  there are: {}\n  hint: choose one by what is unique, such as its PCI address",
+        found.len(),
+        found.join(", ")
+    )]
+    SeveralAdapters {
+        /// What was asked for.
+        wanted: String,
+        /// Those that it fits, each with what chooses it.
         found: Vec<String>,
     },
     /// A limit of the device is too small for what is asked of it.
@@ -105,6 +119,9 @@ pub enum RuntimeError {
     /// Whoever watched the building of a renderer broke it off.
     #[error("interrupted while kernels were built")]
     Interrupted,
+    /// Whoever watched films being merged broke it off.
+    #[error("interrupted while films were merged")]
+    Stopped,
     /// Kernels are to be timed on a GPU that cannot.
     #[error(
         "the GPU `{0}` has no timestamps, by which kernels are timed\n  hint: choose another GPU (`--gpu`), or update its driver"
@@ -170,10 +187,10 @@ impl RuntimeError {
     }
 }
 
-fn no_adapter(wanted: Option<&str>, found: &[String]) -> String {
+fn no_adapter(wanted: Option<&str>, found: &[String], hint: &str) -> String {
     match wanted {
         Some(wanted) if !found.is_empty() => format!(
-            "no GPU is called `{wanted}`\n  there are: {}\n  hint: part of a name is enough, in any case of letters",
+            "no GPU {wanted}\n  there are: {}\n  hint: {hint}",
             found.join(", ")
         ),
         _ => "no GPU was found: one needs a driver for Vulkan, Metal or Direct3D 12\n  \

@@ -11,7 +11,7 @@ use exr::prelude::WritableImage;
 
 use crate::error::RuntimeError;
 use crate::film::cryptomatte;
-use crate::film::file::FilmFile;
+use crate::film::file::{FilmFile, Maker};
 use crate::film::output;
 use crate::film::outputs::Kind;
 use crate::input;
@@ -129,15 +129,20 @@ fn channels(film: &FilmFile) -> Vec<(String, Vec<f32>)> {
 /// What the picture is of.
 fn metadata(film: &FilmFile) -> Vec<(String, AttributeValue)> {
     let text = |value: &str| AttributeValue::Text(text(value));
-    let identity = &film.identity;
+    let about = &film.about;
+    let identity = &about.identity;
     let mut all = vec![
         ("impasto/version".into(), text(env!("CARGO_PKG_VERSION"))),
-        ("impasto/scene".into(), text(&film.scene)),
+        ("impasto/scene".into(), text(&about.scene)),
         ("impasto/samples".into(), text(&film.samples().to_string())),
         ("impasto/seed".into(), text(&identity.seed.to_string())),
         ("impasto/sampler".into(), text(identity.sampler.name())),
         ("impasto/colorSpace".into(), text("linear Rec. 709")),
     ];
+    if !about.makers.is_empty() {
+        let makers: Vec<String> = about.makers.iter().map(Maker::to_string).collect();
+        all.push(("impasto/device".into(), text(&makers.join("; "))));
+    }
     let ids = film.sums.layers().iter();
     for layer in ids.filter(|layer| layer.output.kind == Kind::Ids) {
         let name = layer.output.channels[0];
@@ -202,6 +207,7 @@ mod tests {
         texts.sort();
         let expected = [
             ("impasto/colorSpace", "linear Rec. 709"),
+            ("impasto/device", "NVIDIA H200 (vulkan, NVIDIA 570.195.03)"),
             ("impasto/sampler", "owen"),
             ("impasto/samples", "5"),
             ("impasto/scene", "attic"),

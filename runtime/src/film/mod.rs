@@ -4,15 +4,20 @@
 //! ranges of samples therefore add up to exactly the sums of one render of all of them. So do the other
 //! outputs ([`outputs`]), whose planes come after those of the picture.
 
+mod accumulate;
 pub mod cryptomatte;
 pub mod exr;
 pub mod file;
 pub mod layers;
-mod merge;
+pub mod merge;
 pub mod output;
 pub mod outputs;
+pub mod ranges;
+#[cfg(test)]
+mod speed;
 mod values;
 
+use accumulate::Accumulator;
 use layers::Layers;
 use outputs::SUM_WORDS;
 
@@ -65,6 +70,27 @@ impl Sums {
         })
     }
 
+    /// The sums of no samples. Fails, in words, if there is no memory for them.
+    pub(crate) fn empty(width: u32, height: u32, layers: Layers) -> Result<Self, String> {
+        let too_large = || {
+            let planes = layers.planes();
+            format!("a film of {width}x{height} pixels with {planes} planes fits no memory here")
+        };
+        let pixels = (width as usize).checked_mul(height as usize);
+        let count = pixels.and_then(|pixels| pixels.checked_mul(layers.planes()));
+        let count = count.ok_or_else(too_large)?;
+        // Only asking fails; what is then taken costs memory where it is written.
+        let mut asked: Vec<u32> = Vec::new();
+        asked.try_reserve_exact(count).map_err(|_| too_large())?;
+        drop(asked);
+        Ok(Self {
+            width,
+            height,
+            words: vec![0; count],
+            layers,
+        })
+    }
+
     /// The outputs beside the picture.
     pub fn layers(&self) -> &Layers {
         &self.layers
@@ -97,6 +123,14 @@ impl Sums {
             .unwrap_or(&[])
     }
 
+    /// The same, to be changed.
+    pub(crate) fn plane_mut(&mut self, index: usize) -> &mut [u32] {
+        let count = self.pixel_count();
+        self.words
+            .get_mut(index * count..(index + 1) * count)
+            .unwrap_or(&mut [])
+    }
+
     /// Means of the samples.
     pub fn picture(&self) -> Film {
         let samples = self.plane(COUNT_PLANE).to_vec();
@@ -111,16 +145,11 @@ impl Sums {
 
     /// Adds the sums of other samples of a picture of the same size and outputs.
     pub(crate) fn add(&mut self, other: &Sums) {
-        let count = self.pixel_count();
-        for pixel in 0..count {
-            for channel in 0..3 {
-                let sum = self.sum(channel, pixel) + other.sum(channel, pixel);
-                self.set(channel, pixel, sum);
-            }
-            let at = COUNT_PLANE * count + pixel;
-            self.words[at] = self.words[at].saturating_add(other.words[at]);
+        let mut accumulator = Accumulator::new(self);
+        for plane in 0..other.layers.planes() {
+            accumulator.add(plane, 0, other.plane(plane));
         }
-        self.add_outputs(other);
+        accumulator.finish();
     }
 
     /// Takes the sums of some of these samples away, but for outputs beside the picture.

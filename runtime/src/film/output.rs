@@ -105,7 +105,15 @@ pub fn replace(
     drop(writer);
     file.as_file().sync_all().map_err(text)?;
     file.persist(&target).map_err(|e| text(e.error))?;
+    sync_folder(folder_of(&target));
     Ok(())
+}
+
+/// Makes a renamed file survive a power cut, where the system can; the file itself is safe already.
+fn sync_folder(folder: &Path) {
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
 }
 
 /// Removes what processes that were killed while they wrote the file at `path` left beside it. Only for who is

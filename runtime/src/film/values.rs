@@ -1,5 +1,4 @@
-//! What the planes of outputs amount to: how those of two parts are added, and the values of a
-//! picture's pixels.
+//! What the planes of outputs amount to: the values of a picture's pixels.
 
 use crate::film::layers::Layer;
 use crate::film::outputs::{ID_SLOTS, Kind, Of, SUM_WORDS};
@@ -15,58 +14,6 @@ pub struct IdCount {
 }
 
 impl Sums {
-    /// Adds the outputs of other samples.
-    pub(super) fn add_outputs(&mut self, other: &Sums) {
-        let layers = self.layers.clone();
-        for (first, layer) in layers.placed() {
-            for pixel in 0..self.pixel_count() {
-                match layer.output.kind {
-                    Kind::Mean(..) | Kind::Variance => {
-                        for channel in 0..layer.output.channels.len() {
-                            let plane = first + SUM_WORDS * channel;
-                            let sum = self.sum_words(plane, pixel);
-                            let sum = sum.wrapping_add(other.sum_words(plane, pixel));
-                            self.set_words(plane, pixel, sum);
-                        }
-                    }
-                    Kind::Share => self.combine(other, first, pixel, u32::saturating_add),
-                    // The smaller of two distances is the larger of their complements.
-                    Kind::Nearest => self.combine(other, first, pixel, u32::max),
-                    Kind::Ids => self.add_ids(other, first, pixel),
-                    Kind::Samples => {}
-                }
-            }
-        }
-    }
-
-    fn combine(&mut self, other: &Sums, plane: usize, pixel: usize, with: fn(u32, u32) -> u32) {
-        let word = other.plane(plane)[pixel];
-        let at = plane * self.pixel_count() + pixel;
-        self.words[at] = with(self.words[at], word);
-    }
-
-    /// Puts the ids of both into one list; what finds no room is counted as it is where samples are taken.
-    fn add_ids(&mut self, other: &Sums, first: usize, pixel: usize) {
-        let count = self.pixel_count();
-        let at = |plane: usize| (first + plane) * count + pixel;
-        for theirs in 0..ID_SLOTS {
-            let [id, samples] = [0, 1].map(|word| other.words[at(2 * theirs + word)]);
-            if id == 0 {
-                continue;
-            }
-            let has_room = |own: &usize| [0, id].contains(&self.words[at(2 * own)]);
-            match (0..ID_SLOTS).find(has_room) {
-                Some(own) => {
-                    self.words[at(2 * own)] = id;
-                    self.words[at(2 * own + 1)] += samples;
-                }
-                None => self.words[at(2 * ID_SLOTS)] += samples,
-            }
-        }
-        self.words[at(2 * ID_SLOTS)] += other.words[at(2 * ID_SLOTS)];
-        self.sort_ids(first, pixel);
-    }
-
     /// Puts the ids of every pixel in order, so that equal samples give equal words: which slot an id gets
     /// is up to the sample that comes first.
     pub(crate) fn sort_all_ids(&mut self) {

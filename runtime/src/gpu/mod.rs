@@ -7,24 +7,34 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::RuntimeError;
 
+mod adapters;
 mod info;
+mod memory;
+mod nvidia;
 pub(crate) mod resources;
 pub(crate) mod schedule;
+pub mod selection;
 pub(crate) mod shader;
 pub(crate) mod statistics;
 pub(crate) mod submission;
 mod timing;
 pub(crate) mod work;
 
-pub use info::DeviceInfo;
+pub use info::{DeviceIds, DeviceInfo};
+pub use selection::{Environment, Selector};
 pub use statistics::KernelStatistics;
 pub use timing::Timing;
+
+use adapters::{Adapters, Found};
 
 /// How to choose and open a GPU.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
-    /// Part of the adapter's name, in any case; the fastest kind of adapter if `None`.
-    pub adapter: Option<String>,
+    /// Which; if `None`, the first that the environment leaves, the fastest kind of adapter before others.
+    pub adapter: Option<Selector>,
+    /// What the environment says of GPUs. By default it says nothing; a program that schedulers start wants
+    /// [`Environment::of_process`].
+    pub environment: Environment,
     /// Keeps wgpu's bounds checks and loop bounds in the kernels: slower, for finding defects.
     pub checked: bool,
     /// Lets wgpu check the arguments of indirect dispatches, which the prepare kernels are known to
@@ -40,6 +50,7 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) adapter: wgpu::Adapter,
+    ids: DeviceIds,
     pub(crate) checked: bool,
     pub(crate) timing: Timing,
     failure: Arc<Mutex<Option<RuntimeError>>>,
@@ -56,12 +67,47 @@ pub(crate) const USED_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
 const SUBGROUPS: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::SUBGROUP_BARRIER);
 
 impl Gpu {
-    /// Opens a GPU, with every limit as high as its driver allows.
+    /// Opens a GPU, which may be software, with every limit as high as its driver allows.
+    ///
+    /// # Errors
+    /// If none fits, several do, or it cannot be opened.
     pub fn new(options: &GpuOptions) -> Result<Self, RuntimeError> {
-        let adapter = choose_adapter(
-            adapters(options.validate_indirect),
-            options.adapter.as_deref(),
-        )?;
+        Self::new_noting(options, &mut |_| ())
+    }
+
+    /// The same; `note` is given the lines that say what users should know of the choice.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub fn new_noting(
+        options: &GpuOptions,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Self, RuntimeError> {
+        let adapters = Adapters::of_machine(options.validate_indirect);
+        let found = adapters.choose(options, note)?;
+        match found.or_else(|| adapters.software()) {
+            Some(found) => Self::open(found, options),
+            None => Err(RuntimeError::NoAdapter {
+                wanted: None,
+                found: Vec::new(),
+                hint: "",
+            }),
+        }
+    }
+
+    /// Opens a GPU unless none was asked for, and there is none but software.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub(crate) fn new_hardware(
+        options: &GpuOptions,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Option<Self>, RuntimeError> {
+        let found = Adapters::of_machine(options.validate_indirect).choose(options, note)?;
+        found.map(|found| Self::open(found, options)).transpose()
+    }
+
+    fn open(Found { adapter, ids }: Found, options: &GpuOptions) -> Result<Self, RuntimeError> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("impasto"),
             required_features: adapter.features() & USED_FEATURES,
@@ -80,6 +126,7 @@ impl Gpu {
             device,
             queue,
             adapter,
+            ids,
             checked: options.checked,
             timing,
             failure,
@@ -109,19 +156,14 @@ impl Gpu {
 
     /// All GPUs that there are, best first.
     pub fn found() -> Vec<DeviceInfo> {
-        adapters(false).iter().map(DeviceInfo::new).collect()
-    }
-
-    /// Whether there is a GPU that is no software.
-    pub fn has_hardware() -> bool {
-        let adapters = adapters(false);
-        let first = adapters.first();
-        first.is_some_and(|a| a.get_info().device_type != wgpu::DeviceType::Cpu)
+        let all = Adapters::of_machine(false).all();
+        let info = |found: Found| DeviceInfo::new(&found.adapter, found.ids);
+        all.into_iter().map(info).collect()
     }
 
     /// What the GPU is and can do.
     pub fn info(&self) -> DeviceInfo {
-        DeviceInfo::new(&self.adapter)
+        DeviceInfo::new(&self.adapter, self.ids.clone())
     }
 
     /// Whether the "GPU" is the processor: smaller portions of work keep it responsive.
@@ -177,46 +219,6 @@ impl Gpu {
             hint: "use a smaller scene or picture, or another GPU (`--gpu`)",
         })
     }
-}
-
-/// All adapters, the most capable kind first; equal kinds in the driver's order.
-fn adapters(validate_indirect: bool) -> Vec<wgpu::Adapter> {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    // No debug layers unless the environment asks for them (`WGPU_VALIDATION`, `WGPU_DEBUG`),
-    // and no validation of indirect arguments unless it is asked for: those come from the prepare
-    // kernels alone, which divide a queue's length, at most the pool, into rows within the
-    // limits, and checking them again costs more than the dispatch itself.
-    descriptor.flags = wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER.with_env();
-    if validate_indirect {
-        descriptor.flags |= wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
-    }
-    let instance = wgpu::Instance::new(descriptor);
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    });
-    adapters
-}
-
-fn choose_adapter(
-    adapters: Vec<wgpu::Adapter>,
-    wanted: Option<&str>,
-) -> Result<wgpu::Adapter, RuntimeError> {
-    let found = adapters.iter().map(|a| a.get_info().name).collect();
-    let matches = |name: &str| {
-        wanted.is_none_or(|wanted| name.to_lowercase().contains(&wanted.to_lowercase()))
-    };
-    adapters
-        .into_iter()
-        .find(|adapter| matches(&adapter.get_info().name))
-        .ok_or_else(|| RuntimeError::NoAdapter {
-            wanted: wanted.map(String::from),
-            found,
-        })
 }
 
 /// Makes the device put its first error where `Gpu::check` finds it.

@@ -29,7 +29,7 @@ use impasto_compiler::partition::Workload;
 
 use crate::device::DeviceRef;
 use crate::error::RuntimeError;
-use crate::film::file::{FilmFile, Identity, Range};
+use crate::film::file::{About, FilmFile, Identity, Maker, Range};
 use crate::film::layers::Layers;
 use crate::film::{Film, Sums};
 use crate::kernels::dropped::Dropped;
@@ -136,6 +136,16 @@ impl<'g> Renderer<'g> {
         &self.facts.identity
     }
 
+    /// The device that renders, as films name it.
+    pub fn maker(&self) -> Maker {
+        let device = self.device.info();
+        Maker {
+            device: device.name,
+            backend: device.backend,
+            driver: device.driver,
+        }
+    }
+
     fn render_passes(
         &mut self,
         mut keeping: Option<Keeping<'_>>,
@@ -170,7 +180,8 @@ impl<'g> Renderer<'g> {
             }
         }
         let sums = self.sums(&status, &resumed, pass.done)?;
-        if let Some(keeping) = &mut keeping {
+        // A film of no samples is none.
+        if let Some(keeping) = keeping.as_mut().filter(|_| pass.done > 0) {
             (keeping.keep)(&sums)?;
         }
         let film = sums.sums.picture();
@@ -191,8 +202,9 @@ impl<'g> Renderer<'g> {
         self.built.work.write_film(start.sums.words());
         Ok(Resumed {
             samples,
-            nonfinite: start.nonfinite,
-            clamped: start.clamped,
+            nonfinite: start.about.nonfinite,
+            clamped: start.about.clamped,
+            makers: start.about.makers.clone(),
         })
     }
 
@@ -211,17 +223,29 @@ impl<'g> Renderer<'g> {
         sums.sort_all_ids();
         let (counters, read) = (self.built.layout.counters, &status.counters);
         let before: u64 = status.before.dropped.iter().map(Dropped::samples).sum();
-        Ok(FilmFile {
+        let range = |count: u32| Range {
+            first: self.options.first_sample.into(),
+            count: count.into(),
+        };
+        let about = About {
             identity: self.facts.identity,
             scene: self.facts.name.clone(),
             nonfinite: resumed.nonfinite + before + counters.all_dropped(read),
             clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
-            ranges: vec![Range {
-                first: self.options.first_sample.into(),
-                count: done.into(),
-            }],
-            sums,
-        })
+            ranges: vec![range(done)],
+            asked: vec![range(self.options.samples)],
+            makers: self.makers(resumed),
+        };
+        Ok(FilmFile { about, sums })
+    }
+
+    /// The devices that took samples: this one, and those of what was gone on from.
+    fn makers(&self, resumed: &Resumed) -> Vec<Maker> {
+        let mut makers = resumed.makers.clone();
+        makers.push(self.maker());
+        makers.sort_unstable();
+        makers.dedup();
+        makers
     }
 
     /// How many pixels are rendered.

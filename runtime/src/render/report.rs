@@ -6,8 +6,9 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
 
+use crate::film::file::Maker;
 use crate::film::{Film, Sums};
-use crate::gpu::DeviceInfo;
+use crate::gpu::{DeviceIds, DeviceInfo};
 use crate::kernels::dropped::Dropped;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{DispatchSource, Kernel, KernelDesc};
@@ -24,6 +25,10 @@ use crate::world::GeometryCounts;
 pub struct Report {
     /// The GPU.
     pub adapter: AdapterReport,
+    /// What tells it from others of its kind on its machine, as `--gpu` takes it: its PCI address, or else its
+    /// index; absent for the processor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adapter_id: Option<String>,
     /// The plan's strategy.
     pub strategy: String,
     /// The plan: groups of materials with their forms, as `impasto render --partition` takes it;
@@ -246,7 +251,7 @@ pub struct ReplanReport {
 }
 
 /// What a render took over from an earlier run.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Resumed {
     /// Samples of each pixel.
     pub samples: u32,
@@ -254,6 +259,8 @@ pub(crate) struct Resumed {
     pub nonfinite: u64,
     /// And cut were so many.
     pub clamped: u64,
+    /// The devices that took them.
+    pub makers: Vec<Maker>,
 }
 
 /// What a report is made of.
@@ -345,6 +352,7 @@ impl Inputs<'_> {
             queue_overflow: scalar(Scalar::Overflow),
             media_overflow: scalar(Scalar::MediaOverflow),
             lost_paths: scalar(Scalar::LostPaths),
+            adapter_id: self.device.ids.as_ref().map(DeviceIds::id),
             adapter: self.device.into(),
         }
     }

@@ -20,7 +20,7 @@ fn the_gpu_is_described_as_text_and_as_json() {
 #[test]
 fn a_gpu_that_is_not_there_is_named_with_those_that_are() {
     let options = GpuOptions {
-        adapter: Some("Voodoo 2".into()),
+        adapter: Some("Voodoo 2".parse().expect("a name")),
         ..GpuOptions::default()
     };
     let message = match Gpu::new(&options) {
@@ -36,7 +36,7 @@ fn a_gpu_is_found_by_part_of_its_name_in_any_case() {
     let name = gpu().info().name;
     let part: String = name.to_uppercase().chars().take(4).collect();
     let options = GpuOptions {
-        adapter: Some(part),
+        adapter: Some(part.parse().expect("a name")),
         ..GpuOptions::default()
     };
     let found = Gpu::new(&options).unwrap_or_else(|e| panic!("{e}"));

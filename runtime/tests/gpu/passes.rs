@@ -90,7 +90,10 @@ fn passes_give_the_bits_of_the_whole() {
                 samples: count,
                 ..options.clone()
             };
-            assert_eq!(*film, whole(way, &fewer).sums, "{way:?}: {count}");
+            // But that it knows of the samples that were still to come.
+            assert_eq!(film.about.asked[0].count, 6, "{way:?}: {count}");
+            let film = as_asked(film.clone());
+            assert_eq!(film, whole(way, &fewer).sums, "{way:?}: {count}");
         }
         let items = |r: &Rendering| {
             r.report
@@ -235,8 +238,8 @@ fn a_stopped_render_is_one_of_fewer_samples() {
         };
         let stopped = renderer(way, &room(), &options).render(stop);
         let stopped = stopped.unwrap_or_else(|e| panic!("{e}"));
-        let [Range { first: 0, count }] = stopped.sums.ranges[..] else {
-            panic!("{:?}", stopped.sums.ranges);
+        let [Range { first: 0, count }] = stopped.sums.about.ranges[..] else {
+            panic!("{:?}", stopped.sums.about.ranges);
         };
         assert!((1..1 << 20).contains(&count), "{count}");
         let same = RenderOptions {
@@ -244,9 +247,16 @@ fn a_stopped_render_is_one_of_fewer_samples() {
             ..options
         };
         let reference = whole(way, &same);
-        assert_eq!(stopped.sums, reference.sums, "{way:?}");
+        assert_eq!(stopped.sums.about.asked[0].count, 1 << 20, "{way:?}");
+        assert_eq!(as_asked(stopped.sums), reference.sums, "{way:?}");
         assert_eq!(stopped.report.paths, reference.report.paths);
     }
+}
+
+/// The film of a render that was asked for what there is, and no more.
+fn as_asked(mut film: FilmFile) -> FilmFile {
+    film.about.asked.clone_from(&film.about.ranges);
+    film
 }
 
 /// Half of its samples are by another seed, which no other part of a render has.

@@ -201,6 +201,6 @@ fn example_of(dropped: &Dropped) -> Option<(String, [u32; 2], u32)> {
 
 /// Sums of two seeds are no part of a render by one: they merge with none.
 fn mark(sums: &mut FilmFile) {
-    let scene = sums.identity.scene.to_le_bytes();
-    sums.identity.scene = fingerprint::of(&[&scene[..], b"halves"].concat());
+    let scene = sums.about.identity.scene.to_le_bytes();
+    sums.about.identity.scene = fingerprint::of(&[&scene[..], b"halves"].concat());
 }
