@@ -250,6 +250,21 @@ fn strategies_walk_alike() {
     assert_eq!(pictures[0].pixels, pictures[1].pixels);
 }
 
+/// Where nothing is absorbed some walks take thousands of turns, many iterations in which no other path is left.
+#[test]
+fn long_walks_alone_are_no_standstill() {
+    let floor = Subject {
+        geometry: FLOOR,
+        light: SKY,
+        params: "tone = 1.0, radius = [0.1, 0.1, 0.1]",
+        from: [0.0, 2.0, 0.0],
+        depth: 3,
+        ..cube("")
+    };
+    let rendering = floor.render(Strategy::OWN, 64);
+    assert_near(mean(&rendering), [1.0; 3], 0.01);
+}
+
 /// The limit of short radii is a Lambertian surface, and that of long ones lets light through.
 #[test]
 fn radii_of_any_length_end() {

@@ -4,3 +4,4 @@
 mod lines;
 mod live;
 mod vector;
+mod walks;
