@@ -1,9 +1,7 @@
 //! What the materials of a scene, or of a file, cost where they are used: operations of one
 //! evaluation at points of the scene's own surfaces.
 
-use impasto_compiler::cost::{
-    BUDGET, Cost, Inputs, LineCost, Measured, Operations, Spent, Walks,
-};
+use impasto_compiler::cost::{BUDGET, Cost, Inputs, LineCost, Measured, Operations, Spent, Walks};
 use impasto_compiler::inspect::At;
 use impasto_compiler::{Program, abi::MaterialInfo};
 use serde::Serialize;

@@ -1,12 +1,14 @@
 //! Files that may change: what `--watch` waits for.
 //!
 //! They are looked at again and again, which works on every file system, for files that editors replace by others, and
-//! for such as are not there yet.
+//! for such as are not there yet. A path that stands for the tiles of a texture is all of them, and those that come.
 
 use std::collections::BTreeMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
+
+use impasto_runtime::world::texture;
 
 /// How often files are looked at.
 pub const EVERY: Duration = Duration::from_millis(50);
@@ -14,7 +16,14 @@ pub const EVERY: Duration = Duration::from_millis(50);
 /// Files, and how each of them was when it was looked at last.
 #[derive(Clone, Debug, Default)]
 pub struct Watched {
-    files: BTreeMap<PathBuf, Option<Look>>,
+    files: BTreeMap<PathBuf, Looks>,
+}
+
+/// What is at a path: a file, nothing, or tiles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Looks {
+    One(Option<Look>),
+    Tiles(Vec<(PathBuf, Option<Look>)>),
 }
 
 /// What tells one version of a file from the next.
@@ -38,7 +47,9 @@ impl Watched {
     /// Watches more files, as they are now.
     pub fn add(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
         for path in paths {
-            self.files.entry(path).or_insert_with_key(|path| look(path));
+            self.files
+                .entry(path)
+                .or_insert_with_key(|path| looks(path));
         }
     }
 
@@ -51,7 +62,7 @@ impl Watched {
     pub fn changed(&mut self) -> bool {
         let mut changed = false;
         for (path, last) in &mut self.files {
-            let now = look(path);
+            let now = looks(path);
             changed |= now != *last;
             *last = now;
         }
@@ -61,7 +72,18 @@ impl Watched {
     /// The same, while others are still looking.
     pub fn has_changed(&self) -> bool {
         let mut files = self.files.iter();
-        files.any(|(path, last)| look(path) != *last)
+        files.any(|(path, last)| looks(path) != *last)
+    }
+}
+
+fn looks(path: &Path) -> Looks {
+    let tile = |path: PathBuf| {
+        let look = look(&path);
+        (path, look)
+    };
+    match texture::tiles(path) {
+        Some(tiles) => Looks::Tiles(tiles.into_iter().map(tile).collect()),
+        None => Looks::One(look(path)),
     }
 }
 
@@ -112,5 +134,27 @@ mod tests {
         seen(&mut watched);
         std::fs::create_dir(&path).expect("a folder");
         seen(&mut watched);
+    }
+
+    #[test]
+    fn tiles_are_watched_and_other_files_beside_them_are_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let mut watched = Watched::new([at("wall.<UDIM>.png")]);
+        assert!(!watched.changed());
+        for (name, text, is_seen) in [
+            ("wall.1001.png", "a", true),
+            ("wall.1012.png", "a", true),
+            ("wall.1012.png", "ab", true),
+            ("wall.png", "a", false),
+            ("wall.0999.png", "a", false),
+            ("picture.png", "a", false),
+        ] {
+            std::fs::write(at(name), text).expect("written");
+            assert_eq!(watched.changed(), is_seen, "{name}");
+        }
+        std::fs::remove_file(at("wall.1001.png")).expect("removed");
+        assert!(watched.changed());
+        assert!(!watched.changed());
     }
 }

@@ -128,7 +128,11 @@ fn material(out: &mut String, args: &CostArgs, m: &Change) {
         ("code", f64::from(old.code), f64::from(new.code)),
         ("loops", f64::from(old.loops), f64::from(new.loops)),
         ("bytes read", old.bytes, new.bytes),
-        ("walks in 100", 100.0 * share(&m.old_walks), 100.0 * share(&m.new_walks)),
+        (
+            "walks in 100",
+            100.0 * share(&m.old_walks),
+            100.0 * share(&m.new_walks),
+        ),
         ("ray casts a walk", casts(&m.old_walks), casts(&m.new_walks)),
     ];
     for (what, old, new) in rows.into_iter().filter(|(_, old, new)| shows(*old, *new)) {

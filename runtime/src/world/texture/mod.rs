@@ -20,6 +20,7 @@ use crate::scene::Scene;
 use crate::wgsl;
 use crate::wgsl::template::template;
 use crate::wgsl::{BufferData, ShaderPart};
+pub use tiles::tiles;
 use tiles::{Slot, Slots};
 
 mod levels;

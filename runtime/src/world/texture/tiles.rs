@@ -4,7 +4,9 @@
 //! The tile at column u from 0 to 9 and row v has the number 1001 + u + 10 v in the place of the mark.
 //! Which tiles there are is what files there are.
 
-use std::path::Path;
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use impasto_compiler::abi::{FILTERS, Lookups, TextureRef, WRAPS, texture_mode};
 
@@ -96,22 +98,13 @@ fn files(path: &str, base: &Path) -> Result<Vec<(usize, String)>, SceneError> {
     };
     // An empty path is no folder, but that of a scene in the working directory is empty.
     let folder = Path::new(".").join(base).join(folder);
-    let entries = std::fs::read_dir(folder)
+    let numbers = numbers(&folder, before, after)
         .map_err(|e| error(format!("cannot read the folder of the tiles: {e}")))?;
-    let mut found = Vec::new();
-    for entry in entries.flatten() {
-        let file = entry.file_name();
-        let number = file
-            .to_str()
-            .and_then(|f| f.strip_prefix(before)?.strip_suffix(after));
-        let number = number.filter(|n| n.len() == 4 && n.bytes().all(|b| b.is_ascii_digit()));
-        let number = number.and_then(|n| n.parse::<u32>().ok());
-        if let Some(number) = number.filter(|n| (FIRST..=LAST).contains(n)) {
-            let path = path.replacen(MARK, &number.to_string(), 1);
-            found.push(((number - FIRST) as usize, path));
-        }
-    }
-    found.sort_unstable();
+    let file = |number: u32| {
+        let path = path.replacen(MARK, &number.to_string(), 1);
+        ((number - FIRST) as usize, path)
+    };
+    let found: Vec<(usize, String)> = numbers.into_iter().map(file).collect();
     if found.is_empty() {
         let example = name.replacen(MARK, &FIRST.to_string(), 1);
         let hint = format!(
@@ -120,6 +113,30 @@ fn files(path: &str, base: &Path) -> Result<Vec<(usize, String)>, SceneError> {
         return Err(error("there are no tiles of this name".into()).hint(hint));
     }
     Ok(found)
+}
+
+/// The numbers of the tiles in a folder whose names have these parts before and after them, ascending.
+fn numbers(folder: &Path, before: &str, after: &str) -> io::Result<Vec<u32>> {
+    let number = |file: OsString| {
+        let digits = file.to_str()?.strip_prefix(before)?.strip_suffix(after)?;
+        let digits = Some(digits).filter(|n| n.len() == 4 && n.bytes().all(|b| b.is_ascii_digit()));
+        let number = digits?.parse::<u32>().ok();
+        number.filter(|n| (FIRST..=LAST).contains(n))
+    };
+    let entries = std::fs::read_dir(folder)?.flatten();
+    let mut numbers: Vec<u32> = entries.filter_map(|e| number(e.file_name())).collect();
+    numbers.sort_unstable();
+    Ok(numbers)
+}
+
+/// The files that there are now of the tiles at `path`; none if it is the path of one picture.
+pub fn tiles(path: &Path) -> Option<Vec<PathBuf>> {
+    let (before, after) = path.file_name()?.to_str()?.split_once(MARK)?;
+    let folder = path.parent()?;
+    // A folder that is not there has no tiles.
+    let numbers = numbers(&Path::new(".").join(folder), before, after).unwrap_or_default();
+    let file = |number| folder.join(format!("{before}{number}{after}"));
+    Some(numbers.into_iter().map(file).collect())
 }
 
 /// The words of a table: how many rows, then for each tile its slot, or [`NO_TILE`].
