@@ -72,7 +72,8 @@ fn open<'a>(
     what: &str,
 ) -> Result<(ImageFormat, Box<dyn ImageDecoder + 'a>), SceneError> {
     let error = |message: String| SceneError::in_file(path, message);
-    let unreadable = |e: std::io::Error| error(format!("cannot read the {what}: {e}"));
+    let unreadable =
+        |e: std::io::Error| error(format!("cannot read the {what}: {}", input::reason(&e)));
     let mut file = BufReader::new(input::open(path).map_err(unreadable)?);
     let start = file.fill_buf().map_err(unreadable)?.to_vec();
     if start.is_empty() {

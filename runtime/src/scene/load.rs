@@ -85,8 +85,12 @@ impl<'f> SceneFile<'f> {
         formats: &'f [Format],
         lights: &[LightReader],
     ) -> Result<Self, SceneError> {
-        let text = input::read(path)
-            .map_err(|e| SceneError::in_file(path, format!("cannot read the scene: {e}")))?;
+        let text = input::read(path).map_err(|e| {
+            SceneError::in_file(
+                path,
+                format!("cannot read the scene: {}", input::reason(&e)),
+            )
+        })?;
         let text = String::from_utf8(text)
             .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
         Self::of_text(path, text, formats, lights)

@@ -187,8 +187,12 @@ const MATERIAL: &str = "material";
 
 /// Reads a file of places: a line that names the columns, then a line a place.
 pub(super) fn read_file(path: &Path) -> Result<Places, SceneError> {
-    let bytes = input::read(path)
-        .map_err(|e| SceneError::in_file(path, format!("cannot read the placements: {e}")))?;
+    let bytes = input::read(path).map_err(|e| {
+        SceneError::in_file(
+            path,
+            format!("cannot read the placements: {}", input::reason(&e)),
+        )
+    })?;
     let text = String::from_utf8(bytes)
         .map_err(|_| SceneError::in_file(path, "the placements are not UTF-8 text"))?;
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();

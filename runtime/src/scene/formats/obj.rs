@@ -34,8 +34,12 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         let error = SceneError::in_file(path, format!("{other} files are not read"));
         return Err(error.hint("export the geometry as OBJ"));
     }
-    let bytes = input::read(path)
-        .map_err(|e| SceneError::in_file(path, format!("cannot read the OBJ file: {e}")))?;
+    let bytes = input::read(path).map_err(|e| {
+        SceneError::in_file(
+            path,
+            format!("cannot read the OBJ file: {}", input::reason(&e)),
+        )
+    })?;
     if bytes.contains(&0) {
         let error = SceneError::in_file(path, "the OBJ file is binary or in UTF-16");
         return Err(error.hint("save it as UTF-8 or ASCII text"));

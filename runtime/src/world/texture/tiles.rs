@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use impasto_compiler::abi::{FILTERS, Lookups, TextureRef, WRAPS, texture_mode};
 
 use crate::error::SceneError;
+use crate::input;
 
 /// What stands for the number of a tile.
 const MARK: &str = "<UDIM>";
@@ -98,8 +99,12 @@ fn files(path: &str, base: &Path) -> Result<Vec<(usize, String)>, SceneError> {
     };
     // An empty path is no folder, but that of a scene in the working directory is empty.
     let folder = Path::new(".").join(base).join(folder);
-    let numbers = numbers(&folder, before, after)
-        .map_err(|e| error(format!("cannot read the folder of the tiles: {e}")))?;
+    let numbers = numbers(&folder, before, after).map_err(|e| {
+        error(format!(
+            "cannot read the folder of the tiles: {}",
+            input::reason(&e)
+        ))
+    })?;
     let file = |number: u32| {
         let path = path.replacen(MARK, &number.to_string(), 1);
         ((number - FIRST) as usize, path)

@@ -43,8 +43,12 @@ const fn value(name: &'static str, fallback: &'static [f64]) -> FileValue {
 /// Reads the materials of the MTL file `name`, which is relative to the folder `base` of the scene.
 pub(super) fn load(base: &Path, name: &Path) -> Result<Vec<FileMaterial>, SceneError> {
     let path = &base.join(name);
-    let bytes = input::read(path)
-        .map_err(|e| SceneError::in_file(path, format!("cannot read the MTL file: {e}")))?;
+    let bytes = input::read(path).map_err(|e| {
+        SceneError::in_file(
+            path,
+            format!("cannot read the MTL file: {}", input::reason(&e)),
+        )
+    })?;
     let text = normalise(path, &String::from_utf8_lossy(&bytes))?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
         .map_err(|e| SceneError::in_file(path, format!("not a valid MTL file: {e}")))?;
