@@ -69,10 +69,12 @@ fn with(stage: Stage, asking: &str, call: &str) -> &'static [Stage] {
         assert!(by.body.text.contains(call), "{call}");
         by.body.text = by.body.text.replace(call, &asks).leak();
     }
-    let after = stages.iter().rposition(|s| s.phase == stage.phase);
     let at = match stage.phase {
-        Phase::Rays => after,
-        _ => after.map(|at| at + 1),
+        Phase::Rays => stages.iter().position(|s| s.name == "extension"),
+        phase => stages
+            .iter()
+            .rposition(|s| s.phase == phase)
+            .map(|at| at + 1),
     };
     stages.insert(at.expect("a stage of its phase"), stage);
     stages.leak()
