@@ -40,6 +40,7 @@ pub use runtime::device::{Choice, Device, DeviceOptions};
 pub use runtime::error::RuntimeError;
 pub use runtime::error::SceneError;
 pub use runtime::gpu::{Gpu, GpuOptions};
+pub use runtime::multi::MultiRenderer;
 pub use runtime::options::RenderOptions;
 pub use runtime::render::{Renderer, Rendering};
 pub use runtime::scene::Scene;

@@ -88,7 +88,7 @@ fn pictures_of_a_sheet_run_one_code() {
     let program = compiled(&requests, PAINT);
     assert!(shares_code(&program, &counts));
     let device = device();
-    let studio = Studio::new(&device);
+    let studio = Studio::new(std::slice::from_ref(&device));
     let mut seen: Vec<(Vec<String>, Vec<[f32; 3]>)> = Vec::new();
     for (index, first) in firsts(&counts).into_iter().enumerate() {
         let scene = scene(&subject, &sweep.asked(&asked, index));
@@ -101,7 +101,7 @@ fn pictures_of_a_sheet_run_one_code() {
 #[test]
 fn other_values_and_other_times_need_no_other_code() {
     let (subject, device) = (subject(), device());
-    let studio = Studio::new(&device);
+    let studio = Studio::new(std::slice::from_ref(&device));
     let scene = scene(&subject, &Asked::default());
     let of = |text: &str, moment: Option<Moment>| {
         let mut requests = open_requests(&scene);

@@ -11,6 +11,7 @@
 //! | [`gpu`], [`cpu`] | pipelines, buffers, dispatches; native code and the threads that run it |
 //! | [`device`] | either of them |
 //! | [`render`] | a [`render::Renderer`] dispatches kernels until every path is done, and gives a [`film::Film`] and a [`render::report::Report`] |
+//! | [`multi`] | renderers on several devices share the samples of one picture |
 //! | [`lab`], [`audit`] | experiments on top of all |
 
 pub mod audit;
@@ -24,6 +25,7 @@ mod image_file;
 pub mod input;
 pub mod kernels;
 pub mod lab;
+pub mod multi;
 pub mod options;
 mod parallel;
 pub mod render;

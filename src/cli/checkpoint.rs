@@ -10,7 +10,7 @@ use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::output::remove_unfinished;
 use impasto::runtime::options::Progress;
 use impasto::runtime::render::passes::Keeping;
-use impasto::{Renderer, Rendering, RuntimeError};
+use impasto::{MultiRenderer, Rendering, RuntimeError};
 
 use super::{Failure, Global};
 
@@ -71,7 +71,7 @@ impl CheckpointArgs {
     /// the render itself is still worth finishing.
     pub(super) fn render(
         &self,
-        renderer: &mut Renderer<'_>,
+        renderer: &mut MultiRenderer<'_>,
         start: Option<FilmFile>,
         global: &Global,
         progress: OnProgress<'_>,
@@ -82,9 +82,11 @@ impl CheckpointArgs {
         if let Some(film) = &start {
             let (done, name) = (film.samples(), path.display());
             global.note(&format!("going on from the {done} samples of `{name}`"));
-            let device = renderer.maker();
-            let others = film.about.makers.iter().filter(|maker| **maker != device);
-            for other in others {
+            let devices = renderer.makers();
+            let others = film.about.makers.iter();
+            for other in others.filter(|maker| !devices.contains(maker)) {
+                let names: Vec<String> = devices.iter().map(ToString::to_string).collect();
+                let device = names.join(" and ");
                 global.note(&format!(
                     "warning: they are of {other}, and {device} goes on: the bits may not be those of one device"
                 ));

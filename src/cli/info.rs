@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use impasto::runtime::cpu::MOST_THREADS;
-use impasto::runtime::gpu::{DeviceInfo, Environment, Selector};
+use impasto::runtime::gpu::{DeviceInfo, Environment, Selector, Several};
 use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, Width};
 use serde::Serialize;
 
@@ -102,6 +102,30 @@ impl DeviceArgs {
             ));
         }
         Ok(device)
+    }
+
+    /// The devices that were asked for: several GPUs, or one device.
+    pub(super) fn open_all(
+        &self,
+        several: Option<&Several>,
+        global: &Global,
+    ) -> Result<Vec<Device>, Failure> {
+        let Some(several) = several else {
+            return Ok(vec![self.open(global)?]);
+        };
+        self.check()?;
+        if self.is_cpu() {
+            return Err(Failure::Error(
+                "`--gpus` chooses GPUs, but `--device cpu` the processor\n  hint: leave out one of the two".into(),
+            ));
+        }
+        let mut note = |line: &str| global.note(line);
+        let gpus = Gpu::several(several, &self.gpu.options(), &mut note);
+        let gpus = gpus.map_err(super::runtime)?;
+        Ok(gpus
+            .into_iter()
+            .map(|gpu| Device::Gpu(Box::new(gpu)))
+            .collect())
     }
 
     /// A GPU, software or not, for what needs one.

@@ -8,6 +8,7 @@ use impasto::runtime::gpu::DeviceInfo;
 use super::{Failure, read_text};
 
 /// A profile, and whether it is the GPU's own.
+#[derive(Clone)]
 pub(super) struct Profile {
     /// The name of the shipped profile that it is or is scaled from, or its file.
     pub(super) name: String,

@@ -17,13 +17,14 @@ use impasto::compiler::{self, Loader, Written};
 use impasto::runtime::error::{Excerpt, SceneError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
+use impasto::runtime::gpu::Several;
 use impasto::runtime::options::Progress;
 use impasto::runtime::render::Replanning;
 use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
 use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
-    Device, FileLoader, MaterialRequest, Plan, Program, RenderOptions, Renderer, Rendering,
+    Device, FileLoader, MaterialRequest, MultiRenderer, Plan, Program, RenderOptions, Rendering,
     RuntimeError, Scene, Strategy, files, plan, shot,
 };
 
@@ -84,6 +85,10 @@ pub(super) struct RenderArgs {
     pool: Option<u32>,
     #[command(flatten)]
     pub(super) device: DeviceArgs,
+    /// Share the samples among several GPUs: `all`, so many of them, or a list of what `--gpu` takes. The picture has
+    /// the bits of one GPU of that kind (docs/devices.md)
+    #[arg(long, value_name = "all|N|GPU,..", conflicts_with_all = ["gpu", "threads"], value_parser = parse_several)]
+    pub(super) gpus: Option<Several>,
     #[command(flatten)]
     pub(super) shot: ShotArgs,
     // Last, since its heading is that of all options after it.
@@ -104,6 +109,10 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
             "expected width and height from 1 to {MAX_SIDE}, as in 640x480"
         )),
     }
+}
+
+fn parse_several(text: &str) -> Result<Several, String> {
+    text.parse()
 }
 
 /// Longest side of a picture in pixels.
@@ -130,16 +139,17 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     meter.show(0.0, COMPILING);
     let program = Arc::new(compile(&scene, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
-    let device = args.device.open(global)?;
-    let planned = args.planned(&scene, &program, &device)?;
-    if device.replaces_plan(&planned.plan) {
-        global.note(&replaced(&planned.plan.strategy, device.strategy()));
+    let devices = args.device.open_all(args.gpus.as_ref(), global)?;
+    // GPUs plan alike until they know what paths hit; the processor renders alone.
+    let planned = args.planned(&scene, &program, &devices[0])?;
+    if devices[0].replaces_plan(&planned.plan) {
+        global.note(&replaced(&planned.plan.strategy, devices[0].strategy()));
     }
     let given = args.device_profile.as_deref().map(Profile::given);
     let given = given.transpose()?;
     let options = args.options(planned.renewed_by.is_some(), goals.is_some());
     let mut renderer = build(
-        &device,
+        &devices,
         &scene,
         &program,
         &planned.plan,
@@ -148,13 +158,21 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         &meter,
     )?;
     if let Some(strategy) = planned.renewed_by {
-        let profile = given.map_or_else(|| Profile::of(&device.info()), Ok)?;
-        if !profile.exact {
+        let profile = |device: &Device| match &given {
+            Some(profile) => Ok(profile.clone()),
+            None => Profile::of(&device.info()),
+        };
+        let profiles: Result<Vec<Profile>, Failure> = devices.iter().map(profile).collect();
+        let profiles = profiles?;
+        if profiles.iter().any(|profile| !profile.exact) {
             global.detail("no profile is of this GPU; `impasto calibrate` makes one");
         }
-        let (scene, program) = (scene.clone(), program.clone());
-        let planner = plan::planner(strategy, scene, program.clone(), profile.profile, POINTS);
-        renderer.replan(Replanning::new(program, planner));
+        renderer.replan(|index| {
+            let (scene, program) = (scene.clone(), program.clone());
+            let profile = profiles[index].profile.clone();
+            let planner = plan::planner(strategy, scene, program.clone(), profile, POINTS);
+            Replanning::new(program, planner)
+        });
     }
     let mut rendering = match &goals {
         Some(goals) => {
@@ -358,19 +376,21 @@ fn interrupted_early(global: &Global) -> Failure {
 
 /// Makes everything ready for sampling, and shows how far that is: very many materials take a while.
 fn build<'g>(
-    device: &'g Device,
+    devices: &'g [Device],
     scene: &Scene,
     program: &Program,
     plan: &Plan,
     options: &RenderOptions,
     global: &Global,
     meter: &Meter,
-) -> Result<Renderer<'g>, Failure> {
+) -> Result<MultiRenderer<'g>, Failure> {
     let watch = |done: usize, total: usize| {
         meter.show(0.0, format!("building kernels (step {done} of {total})"));
         unless_interrupted()
     };
-    let renderer = Renderer::new_watched(device, scene, program, plan, options, &watch);
+    let devices = devices.iter().map(|device| (device.into(), plan));
+    let devices: Vec<_> = devices.collect();
+    let renderer = MultiRenderer::new_watched(&devices, scene, program, options, &watch);
     renderer.map_err(|error| match error {
         RuntimeError::Interrupted => interrupted_early(global),
         other => runtime(other),
@@ -379,7 +399,7 @@ fn build<'g>(
 
 /// Takes all samples, or those until Ctrl-C.
 fn sample(
-    renderer: &mut Renderer,
+    renderer: &mut MultiRenderer<'_>,
     args: &RenderArgs,
     start: Option<FilmFile>,
     global: &Global,
@@ -397,7 +417,7 @@ fn sample(
 
 /// Takes samples until a goal is reached, or Ctrl-C, and tells the error as it falls.
 fn sample_until(
-    renderer: &mut Renderer,
+    renderer: &mut MultiRenderer<'_>,
     (goals, way): (&Goals, Way),
     scene: &Scene,
     global: &Global,
@@ -448,8 +468,11 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
         outputs.names(),
         report.wall_seconds,
         report.paths_per_second * 1e-6,
-        report.adapter.name,
+        rendered_on(report),
     ));
+    for warning in lost(report) {
+        global.note(&warning);
+    }
     global.note(&format!(
         "{} for {}: {}",
         super::count(report.material_count, "material"),
@@ -497,6 +520,38 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
             "warning: {lost} paths crossed too many hidden boundaries in a row, or were turned too often in matter, and were ended"
         ));
     }
+}
+
+/// The device that rendered, or how many there were of each name.
+fn rendered_on(report: &Report) -> String {
+    let mut names: Vec<(&str, usize)> = Vec::new();
+    for device in &report.devices {
+        let name = device.adapter.name.as_str();
+        match names.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => names.push((name, 1)),
+        }
+    }
+    if names.is_empty() {
+        return report.adapter.name.clone();
+    }
+    let said = names
+        .iter()
+        .map(|(name, count)| format!("{count} x {name}"));
+    said.collect::<Vec<_>>().join(", ")
+}
+
+/// Warnings of devices that were lost, where others went on.
+fn lost(report: &Report) -> impl Iterator<Item = String> {
+    let lost = report.devices.iter().filter_map(|device| {
+        let why = device.lost.as_ref()?.lines().next()?;
+        let id = device.adapter_id.as_deref().unwrap_or_default();
+        Some(format!(
+            "warning: {} (`{id}`) was lost after {} samples, and others took over the rest: {why}",
+            device.adapter.name, device.samples
+        ))
+    });
+    lost
 }
 
 /// What became of the automatic plan.

@@ -184,11 +184,11 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         return watch(args, global);
     }
     let outputs = sheet_outputs(args)?;
-    let device = args.device.open(global)?;
+    let devices = args.device.open_all(args.gpus.as_ref(), global)?;
     let stop = || interrupt::requested();
     let made = Making {
         args,
-        studio: &Studio::new(&device),
+        studio: &Studio::new(&devices),
         global,
         stop: &stop,
         watched: None,
@@ -365,8 +365,8 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
     }
     let first = Outputs::of(&frames.path(&out, frames.numbers().next().unwrap_or(0)))?;
     first.check_aov(&args.aov)?;
-    let device = args.device.open(global)?;
-    let studio = Studio::new(&device);
+    let devices = args.device.open_all(args.gpus.as_ref(), global)?;
+    let studio = Studio::new(&devices);
     let quiet = Global {
         quiet: true,
         verbose: 0,
@@ -448,8 +448,8 @@ fn watch(args: &RenderArgs, global: &Global) -> Outcome {
         // That is a slip, and nothing to wait for.
         files::check_readable(&args.scene)?;
     }
-    let device = args.device.open(global)?;
-    let studio = Studio::new(&device);
+    let devices = args.device.open_all(args.gpus.as_ref(), global)?;
+    let studio = Studio::new(&devices);
     let watched = RefCell::new(Watched::new([args.scene.clone()]));
     loop {
         watched.borrow_mut().changed();

@@ -9,8 +9,9 @@ use impasto_compiler::partition::Plan;
 use impasto_compiler::{MaterialRequest, Parameters, Program};
 use impasto_runtime::device::Device;
 use impasto_runtime::error::{RuntimeError, SceneError};
+use impasto_runtime::multi::MultiRenderer;
 use impasto_runtime::options::RenderOptions;
-use impasto_runtime::render::Renderer;
+use impasto_runtime::render::NOBODY;
 use impasto_runtime::scene::{Animation, Asked, Scene, SceneFile};
 use impasto_runtime::world::bvh::Trees;
 use impasto_runtime::world::{self, MaterialSource, World};
@@ -114,18 +115,18 @@ pub fn textures(scene: &Scene, program: &Program) -> Vec<PathBuf> {
     textures.map(|t| scene.base.join(t.path)).collect()
 }
 
-/// A device, and what is kept on it from one picture to the next.
+/// Devices that render together, and what is kept on them from one picture to the next.
 #[derive(Debug)]
 pub struct Studio<'d> {
-    device: &'d Device,
+    devices: &'d [Device],
     trees: Trees,
 }
 
 impl<'d> Studio<'d> {
     /// One that keeps nothing yet.
-    pub fn new(device: &'d Device) -> Self {
+    pub fn new(devices: &'d [Device]) -> Self {
         Self {
-            device,
+            devices,
             trees: Trees::default(),
         }
     }
@@ -141,7 +142,7 @@ impl<'d> Studio<'d> {
         program: &Program,
         first: usize,
         options: &RenderOptions,
-    ) -> Result<Renderer<'d>, RuntimeError> {
+    ) -> Result<MultiRenderer<'d>, RuntimeError> {
         let chosen = Chosen::new(program, first, scene.materials.len());
         let (technique, outputs) = (&options.technique, &options.outputs);
         let instances = &chosen.instances;
@@ -149,7 +150,9 @@ impl<'d> Studio<'d> {
             World::of_instances(scene, program, instances, technique, outputs, &self.trees)?;
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let plan = Plan::few_kernels(&names, &scene.unbound(names.len(), instances));
-        let renderer = Renderer::from_world(self.device, &world, &chosen, &plan, options)?;
+        let devices = self.devices.iter().map(|device| (device.into(), &plan));
+        let devices: Vec<_> = devices.collect();
+        let renderer = MultiRenderer::build(&devices, &world, &chosen, options, NOBODY)?;
         Ok(renderer.named(&scene.name))
     }
 }

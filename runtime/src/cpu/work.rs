@@ -286,6 +286,11 @@ impl Work {
         self.shared[BufferId::Film.index()].write(0, words);
     }
 
+    /// Empties the film alone.
+    pub(crate) fn clear_film(&self) {
+        self.shared[BufferId::Film.index()].clear();
+    }
+
     /// The words of the film.
     pub(crate) fn read_film(&self) -> Vec<u32> {
         self.shared[BufferId::Film.index()].read()

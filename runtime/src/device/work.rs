@@ -145,6 +145,14 @@ impl Work {
         }
     }
 
+    /// Empties the film alone.
+    pub(crate) fn clear_film(&self) {
+        match self {
+            Work::Gpu(work) => work.clear_film(),
+            Work::Cpu(work) => work.clear_film(),
+        }
+    }
+
     /// The words of the film.
     pub(crate) fn read_film(&self) -> Result<Vec<u32>, RuntimeError> {
         match self {

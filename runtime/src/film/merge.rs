@@ -261,15 +261,15 @@ impl FilmFile {
         Ok(())
     }
 
-    /// How many samples of a render with some outputs are done, if these are the first ones of it. Fails, in
-    /// words, if they are not.
+    /// Which samples of a render with some outputs are done, if these are none but its own. Fails, in words, if they are
+    /// not.
     pub(crate) fn done_of_all(
         &self,
         identity: &Identity,
         layers: &Layers,
         first: u32,
         samples: u32,
-    ) -> Result<u32, String> {
+    ) -> Result<&[Range], String> {
         match layers.difference(self.sums.layers()) {
             Some(difference) => Err(format!("its outputs are others: {difference}")),
             None => self.done_of(identity, first, samples),
@@ -277,26 +277,38 @@ impl FilmFile {
     }
 
     /// The same, whatever the outputs.
-    pub fn done_of(&self, identity: &Identity, first: u32, samples: u32) -> Result<u32, String> {
+    pub fn done_of(
+        &self,
+        identity: &Identity,
+        first: u32,
+        samples: u32,
+    ) -> Result<&[Range], String> {
         if let Some(difference) = identity.difference(&self.about.identity) {
             return Err(format!("it is of another render: {difference}"));
         }
-        let [range] = self.about.ranges[..] else {
-            return Err("its samples have gaps".into());
-        };
-        let (from, last) = (range.first, range.end() - 1);
-        if from != u64::from(first) {
+        let held = &self.about.ranges;
+        let begins = held.first().is_none_or(|r| r.first >= u64::from(first));
+        if !begins {
             return Err(format!(
-                "it holds the samples {from} to {last}, but this render starts at {first}"
+                "it holds {}, but this render starts at {first}",
+                ranges::said(held)
             ));
         }
-        match u32::try_from(range.count) {
-            Ok(count) if count <= samples => Ok(count),
-            _ => Err(format!(
-                "it holds {} samples a pixel, more than the {samples} asked for",
-                range.count
-            )),
+        let end = u64::from(first) + u64::from(samples);
+        if held.last().is_some_and(|range| range.end() > end) {
+            return Err(match held[..] {
+                [range] if range.first == u64::from(first) => format!(
+                    "it holds {} samples a pixel, more than the {samples} asked for",
+                    range.count
+                ),
+                _ => format!(
+                    "it holds {}, but this render ends at {}",
+                    ranges::said(held),
+                    end - 1
+                ),
+            });
         }
+        Ok(held)
     }
 }
 
@@ -361,10 +373,13 @@ mod tests {
     fn a_checkpoint_fits_its_render_and_no_other() {
         let film = part(4, 6, 1);
         let done = |first, samples| film.done_of(&film.about.identity, first, samples);
-        assert_eq!(done(4, 6), Ok(6));
-        assert_eq!(done(4, 100), Ok(6));
+        let all: Result<&[Range], String> = Ok(&[Range { first: 4, count: 6 }]);
+        assert_eq!(done(4, 6), all);
+        assert_eq!(done(4, 100), all);
+        assert_eq!(done(0, 10), all);
         assert!(done(4, 5).is_err_and(|e| e.contains("holds 6 samples")));
-        assert!(done(0, 6).is_err_and(|e| e.contains("samples 4 to 9")));
+        assert!(done(0, 6).is_err_and(|e| e.contains("samples 4 to 9, but this render ends at 5")));
+        assert!(done(5, 9).is_err_and(|e| e.contains("starts at 5")));
         let other = Identity {
             seed: 1,
             ..film.about.identity

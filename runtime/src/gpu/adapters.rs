@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::selection::{Chosen, Described, PciAddress, select};
+use super::selection::{Chosen, Described, PciAddress, Several, select, select_all};
 use super::{DeviceIds, GpuOptions, memory, nvidia, selection};
 use crate::error::RuntimeError;
 
@@ -52,6 +52,22 @@ impl Adapters {
         let Chosen { adapters, notes } = select(selector, &options.environment, &self.described)?;
         notes.iter().for_each(|line| note(line));
         Ok(adapters.first().and_then(|place| self.at(*place)))
+    }
+
+    /// Those that render together.
+    pub(super) fn choose_several(
+        &self,
+        several: &Several,
+        options: &GpuOptions,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Found>, RuntimeError> {
+        let Chosen { adapters, notes } =
+            select_all(several, &options.environment, &self.described)?;
+        notes.iter().for_each(|line| note(line));
+        Ok(adapters
+            .into_iter()
+            .filter_map(|place| self.at(place))
+            .collect())
     }
 
     /// The first driver in software.

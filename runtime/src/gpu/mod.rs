@@ -21,7 +21,7 @@ mod timing;
 pub(crate) mod work;
 
 pub use info::{DeviceIds, DeviceInfo};
-pub use selection::{Environment, Selector};
+pub use selection::{Environment, Selector, Several};
 pub use statistics::KernelStatistics;
 pub use timing::Timing;
 
@@ -93,6 +93,23 @@ impl Gpu {
                 hint: "",
             }),
         }
+    }
+
+    /// Opens GPUs that render together, each once.
+    ///
+    /// # Errors
+    /// If one is not there, fits several, is listed twice, there are fewer than asked for, or one cannot be opened.
+    pub fn several(
+        several: &Several,
+        options: &GpuOptions,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Self>, RuntimeError> {
+        let adapters = Adapters::of_machine(options.validate_indirect);
+        let found = adapters.choose_several(several, options, note)?;
+        found
+            .into_iter()
+            .map(|found| Self::open(found, options))
+            .collect()
     }
 
     /// Opens a GPU unless none was asked for, and there is none but software.

@@ -121,6 +121,13 @@ impl Resources {
         gpu.queue.write_buffer(film, 0, bytemuck::cast_slice(words));
     }
 
+    /// Empties the film alone.
+    pub(crate) fn clear_film(&self, gpu: &Gpu) {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(self.buffer(BufferId::Film), 0, None);
+        gpu.queue.submit([encoder.finish()]);
+    }
+
     /// The words of the film.
     pub(crate) fn read_film(&self, gpu: &Gpu) -> Result<Vec<u32>, RuntimeError> {
         let film = self.buffer(BufferId::Film);

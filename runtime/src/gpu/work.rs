@@ -110,6 +110,11 @@ impl Work {
         self.resources.write_film(&self.gpu, words);
     }
 
+    /// Empties the film alone.
+    pub(crate) fn clear_film(&self) {
+        self.resources.clear_film(&self.gpu);
+    }
+
     /// The words of the film.
     pub(crate) fn read_film(&self) -> Result<Vec<u32>, RuntimeError> {
         self.resources.read_film(&self.gpu)

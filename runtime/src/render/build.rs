@@ -144,7 +144,7 @@ impl<'g> Renderer<'g> {
         Self::build(device.into(), world, source, plan, options, NOBODY)
     }
 
-    pub(super) fn build(
+    pub(crate) fn build(
         device: DeviceRef<'g>,
         world: &World,
         source: &dyn MaterialSource,

@@ -5,13 +5,12 @@
 //! pool and by adapting the number of iterations, so that a driver never sees a long kernel.
 
 use std::collections::VecDeque;
-use std::ops::ControlFlow;
 
 use super::{Progress, Renderer};
 use crate::device::Submission;
 use crate::error::RuntimeError;
 use crate::kernels::queues::Scalar;
-use crate::render::passes::Pass;
+use crate::render::passes::{Order, Pass, Watcher};
 use crate::render::pool::{self, Pace};
 use crate::render::status::Status;
 
@@ -31,18 +30,18 @@ struct Run<'r> {
     finished_at: u64,
     /// Whether there is more to submit.
     going: bool,
-    /// Whether the pass was cut short.
-    cut: bool,
+    /// Whether the pass is to be cut short when nothing is in flight.
+    halted: bool,
 }
 
 impl Renderer<'_> {
-    /// Submits iterations until no path of the pass is left. If `progress` breaks, the pass ends
-    /// with the sample that the last path to be begun is of.
-    pub(super) fn run(
+    /// Submits iterations until no path of the pass is left. The watcher hears how many paths of this render are done,
+    /// and may make the pass shorter.
+    pub(crate) fn run(
         &mut self,
         pass: &mut Pass,
         status: &mut Status,
-        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        watcher: &mut dyn Watcher,
     ) -> Result<(), RuntimeError> {
         if let Some(replan) = &mut self.replan {
             replan.begin_pass(status.iterations);
@@ -57,7 +56,7 @@ impl Renderer<'_> {
             in_flight: VecDeque::new(),
             spare: Vec::new(),
             going: true,
-            cut: false,
+            halted: false,
             pass,
             status,
         };
@@ -69,25 +68,27 @@ impl Renderer<'_> {
             }
             if let Some(submission) = run.in_flight.pop_front() {
                 run.wait(self, submission)?;
-                if progress(&self.progress_of_all(&run.now, run.pass)).is_break() {
-                    run.stop();
+                if watcher.look(&run.now) == Order::Halt {
+                    (run.going, run.halted) = (false, true);
                 }
             } else if changes {
                 self.change_plan(run.status, run.now.elapsed);
                 run.spare.clear();
                 run.pace.limit(self.built.work.max_iterations());
-            } else if !run.goes_on_after_cut(self) {
+            } else if !run.goes_on_after_cut(self, watcher) {
                 return Ok(());
             }
         }
     }
 
-    /// Ends a pass with the sample whose paths were begun last.
-    fn cut(&self, pass: &mut Pass, status: &Status) {
+    /// Makes a pass shorter, as the watcher says. Nothing may be in flight: what is begun is known only then.
+    fn cut(&self, pass: &mut Pass, status: &Status, watcher: &mut dyn Watcher) {
         let built = &self.built;
         let scalar = |s| built.layout.counters.scalar(&status.counters, s);
-        let begun = u32::from(scalar(Scalar::NextPixel) > 0);
-        pass.samples = pass.samples.min(scalar(Scalar::NextSample) + begun);
+        let begun = scalar(Scalar::NextSample) + u32::from(scalar(Scalar::NextPixel) > 0);
+        let begun = begun.min(pass.samples);
+        let keep = watcher.keep(begun, pass.samples);
+        pass.samples = keep.clamp(begun, pass.samples);
         built.work.set_run(&pass.options(&self.options));
     }
 
@@ -110,7 +111,7 @@ impl Renderer<'_> {
     fn progress(&self, status: Option<&Status>, pass: &Pass) -> Progress {
         let layout = &self.built.layout;
         let pixels = self.pixels();
-        let before = pixels * u64::from(pass.done - pass.resumed);
+        let before = pixels * u64::from(pass.done);
         let paths = status.map_or(before, |status| {
             let words = &status.counters;
             let scalar = |s| u64::from(layout.counters.scalar(words, s));
@@ -129,21 +130,12 @@ impl Renderer<'_> {
         }
     }
 
-    /// The same of all samples that are asked for.
-    fn progress_of_all(&self, now: &Progress, pass: &Pass) -> Progress {
-        Progress {
-            paths: now.paths + self.pixels() * u64::from(pass.resumed),
-            total: self.pixels() * u64::from(self.options.samples),
-            ..*now
-        }
-    }
-
     /// The time that all that is left will take, at the rate so far.
     fn time_left(&self, now: &Progress, pass: &Pass) -> f64 {
-        if pass.stopped || now.paths == 0 {
+        if now.paths == 0 {
             return 0.0;
         }
-        let all = self.pixels() * u64::from(self.options.samples - pass.resumed);
+        let all = self.pixels() * u64::from(pass.expected.max(pass.done + pass.samples));
         let left = all.saturating_sub(now.paths) as f64;
         now.elapsed.as_secs_f64() * left / now.paths as f64
     }
@@ -188,22 +180,13 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Submits no more of this pass than what is begun.
-    fn stop(&mut self) {
-        if !self.pass.stopped {
-            self.pass.stopped = true;
-            self.going = false;
-        }
-    }
-
-    /// Whether there is more to do when nothing is in flight: once, if the render was stopped, whose
-    /// counters then say which sample it ends with.
-    fn goes_on_after_cut(&mut self, renderer: &Renderer<'_>) -> bool {
-        if !self.pass.stopped || self.cut {
+    /// Whether there is more to do when nothing is in flight: after a halt, when the counters say how many samples
+    /// are begun.
+    fn goes_on_after_cut(&mut self, renderer: &Renderer<'_>, watcher: &mut dyn Watcher) -> bool {
+        if !std::mem::take(&mut self.halted) {
             return false;
         }
-        self.cut = true;
-        renderer.cut(self.pass, self.status);
+        renderer.cut(self.pass, self.status, watcher);
         self.now = renderer.progress(Some(self.status), self.pass);
         self.going = self.now.paths < self.now.total;
         true

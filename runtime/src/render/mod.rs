@@ -23,7 +23,7 @@ pub use replan::{Planner, Replanning};
 pub use selection::Samples;
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use impasto_compiler::partition::Workload;
 
@@ -31,11 +31,11 @@ use crate::device::DeviceRef;
 use crate::error::RuntimeError;
 use crate::film::file::{About, FilmFile, Identity, Maker, Range};
 use crate::film::layers::Layers;
-use crate::film::{Film, Sums};
+use crate::film::{Film, Sums, ranges};
 use crate::kernels::dropped::Dropped;
 use crate::kernels::queues::Scalar;
 use crate::options::{Progress, RenderOptions};
-use crate::render::passes::{Keeping, Pass, Passes};
+use crate::render::passes::{Keeping, Pass, Passes, Stopping, Watcher};
 use crate::render::report::{MaterialReport, Report, Resumed};
 use crate::render::status::Status;
 use crate::render::workload::Mark;
@@ -66,6 +66,35 @@ pub struct Renderer<'g> {
     texts: Option<World>,
     replan: Option<Replan>,
     replanned: Option<Change>,
+}
+
+/// What a renderer has taken of a render so far.
+pub(crate) struct Taking {
+    pub pass: Pass,
+    pub status: Status,
+    /// The samples that are in its film, but for those it was filled with.
+    pub taken: Vec<Range>,
+}
+
+impl Taking {
+    /// Nothing yet of a render that began at some time and in which a renderer is expected to take so many samples, by
+    /// kernels of so many steps.
+    fn new(begin: Instant, expected: u32, steps: usize) -> Self {
+        Self {
+            pass: Pass::new(begin, expected),
+            status: Status::new(steps),
+            taken: Vec::new(),
+        }
+    }
+}
+
+/// Samples that are not in a film as they came out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Counted {
+    /// Those that were dropped.
+    pub nonfinite: u64,
+    /// Those that were cut.
+    pub clamped: u64,
 }
 
 /// What the report says of the world and the plan.
@@ -146,97 +175,179 @@ impl<'g> Renderer<'g> {
         }
     }
 
+    /// What is rendered.
+    pub(crate) fn options(&self) -> &RenderOptions {
+        &self.options
+    }
+
+    /// Changes which samples are rendered, of a seed and a range that are checked.
+    pub(crate) fn change_options(&mut self, change: &dyn Fn(&mut RenderOptions)) {
+        change(&mut self.options);
+    }
+
+    /// What the scene is called.
+    pub(crate) fn scene(&self) -> &str {
+        &self.facts.name
+    }
+
     fn render_passes(
         &mut self,
         mut keeping: Option<Keeping<'_>>,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Rendering, RuntimeError> {
         let begin = Instant::now();
-        self.replanned = None;
         let start = keeping.as_mut().and_then(|k| k.start.take());
-        let resumed = self.take_up(start.as_ref())?;
+        let resumed = self.resumed(start.as_ref())?;
+        self.begin(start.as_ref());
         drop(start);
-        let mut status = Status::new(self.built.work.steps());
-        let mut pass = Pass::new(begin, resumed.samples);
+        let left = self.options.samples - resumed.samples;
+        let mut taking = self.taking(begin);
+        taking.pass.expected = left;
         let every = keeping.as_ref().map(|k| k.every);
-        let mut passes = Passes::new(self.options.samples - resumed.samples, every);
+        let mut passes = Passes::new(left, every);
+        let (pixels, all) = (self.pixels(), u64::from(self.options.samples));
+        let before = pixels * u64::from(resumed.samples);
+        let mut of_all = |now: &Progress| {
+            progress(&Progress {
+                paths: now.paths + before,
+                total: pixels * all,
+                ..*now
+            })
+        };
+        let mut watcher = Stopping::new(&mut of_all);
+        let mut todo = ranges::missing(&[self.asked()], &resumed.ranges);
         let mut kept = begin;
-        loop {
-            let wanted = passes.next();
-            let Some(samples) = wanted.filter(|_| !pass.stopped) else {
+        while let Some(samples) = passes.next().filter(|_| !watcher.stopped) {
+            let Some(next) = todo.first().copied() else {
                 break;
             };
             let pass_begin = Instant::now();
-            pass.samples = samples;
-            self.run(&mut pass, &mut status, progress)?;
-            passes.taken(pass.samples, pass_begin.elapsed());
-            pass.advance();
+            let taken = self.take(&mut taking, next, samples, &mut watcher)?;
+            passes.taken(taken, pass_begin.elapsed());
+            todo = ranges::missing(&todo, &taking.taken);
             if let Some(keeping) = &mut keeping
                 && passes.next().is_some()
                 && 2 * kept.elapsed() >= keeping.every
             {
-                (keeping.keep)(&self.sums(&status, &resumed, pass.done)?)?;
+                (keeping.keep)(&self.film(&taking, &resumed)?)?;
                 kept = Instant::now();
             }
         }
-        let sums = self.sums(&status, &resumed, pass.done)?;
+        let sums = self.film(&taking, &resumed)?;
         // A film of no samples is none.
-        if let Some(keeping) = keeping.as_mut().filter(|_| pass.done > 0) {
+        if let Some(keeping) = keeping.as_mut().filter(|_| sums.samples() > 0) {
             (keeping.keep)(&sums)?;
         }
         let film = sums.sums.picture();
-        let report = self.report(&status, (&film, &sums.sums), resumed, begin.elapsed());
+        let report = self.report(&taking, (&film, &sums.sums), &resumed);
         Ok(Rendering { film, sums, report })
     }
 
-    /// Empties everything, then fills the film with the sums that are gone on from.
-    fn take_up(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
-        self.built.work.clear();
+    /// The samples that are asked for.
+    pub(crate) fn asked(&self) -> Range {
+        Range {
+            first: self.options.first_sample.into(),
+            count: self.options.samples.into(),
+        }
+    }
+
+    /// What is taken over from a film of some of these samples.
+    pub(crate) fn resumed(&self, start: Option<&FilmFile>) -> Result<Resumed, RuntimeError> {
         let Some(start) = start else {
             return Ok(Resumed::default());
         };
         let (identity, options) = (self.identity(), &self.options);
         let (first, samples) = (options.first_sample, options.samples);
         let done = start.done_of_all(identity, &self.facts.layers, first, samples);
-        let samples = done.map_err(RuntimeError::OtherRender)?;
-        self.built.work.write_film(start.sums.words());
+        let ranges = done.map_err(RuntimeError::OtherRender)?.to_vec();
+        // Those are some of the samples of this render, of which there are no more than this.
+        let samples = ranges.iter().map(|range| range.count).sum::<u64>() as u32;
         Ok(Resumed {
             samples,
+            ranges,
             nonfinite: start.about.nonfinite,
             clamped: start.about.clamped,
             makers: start.about.makers.clone(),
         })
     }
 
-    /// What the film holds between two passes, when `done` samples are taken.
-    fn sums(
+    /// Nothing yet of a render that began at some time.
+    pub(crate) fn taking(&self, begin: Instant) -> Taking {
+        Taking::new(begin, self.options.samples, self.built.work.steps())
+    }
+
+    /// Empties the film, between two passes.
+    pub(crate) fn empty_film(&self) {
+        self.built.work.clear_film();
+    }
+
+    /// Empties everything, and fills the film with the sums that are gone on from.
+    pub(crate) fn begin(&mut self, start: Option<&FilmFile>) {
+        self.replanned = None;
+        self.built.work.clear();
+        if let Some(start) = start {
+            self.built.work.write_film(start.sums.words());
+        }
+    }
+
+    /// Takes samples from the beginning of a range on, at most so many; how many it were.
+    pub(crate) fn take(
+        &mut self,
+        taking: &mut Taking,
+        range: Range,
+        samples: u32,
+        watcher: &mut dyn Watcher,
+    ) -> Result<u32, RuntimeError> {
+        let pass = &mut taking.pass;
+        // Ranges are of samples that were asked for, whose indices are words.
+        pass.first = range.first as u32;
+        pass.samples = samples.min(u32::try_from(range.count).unwrap_or(u32::MAX));
+        self.run(pass, &mut taking.status, watcher)?;
+        let (taken, all) = (pass.range(), pass.samples);
+        pass.advance();
+        taking.taken = ranges::joined(&taking.taken, taken.as_slice());
+        Ok(all)
+    }
+
+    /// What the film holds between two passes.
+    pub(crate) fn film(
         &self,
-        status: &Status,
+        taking: &Taking,
         resumed: &Resumed,
-        done: u32,
     ) -> Result<FilmFile, RuntimeError> {
+        let sums = self.sums()?;
+        let counted = self.counted(&taking.status);
+        let about = About {
+            identity: self.facts.identity,
+            scene: self.facts.name.clone(),
+            nonfinite: resumed.nonfinite + counted.nonfinite,
+            clamped: resumed.clamped + counted.clamped,
+            ranges: ranges::joined(&resumed.ranges, &taking.taken),
+            asked: vec![self.asked()],
+            makers: self.makers(resumed),
+        };
+        Ok(FilmFile { about, sums })
+    }
+
+    /// The sums of all samples since the film was emptied.
+    pub(crate) fn sums(&self) -> Result<Sums, RuntimeError> {
         let (width, height) = (self.facts.width, self.facts.height);
         let words = self.built.work.read_film()?;
         let sums = Sums::new(width, height, self.facts.layers.clone(), words);
         let lost = || RuntimeError::Validation("the film lost its size".into());
         let mut sums = sums.ok_or_else(lost)?;
         sums.sort_all_ids();
+        Ok(sums)
+    }
+
+    /// What is counted of samples since the render began.
+    pub(crate) fn counted(&self, status: &Status) -> Counted {
         let (counters, read) = (self.built.layout.counters, &status.counters);
         let before: u64 = status.before.dropped.iter().map(Dropped::samples).sum();
-        let range = |count: u32| Range {
-            first: self.options.first_sample.into(),
-            count: count.into(),
-        };
-        let about = About {
-            identity: self.facts.identity,
-            scene: self.facts.name.clone(),
-            nonfinite: resumed.nonfinite + before + counters.all_dropped(read),
-            clamped: resumed.clamped + u64::from(counters.scalar(read, Scalar::FilmClamped)),
-            ranges: vec![range(done)],
-            asked: vec![range(self.options.samples)],
-            makers: self.makers(resumed),
-        };
-        Ok(FilmFile { about, sums })
+        Counted {
+            nonfinite: before + counters.all_dropped(read),
+            clamped: counters.scalar(read, Scalar::FilmClamped).into(),
+        }
     }
 
     /// The devices that took samples: this one, and those of what was gone on from.
@@ -249,7 +360,7 @@ impl<'g> Renderer<'g> {
     }
 
     /// How many pixels are rendered.
-    fn pixels(&self) -> u64 {
+    pub(crate) fn pixels(&self) -> u64 {
         self.options
             .pixel_count(self.facts.width, self.facts.height)
     }
@@ -263,15 +374,17 @@ impl<'g> Renderer<'g> {
         })
     }
 
-    fn report(
+    /// What was done, and the picture that it came to.
+    pub(crate) fn report(
         &self,
-        status: &Status,
+        taking: &Taking,
         (film, sums): (&Film, &Sums),
-        resumed: Resumed,
-        wall: Duration,
+        resumed: &Resumed,
     ) -> Report {
+        let status = &taking.status;
         crate::render::report::Inputs {
             resumed,
+            taken: taking.pass.done,
             device: self.device.info(),
             options: &self.options,
             layout: &self.built.layout,
@@ -286,7 +399,7 @@ impl<'g> Renderer<'g> {
             materials: &self.facts.materials,
             workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,
-            wall_seconds: wall.as_secs_f64(),
+            wall_seconds: taking.pass.begin.elapsed().as_secs_f64(),
         }
         .report(status, film, sums)
     }

@@ -4,11 +4,12 @@
 //! whole samples, which can be kept and gone on from. A pass costs the time in which its last
 //! paths leave most of the pool idle; a pass of some seconds hardly notices.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use crate::error::RuntimeError;
-use crate::film::file::FilmFile;
-use crate::options::RenderOptions;
+use crate::film::file::{FilmFile, Range};
+use crate::options::{Progress, RenderOptions};
 
 /// What a render that can be interrupted starts from and leaves behind.
 pub struct Keeping<'a> {
@@ -61,51 +62,103 @@ impl Passes {
     }
 }
 
-/// A pass over some samples of every pixel.
+/// A pass over consecutive samples of every pixel.
 pub(crate) struct Pass {
     /// When the render began.
     pub begin: Instant,
-    /// Samples that an earlier run had taken.
-    pub resumed: u32,
-    /// Samples taken before this pass.
+    /// Samples that this device took before the pass.
     pub done: u32,
-    /// Those of them that are by the seed of this pass.
-    pub before: u32,
+    /// Those that it is expected to take in all.
+    pub expected: u32,
+    /// Index of the first sample of the pass.
+    pub first: u32,
     /// Samples of this pass.
     pub samples: u32,
-    /// Which pass of this run it is, from 1.
+    /// Which pass of this render it is, from 1.
     pub number: u64,
-    /// Whether the render was asked to end.
-    pub stopped: bool,
 }
 
 impl Pass {
-    pub(crate) fn new(begin: Instant, resumed: u32) -> Self {
+    /// Before the first pass of a render in which a device is expected to take so many samples.
+    pub(crate) fn new(begin: Instant, expected: u32) -> Self {
         Self {
             begin,
-            resumed,
-            done: resumed,
-            before: resumed,
+            done: 0,
+            expected,
+            first: 0,
             samples: 0,
             number: 1,
-            stopped: false,
         }
     }
 
     /// Goes on to the next.
     pub(crate) fn advance(&mut self) {
         self.done += self.samples;
-        self.before += self.samples;
         self.number += 1;
+    }
+
+    /// The samples of the pass, if it has any.
+    pub(crate) fn range(&self) -> Option<Range> {
+        let first = u64::from(self.first);
+        Range::new(first, first + u64::from(self.samples))
     }
 
     /// What kernels are told.
     pub(crate) fn options(&self, all: &RenderOptions) -> RenderOptions {
         RenderOptions {
-            first_sample: all.first_sample + self.before,
+            first_sample: self.first,
             samples: self.samples,
             ..all.clone()
         }
+    }
+}
+
+/// Who looks on at a pass, and may make it shorter.
+pub(crate) trait Watcher {
+    /// Called after each submission. With [`Order::Halt`] nothing is submitted until [`keep`](Self::keep) was asked.
+    fn look(&mut self, now: &Progress) -> Order;
+
+    /// How many samples the pass ends with, when so many of all are begun. It cannot have fewer.
+    fn keep(&mut self, begun: u32, all: u32) -> u32;
+}
+
+/// How a pass goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// As it was.
+    GoOn,
+    /// Shorter than it was meant to be.
+    Halt,
+}
+
+/// Lets a pass end with the samples that are begun once `progress` breaks.
+pub(crate) struct Stopping<'p> {
+    progress: &'p mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    /// Whether it broke.
+    pub stopped: bool,
+}
+
+impl<'p> Stopping<'p> {
+    pub(crate) fn new(progress: &'p mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Self {
+        Self {
+            progress,
+            stopped: false,
+        }
+    }
+}
+
+impl Watcher for Stopping<'_> {
+    fn look(&mut self, now: &Progress) -> Order {
+        let breaks = (self.progress)(now).is_break();
+        if breaks && !self.stopped {
+            self.stopped = true;
+            return Order::Halt;
+        }
+        Order::GoOn
+    }
+
+    fn keep(&mut self, begun: u32, _all: u32) -> u32 {
+        begun
     }
 }
 

@@ -6,7 +6,7 @@ use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
 
-use crate::film::file::Maker;
+use crate::film::file::{Maker, Range};
 use crate::film::{Film, Sums};
 use crate::gpu::{DeviceIds, DeviceInfo};
 use crate::kernels::dropped::Dropped;
@@ -94,6 +94,10 @@ pub struct Report {
     pub iterations: u64,
     /// The kernels in the order of an iteration; of a renewed plan what they did since then.
     pub kernels: Vec<KernelReport>,
+    /// What each of several devices did; absent if there was one. Times, rates and numbers of the report are then sums
+    /// over them, and its plan, pool and kernels are those of `adapter`, the first one that was not lost.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub devices: Vec<DeviceReport>,
     /// What paths hit, on average over the iterations; absent if that was not counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workload: Option<Workload>,
@@ -194,6 +198,37 @@ impl From<DeviceInfo> for AdapterReport {
     }
 }
 
+/// What one of several devices did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DeviceReport {
+    /// The device.
+    pub adapter: AdapterReport,
+    /// What tells it from others of its kind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adapter_id: Option<String>,
+    /// Samples of each pixel that it took.
+    pub samples: u64,
+    /// Time that it was busy.
+    pub gpu_seconds: f64,
+    /// Paths finished in a second of that.
+    pub paths_per_second: f64,
+    /// Its plan.
+    pub plan: String,
+    /// How that was renewed while rendering; absent if it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replanned: Option<ReplanReport>,
+    /// Paths in flight.
+    pub pool_size: u32,
+    /// Times every kernel was dispatched.
+    pub iterations: u64,
+    /// Its kernels.
+    pub kernels: Vec<KernelReport>,
+    /// Why it was lost while rendering; absent if it was not. Its samples are those that it had given until then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost: Option<String>,
+}
+
 /// What one kernel did.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -255,6 +290,8 @@ pub struct ReplanReport {
 pub(crate) struct Resumed {
     /// Samples of each pixel.
     pub samples: u32,
+    /// Which ones.
+    pub ranges: Vec<Range>,
     /// Of which no number were so many.
     pub nonfinite: u64,
     /// And cut were so many.
@@ -265,7 +302,9 @@ pub(crate) struct Resumed {
 
 /// What a report is made of.
 pub(crate) struct Inputs<'a> {
-    pub resumed: Resumed,
+    pub resumed: &'a Resumed,
+    /// Samples of each pixel that this run took.
+    pub taken: u32,
     pub device: DeviceInfo,
     pub options: &'a RenderOptions,
     pub layout: &'a PlanLayout,
@@ -287,7 +326,7 @@ impl Inputs<'_> {
     pub(crate) fn report(self, status: &Status, film: &Film, sums: &Sums) -> Report {
         let pixels = self.options.pixel_count(film.width, film.height);
         let all_paths = film.total_samples();
-        let paths = all_paths.saturating_sub(pixels * u64::from(self.resumed.samples));
+        let paths = pixels * u64::from(self.taken);
         let gpu_seconds = if self.timed {
             status.gpu_seconds
         } else {
@@ -333,12 +372,12 @@ impl Inputs<'_> {
             wall_seconds: self.wall_seconds,
             compile_seconds: self.compile_seconds,
             paths_per_second: paths as f64 / gpu_seconds.max(f64::MIN_POSITIVE),
-            steady_paths_per_second: status
-                .steady_rate(pixels * u64::from(self.options.samples - self.resumed.samples)),
+            steady_paths_per_second: status.steady_rate(paths),
             path_state_bytes: self.layout.memory(),
             pool_size: self.pool,
             iterations: status.iterations,
             kernels,
+            devices: Vec::new(),
             workload: self.workload,
             nonfinite_samples: self.resumed.nonfinite
                 + dropped.iter().map(Dropped::samples).sum::<u64>(),

@@ -26,6 +26,7 @@ mod plans;
 mod random;
 mod replan;
 mod scene;
+mod several;
 mod stub;
 mod techniques;
 mod volume;

@@ -89,6 +89,7 @@ const CRATES: &[Crate] = &[
             &["cpu"],
             &["device"],
             &["render"],
+            &["multi"],
             &["lab", "audit"],
         ],
     },

@@ -6,7 +6,7 @@
 //! their mean, pixel by pixel, even where the samples of a half depend on each other. Ranges of one
 //! scrambled sequence would not do: they fill each other's gaps.
 
-mod course;
+pub(crate) mod course;
 
 use std::time::Duration;
 
