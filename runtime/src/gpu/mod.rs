@@ -3,7 +3,7 @@
 //! wgpu reports errors through callbacks that panic by default. Here they are collected, and
 //! `Gpu::check` turns the first into a [`RuntimeError`].
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::error::RuntimeError;
 
@@ -53,8 +53,31 @@ pub struct Gpu {
     ids: DeviceIds,
     pub(crate) checked: bool,
     pub(crate) timing: Timing,
-    failure: Arc<Mutex<Option<RuntimeError>>>,
+    failure: Arc<Failure>,
     pipelines: Arc<shader::Pipelines>,
+}
+
+/// What went wrong on a device.
+#[derive(Debug, Default)]
+struct Failure {
+    /// The first error that nobody was told yet.
+    first: Mutex<Option<RuntimeError>>,
+    /// Why the device is lost, if it is: whatever is asked of it from then on fails for that reason.
+    lost: OnceLock<String>,
+}
+
+impl Failure {
+    fn keep_first(&self, error: RuntimeError) {
+        let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        first.get_or_insert(error);
+    }
+
+    fn take(&self) -> Option<RuntimeError> {
+        let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
+        let error = first.take()?;
+        let lost = self.lost.get().cloned();
+        Some(lost.map_or(error, RuntimeError::DeviceLost))
+    }
 }
 
 /// Features that are used where they exist; nothing requires one.
@@ -212,8 +235,7 @@ impl Gpu {
 
     /// The first error since the device was opened, if there was any.
     pub(crate) fn check(&self) -> Result<(), RuntimeError> {
-        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-        failure.take().map_or(Ok(()), Err)
+        self.failure.take().map_or(Ok(()), Err)
     }
 
     /// Fails if a storage buffer of `bytes` for `what` is more than a kernel can bind.
@@ -239,21 +261,18 @@ impl Gpu {
 }
 
 /// Makes the device put its first error where `Gpu::check` finds it.
-fn collect_errors(device: &wgpu::Device) -> Arc<Mutex<Option<RuntimeError>>> {
-    let failure = Arc::new(Mutex::new(None));
-    let keep_first = |slot: &Mutex<Option<RuntimeError>>, error| {
-        slot.lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert(error);
-    };
+fn collect_errors(device: &wgpu::Device) -> Arc<Failure> {
+    let failure = Arc::new(Failure::default());
     let on_error = failure.clone();
     device.on_uncaptured_error(Arc::new(move |error| {
-        keep_first(&on_error, runtime_error(error));
+        on_error.keep_first(runtime_error(error));
     }));
     let on_loss = failure.clone();
     device.set_device_lost_callback(move |reason, message| {
+        let message = on_loss.lost.get_or_init(|| message).clone();
+        // Who gave it up knows.
         if reason != wgpu::DeviceLostReason::Destroyed {
-            keep_first(&on_loss, RuntimeError::DeviceLost(message));
+            on_loss.keep_first(RuntimeError::DeviceLost(message));
         }
     });
     failure

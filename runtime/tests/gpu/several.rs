@@ -14,9 +14,9 @@ use impasto_runtime::film::file::{FilmFile, Range};
 use impasto_runtime::gpu::{Gpu, GpuOptions};
 use impasto_runtime::multi::MultiRenderer;
 use impasto_runtime::options::{Progress, RenderOptions};
-use impasto_runtime::render::Rendering;
 use impasto_runtime::render::passes::Keeping;
 use impasto_runtime::render::until::{Ending, Goals};
+use impasto_runtime::render::{NOBODY, Rendering};
 
 fn room() -> Room {
     Room {
@@ -64,8 +64,6 @@ fn renderer<'g>(devices: &[DeviceRef<'g>], options: &RenderOptions) -> MultiRend
         .worthwhile(0.0)
 }
 
-use impasto_runtime::render::NOBODY;
-
 fn go_on(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
@@ -95,12 +93,15 @@ fn together_they_have_the_bits_of_one() {
             assert_eq!(all.sums, one.sums, "{count}");
             assert_eq!(all.film, one.film);
             let (a, b) = (&all.report, &one.report);
-            assert_eq!((a.paths, a.nonfinite_samples), (b.paths, b.nonfinite_samples));
+            assert_eq!(
+                (a.paths, a.nonfinite_samples),
+                (b.paths, b.nonfinite_samples)
+            );
             assert_eq!(a.samples_per_pixel, count);
             assert!(b.devices.is_empty());
             assert_eq!(a.devices.len(), devices.len());
             let taken: Vec<u64> = a.devices.iter().map(|device| device.samples).collect();
-            assert_eq!(taken.iter().sum::<u64>(), count.into(), "{taken:?}");
+            assert_eq!(taken.iter().sum::<u64>(), u64::from(count), "{taken:?}");
             assert!(taken.iter().all(|t| *t > 0 || count < 3), "{taken:?}");
             let dropped: u64 = a.dropped.iter().map(|d| d.nonfinite).sum();
             assert_eq!(dropped, b.dropped.iter().map(|d| d.nonfinite).sum::<u64>());
@@ -120,14 +121,19 @@ fn progress_is_of_all_and_ends_with_them() {
         last = progress.paths;
         ControlFlow::Continue(())
     });
-    assert_eq!(rendering.unwrap_or_else(|e| panic!("{e}")).report.paths, 16 * 8 * 60);
+    assert_eq!(
+        rendering.unwrap_or_else(|e| panic!("{e}")).report.paths,
+        16 * 8 * 60
+    );
     assert!(last > 0);
 }
 
 #[test]
 fn what_is_kept_is_gone_on_from_by_one_or_by_several() {
+    /// Enough to take longer than all it takes to keep some.
+    const COUNT: u32 = 2000;
     for devices in kinds() {
-        let options = samples(40);
+        let options = samples(COUNT);
         let reference = whole(&devices[..1], &options).sums;
         let mut kept: Vec<FilmFile> = Vec::new();
         let mut keep = |film: &FilmFile| {
@@ -144,7 +150,7 @@ fn what_is_kept_is_gone_on_from_by_one_or_by_several() {
         assert_eq!(kept.last(), Some(&reference));
         assert!(kept.len() > 1, "nothing was kept meanwhile");
         let early = kept[0].clone();
-        assert!(early.samples() < 40);
+        assert!(early.samples() < COUNT.into());
         for devices in [&devices[..1], &devices[..]] {
             let keeping = Keeping {
                 start: Some(early.clone()),
@@ -154,7 +160,7 @@ fn what_is_kept_is_gone_on_from_by_one_or_by_several() {
             let rendering = renderer(devices, &options).render_keeping(keeping, &mut go_on);
             let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(rendering.sums, reference);
-            assert_eq!(rendering.report.paths, 16 * 8 * 40);
+            assert_eq!(rendering.report.paths, 16 * 8 * u64::from(COUNT));
             assert_eq!(u64::from(rendering.report.resumed_samples), early.samples());
         }
     }
@@ -176,15 +182,22 @@ fn who_cannot_keep_ends_the_render() {
 #[test]
 fn a_stopped_render_is_one_of_the_samples_that_it_names() {
     let devices = &kinds()[0];
-    let rendering = renderer(devices, &samples(1 << 20)).render(&mut |progress| {
-        match progress.paths > 16 * 8 * 30 {
+    let rendering =
+        renderer(devices, &samples(1 << 20)).render(&mut |progress| match progress.paths
+            > 16 * 8 * 30
+        {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
-        }
-    });
+        });
     let stopped = rendering.unwrap_or_else(|e| panic!("{e}")).sums;
     assert!((30..1 << 20).contains(&stopped.samples()));
-    assert_eq!(stopped.about.asked, [Range { first: 0, count: 1 << 20 }]);
+    assert_eq!(
+        stopped.about.asked,
+        [Range {
+            first: 0,
+            count: 1 << 20
+        }]
+    );
     let mut parts = stopped.about.ranges.iter().map(|range| {
         let options = RenderOptions {
             first_sample: range.first as u32,
@@ -218,7 +231,10 @@ fn the_samples_of_a_lost_device_are_taken_by_the_others() {
     let lost = devices[1].lost.as_deref().expect("it is lost");
     assert!(lost.contains("the GPU was lost while rendering"), "{lost}");
     assert_eq!(devices[0].samples + devices[1].samples, 600);
-    assert_eq!(rendering.report.nonfinite_samples, one.report.nonfinite_samples);
+    assert_eq!(
+        rendering.report.nonfinite_samples,
+        one.report.nonfinite_samples
+    );
 
     first.lose();
     let error = renderer.render(&mut go_on).expect_err("none is left");
@@ -264,8 +280,14 @@ fn devices_that_render_other_things_do_not_go_together() {
     let own = plan(Strategy::OWN, &surfaces);
     let make = |room: &Room, options: &RenderOptions| {
         let device = DeviceRef::from(&processors()[0]);
-        impasto_runtime::render::Renderer::from_world(device, &room.world(), &surfaces, &own, options)
-            .unwrap_or_else(|e| panic!("{e}"))
+        impasto_runtime::render::Renderer::from_world(
+            device,
+            &room.world(),
+            &surfaces,
+            &own,
+            options,
+        )
+        .unwrap_or_else(|e| panic!("{e}"))
     };
     let room = Room::default();
     let seeded = RenderOptions {
