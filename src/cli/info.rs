@@ -104,6 +104,18 @@ impl DeviceArgs {
         Ok(device)
     }
 
+    /// Fails if the options contradict each other or the choice of several GPUs.
+    pub(super) fn check_several(&self, several: Option<&Several>) -> Result<(), Failure> {
+        self.check()?;
+        if several.is_some() && self.is_cpu() {
+            return Err(Failure::Error(
+                "`--gpus` chooses GPUs, but `--device cpu` the processor\n  hint: leave out one of the two"
+                    .into(),
+            ));
+        }
+        Ok(())
+    }
+
     /// The devices that were asked for: several GPUs, or one device.
     pub(super) fn open_all(
         &self,
@@ -113,12 +125,7 @@ impl DeviceArgs {
         let Some(several) = several else {
             return Ok(vec![self.open(global)?]);
         };
-        self.check()?;
-        if self.is_cpu() {
-            return Err(Failure::Error(
-                "`--gpus` chooses GPUs, but `--device cpu` the processor\n  hint: leave out one of the two".into(),
-            ));
-        }
+        self.check_several(Some(several))?;
         let mut note = |line: &str| global.note(line);
         let gpus = Gpu::several(several, &self.gpu.options(), &mut note);
         let gpus = gpus.map_err(super::runtime)?;

@@ -119,7 +119,7 @@ fn parse_several(text: &str) -> Result<Several, String> {
 const MAX_SIDE: u32 = 65_536;
 
 pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
-    args.device.check()?;
+    args.device.check_several(args.gpus.as_ref())?;
     if args.is_many() {
         interrupt::install()?;
         return super::shot::run(args, global);

@@ -2,8 +2,11 @@
 //! frames, and pictures at each save.
 
 use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::{ArgGroup, Args, ValueEnum};
@@ -349,13 +352,13 @@ fn note_warnings(scene: &Scene, global: &Global) {
     }
 }
 
-/// Renders frames one after another. What is done stays when it is interrupted.
+/// Renders frames, each by one device if there are as many frames as devices. What is done stays when it is interrupted.
 fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome {
     let (out, count) = (args.out(), frames.count());
     check_options(args, "frames")?;
     let Shot {
         subject,
-        mut asked,
+        asked,
         axes,
     } = args.shot()?;
     if !axes.is_empty() {
@@ -367,68 +370,150 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
     first.check_aov(&args.aov)?;
     let devices = args.device.open_all(args.gpus.as_ref(), global)?;
     let studio = Studio::new(&devices);
-    let quiet = Global {
-        quiet: true,
-        verbose: 0,
-        ..*global
+    let begin = Instant::now();
+    let is_left = |frame: &u32| !(args.shot.skip_existing && frames.path(&out, *frame).exists());
+    let shooting = Shooting {
+        args,
+        global,
+        frames,
+        subject: &subject,
+        asked: &asked,
+        meter: Meter::new(global),
+        todo: Mutex::new(
+            frames
+                .numbers()
+                .enumerate()
+                .filter(|(_, f)| is_left(f))
+                .collect(),
+        ),
+        is_said: AtomicBool::new(false),
+        done: Mutex::default(),
+        failed: Mutex::default(),
     };
-    let stop = || interrupt::requested();
-    let rate = subject.animation().frames_per_second;
-    let (begin, mut done, mut written) = (Instant::now(), 0, None);
-    let meter = Meter::new(global);
-    for (index, frame) in frames.numbers().enumerate() {
-        let path = frames.path(&out, frame);
-        if args.shot.skip_existing && path.exists() {
-            continue;
-        }
-        asked.frame = frame.into();
-        let made = Making {
-            args,
-            studio: &studio,
-            // What is odd about all frames is said once.
-            global: if done == 0 { global } else { &quiet },
-            stop: &stop,
-            watched: None,
-        };
-        let picture = || {
-            let outputs = Outputs::of(&path)?;
-            let name = format!("frame {frame} ({} of {count}): ", index + 1);
-            let width = 1.0 / count as f64;
-            let part = meter.part(index as f64 * width, width);
-            part.show(0.0, format!("{name}{COMPILING}"));
-            let scene = args.scene_of(&subject, &asked)?;
-            note_warnings(&scene, made.global);
-            let mut requests = requests(&scene);
-            for request in &mut requests {
-                request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
+    let is_alone = devices.len() == 1 || (count as usize) < devices.len();
+    if is_alone {
+        shooting.work(&studio);
+    } else {
+        std::thread::scope(|scope| {
+            for studio in studio.split() {
+                let shooting = &shooting;
+                scope.spawn(move || shooting.work(&studio));
             }
-            let program = made.compile(&requests, &scene)?;
-            let rendering = made.rendering(&scene, &program, 0, part, &name)?;
-            outputs.write(&rendering.film, &rendering.sums, args.exposure)
-        };
-        match picture() {
-            Err(Failure::Interrupted) => {
-                global.note(&format!(
-                    "interrupted: {done} of {count} frames are written"
-                ));
-                return Err(Failure::Interrupted);
-            }
-            other => other?,
-        }
-        done += 1;
-        written.get_or_insert(path);
+        });
     }
+    let Shooting {
+        meter,
+        done,
+        failed,
+        ..
+    } = shooting;
     drop(meter);
-    global.note(&match written {
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(Failure::Interrupted) => {
+            let written = done.len();
+            global.note(&format!(
+                "interrupted: {written} of {count} frames are written"
+            ));
+            return Err(Failure::Interrupted);
+        }
+        Some(failure) => return Err(failure),
+        None => {}
+    }
+    global.note(&match done.iter().min() {
         None => "nothing to render: the pictures of all frames are there".into(),
-        Some(from) => format!(
+        Some(first) => format!(
             "wrote {} from {} on ({:.1} s)",
-            super::count(done, "frame"),
-            from.display(),
+            super::count(done.len(), "frame"),
+            frames.path(&out, *first).display(),
             begin.elapsed().as_secs_f64()
         ),
     });
     Ok(())
+}
+
+/// Frames that are rendered, on several threads where several devices do.
+struct Shooting<'a> {
+    args: &'a RenderArgs,
+    global: &'a Global,
+    frames: Frames,
+    subject: &'a Subject,
+    asked: &'a Asked,
+    meter: Meter,
+    /// Frames that nobody renders yet, with their places among all.
+    todo: Mutex<VecDeque<(usize, u32)>>,
+    /// Whether one of them has begun.
+    is_said: AtomicBool,
+    /// Those that are written.
+    done: Mutex<Vec<u32>>,
+    /// What ends the work on others.
+    failed: Mutex<Option<Failure>>,
+}
+
+/// What is locked here is whole after a panic too.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shooting<'_> {
+    /// Renders frames until there are none, or one failed.
+    fn work(&self, studio: &Studio<'_>) {
+        loop {
+            let next = lock(&self.todo).pop_front();
+            let Some((index, frame)) = next.filter(|_| lock(&self.failed).is_none()) else {
+                return;
+            };
+            match self.frame(studio, index, frame) {
+                Ok(()) => lock(&self.done).push(frame),
+                Err(failure) => {
+                    // That it was interrupted says less than what went wrong.
+                    let mut failed = lock(&self.failed);
+                    if !matches!(failure, Failure::Interrupted) || failed.is_none() {
+                        *failed = Some(failure);
+                    }
+                }
+            }
+        }
+    }
+
+    fn frame(&self, studio: &Studio<'_>, index: usize, frame: u32) -> Outcome {
+        let (args, count) = (self.args, self.frames.count());
+        let quiet = Global {
+            quiet: true,
+            verbose: 0,
+            ..*self.global
+        };
+        // What is odd about all frames is said once.
+        let is_first = !self.is_said.swap(true, Ordering::Relaxed);
+        let stop = || interrupt::requested() || lock(&self.failed).is_some();
+        let made = Making {
+            args,
+            studio,
+            global: if is_first { self.global } else { &quiet },
+            stop: &stop,
+            watched: None,
+        };
+        let path = self.frames.path(&args.out(), frame);
+        let outputs = Outputs::of(&path)?;
+        let name = format!("frame {frame} ({} of {count}): ", index + 1);
+        let width = 1.0 / count as f64;
+        let part = self.meter.part(index as f64 * width, width);
+        part.show(0.0, format!("{name}{COMPILING}"));
+        let asked = Asked {
+            frame: frame.into(),
+            ..self.asked.clone()
+        };
+        let scene = args.scene_of(self.subject, &asked)?;
+        note_warnings(&scene, made.global);
+        let rate = self.subject.animation().frames_per_second;
+        let mut requests = requests(&scene);
+        for request in &mut requests {
+            request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
+        }
+        let program = made.compile(&requests, &scene)?;
+        let rendering = made.rendering(&scene, &program, 0, part, &name)?;
+        outputs.write(&rendering.film, &rendering.sums, args.exposure)
+    }
 }
 
 /// Renders at each save.

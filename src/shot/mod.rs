@@ -3,6 +3,7 @@
 //! geometry; cameras and values of parameters are data.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use impasto_compiler::abi::{INSTANCES, InstanceInfo, MaterialInfo, Table};
 use impasto_compiler::partition::Plan;
@@ -119,7 +120,7 @@ pub fn textures(scene: &Scene, program: &Program) -> Vec<PathBuf> {
 #[derive(Debug)]
 pub struct Studio<'d> {
     devices: &'d [Device],
-    trees: Trees,
+    trees: Arc<Trees>,
 }
 
 impl<'d> Studio<'d> {
@@ -127,8 +128,17 @@ impl<'d> Studio<'d> {
     pub fn new(devices: &'d [Device]) -> Self {
         Self {
             devices,
-            trees: Trees::default(),
+            trees: Arc::default(),
         }
+    }
+
+    /// A studio for each device, for pictures that are made at the same time.
+    pub fn split(&self) -> Vec<Self> {
+        let alone = |device: &'d Device| Self {
+            devices: std::slice::from_ref(device),
+            trees: self.trees.clone(),
+        };
+        self.devices.iter().map(alone).collect()
     }
 
     /// Makes everything ready to render `scene`, whose bindings are the instances of `program` from number `first` on.

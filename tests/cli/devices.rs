@@ -154,6 +154,13 @@ fn options_that_contradict_each_other_are_refused() {
     refused(&["--threads=100000"]).says("100000 is not in 1..=1024");
     refused(&["--device", "tpu"]).says("[possible values: gpu, cpu]");
     // Before anything is read.
+    let several = ["render", "none.toml", "--out", "p.exr", "--gpus"];
+    let several = |more: &[&str]| impasto(&[&several[..], more].concat()).exits(2);
+    several(&["all", "--device=cpu"]).says("`--gpus` chooses GPUs, but `--device cpu`");
+    several(&["all", "--gpu=x"]).says("cannot be used with '--gpu <GPU>'");
+    several(&["all", "--threads=2"]).says("cannot be used with '--threads <N>'");
+    several(&["0"]).says("expected how many GPUs, from 1");
+    several(&["0,"]).says("--gpus");
     impasto(&[
         "render",
         "none.toml",
@@ -164,6 +171,37 @@ fn options_that_contradict_each_other_are_refused() {
     ])
     .exits(2)
     .says("leave out one of the two");
+}
+
+/// What several devices do together is tested in the runtime; here there may be but one.
+#[test]
+fn several_gpus_are_chosen_as_one_is() {
+    let folder = folder();
+    let render = |out: &str, options: &[&str]| {
+        let [out, report] = [out, "r.json"].map(|n| folder.path().join(n).display().to_string());
+        let args = [
+            "render", SCENE, "--size", "6x4", "--spp", "3", "--out", &out, "--report", &report,
+        ];
+        let run = impasto(&[&args, options].concat());
+        (run, out, report)
+    };
+    let (run, all, report) = render("all.exr", &["--gpus", "all"]);
+    run.exits(0);
+    let json: Value =
+        serde_json::from_slice(&std::fs::read(report).expect("a report")).expect("it");
+    let devices = json["devices"].as_array().map_or(1, Vec::len);
+    let (run, one, _) = render("one.exr", &["--device", "gpu"]);
+    run.exits(0);
+    let bytes = |path: &str| std::fs::read(path).expect("a picture");
+    assert_eq!(bytes(&all), bytes(&one));
+    let (run, _, _) = render("x.exr", &["--gpus", &(devices + 1).to_string()]);
+    run.exits(2).says(&format!(
+        "no GPU is left after {devices} of the {} asked for",
+        devices + 1
+    ));
+    let (run, _, _) = render("x.exr", &["--gpus", "0,0"]);
+    run.exits(2).says("each GPU once, and `0` is listed before");
+    assert!(!names(folder.path()).contains(&"x.exr".to_string()));
 }
 
 #[test]

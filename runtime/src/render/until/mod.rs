@@ -232,8 +232,8 @@ pub(crate) fn next(goals: &Goals, checks: &[Check], done: u32, limit: u32) -> Ne
         .factor(last, slope(checks))
         .map(|factor| 1.05 * factor * here);
     let enough = enough.map(|samples| samples.max(f64::from(LEAST_SAMPLES)));
-    let each = last.seconds / here.max(1.0);
-    let in_time = |time: f64| here + (time / each.max(1e-9)).max(0.0);
+    let [look, each] = cost(checks);
+    let in_time = |time: f64| here + ((time - look) / each.max(1e-9)).max(0.0);
     let over = goals
         .time
         .map(|time| in_time(time.as_secs_f64() - last.seconds));
@@ -248,6 +248,33 @@ pub(crate) fn next(goals: &Goals, checks: &[Check], done: u32, limit: u32) -> Ne
         expected: (expected.ceil() as u32).clamp(done + 1, done + left),
     }
 }
+
+/// The seconds that a look at the error takes, and those of a sample, by the last two passes: with looks that take long
+/// the mean of a sample says little of how many fit into the time that is left.
+fn cost(checks: &[Check]) -> [f64; 2] {
+    let pass = |at: usize| {
+        let until = checks
+            .get(at)
+            .map_or((0.0, 0.0), |c| (f64::from(c.samples), c.seconds));
+        let from = at.checked_sub(1).and_then(|at| checks.get(at));
+        let from = from.map_or((0.0, 0.0), |c| (f64::from(c.samples), c.seconds));
+        (until.0 - from.0, until.1 - from.1)
+    };
+    let Some(last) = checks.len().checked_sub(1) else {
+        return [0.0; 2];
+    };
+    let (samples, seconds) = pass(last);
+    let mean = seconds / samples.max(1.0);
+    let each = match last.checked_sub(1).map(pass) {
+        Some((fewer, sooner)) if fewer < samples => (seconds - sooner) / (samples - fewer),
+        _ => mean,
+    };
+    let each = each.clamp(LEAST_SHARE * mean, mean);
+    [seconds - each * samples, each]
+}
+
+/// The share of a pass's time that its samples take, at least: times of short passes are uncertain.
+const LEAST_SHARE: f64 = 0.05;
 
 /// How fast the squared error falls with samples, by the last looks at it: 1 for independent samples, more
 /// for sequences.

@@ -213,6 +213,26 @@ fn passes_end_with_the_time_or_the_samples() {
     assert_eq!(looks(&short, 64, 1.0, |n| 1.0 / n).len(), 1);
 }
 
+/// A sample takes a hundredth of what a look does.
+#[test]
+fn the_time_that_looks_take_is_no_time_of_samples() {
+    let goals = Goals {
+        time: Some(Duration::from_secs(5)),
+        ..Goals::default()
+    };
+    let (mut checks, mut done, mut seconds) = (Vec::new(), 0, 0.0);
+    while seconds < 5.0 {
+        let next = next(&goals, &checks, done, 1 << 20);
+        done += 2 * next.samples;
+        seconds += 0.4 + 0.004 * f64::from(2 * next.samples);
+        checks.push(check(done, seconds, 1.0));
+    }
+    // By the mean it would be 60, of the 500 that there is time for beside so many looks.
+    assert!((400..600).contains(&done), "{done} {seconds}");
+    assert!(seconds < 5.5, "{seconds}");
+    assert!(checks.len() < 12);
+}
+
 #[test]
 fn the_first_goal_that_is_reached_ends_a_render() {
     let both = Goals {
