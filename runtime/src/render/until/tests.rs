@@ -227,8 +227,8 @@ fn the_time_that_looks_take_is_no_time_of_samples() {
         seconds += 0.4 + 0.004 * f64::from(2 * next.samples);
         checks.push(check(done, seconds, 1.0));
     }
-    // By the mean it would be 60, of the 500 that there is time for beside so many looks.
-    assert!((400..600).contains(&done), "{done} {seconds}");
+    // By the mean of a sample it would be 60. Passes that double take nine looks until here.
+    assert!((300..600).contains(&done), "{done} {seconds}");
     assert!(seconds < 5.5, "{seconds}");
     assert!(checks.len() < 12);
 }
