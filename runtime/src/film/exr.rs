@@ -2,14 +2,21 @@
 //! and what all that is of as metadata.
 
 use std::io::{Cursor, Write};
+use std::ops::Range;
 use std::path::Path;
 
-use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer as ExrLayer};
-use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
-use exr::meta::header::LayerAttributes;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::image::write::channels::{ChannelsWriter, WritableChannels};
+use exr::image::{Encoding, Image, Layer as ExrLayer};
+use exr::math::RoundingMode;
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, ChannelList, Chromaticities, LevelMode, SampleType, Text,
+};
+use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::WritableImage;
 
 use crate::error::RuntimeError;
+use crate::film::Sums;
 use crate::film::cryptomatte;
 use crate::film::file::{FilmFile, Maker};
 use crate::film::output;
@@ -38,9 +45,6 @@ pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
 
 fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
     let (width, height) = film.sums.size();
-    let channel =
-        |(name, values): (String, Vec<f32>)| AnyChannel::new(text(&name), FlatSamples::F32(values));
-    let channels = channels(film).into_iter().map(channel).collect();
     let mut attributes = LayerAttributes::default();
     let version = env!("CARGO_PKG_VERSION");
     attributes.software_name = Some(text(&format!("impasto {version}")));
@@ -49,7 +53,7 @@ fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
         attributes,
         // Lossless, since ids are no amounts.
         Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(channels),
+        Values(&film.sums),
     );
     let mut image = Image::from_layer(layer);
     let [red, green, blue, white] = REC_709.map(Into::into);
@@ -102,12 +106,60 @@ fn attribute_length(bytes: &[u8]) -> Option<usize> {
     value.checked_add(after_type + 1 + 4)
 }
 
-/// Every channel with its values.
-fn channels(film: &FilmFile) -> Vec<(String, Vec<f32>)> {
-    let sums = &film.sums;
-    let pixels = sums.picture().pixels;
+/// The values of a film, of which the encoder has a few rows at a time: all of them would be as large as the film.
+struct Values<'f>(&'f Sums);
+
+impl Values<'_> {
+    /// Every channel with its values in some pixels, in the order of the names.
+    fn sorted(&self, pixels: Range<usize>) -> Vec<(Text, Vec<f32>)> {
+        let channels = channels(self.0, pixels).into_iter();
+        let mut channels: Vec<_> = channels.map(|(name, v)| (text(&name), v)).collect();
+        channels.sort_by(|(a, _), (b, _)| a.cmp(b));
+        channels
+    }
+}
+
+impl<'f> WritableChannels<'f> for Values<'f> {
+    type Writer = Values<'f>;
+
+    fn infer_channel_list(&self) -> ChannelList {
+        let names = self.sorted(0..0).into_iter().map(|(name, _)| name);
+        let channel = |name| ChannelDescription::named(name, SampleType::F32);
+        ChannelList::new(names.map(channel).collect())
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_writer(&'f self, _: &Header) -> Self::Writer {
+        Values(self.0)
+    }
+}
+
+impl ChannelsWriter for Values<'_> {
+    fn extract_uncompressed_block(&self, header: &Header, block: BlockIndex) -> Vec<u8> {
+        // Blocks are whole rows.
+        let width = header.layer_size.0;
+        let first = width * block.pixel_position.1;
+        let channels = self.sorted(first..first + width * block.pixel_size.1);
+        UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
+            let at = line.location;
+            let row = width * (at.position.1 - block.pixel_position.1);
+            let values = &channels[at.channel].1[row..][..width];
+            let bytes = line.value.chunks_exact_mut(size_of::<f32>());
+            for (bytes, value) in bytes.zip(values) {
+                bytes.copy_from_slice(&value.to_ne_bytes());
+            }
+        })
+    }
+}
+
+/// Every channel with its values in some pixels.
+fn channels(sums: &Sums, pixels: Range<usize>) -> Vec<(String, Vec<f32>)> {
+    let picture: Vec<[f32; 3]> = pixels.clone().map(|pixel| sums.mean(pixel)).collect();
     let beauty = |(channel, name): (usize, &str)| {
-        let values = pixels.iter().map(|pixel| pixel[channel]).collect();
+        let values = picture.iter().map(|pixel| pixel[channel]).collect();
         (name.to_owned(), values)
     };
     let mut channels: Vec<_> = ["R", "G", "B"]
@@ -117,9 +169,9 @@ fn channels(film: &FilmFile) -> Vec<(String, Vec<f32>)> {
         .collect();
     for layer in sums.layers().iter() {
         if layer.output.kind == Kind::Ids {
-            channels.extend(cryptomatte::channels(sums, layer));
+            channels.extend(cryptomatte::channels(sums, layer, pixels.clone()));
         } else {
-            let values = sums.values(&layer.name);
+            let values = sums.values_in(&layer.name, pixels.clone());
             channels.extend(layer.channels().into_iter().zip(values));
         }
     }

@@ -1,17 +1,18 @@
 //! Which films are parts of one render, and what they are together: the very bits of a render of all
 //! their samples.
 //!
-//! Files are merged by adding one after another to one film, piece by piece, so that the memory does not grow with
+//! Files are merged by adding a few at a time to one film, piece by piece, so that the memory does not grow with
 //! their number. What they are of is looked at before anything is added: it is little, and most of what can be wrong
 //! with a merge shows there.
 
+use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::error::RuntimeError;
 use crate::film::Sums;
 use crate::film::accumulate::Accumulator;
-use crate::film::file::{About, FilmFile, Header, Identity, Maker, Part};
+use crate::film::file::{About, FilmFile, Header, Identity, Maker, Part, Wrong, side_by_side};
 use crate::film::layers::Layers;
 use crate::film::ranges::{self, Range};
 use crate::technique::Choice;
@@ -193,37 +194,57 @@ pub fn merge_files(
 ) -> Result<Option<(FilmFile, Together)>, RuntimeError> {
     let mut together: Option<Together> = None;
     let mut sums: Option<Sums> = None;
-    for path in paths {
-        let part = Part::open(path).map_err(|reason| unusable(path, reason))?;
-        let part = take_up(&mut together, path, part)?;
-        let end = match &mut sums {
-            None => FilmFile::of(part, watch).map(|(film, end)| {
-                sums = Some(film.sums);
-                end
-            }),
-            Some(sums) => {
-                let mut accumulator = Accumulator::new(sums);
-                let mut add = |plane: usize, pixel: usize, words: &[u32]| {
-                    accumulator.add(plane, pixel, words);
-                };
-                part.planes(&mut add, watch)
-            }
+    let mut rest = paths;
+    while let Some(first) = rest.first() {
+        let group;
+        (group, rest) = rest.split_at(group_length(rest));
+        let mut parts = Vec::with_capacity(group.len());
+        for path in group {
+            let part = Part::open(path).map_err(|reason| unusable(path, reason))?;
+            parts.push(take_up(&mut together, path, part)?);
+        }
+        let sums = match &mut sums {
+            Some(sums) => sums,
+            None => sums.insert(parts[0].empty().map_err(|reason| unusable(first, reason))?),
         };
-        if end.map_err(|reason| unusable(path, reason))?.is_break() {
+        let end =
+            add(parts, sums, watch).map_err(|(film, reason)| unusable(&group[film], reason))?;
+        if end.is_break() {
             return Err(RuntimeError::Stopped);
         }
     }
     let Some((mut sums, together)) = sums.zip(together) else {
         return Ok(None);
     };
-    // Ids are in order; those that were added come after the first film's until now.
+    // Ids come in the order in which films have them until now.
     Accumulator::new(&mut sums).finish();
     let about = together.about.clone();
     Ok(Some((FilmFile { about, sums }, together)))
 }
 
+/// Adds the sums of some films, read side by side.
+pub(super) fn add<R: Read + Send>(
+    parts: Vec<Part<R>>,
+    sums: &mut Sums,
+    watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<ControlFlow<()>, Wrong> {
+    let mut accumulator = Accumulator::new(sums);
+    side_by_side(parts, &mut |piece| accumulator.add_piece(piece), watch)
+}
+
+/// The most films that are read side by side. A number that does not depend on the machine, since where a pixel has more
+/// ids than find room the order counts in which they come.
+pub(super) const SIDE_BY_SIDE: usize = 4;
+
+/// How many of some films are read side by side, beginning with the first. Those that are no files are read alone: who
+/// writes one may wait with the next until it is read.
+fn group_length(paths: &[PathBuf]) -> usize {
+    let group = paths.iter().take(SIDE_BY_SIDE);
+    group.take_while(|path| !is_stream(path)).count().max(1)
+}
+
 /// Takes up another film, which is given back.
-fn take_up<R: std::io::Read>(
+fn take_up<R: Read>(
     together: &mut Option<Together>,
     path: &Path,
     part: Part<R>,
