@@ -1,7 +1,7 @@
 //! OpenEXR files of films: the picture as `R`, `G`, `B`, a layer for each output beside it under its usual names,
 //! and what all that is of as metadata.
 
-use std::io::{Cursor, Write};
+use std::io::{Read, Seek, Write};
 use std::ops::Range;
 use std::path::Path;
 
@@ -36,14 +36,16 @@ pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
         path: path.to_path_buf(),
         reason,
     };
-    let bytes = encode(film).map_err(failure)?;
     output::replace(path, |file| {
-        file.write_all(&bytes).map_err(|e| input::reason(&e))
+        encode(film, &mut *file)?;
+        file.flush().map_err(|e| input::reason(&e))?;
+        sort_attributes(file.get_mut())
     })
     .map_err(failure)
 }
 
-fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
+/// Writes a file whose attributes are in some order.
+fn encode(film: &FilmFile, to: impl Write + Seek) -> Result<(), String> {
     let (width, height) = film.sums.size();
     let mut attributes = LayerAttributes::default();
     let version = env!("CARGO_PKG_VERSION");
@@ -66,21 +68,35 @@ fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
     for (key, value) in metadata(film) {
         image.attributes.other.insert(text(&key), value);
     }
-    // The encoder seeks, which a file can and a pipe could not.
-    let mut bytes = Cursor::new(Vec::new());
-    let written = image.write().to_buffered(&mut bytes);
-    written.map_err(|e| e.to_string())?;
-    let mut bytes = bytes.into_inner();
-    sort_attributes(&mut bytes).ok_or("what was encoded has no whole header")?;
-    Ok(bytes)
+    image.write().to_buffered(to).map_err(|error| match error {
+        exr::error::Error::Io(error) => input::reason(&error),
+        error => error.to_string(),
+    })
 }
 
 /// Bytes before the first attribute: the magic number and the version.
 const BEFORE_ATTRIBUTES: usize = 8;
+/// Bytes that most headers have room in.
+const HEADER: u64 = 1 << 16;
 
 /// Puts the attributes of a file with one header in the order of their names, so that equal films give equal
-/// files: the encoder takes our own attributes from a hash map. `None` if the header is not whole.
-fn sort_attributes(file: &mut [u8]) -> Option<()> {
+/// files: the encoder takes our own attributes from a hash map.
+fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> Result<(), String> {
+    let why = |error: std::io::Error| input::reason(&error);
+    let mut header = Vec::new();
+    file.rewind().map_err(why)?;
+    while sort_header(&mut header).is_none() {
+        let more = file.by_ref().take(HEADER).read_to_end(&mut header);
+        if more.map_err(why)? == 0 {
+            return Err("what was encoded has no whole header".into());
+        }
+    }
+    file.rewind().map_err(why)?;
+    file.write_all(&header).map_err(why)
+}
+
+/// The same in the first bytes of a file; `None` if the header goes on after them.
+fn sort_header(file: &mut [u8]) -> Option<()> {
     let mut rest = file.get(BEFORE_ATTRIBUTES..)?;
     let mut attributes = Vec::new();
     // A 0 in place of a name ends the header.
@@ -216,6 +232,9 @@ fn text(value: &str) -> Text {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
+    use exr::image::FlatSamples;
     use exr::prelude::read_first_flat_layer_from_file;
 
     use super::*;
@@ -224,15 +243,46 @@ mod tests {
     #[test]
     fn equal_films_are_equal_files() {
         let film = with_outputs(0, 2, 3, &["albedo", "material", "object"]);
-        let first = encode(&film).expect("encoded");
+        let encoded = || {
+            let mut bytes = Cursor::new(Vec::new());
+            encode(&film, &mut bytes).expect("encoded");
+            sort_attributes(&mut bytes).expect("a header");
+            bytes.into_inner()
+        };
+        let first = encoded();
         for _ in 0..8 {
-            assert!(encode(&film).expect("encoded") == first);
+            assert!(encoded() == first);
         }
         let [seed, version] = ["impasto/seed", "impasto/version"].map(|name| {
             let found = first.windows(name.len()).position(|w| w == name.as_bytes());
             found.unwrap_or_else(|| panic!("{name}"))
         });
         assert!(seed < version);
+    }
+
+    /// The encoder asks for a few rows at a time, and gets those of the film.
+    #[test]
+    fn every_row_of_every_channel_is_that_of_the_film() {
+        let small = with_outputs(0, 2, 3, &["albedo", "depth", "material", "variance"]);
+        let (width, height) = (3, 77);
+        let layers = small.sums.layers().clone();
+        let mut film = small;
+        film.sums = Sums::empty(width, height, layers).expect("memory");
+        for plane in 0..film.sums.layers().planes() {
+            let words = film.sums.plane_mut(plane).iter_mut().enumerate();
+            words.for_each(|(at, word)| *word = (plane + 1) as u32 * at as u32 % 61);
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr");
+        write(&film, &path).expect("written");
+        let image = read_first_flat_layer_from_file(&path).expect("an EXR");
+        let read = &image.layer_data.channel_data.list;
+        let expected = Values(&film.sums).sorted(0..(width * height) as usize);
+        assert_eq!(read.len(), expected.len());
+        for (read, (name, values)) in read.iter().zip(expected) {
+            assert_eq!(read.name, name);
+            assert_eq!(read.sample_data, FlatSamples::F32(values), "{name}");
+        }
     }
 
     /// A film without outputs has the picture that other files of it have, and says what it is of.

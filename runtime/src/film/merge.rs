@@ -336,6 +336,7 @@ impl FilmFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PLANES;
     use crate::film::file::tests::{maker, part, with_outputs};
     use crate::technique::Sampler;
 
@@ -454,6 +455,63 @@ mod tests {
         assert!(merge_files(&[], &mut |_| ControlFlow::Continue(())).is_ok_and(|m| m.is_none()));
         let stopped = merge_files(&paths, &mut |_| ControlFlow::Break(()));
         assert!(matches!(stopped, Err(RuntimeError::Stopped)), "{stopped:?}");
+    }
+
+    /// More than are read side by side: some with planes that others lack, and ids in other slots.
+    #[test]
+    fn many_files_merge_in_any_order_to_the_same() {
+        let names = ["albedo", "depth", "material"];
+        let film = |first: u64| {
+            let mut film = with_outputs(first, 1, (first as u32).wrapping_mul(0x5bd1_e995), &names);
+            // Four ids in all, so that each finds room.
+            let ids = film.sums.layers().placed().last().expect("a layer").0;
+            for plane in ids..film.sums.layers().planes() {
+                let word = |pixel: u64| match (plane - ids) / 2 {
+                    slot @ 0..2 if (plane - ids) % 2 == 0 => 1 + (first + pixel + slot as u64) % 4,
+                    0..2 => 1,
+                    _ => 0,
+                };
+                let words = [0, 1].map(|pixel| word(pixel) as u32);
+                film.sums.plane_mut(plane).copy_from_slice(&words);
+            }
+            if first % 3 == 1 {
+                film.sums.plane_mut(PLANES).fill(0);
+            }
+            film.sums.sort_all_ids();
+            film
+        };
+        let films: Vec<FilmFile> = (0..11).map(film).collect();
+        let mut whole = films[0].clone();
+        for other in &films[1..] {
+            whole.merge(other).expect("they merge");
+        }
+        assert_eq!(whole.sums.lost_ids(), 0);
+        let (_folder, mut paths) = files(&films.iter().collect::<Vec<_>>());
+        for turn in 0..paths.len() {
+            paths.rotate_left(turn);
+            assert_eq!(merged(&paths).expect("they merge").0, whole);
+            paths.reverse();
+        }
+    }
+
+    /// Wherever it is among those that are read side by side, and wherever the damage is.
+    #[test]
+    fn a_damaged_file_among_many_is_found_and_named() {
+        let films: Vec<FilmFile> = (0..7).map(|first| part(first, 1, 9)).collect();
+        let (_folder, paths) = files(&films.iter().collect::<Vec<_>>());
+        for (at, path) in paths.iter().enumerate() {
+            let good = std::fs::read(path).expect("a file");
+            for back in [1, 9, 40] {
+                let mut bad = good.clone();
+                let place = bad.len() - back;
+                bad[place] ^= 1;
+                std::fs::write(path, bad).expect("written");
+                let error = merged(&paths).expect_err("it is damaged");
+                let named = error.contains(&format!("{at}.film")) && error.contains("damaged");
+                assert!(named, "{at}, {back}: {error}");
+            }
+            std::fs::write(path, good).expect("written");
+        }
     }
 
     #[test]

@@ -87,17 +87,33 @@ fn compare(what: &str, paths: &[PathBuf], prepare: impl Fn(), merge: impl FnOnce
     prepare();
     // The high-water mark of memory begins anew.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
-    let begin = Instant::now();
+    let (begin, worked) = (Instant::now(), seconds_of_cores());
     merge();
-    let took = begin.elapsed();
+    let (took, worked) = (begin.elapsed(), seconds_of_cores() - worked);
     let ratio = took.as_secs_f64() / cat.as_secs_f64();
     eprintln!(
-        "{what}: cat {:.2} GB/s, merge {:.2} GB/s, {:.2} s, {ratio:.2} times as long, {}",
+        "{what}: cat {:.2} GB/s, merge {:.2} GB/s, {:.2} s, {worked:.2} s of cores, {ratio:.2} times as long, {}",
         speed(cat),
         speed(took),
         took.as_secs_f64(),
         most_memory()
     );
+}
+
+/// What this process worked so far, on all cores.
+fn seconds_of_cores() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or_default()
+        .split_whitespace();
+    // Hundredths of a second, of the program and of the system.
+    let ticks = fields
+        .skip(11)
+        .take(2)
+        .filter_map(|f| f.parse::<f64>().ok());
+    ticks.sum::<f64>() / 100.0
 }
 
 fn most_memory() -> String {
