@@ -86,7 +86,7 @@ fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> Result<(), String> 
     let mut header = Vec::new();
     file.rewind().map_err(why)?;
     while sort_header(&mut header).is_none() {
-        let more = file.by_ref().take(HEADER).read_to_end(&mut header);
+        let more = Read::by_ref(file).take(HEADER).read_to_end(&mut header);
         if more.map_err(why)? == 0 {
             return Err("what was encoded has no whole header".into());
         }
@@ -281,7 +281,11 @@ mod tests {
         assert_eq!(read.len(), expected.len());
         for (read, (name, values)) in read.iter().zip(expected) {
             assert_eq!(read.name, name);
-            assert_eq!(read.sample_data, FlatSamples::F32(values), "{name}");
+            let FlatSamples::F32(samples) = &read.sample_data else {
+                panic!("{name} is no float");
+            };
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(samples), bits(&values), "{name}");
         }
     }
 
