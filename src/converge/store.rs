@@ -274,7 +274,8 @@ impl Store {
         let path = self.folder.join(name);
         let text = serde_json::to_string_pretty(value)
             .map_err(|error| format!("cannot write `{}`: {error}", path.display()));
-        let written = text.and_then(|t| files::write_whole(&path, format!("{t}\n").as_bytes()));
+        let written =
+            text.and_then(|t| Ok(files::write_whole(&path, format!("{t}\n").as_bytes())?));
         written.map_err(StudyError::Folder)
     }
 
