@@ -88,6 +88,8 @@ pub struct Options {
     pub material: Option<String>,
     /// Frames of a turn.
     pub turntable: Option<u32>,
+    /// Seconds between two checkpoints of a part.
+    pub checkpoint_every: f64,
     /// Further options of `impasto render`, as they were given.
     pub more: Vec<String>,
 }

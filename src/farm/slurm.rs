@@ -119,7 +119,7 @@ case $code in
         echo "$task: exit code $code, restart $((${{SLURM_RESTART_COUNT:-0}} + 1)) of {last}"
         # The controller may be away for a moment. Once it has heard, it ends this script.
         for _ in 1 2 3 4 5 6; do
-            scontrol requeue "$SLURM_JOB_ID" && sleep 120
+            scontrol requeue "$SLURM_JOB_ID" && exec sleep 120
             sleep 10
         done
     fi ;;

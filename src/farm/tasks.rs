@@ -24,8 +24,6 @@ use super::state::{self, Film, Made, Record, Stage};
 use super::{FarmError, INTERRUPTED, IS_TASK, TRANSIENT};
 use crate::files::{self, Lock, LockError};
 
-/// Seconds between two checkpoints of a part.
-const CHECKPOINT_SECONDS: &str = "30";
 /// The time between two looks at a process.
 const LOOK: Duration = Duration::from_millis(50);
 /// The time between two records of a task.
@@ -101,7 +99,8 @@ pub fn part_words(
     let [first, count] = samples;
     words.extend(["--samples-from".into(), first, "--spp".into(), count]);
     words.extend(["--checkpoint".into(), shown(checkpoint)]);
-    words.extend(["--checkpoint-every".into(), CHECKPOINT_SECONDS.into()]);
+    let every = render.options.checkpoint_every.to_string();
+    words.extend(["--checkpoint-every".into(), every]);
     words.extend(["--out".into(), shown(film)]);
     words
 }

@@ -11,6 +11,7 @@ use impasto::shot::frames::Frames;
 use impasto::shot::is_material;
 use impasto::shot::param::{self, ParamOption};
 
+use crate::cli::checkpoint::parse_seconds;
 use crate::cli::completions::Known;
 use crate::cli::outputs::{aov_help, aov_names};
 use crate::cli::progress::Meter;
@@ -69,6 +70,9 @@ pub(in crate::cli) struct NewArgs {
     /// GPUs that a task is given; 0 renders on processors
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=64))]
     gpus_per_task: u32,
+    /// Seconds between two checkpoints of a part, and so the most that a lost machine takes along
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = parse_seconds, conflicts_with = "commands")]
+    checkpoint_every: f64,
     /// More options of `render`, after `--`
     #[arg(last = true, value_name = "OPTION", allow_hyphen_values = true)]
     more: Vec<String>,
@@ -156,6 +160,7 @@ impl NewArgs {
                 on: self.on.clone(),
                 material: self.material.clone(),
                 turntable: self.turntable,
+                checkpoint_every: self.checkpoint_every,
                 more: self.more.clone(),
             },
             estimate: None,
