@@ -314,10 +314,11 @@ fn print(text: &str) -> Outcome {
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
     });
     match written {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Error(format!(
-            "cannot write to standard output: {}",
-            impasto::files::reason(&error)
-        ))),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            let why = impasto::files::reason(&error);
+            let message = format!("cannot write to standard output: {why}");
+            Err(Failure::new(message, Unwritten::from(error).transient))
+        }
         _ => Ok(()),
     }
 }

@@ -1,6 +1,7 @@
 //! `impasto farm new`: what is to be rendered becomes a job in a folder. Options of `render` are checked by `render`'s
 //! own, on the first picture, which is also rendered a little to learn how fast that is.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args, CommandFactory, Parser, ValueHint};
@@ -103,7 +104,7 @@ pub(super) fn run(args: &NewArgs, global: &Global) -> Outcome {
     let program = program
         .map_err(|error| format!("cannot find this program's file: {}", files::reason(&error)))?;
     let (name, work) = match (&args.commands, &args.scene) {
-        (Some(file), _) => args.commands(file)?,
+        (Some(file), _) => args.commands(file, global)?,
         (None, Some(scene)) => args.render(scene, &program, global)?,
         (None, None) => return Err(Failure::Error("name a scene, or `--commands FILE`".into())),
     };
@@ -114,7 +115,7 @@ pub(super) fn run(args: &NewArgs, global: &Global) -> Outcome {
 }
 
 impl NewArgs {
-    fn commands(&self, file: &Path) -> Result<(String, Work), Failure> {
+    fn commands(&self, file: &Path, global: &Global) -> Result<(String, Work), Failure> {
         let text = crate::cli::read_text(file)?;
         let known = Cli::command();
         let is_ours = |word: &str| {
@@ -130,6 +131,10 @@ impl NewArgs {
             if let Err(error) = Cli::try_parse_from(words) {
                 return Err(bad(format!("`{}`: {error}", line.text())).into());
             }
+        }
+        let programs: BTreeSet<&String> = lines.iter().filter_map(|line| line.program.as_ref()).collect();
+        for program in programs.into_iter().filter(|program| !is_found(program)) {
+            global.note(&format!("note: there is no program `{program}` here; is it where the tasks run?"));
         }
         let folder = std::env::current_dir();
         let folder = folder
@@ -204,6 +209,17 @@ impl NewArgs {
             rate: speed.rate,
             start: speed.start,
         }))
+    }
+}
+
+/// Is there a program of that name?
+fn is_found(program: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut folders = std::env::split_paths(&path);
+    if program.contains('/') {
+        Path::new(program).is_file()
+    } else {
+        folders.any(|folder| folder.join(program).is_file())
     }
 }
 
