@@ -7,7 +7,7 @@
 //! a job of T tasks is at most about twice the root of T calls of `sbatch`. Elements are numbered within the largest
 //! that the cluster takes, and a second number says what to add.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::process::{Command, Stdio};
 
@@ -341,8 +341,8 @@ pub fn submit(job: &Job, folder: &Folder, wish: &Wish) -> Result<Vec<Array>, Far
     let lines = in_queue(job)?;
     if !lines.is_empty() {
         let numbers = lines.iter().filter_map(|line| line.split('|').next());
-        let mut numbers: Vec<&str> = numbers.collect();
-        numbers.dedup();
+        let numbers: BTreeSet<u32> = numbers.filter_map(|number| number.parse().ok()).collect();
+        let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
         return Err(FarmError::Permanent(format!(
             "`{}` is in the queue already: {} of the jobs {}, called `{}`\n  hint: wait for it (`impasto farm status {0} --watch`), or end it (`impasto farm cancel {0}`)",
             folder.root.display(),

@@ -430,7 +430,8 @@ fn commands_are_tasks_too() {
         .says("--nonsense");
     // A program that is not there is no reason to try again.
     write(at, "commands.txt", "no-such-program\n");
-    run(at, "farm new --commands commands.txt --out missing").exits(0)
+    run(at, "farm new --commands commands.txt --out missing")
+        .exits(0)
         .says("there is no program `no-such-program` here");
     run(at, "farm task missing run-1")
         .exits(2)

@@ -109,8 +109,8 @@ pub(super) fn run(args: &NewArgs, global: &Global) -> Outcome {
         (None, None) => return Err(Failure::Error("name a scene, or `--commands FILE`".into())),
     };
     let job = Job::new(name, program, args.gpus_per_task, work)?;
-    let folder = Folder::make(&args.out, &job)?;
-    tell(&job, &folder, args, global);
+    Folder::make(&args.out, &job)?;
+    tell(&job, args, global);
     Ok(())
 }
 
@@ -132,9 +132,14 @@ impl NewArgs {
                 return Err(bad(format!("`{}`: {error}", line.text())).into());
             }
         }
-        let programs: BTreeSet<&String> = lines.iter().filter_map(|line| line.program.as_ref()).collect();
+        let programs: BTreeSet<&String> = lines
+            .iter()
+            .filter_map(|line| line.program.as_ref())
+            .collect();
         for program in programs.into_iter().filter(|program| !is_found(program)) {
-            global.note(&format!("note: there is no program `{program}` here; is it where the tasks run?"));
+            global.note(&format!(
+                "note: there is no program `{program}` here; is it where the tasks run?"
+            ));
         }
         let folder = std::env::current_dir();
         let folder = folder
@@ -292,7 +297,7 @@ fn render_args(render: &Render, picture: &Picture) -> Result<Box<RenderArgs>, Fa
 }
 
 /// Says what was made.
-fn tell(job: &Job, folder: &Folder, args: &NewArgs, global: &Global) {
+fn tell(job: &Job, args: &NewArgs, global: &Global) {
     let out = args.out.display();
     match &job.work {
         Work::Commands(commands) => {
@@ -321,7 +326,6 @@ fn tell(job: &Job, folder: &Folder, args: &NewArgs, global: &Global) {
             }
         }
     }
-    let _ = folder;
     global.note(&format!(
         "next: `impasto farm submit {out}` (Slurm), `openjd run {out}/template.yaml`, or `impasto farm run {out}` (here)"
     ));

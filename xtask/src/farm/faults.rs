@@ -95,7 +95,7 @@ fn crash(bench: &Bench) -> Result<String> {
 
 /// A node's daemon is gone, and its task renders on beside the retry.
 fn orphan(bench: &Bench) -> Result<String> {
-    let samples = bench.seconds(24);
+    let samples = bench.seconds(18);
     let job = bench.job("orphan", "3", samples, 1, &[])?;
     submit(bench, &job)?;
     let node = bench.node_of(&job, 1, 1)?;
