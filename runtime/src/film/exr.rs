@@ -13,8 +13,8 @@ use crate::error::RuntimeError;
 use crate::film::cryptomatte;
 use crate::film::file::{FilmFile, Maker};
 use crate::film::output;
+use crate::film::output::Unwritten;
 use crate::film::outputs::Kind;
-use crate::input;
 use crate::technique::Choice;
 
 /// The primaries and the white of Rec. 709, which the picture's values are of.
@@ -25,15 +25,9 @@ const REC_709: [(f32, f32); 4] = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3
 /// # Errors
 /// The file cannot be written.
 pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
-    let failure = |reason: String| RuntimeError::Output {
-        path: path.to_path_buf(),
-        reason,
-    };
-    let bytes = encode(film).map_err(failure)?;
-    output::replace(path, |file| {
-        file.write_all(&bytes).map_err(|e| input::reason(&e))
-    })
-    .map_err(failure)
+    let failure = |why: Unwritten| why.at(path);
+    let bytes = encode(film).map_err(|reason| failure(reason.into()))?;
+    output::replace(path, |file| Ok(file.write_all(&bytes)?)).map_err(failure)
 }
 
 fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
