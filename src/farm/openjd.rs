@@ -85,9 +85,7 @@ fn step(
         };
         text += &format!("    - name: {name}\n      type: INT\n      range: \"{range}\"\n");
     }
-    text += &format!(
-        "  script:\n    actions:\n      onRun:\n        command: \"{{{{Param.Impasto}}}}\"\n        args:\n"
-    );
+    text += "  script:\n    actions:\n      onRun:\n        command: \"{{Param.Impasto}}\"\n        args:\n";
     let digest = &job.digest;
     for word in [
         "--progress",

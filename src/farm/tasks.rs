@@ -268,21 +268,21 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The checkpoint to go on from that nobody uses and that has the most samples; or else a copy of the one with the
-    /// most samples. Tells whether somebody uses another.
+    /// The checkpoint to go on from: of those that nobody uses, the one with the most samples. If one that is in use has
+    /// more, it is a copy of that. Tells whether somebody uses another.
     fn choose_checkpoint(
         &self,
         render: &Render,
         picture: usize,
         part: usize,
     ) -> Result<(PathBuf, bool), FarmError> {
-        let (mut best, mut in_use, mut most): (
-            Option<(PathBuf, u64)>,
-            bool,
-            Option<(PathBuf, u64)>,
-        ) = (None, false, None);
-        let mut number = 1;
-        loop {
+        struct Candidate {
+            path: PathBuf,
+            samples: u64,
+            is_free: bool,
+        }
+        let mut candidates: Vec<Candidate> = Vec::new();
+        for number in 1.. {
             let path = self.folder.checkpoint(picture, part, number);
             let samples = match state::film(render, part, &path, true) {
                 Film::Whole => u64::from(render.parts[part - 1].count),
@@ -297,42 +297,42 @@ impl<'a> Task<'a> {
                     0
                 }
             };
-            if most.as_ref().is_none_or(|(_, most)| samples > *most) && path.exists() {
-                most = Some((path.clone(), samples));
-            }
-            let is_free = match Lock::take(&path) {
-                Ok(_) => true,
-                Err(LockError::InUse(_)) => false,
-                // Rendering will say what is wrong.
-                Err(LockError::Failed(_)) => true,
-            };
-            in_use |= !is_free;
-            if is_free && best.as_ref().is_none_or(|(_, best)| samples > *best) {
-                best = Some((path.clone(), samples));
-            }
-            if !path.exists() && is_free {
+            // If it cannot be locked at all, rendering will say why.
+            let is_free = !matches!(Lock::take(&path), Err(LockError::InUse(_)));
+            let is_last = is_free && !path.exists();
+            candidates.push(Candidate {
+                path,
+                samples,
+                is_free,
+            });
+            if is_last {
                 break;
             }
-            number += 1;
         }
-        let Some((path, samples)) = best else {
-            // The loop ends at one that is free.
-            return Ok((self.folder.checkpoint(picture, part, number), in_use));
+        let is_beside = candidates.iter().any(|candidate| !candidate.is_free);
+        // Of equals, the first: `max_by_key` takes the last.
+        let most = |free: bool| {
+            let all = candidates.iter().rev();
+            all.filter(|c| c.is_free == free).max_by_key(|c| c.samples)
         };
-        if in_use {
+        let Some(own) = most(true) else {
+            // The last is free.
+            return Ok((self.folder.checkpoint(picture, part, 1), is_beside));
+        };
+        if let Some(other) = most(false) {
             (self.watch.note)(
                 "the checkpoint is in use by another process, which may be an orphan: rendering beside it",
             );
-            if let Some((other, _)) = most.filter(|(_, most)| *most > samples) {
+            if other.samples > own.samples {
                 // It is replaced whole, so that whatever is copied is whole.
-                let copied = fs::read(&other).map_err(files::Unwritten::from);
-                let copied = copied.and_then(|bytes| files::write_whole(&path, &bytes));
+                let bytes = fs::read(&other.path).map_err(files::Unwritten::from);
+                let copied = bytes.and_then(|bytes| files::write_whole(&own.path, &bytes));
                 if let Err(why) = copied {
                     (self.watch.note)(&format!("warning: beginning anew: {why}"));
                 }
             }
         }
-        Ok((path, in_use))
+        Ok((own.path.clone(), is_beside))
     }
 
     /// Removes what a part was made from, but for what others use.
@@ -581,7 +581,7 @@ impl<'a> Task<'a> {
             .map_or(String::new(), |gpus| format!(", GPU {gpus}"));
         let head = format!(
             "=== {} UTC, {}, attempt {}{by}{gpus}\n$ {}\n",
-            time(SystemTime::now()),
+            time(now()),
             record.host,
             record.attempt,
             line.text()
@@ -731,6 +731,12 @@ fn end(child: &mut Child) {
 #[cfg(not(unix))]
 fn end(child: &mut Child) {
     let _ = child.kill();
+}
+
+/// The time of the day, for people who read logs. Nothing is measured by it.
+#[allow(clippy::disallowed_methods)]
+fn now() -> SystemTime {
+    SystemTime::now()
 }
 
 /// `2026-11-25 06:20:01`

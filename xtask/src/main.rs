@@ -10,6 +10,7 @@ use xtask::{adapter, shell};
 
 mod bless;
 mod demo;
+#[cfg(unix)]
 mod farm;
 mod hostile;
 mod layers;
@@ -30,6 +31,7 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Build and run every test of the workspace
     Test(test::TestArgs),
+    #[cfg(unix)]
     /// Start a Slurm cluster on this machine, run jobs of `impasto farm` on it through faults, and compare bits
     Farm(farm::FarmArgs),
     /// Run the command on hostile files of every kind for some minutes, with limits on time and memory
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
     shell::exit_code(match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
+        #[cfg(unix)]
         Command::Farm(args) => farm::run(&args),
         Command::Hostile(args) => hostile::run(&args),
         Command::Layers(args) => layers::run(&args),

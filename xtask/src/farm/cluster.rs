@@ -41,7 +41,7 @@ pub(super) fn prepare() -> Result {
     let programs = ["slurmctld", "slurmd", "sbatch", "munged"];
     let is_there =
         |program: &&str| shell::exists(program) || Path::new("/usr/sbin").join(program).is_file();
-    if programs.iter().all(|program| is_there(&program)) {
+    if programs.iter().all(is_there) {
         return Ok(());
     }
     shell::section("Installing Slurm");
