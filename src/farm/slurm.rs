@@ -446,6 +446,14 @@ fn asked(command: &mut Command) -> Result<String, FarmError> {
         said.strip_prefix(&format!("{name}: error: "))
             .unwrap_or(said)
     );
+    let lacks = ["generic resource", "node configuration is not available"];
+    let message = if lacks.iter().any(|text| said.contains(text)) {
+        format!(
+            "{message}\n  hint: has a node so many GPUs? `--no-gpu` asks for none, and `--gpus-per-task` of `farm new` for another number"
+        )
+    } else {
+        message
+    };
     if is_away.iter().any(|text| said.contains(text)) {
         return Err(FarmError::Transient(message));
     }

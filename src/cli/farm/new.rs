@@ -299,6 +299,7 @@ fn render_args(render: &Render, picture: &Picture) -> Result<Box<RenderArgs>, Fa
 /// Says what was made.
 fn tell(job: &Job, args: &NewArgs, global: &Global) {
     let out = args.out.display();
+    let dir = tasks::quoted(&args.out.to_string_lossy());
     match &job.work {
         Work::Commands(commands) => {
             global.note(&format!(
@@ -327,6 +328,6 @@ fn tell(job: &Job, args: &NewArgs, global: &Global) {
         }
     }
     global.note(&format!(
-        "next: `impasto farm submit {out}` (Slurm), `openjd run {out}/template.yaml`, or `impasto farm run {out}` (here)"
+        "next: `impasto farm submit {dir}` (Slurm), `openjd run {dir}/template.yaml`, or `impasto farm run {dir}` (here)"
     ));
 }
