@@ -3,6 +3,7 @@
 //! The compiler does no I/O of its own; it asks a [`Loader`] for every file it meets.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use impasto_compiler::source::MAX_SOURCE_BYTES;
 use impasto_compiler::{Loader, library_text};
 use impasto_runtime::film::output;
+pub use impasto_runtime::film::output::Unwritten;
 use impasto_runtime::input;
 pub use impasto_runtime::input::reason;
 
@@ -123,15 +125,19 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
 
 /// Writes a whole file or none: a temporary one beside it takes its name once it is complete.
 /// Devices and pipes are written to as they are.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
+///
+/// # Errors
+/// Why it could not be written, with its name.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
     let written = if is_device(path) {
-        std::fs::write(path, bytes).map_err(|error| reason(&error))
+        std::fs::write(path, bytes).map_err(Unwritten::from)
     } else {
-        output::replace(path, |file| {
-            file.write_all(bytes).map_err(|error| reason(&error))
-        })
+        output::replace(path, |file| Ok(file.write_all(bytes)?))
     };
-    written.map_err(|why| format!("cannot write `{}`: {why}", path.display()))
+    written.map_err(|why| Unwritten {
+        reason: format!("cannot write `{}`: {why}", path.display()),
+        ..why
+    })
 }
 
 /// Does `path` name something that exists and is neither file nor folder?
@@ -143,6 +149,22 @@ fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
+    }
+}
+
+/// Why a file is not kept to this process.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LockError {
+    /// Another process has it.
+    InUse(String),
+    /// The file beside it cannot be made or locked.
+    Failed(String),
+}
+
+impl fmt::Display for LockError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::InUse(message) | Self::Failed(message)) = self;
+        f.write_str(message)
     }
 }
 
@@ -161,14 +183,17 @@ impl Lock {
     ///
     /// # Errors
     /// If another process has it, or the file beside it cannot be made.
-    pub fn take(path: &Path) -> Result<Self, String> {
+    pub fn take(path: &Path) -> Result<Self, LockError> {
         let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let mut name = target.into_os_string();
         name.push(".lock");
         let lock = PathBuf::from(name);
         let cannot = |error: io::Error| {
             let (name, why) = (lock.display(), reason(&error));
-            format!("cannot lock `{}` by `{name}`: {why}", path.display())
+            LockError::Failed(format!(
+                "cannot lock `{}` by `{name}`: {why}",
+                path.display()
+            ))
         };
         loop {
             let mut options = OpenOptions::new();
@@ -185,7 +210,8 @@ impl Lock {
                 }
                 Err(TryLockError::WouldBlock) => {
                     let name = path.display();
-                    return Err(format!("`{name}` is in use by another process"));
+                    let message = format!("`{name}` is in use by another process");
+                    return Err(LockError::InUse(message));
                 }
                 // A file system without locks holds nobody back, as before.
                 Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
@@ -289,7 +315,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("c.film");
         let held = Lock::take(&path).expect("it is free");
-        let refusal = Lock::take(&path).expect_err("it is held");
+        let refusal = Lock::take(&path).expect_err("it is held").to_string();
         assert!(refusal.contains("in use by another process"), "{refusal}");
         drop(held);
         assert!(!folder.path().join("c.film.lock").exists());
@@ -297,7 +323,9 @@ mod tests {
         std::fs::write(folder.path().join("c.film.lock"), "").expect("written");
         drop(Lock::take(&path).expect("it is free"));
         let missing = folder.path().join("missing/c.film");
-        let refusal = Lock::take(&missing).expect_err("there is no folder");
+        let refusal = Lock::take(&missing)
+            .expect_err("there is no folder")
+            .to_string();
         assert!(refusal.contains("no such file or folder"), "{refusal}");
     }
 

@@ -51,6 +51,7 @@ pub mod cost;
 pub mod docs;
 mod driver;
 mod error;
+pub mod farm;
 pub mod files;
 mod ir_text;
 pub mod measure;

@@ -38,7 +38,7 @@ impl Fingerprint {
 }
 
 /// The fingerprint of some bytes.
-pub(crate) fn of(bytes: &[u8]) -> u64 {
+pub fn of(bytes: &[u8]) -> u64 {
     let mut fingerprint = Fingerprint::new();
     fingerprint.add(bytes);
     fingerprint.finish()

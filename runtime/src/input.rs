@@ -43,6 +43,25 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
+/// May the same work on another try, or on another machine? A disk that is full may be emptied and a server may come
+/// back; what is missing, forbidden or a folder stays so.
+pub fn is_transient(error: &io::Error) -> bool {
+    use io::ErrorKind::*;
+    !matches!(
+        error.kind(),
+        NotFound
+            | PermissionDenied
+            | IsADirectory
+            | NotADirectory
+            | AlreadyExists
+            | InvalidInput
+            | InvalidFilename
+            | Unsupported
+            | FileTooLarge
+            | ReadOnlyFilesystem
+    )
+}
+
 /// An I/O error in a few words, without the operating system's number where the kind is clear.
 pub fn reason(error: &io::Error) -> String {
     match error.kind() {

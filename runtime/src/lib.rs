@@ -19,7 +19,7 @@ pub mod cpu;
 pub mod device;
 pub mod error;
 pub mod film;
-mod fingerprint;
+pub mod fingerprint;
 pub mod gpu;
 mod image_file;
 pub mod input;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use impasto::files::{self, Lock};
+use impasto::files::{self, Lock, LockError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::output::remove_unfinished;
 use impasto::runtime::options::Progress;
@@ -24,7 +24,7 @@ pub(super) struct CheckpointArgs {
     checkpoint_every: f64,
 }
 
-fn parse_seconds(text: &str) -> Result<f64, String> {
+pub(super) fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.01..=86_400.0).contains(&seconds) => Ok(seconds),
         _ => Err("expected a number of seconds from 0.01 to 86400".into()),
@@ -48,7 +48,9 @@ impl CheckpointArgs {
         files::check_writable(path)?;
         let lock = Lock::take(path).map_err(|why| {
             let hint = "wait until that render ends, or name another with `--checkpoint`";
-            Failure::Error(format!("cannot use the checkpoint: {why}\n  hint: {hint}"))
+            let is_transient = matches!(why, LockError::InUse(_));
+            let message = format!("cannot use the checkpoint: {why}\n  hint: {hint}");
+            Failure::new(message, is_transient)
         })?;
         remove_unfinished(path);
         Ok(Some(lock))

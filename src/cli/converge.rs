@@ -229,7 +229,7 @@ impl ConvergeArgs {
                 ));
                 Failure::Interrupted
             }
-            error => Failure::Error(error.to_string()),
+            error => Failure::new(error.to_string(), error.is_transient()),
         }
     }
 }

@@ -115,7 +115,7 @@ fn one(name: &str, args: &FmtArgs, global: &Global, done: &mut Done) -> Result<(
     } else if name == STDIN {
         print(&formatted).map_err(failed)
     } else if changes {
-        files::write_whole(Path::new(name), formatted.as_bytes())
+        Ok(files::write_whole(Path::new(name), formatted.as_bytes())?)
     } else {
         Ok(())
     }

@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use impasto::runtime::cpu::MOST_THREADS;
 use impasto::runtime::gpu::{DeviceInfo, Environment, Selector, Several};
-use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, Width};
+use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, RuntimeError, Width};
 use serde::Serialize;
 
 use super::{Failure, Global, Outcome, print};
@@ -158,7 +158,9 @@ impl GpuArgs {
 
     /// The GPU, for what needs one.
     pub(super) fn open(&self, what: &'static str, global: &Global) -> Result<Gpu, Failure> {
-        let needed = |error| Failure::Error(format!("{what} needs a GPU: {error}"));
+        let needed = |error: RuntimeError| {
+            Failure::new(format!("{what} needs a GPU: {error}"), error.is_transient())
+        };
         let mut note = |line: &str| global.note(line);
         Gpu::new_noting(&self.options(), &mut note).map_err(needed)
     }

@@ -27,12 +27,14 @@ pub(super) fn outlive_file_limit() {
 
 /// From now on the first signal only sets what [`requested`] tells; the second one exits with 130.
 pub(super) fn install() -> Result<(), String> {
-    let handler = || {
+    // An engine tells every process of a task, and each tells its own; whoever cannot wait kills.
+    let is_task = std::env::var_os(impasto::farm::IS_TASK).is_some();
+    let handler = move || {
         let now = Instant::now();
         let first = *REQUESTED.get_or_init(|| now);
         if first == now {
             super::say("\nstopping; once more to quit at once");
-        } else if now.duration_since(first) > TOGETHER {
+        } else if now.duration_since(first) > TOGETHER && !is_task {
             std::process::exit(130);
         }
     };

@@ -1,7 +1,7 @@
 //! The command line: options, exit codes, and what goes to which stream.
 //!
 //! Results and what programs read go to standard output; diagnostics for people, progress and
-//! notes go to standard error. A command fails in one of three ways, see [`Failure`].
+//! notes go to standard error. A command fails in one of four ways, see [`Failure`].
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
@@ -10,6 +10,8 @@ use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
 use impasto::compiler::diag::{self, Diagnostic};
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, MaterialRequest, Program};
+use impasto::farm::{FarmError, INTERRUPTED, TRANSIENT};
+use impasto::files::Unwritten;
 use impasto::{FileLoader, Scene};
 
 mod calibrate;
@@ -23,6 +25,7 @@ mod emit;
 mod eval;
 mod exhaustive;
 mod explain;
+mod farm;
 mod fmt;
 mod info;
 mod interrupt;
@@ -48,7 +51,8 @@ mod until;
 #[command(
     name = "impasto",
     version,
-    after_help = "Exit codes: 0 fine; 1 diagnostics; 2 usage, input or output; 130 interrupted."
+    after_help = "Exit codes: 0 fine; 1 diagnostics; 2 usage, input or output; 75 may work on another try or machine; \
+                  130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -72,6 +76,23 @@ struct Global {
     /// Print only errors and results
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
+    /// How progress is shown: a bar or lines on standard error, or lines that OpenJD takes on standard output
+    #[arg(
+        long = "progress",
+        global = true,
+        value_name = "FORM",
+        default_value = "auto"
+    )]
+    progress: ProgressForm,
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ProgressForm {
+    /// A bar on a terminal, and elsewhere a line every five seconds, on standard error
+    Auto,
+    /// `openjd_progress` and `openjd_status`, on standard output
+    Openjd,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -108,6 +129,9 @@ enum Command {
     Rays(rays::RaysArgs),
     /// Merge parts of a render into one picture
     Merge(merge::MergeArgs),
+    /// Render on a farm of machines: jobs for Slurm and OpenJD, and here
+    #[command(subcommand)]
+    Farm(Box<farm::FarmCommand>),
     /// Show the device that would render, with its limits, and the others
     Info(info::DeviceArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
@@ -122,6 +146,10 @@ enum Failure {
     Diagnostics,
     /// A usage, input or output error, still to be reported: exit code 2.
     Error(String),
+    /// What may work on another try or on another machine, still to be reported: exit code 75, as BSD's sysexits
+    /// name it (EX_TEMPFAIL). A GPU was lost, or none was found that was asked for; its memory or a disk was full;
+    /// another process holds the checkpoint.
+    Transient(String),
     /// Ctrl-C; what could be kept was kept and said: exit code 130.
     Interrupted,
 }
@@ -129,6 +157,50 @@ enum Failure {
 impl From<String> for Failure {
     fn from(message: String) -> Self {
         Failure::Error(message)
+    }
+}
+
+impl From<Unwritten> for Failure {
+    fn from(unwritten: Unwritten) -> Self {
+        Self::new(unwritten.reason, unwritten.transient)
+    }
+}
+
+impl From<FarmError> for Failure {
+    fn from(error: FarmError) -> Self {
+        match error {
+            FarmError::Permanent(message) => Failure::Error(message),
+            FarmError::Transient(message) => Failure::Transient(message),
+            FarmError::Interrupted => Failure::Interrupted,
+        }
+    }
+}
+
+impl Failure {
+    /// One that may pass, or one that will not.
+    fn new(message: String, is_transient: bool) -> Self {
+        if is_transient {
+            Failure::Transient(message)
+        } else {
+            Failure::Error(message)
+        }
+    }
+
+    /// What is still to be said of it.
+    fn message(&self) -> Option<&str> {
+        match self {
+            Failure::Error(message) | Failure::Transient(message) => Some(message),
+            Failure::Diagnostics | Failure::Interrupted => None,
+        }
+    }
+
+    fn code(&self) -> u8 {
+        match self {
+            Failure::Diagnostics => 1,
+            Failure::Error(_) => 2,
+            Failure::Transient(_) => TRANSIENT,
+            Failure::Interrupted => INTERRUPTED,
+        }
     }
 }
 
@@ -153,18 +225,23 @@ pub(crate) fn main() -> ExitCode {
         Command::Trace(args) => trace::run(&args, &global),
         Command::Rays(args) => rays::run(&args, &global),
         Command::Merge(args) => merge::run(&args, &global),
+        Command::Farm(command) => farm::run(&command, &global),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Diagnostics) => ExitCode::from(1),
-        Err(Failure::Error(message)) => {
-            say(&format!("{}: {message}", global.error_word()));
-            ExitCode::from(2)
+        Ok(()) => {
+            progress::complete(&global);
+            ExitCode::SUCCESS
         }
-        Err(Failure::Interrupted) => ExitCode::from(130),
+        Err(failure) => {
+            if let Some(message) = failure.message() {
+                say(&format!("{}: {message}", global.error_word()));
+                progress::failed(&global, message);
+            }
+            ExitCode::from(failure.code())
+        }
     }
 }
 
@@ -237,10 +314,11 @@ fn print(text: &str) -> Outcome {
         out.write_all(text.as_bytes()).and_then(|()| out.flush())
     });
     match written {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::Error(format!(
-            "cannot write to standard output: {}",
-            impasto::files::reason(&error)
-        ))),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            let why = impasto::files::reason(&error);
+            let message = format!("cannot write to standard output: {why}");
+            Err(Failure::new(message, Unwritten::from(error).transient))
+        }
         _ => Ok(()),
     }
 }
@@ -275,7 +353,7 @@ fn read_text(path: &std::path::Path) -> Result<String, Failure> {
 
 /// An error of the renderer.
 fn runtime(error: impasto::RuntimeError) -> Failure {
-    Failure::Error(error.to_string())
+    Failure::new(error.to_string(), error.is_transient())
 }
 
 /// `1 error`, `2 errors`.

@@ -1,5 +1,5 @@
 //! How far a command is: a bar on a terminal, and elsewhere a plain line every few seconds, so that logs of farms and
-//! editors tell the same.
+//! editors tell the same. With `--progress openjd` it is lines on standard output that workers of OpenJD take.
 //!
 //! A command has one [`Meter`] for all of its work. What it shows never falls, and is complete only when the work is.
 
@@ -11,12 +11,14 @@ use std::time::{Duration, Instant};
 use impasto::runtime::options::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use super::Global;
+use super::{Global, ProgressForm};
 
 /// The time between two lines, and before the first one.
 const EVERY: Duration = Duration::from_secs(5);
 /// The time between two looks at a bar whose work says nothing: its clock goes on.
 const TICK: Duration = Duration::from_millis(500);
+/// The time between two lines for a program.
+const OFTEN: Duration = Duration::from_secs(1);
 /// Steps of a bar.
 const STEPS: u64 = 10_000;
 
@@ -58,12 +60,20 @@ impl Meter {
     /// For a command that begins now.
     pub(super) fn new(global: &Global) -> Self {
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        Self(if global.quiet {
+        Self(if global.progress == ProgressForm::Openjd {
+            let mut last = String::new();
+            lines(OFTEN, State::openjd, move |line| {
+                if last != line {
+                    openjd(line);
+                    line.clone_into(&mut last);
+                }
+            })
+        } else if global.quiet {
             Shown::Nowhere
         } else if io::stderr().is_terminal() && !is_dumb {
             Shown::Bar(bar(), Mutex::default())
         } else {
-            lines(EVERY, |line| {
+            lines(EVERY, State::line, |line| {
                 // There is nobody left to tell when that fails.
                 let _ = writeln!(io::stderr().lock(), "{line}");
             })
@@ -150,6 +160,33 @@ impl Part<'_> {
     }
 }
 
+/// Writes lines for a worker of OpenJD. Whoever reads them may be gone.
+fn openjd(lines: &str) {
+    let mut out = io::stdout().lock();
+    let _ = writeln!(out, "{lines}").and_then(|()| out.flush());
+}
+
+/// Tells a worker of OpenJD that all is done, if one listens.
+pub(super) fn complete(global: &Global) {
+    if global.progress == ProgressForm::Openjd {
+        openjd("openjd_progress: 100.0");
+    }
+}
+
+/// Tells a worker of OpenJD why the command failed, if one listens.
+pub(super) fn failed(global: &Global, message: &str) {
+    if global.progress == ProgressForm::Openjd {
+        openjd(&format!("openjd_fail: {}", one_line(message)));
+    }
+}
+
+/// A text that does not break a line, nor moves a cursor.
+fn one_line(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let joined = lines.join("; ");
+    joined.chars().filter(|c| !c.is_control()).collect()
+}
+
 /// How much of a render is done.
 pub(super) fn share(progress: &Progress) -> f64 {
     progress.paths as f64 / progress.total.max(1) as f64
@@ -181,10 +218,14 @@ fn bar() -> ProgressBar {
 }
 
 /// Lines from a thread of their own: a step of the work that says nothing for long is no reason for silence.
-fn lines(every: Duration, mut write: impl FnMut(&str) + Send + 'static) -> Shown {
+fn lines(
+    every: Duration,
+    form: fn(&State, Duration) -> String,
+    mut write: impl FnMut(&str) + Send + 'static,
+) -> Shown {
     let ticking = Arc::new(Ticking {
         begin: Instant::now(),
-        lines: Mutex::new(Some(Lines::new(every))),
+        lines: Mutex::new(Some(Lines::new(every, form))),
         ended: Condvar::new(),
     });
     let shared = ticking.clone();
@@ -208,14 +249,16 @@ fn lines(every: Duration, mut write: impl FnMut(&str) + Send + 'static) -> Shown
 struct Lines {
     every: Duration,
     next: Duration,
+    form: fn(&State, Duration) -> String,
     state: State,
 }
 
 impl Lines {
-    fn new(every: Duration) -> Self {
+    fn new(every: Duration, form: fn(&State, Duration) -> String) -> Self {
         Self {
             every,
             next: every,
+            form,
             state: State::default(),
         }
     }
@@ -226,7 +269,7 @@ impl Lines {
             return None;
         }
         self.next = now + self.every;
-        (!self.state.what.is_empty()).then(|| self.state.line(now))
+        (!self.state.what.is_empty()).then(|| (self.form)(&self.state, now))
     }
 }
 
@@ -260,6 +303,15 @@ impl State {
         // Nothing that is named may break the line, or move the cursor.
         let what: String = self.what.chars().filter(|c| !c.is_control()).collect();
         format!("{percent:>3} %, {} gone{left}: {what}", time(now))
+    }
+
+    /// The same for a worker of OpenJD.
+    fn openjd(&self, _: Duration) -> String {
+        format!(
+            "openjd_progress: {:.1}\nopenjd_status: {}",
+            100.0 * self.share,
+            one_line(&self.what)
+        )
     }
 
     /// The time that the rest takes at the rate so far, once there is one.
@@ -299,7 +351,7 @@ mod tests {
 
     #[test]
     fn a_line_every_five_seconds_and_none_before() {
-        let mut lines = Lines::new(EVERY);
+        let mut lines = Lines::new(EVERY, State::line);
         assert_eq!(lines_at(&mut lines, 0..7), [""; 0], "nothing to say");
         lines.state.advance(seconds(7), 0.0, "building".into());
         assert_eq!(lines_at(&mut lines, 7..10), [""; 0]);
@@ -366,7 +418,7 @@ mod tests {
 
     #[test]
     fn parts_are_of_the_whole() {
-        let ticking = lines(seconds(3600), |_| ());
+        let ticking = lines(seconds(3600), State::line, |_| ());
         let meter = Meter(ticking);
         let share = |meter: &Meter| match &meter.0 {
             Shown::Lines(ticking, _) => {
@@ -389,16 +441,28 @@ mod tests {
             format: super::super::Format::Text,
             verbose: 0,
             quiet,
+            progress: ProgressForm::Auto,
         };
         assert!(matches!(Meter::new(&global(true)).0, Shown::Nowhere));
         assert!(!matches!(Meter::new(&global(false)).0, Shown::Nowhere));
+    }
+
+    #[test]
+    fn workers_of_openjd_are_told_percent_and_what_is_done() {
+        let mut state = State::default();
+        state.advance(seconds(1), 0.375, "24 of 64\nsamples\x1b[2K".into());
+        assert_eq!(
+            state.openjd(seconds(2)),
+            "openjd_progress: 37.5\nopenjd_status: 24 of 64; samples[2K"
+        );
+        assert_eq!(one_line("no film\n  hint: none"), "no film; hint: none");
     }
 
     /// A step that says nothing has lines too, and none comes after the end.
     #[test]
     fn a_thread_writes_while_the_work_is_silent() {
         let (sender, receiver) = std::sync::mpsc::channel();
-        let meter = Meter(lines(Duration::from_millis(10), move |line| {
+        let meter = Meter(lines(Duration::from_millis(10), State::line, move |line| {
             let _ = sender.send(line.to_owned());
         }));
         meter.show(0.25, "one long step");

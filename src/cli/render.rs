@@ -13,7 +13,7 @@ use clap::builder::StringValueParser;
 use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
 use impasto::compiler::partition::{PlanInputs, Requires};
-use impasto::compiler::{self, Loader, Written};
+use impasto::compiler::{self, Loader, Moment, Written};
 use impasto::runtime::error::{Excerpt, SceneError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
@@ -133,11 +133,12 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let _lock = args.checkpoint.lock()?;
     let start = args.checkpoint.read()?;
     interrupt::install()?;
-    let scene = Arc::new(load(args, global)?);
+    let (scene, moment) = load(args, global)?;
+    let scene = Arc::new(scene);
     let started = Instant::now();
     let meter = Meter::new(global);
     meter.show(0.0, COMPILING);
-    let program = Arc::new(compile(&scene, args, global)?);
+    let program = Arc::new(compile(&scene, moment, args, global)?);
     let material_seconds = started.elapsed().as_secs_f64();
     let devices = args.device.open_all(args.gpus.as_ref(), global)?;
     // GPUs plan alike until they know what paths hit; the processor renders alone.
@@ -292,20 +293,28 @@ fn write_report(report: &Report, args: &RenderArgs) -> Result<(), Failure> {
     Ok(files::write_whole(path, format!("{json}\n").as_bytes())?)
 }
 
-/// The scene, at the size that was asked for. What is odd about it is noted.
-fn load(args: &RenderArgs, global: &Global) -> Result<Scene, Failure> {
+/// The scene, at the size that was asked for, and when it is seen if that was. What is odd about it is noted.
+fn load(args: &RenderArgs, global: &Global) -> Result<(Scene, Option<Moment>), Failure> {
     let shot = args.shot()?;
     let scene = args.scene_of(&shot.subject, &shot.asked)?;
     for warning in &scene.warnings {
         global.note(&format!("warning: {warning}"));
     }
-    Ok(scene)
+    Ok((scene, args.shot.moment(&shot.subject)))
 }
 
 /// The scene's materials. A file that is not there is an input error, not one of the language.
-fn compile(scene: &Scene, args: &RenderArgs, global: &Global) -> Result<Program, Failure> {
+fn compile(
+    scene: &Scene,
+    moment: Option<Moment>,
+    args: &RenderArgs,
+    global: &Global,
+) -> Result<Program, Failure> {
     let mut loader = FileLoader::new(&scene.base);
-    let requests = impasto::requests(scene);
+    let mut requests = impasto::requests(scene);
+    for request in &mut requests {
+        request.moment = moment;
+    }
     let stop = || interrupt::requested();
     compile_requests(&requests, &mut loader, args, global, &stop).map_err(|failure| match failure {
         Failure::Interrupted => interrupted_early(global),

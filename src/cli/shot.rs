@@ -10,9 +10,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::{ArgGroup, Args, ValueEnum};
-use impasto::compiler::Program;
+use impasto::compiler::{Moment, Program};
 use impasto::runtime::options::Progress;
-use impasto::runtime::scene::{Asked, FilmSettings};
+use impasto::runtime::scene::{Asked, FilmSettings, MAX_FRAME};
 use impasto::set::{Sample, Set};
 use impasto::shot::frames::Frames;
 use impasto::shot::param::{self, ParamOption};
@@ -42,6 +42,9 @@ pub(super) struct ShotArgs {
     /// Render frames, as in `1-120`, `5` or `1-120x2`, to numbered files
     #[arg(long, value_name = "FRAMES", value_parser = Frames::parse)]
     frames: Option<Frames>,
+    /// Render this frame alone, as one picture: with a checkpoint, as a part, or whatever else one picture can have
+    #[arg(long, value_name = "FRAME", conflicts_with_all = ["frames", "watch", "skip_existing"], value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_FRAME)))]
+    frame: Option<u32>,
     /// Turn what a material file is put on once in so many frames; renders these unless `--frames` says which
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     turntable: Option<u32>,
@@ -128,6 +131,9 @@ impl RenderArgs {
             let bindings: Vec<String> = scene.materials.into_iter().map(|b| b.name).collect();
             (asked.given, axes) = param::given(params, &subject, &bindings)?;
         }
+        if let Some(frame) = self.shot.frame {
+            asked.frame = frame.into();
+        }
         Ok(Shot {
             subject,
             asked,
@@ -158,7 +164,17 @@ impl ShotArgs {
         self.on.is_none() && self.params.is_empty()
     }
 
+    /// When the picture is taken, if that is said.
+    pub(super) fn moment(&self, subject: &Subject) -> Option<Moment> {
+        let rate = subject.animation().frames_per_second;
+        let moment = |frame: u32| Moment::of_frame(frame.into(), rate);
+        self.frame.map(moment)
+    }
+
     fn all_frames(&self) -> Option<Frames> {
+        if self.frame.is_some() {
+            return None;
+        }
         self.frames.or(self.turntable.map(Frames::up_to))
     }
 
@@ -235,6 +251,7 @@ fn sheet_outputs(args: &RenderArgs) -> Result<Outputs, Failure> {
     let outputs = Outputs::of(&args.out())?;
     let refused = [
         ("--aov", !args.aov.is_empty()),
+        ("`--frame`", args.shot.frame.is_some()),
         ("a .film file", outputs.is_film()),
     ];
     match refused.into_iter().find(|(_, is_there)| *is_there) {
@@ -386,6 +403,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
                 .filter(|(_, f)| is_left(f))
                 .collect(),
         ),
+        working: Mutex::new(1),
         is_said: AtomicBool::new(false),
         done: Mutex::default(),
         failed: Mutex::default(),
@@ -394,6 +412,7 @@ fn render_frames(args: &RenderArgs, frames: Frames, global: &Global) -> Outcome 
     if is_alone {
         shooting.work(&studio);
     } else {
+        *lock(&shooting.working) = devices.len();
         std::thread::scope(|scope| {
             for studio in studio.split() {
                 let shooting = &shooting;
@@ -442,6 +461,8 @@ struct Shooting<'a> {
     meter: Meter,
     /// Frames that nobody renders yet, with their places among all.
     todo: Mutex<VecDeque<(usize, u32)>>,
+    /// Threads that render.
+    working: Mutex<usize>,
     /// Whether one of them has begun.
     is_said: AtomicBool,
     /// Those that are written.
@@ -465,6 +486,14 @@ impl Shooting<'_> {
             };
             match self.frame(studio, index, frame) {
                 Ok(()) => lock(&self.done).push(frame),
+                // Another device may do what this one could not.
+                Err(Failure::Transient(why)) if self.leaves_others() => {
+                    self.global.note(&format!(
+                        "warning: frame {frame} goes to another device: {why}"
+                    ));
+                    lock(&self.todo).push_front((index, frame));
+                    return;
+                }
                 Err(failure) => {
                     // That it was interrupted says less than what went wrong.
                     let mut failed = lock(&self.failed);
@@ -474,6 +503,14 @@ impl Shooting<'_> {
                 }
             }
         }
+    }
+
+    /// Ends the work of a device, unless it is the last one.
+    fn leaves_others(&self) -> bool {
+        let mut working = lock(&self.working);
+        let are_others = *working > 1;
+        *working -= usize::from(are_others);
+        are_others
     }
 
     fn frame(&self, studio: &Studio<'_>, index: usize, frame: u32) -> Outcome {
@@ -508,7 +545,7 @@ impl Shooting<'_> {
         let rate = self.subject.animation().frames_per_second;
         let mut requests = requests(&scene);
         for request in &mut requests {
-            request.moment = Some(impasto::compiler::Moment::of_frame(frame.into(), rate));
+            request.moment = Some(Moment::of_frame(frame.into(), rate));
         }
         let program = made.compile(&requests, &scene)?;
         let rendering = made.rendering(&scene, &program, 0, part, &name)?;
@@ -562,7 +599,7 @@ fn watch(args: &RenderArgs, global: &Global) -> Outcome {
             // Something was saved meanwhile.
             Err(Failure::Interrupted) => continue,
             Err(failure) => {
-                if let Failure::Error(message) = failure {
+                if let Some(message) = failure.message() {
                     super::say(&format!("{}: {message}", global.error_word()));
                 }
                 global.note("the last picture stays; waiting for a save");

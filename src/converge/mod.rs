@@ -45,6 +45,20 @@ pub enum StudyError {
     /// The folder of results cannot be used.
     #[error("{0}")]
     Folder(String),
+    /// Another process works in the folder of results.
+    #[error("{0}")]
+    InUse(String),
+}
+
+impl StudyError {
+    /// May the same study go on at another try, or on another machine?
+    pub fn is_transient(&self) -> bool {
+        match self {
+            Self::InUse(_) => true,
+            Self::Render(crate::Error::Runtime(error)) => error.is_transient(),
+            _ => false,
+        }
+    }
 }
 
 impl From<RuntimeError> for StudyError {

@@ -50,7 +50,7 @@ pub fn write(dir: &Path, convergence: &Convergence, pictures: &Pictures) -> Resu
     keep("index.html", &html(convergence, pictures))?;
     let json = serde_json::to_string_pretty(convergence)
         .map_err(|error| format!("cannot write what was found as JSON: {error}"))?;
-    keep("convergence.json", &format!("{json}\n"))
+    Ok(keep("convergence.json", &format!("{json}\n"))?)
 }
 
 /// The report: tables and plots as Markdown. Links to plots are relative.

@@ -140,10 +140,14 @@ impl Store {
     pub fn open(folder: &Path, key: &Key, fresh: bool) -> Result<Self, StudyError> {
         make_folder(folder)?;
         let lock = files::Lock::take(&folder.join(KEY)).map_err(|why| {
-            StudyError::Folder(format!(
+            let message = format!(
                 "cannot go on in `{}`: {why}\n  hint: wait until that study ends, or name another folder with `--out`",
                 folder.display()
-            ))
+            );
+            match why {
+                files::LockError::InUse(_) => StudyError::InUse(message),
+                files::LockError::Failed(_) => StudyError::Folder(message),
+            }
         })?;
         let store = Self {
             folder: folder.to_owned(),
@@ -274,7 +278,8 @@ impl Store {
         let path = self.folder.join(name);
         let text = serde_json::to_string_pretty(value)
             .map_err(|error| format!("cannot write `{}`: {error}", path.display()));
-        let written = text.and_then(|t| files::write_whole(&path, format!("{t}\n").as_bytes()));
+        let written =
+            text.and_then(|t| Ok(files::write_whole(&path, format!("{t}\n").as_bytes())?));
         written.map_err(StudyError::Folder)
     }
 

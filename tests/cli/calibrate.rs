@@ -190,6 +190,6 @@ fn files_that_cannot_be_fitted_are_named_with_what_to_do() {
     .exits(2)
     .says("there is no folder");
     impasto(&["calibrate", "--gpu", "voodoo"])
-        .exits(2)
+        .exits(75)
         .says("no GPU is called `voodoo`");
 }

@@ -21,7 +21,7 @@ fn offers() -> BTreeMap<(String, String), Offer> {
     for line in script.lines().map(str::trim) {
         if let Some(label) = line.strip_suffix(')').filter(|l| !l.contains(['(', ' '])) {
             if let Some((_, name)) = label.split_once("impasto__subcmd__") {
-                command = name.to_owned();
+                command = name.replace("__subcmd__", " ");
             }
             option = label.to_owned();
         }
@@ -110,7 +110,15 @@ fn files_are_offered_where_files_are_taken() {
             _ => {}
         }
     }
-    assert_eq!(folders, ["converge --out", "converge -o"]);
+    assert_eq!(
+        folders,
+        [
+            "converge --out",
+            "converge -o",
+            "farm new --out",
+            "farm new -o"
+        ]
+    );
     assert_eq!(
         files,
         [
@@ -122,6 +130,7 @@ fn files_are_offered_where_files_are_taken() {
             "converge --reference",
             "emit --out",
             "emit -o",
+            "farm new --commands",
             "merge --out",
             "merge -o",
             "plan --plan",

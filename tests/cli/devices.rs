@@ -70,9 +70,9 @@ fn gpus_are_chosen_by_what_info_lists_of_them() {
     let text = impasto(&["info", "--device", "gpu"]).exits(0).stdout;
     assert!(text.contains("\n  ids      "), "{text}");
     assert!(text.contains("\n  driver   "), "{text}");
-    let refused = |selector: &str| {
+    let refused = |selector: &str, code: i32| {
         let args = ["render", SCENE, "--out", "p.exr", "--gpu", selector];
-        impasto(&args).exits(2).prints_nothing()
+        impasto(&args).exits(code).prints_nothing()
     };
     for selector in [
         "",
@@ -88,9 +88,9 @@ fn gpus_are_chosen_by_what_info_lists_of_them() {
         "minor:-1",
         "99999999999",
     ] {
-        refused(selector).says("--gpu").says("expected");
+        refused(selector, 2).says("--gpu").says("expected");
     }
-    refused("uuid:MIG-1").says("MIG");
+    refused("uuid:MIG-1", 2).says("MIG");
     for (selector, said) in [
         ("4294967295", "has the index 4294967295"),
         ("pci:ffff:ff:1f.7", "has the PCI address `ffff:ff:1f.7`"),
@@ -101,7 +101,8 @@ fn gpus_are_chosen_by_what_info_lists_of_them() {
             "is called `r\u{f6}ntgen \u{1f3a8}`",
         ),
     ] {
-        refused(selector)
+        // Another machine may have it.
+        refused(selector, 75)
             .says(&format!("no GPU {said}"))
             .says("there are: ")
             .says("hint");
@@ -338,16 +339,16 @@ fn without_a_gpu_the_processor_renders_and_measurements_say_what_they_need() {
         &["plan", SCENE, "--strategy", "exhaustive"],
         &["plan", SCENE, "--profile", "h200"],
     ] {
-        let run = without_gpu(args).exits(2).prints_nothing();
+        let run = without_gpu(args).exits(75).prints_nothing();
         run.says("no GPU was found")
             .says("mesa-vulkan-drivers")
             .says("--device cpu");
     }
     without_gpu(&["calibrate", "--quick"])
-        .exits(2)
+        .exits(75)
         .says("`impasto calibrate` needs a GPU");
     without_gpu(&["rays", SCENE])
-        .exits(2)
+        .exits(75)
         .says("`impasto rays` needs a GPU");
     assert_eq!(names(folder.path()), [""; 0]);
     without_gpu(&[

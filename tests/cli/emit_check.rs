@@ -283,7 +283,7 @@ fn a_reader_that_goes_away_is_no_error() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_standard_output_exits_with_2() {
+fn a_full_standard_output_exits_with_75() {
     let full = std::fs::OpenOptions::new()
         .write(true)
         .open("/dev/full")
@@ -293,7 +293,7 @@ fn a_full_standard_output_exits_with_2() {
         .output()
         .expect("the command starts");
     crate::cli::common::Run::from(output)
-        .exits(2)
+        .exits(75)
         .says("standard output")
         .says("no space left");
 }

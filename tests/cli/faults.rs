@@ -146,7 +146,7 @@ fn a_second_render_on_a_checkpoint_is_refused_until_the_first_is_gone() {
     wait_for_more(at, 0);
     let second = |arguments: &str| render(at, &format!("{arguments} {keeping} --out {{}}/b.exr"));
     second("--spp 4")
-        .exits(2)
+        .exits(75)
         .says("c.film` is in use by another process")
         .says("hint");
     // Reading it needs no lock: it is whole whenever it is read.
@@ -185,7 +185,7 @@ fn a_second_study_in_a_folder_is_refused_until_the_first_is_gone() {
         std::thread::sleep(Duration::from_millis(5));
     }
     impasto(&args)
-        .exits(2)
+        .exits(75)
         .says("is in use by another process")
         .says("hint");
     first.kill().expect("it is killed");
@@ -388,7 +388,7 @@ fn nobody_needs_to_listen() {
         assert_eq!(status.code(), Some(code), "closed pipes: {args:?}");
     }
     limited("exec >/dev/full", &["emit", &good])
-        .exits(2)
+        .exits(75)
         .says("no space left on the device");
     let args = rendering(at, "--spp 2 --verbose --out {}/p.exr");
     let args: Vec<&str> = args.iter().map(String::as_str).collect();

@@ -13,6 +13,7 @@ mod devices;
 mod emit_check;
 mod eval;
 mod explain;
+mod farm;
 #[cfg(unix)]
 mod faults;
 mod film;

@@ -66,11 +66,16 @@ fn install(reason: &str) -> Result {
     }
     let packages = PACKAGES.join(" and ");
     eprintln!("{reason}: installing Mesa's software Vulkan with apt ({packages})");
+    install_packages(&PACKAGES)
+}
+
+/// Installs packages of Debian and Ubuntu.
+pub fn install_packages(packages: &[&str]) -> Result {
     shell::run(apt().arg("update"))?;
     shell::run(
         apt()
             .args(["install", "--yes", "--no-install-recommends"])
-            .args(PACKAGES),
+            .args(packages),
     )
 }
 
@@ -107,7 +112,8 @@ fn apt() -> Command {
     command
 }
 
-fn is_root() -> bool {
+/// Does this run as root?
+pub fn is_root() -> bool {
     shell::capture(Command::new("id").arg("-u")).is_ok_and(|id| id == "0")
 }
 

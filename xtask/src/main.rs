@@ -10,6 +10,8 @@ use xtask::{adapter, shell};
 
 mod bless;
 mod demo;
+#[cfg(unix)]
+mod farm;
 mod hostile;
 mod layers;
 #[cfg(test)]
@@ -29,6 +31,9 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Build and run every test of the workspace
     Test(test::TestArgs),
+    #[cfg(unix)]
+    /// Start a Slurm cluster on this machine, run jobs of `impasto farm` on it through faults, and compare bits
+    Farm(farm::FarmArgs),
     /// Run the command on hostile files of every kind for some minutes, with limits on time and memory
     Hostile(hostile::HostileArgs),
     /// Draw the folders of each crate with the folders that they name; fail if one may not
@@ -41,6 +46,8 @@ fn main() -> ExitCode {
     shell::exit_code(match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Test(args) => test::run(&args),
+        #[cfg(unix)]
+        Command::Farm(args) => farm::run(&args),
         Command::Hostile(args) => hostile::run(&args),
         Command::Layers(args) => layers::run(&args),
         Command::Bless => bless::run(),

@@ -58,6 +58,7 @@ const LEFT_OUT: &[(&str, &[(&str, &str)])] = &[
             ),
             ("cli::calibrate::", "the command, rendering"),
             ("cli::converge::", "the command, rendering"),
+            ("cli::farm::", "the command, rendering"),
             ("cli::faults::", "the command, rendering"),
             ("cli::film::", "the command, rendering"),
             ("cli::hostile::", "the command, rendering"),

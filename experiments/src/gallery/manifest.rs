@@ -45,7 +45,7 @@ pub(super) fn read(path: &Path) -> Result<Manifest> {
 pub(super) fn write(path: &Path, manifest: &Manifest) -> Result {
     let mut text = serde_json::to_string_pretty(manifest).map_err(|e| e.to_string())?;
     text.push('\n');
-    write_whole(path, text.as_bytes())
+    Ok(write_whole(path, text.as_bytes())?)
 }
 
 /// The hash of what a picture shows.

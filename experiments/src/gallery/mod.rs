@@ -227,7 +227,7 @@ fn keep(path: &Path, bytes: &[u8]) -> Result {
         fs::create_dir_all(folder)
             .map_err(|e| format!("cannot create the folder {}: {e}", folder.display()))?;
     }
-    write_whole(path, bytes)
+    Ok(write_whole(path, bytes)?)
 }
 
 impl Studio {

@@ -71,7 +71,7 @@ impl Paper {
         let text = self
             .text()
             .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
-        write_whole(path, text.as_bytes())
+        Ok(write_whole(path, text.as_bytes())?)
     }
 
     /// As JSON, with a line for each record.

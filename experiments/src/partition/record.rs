@@ -66,7 +66,7 @@ impl Record {
     pub(super) fn save(&self, path: &Path) -> Result {
         let text = serde_json::to_string(self)
             .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
-        write_whole(path, text.as_bytes())
+        Ok(write_whole(path, text.as_bytes())?)
     }
 
     /// Replaces what was predicted and chosen by what a profile says; what was measured stays, but for

@@ -174,10 +174,25 @@ pub enum RuntimeError {
         path: PathBuf,
         /// Why.
         reason: String,
+        /// May it be written on another try?
+        transient: bool,
     },
 }
 
 impl RuntimeError {
+    /// May the same render on another try, or on another machine?
+    pub fn is_transient(&self) -> bool {
+        match self {
+            Self::NoAdapter { .. }
+            | Self::DeviceRequest { .. }
+            | Self::DeviceLost(_)
+            | Self::OutOfMemory(_)
+            | Self::Threads { .. } => true,
+            Self::Output { transient, .. } => *transient,
+            _ => false,
+        }
+    }
+
     /// With another hint, where a limit is too small.
     pub(crate) fn with_hint(mut self, better: &'static str) -> Self {
         if let Self::LimitTooSmall { hint, .. } = &mut self {

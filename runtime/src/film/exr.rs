@@ -20,8 +20,8 @@ use crate::film::Sums;
 use crate::film::cryptomatte;
 use crate::film::file::{FilmFile, Maker};
 use crate::film::output;
+use crate::film::output::Unwritten;
 use crate::film::outputs::Kind;
-use crate::input;
 use crate::technique::Choice;
 
 /// The primaries and the white of Rec. 709, which the picture's values are of.
@@ -32,20 +32,16 @@ const REC_709: [(f32, f32); 4] = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3
 /// # Errors
 /// The file cannot be written.
 pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
-    let failure = |reason: String| RuntimeError::Output {
-        path: path.to_path_buf(),
-        reason,
-    };
-    output::replace(path, |file| {
+    let written = output::replace(path, |file| {
         encode(film, &mut *file)?;
-        file.flush().map_err(|e| input::reason(&e))?;
-        sort_attributes(file.get_mut())
-    })
-    .map_err(failure)
+        file.flush()?;
+        Ok(sort_attributes(file.get_mut())?)
+    });
+    written.map_err(|why| why.at(path))
 }
 
 /// Writes a file whose attributes are in some order.
-fn encode(film: &FilmFile, to: impl Write + Seek) -> Result<(), String> {
+fn encode(film: &FilmFile, to: impl Write + Seek) -> Result<(), Unwritten> {
     let (width, height) = film.sums.size();
     let mut attributes = LayerAttributes::default();
     let version = env!("CARGO_PKG_VERSION");
@@ -69,8 +65,8 @@ fn encode(film: &FilmFile, to: impl Write + Seek) -> Result<(), String> {
         image.attributes.other.insert(text(&key), value);
     }
     image.write().to_buffered(to).map_err(|error| match error {
-        exr::error::Error::Io(error) => input::reason(&error),
-        error => error.to_string(),
+        exr::error::Error::Io(error) => error.into(),
+        error => error.to_string().into(),
     })
 }
 
@@ -81,18 +77,18 @@ const HEADER: u64 = 1 << 16;
 
 /// Puts the attributes of a file with one header in the order of their names, so that equal films give equal
 /// files: the encoder takes our own attributes from a hash map.
-fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> Result<(), String> {
-    let why = |error: std::io::Error| input::reason(&error);
+fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> std::io::Result<()> {
     let mut header = Vec::new();
-    file.rewind().map_err(why)?;
+    file.rewind()?;
     while sort_header(&mut header).is_none() {
-        let more = Read::by_ref(file).take(HEADER).read_to_end(&mut header);
-        if more.map_err(why)? == 0 {
-            return Err("what was encoded has no whole header".into());
+        let more = Read::by_ref(file).take(HEADER).read_to_end(&mut header)?;
+        if more == 0 {
+            let lacks = "what was encoded has no whole header";
+            return Err(std::io::Error::other(lacks));
         }
     }
-    file.rewind().map_err(why)?;
-    file.write_all(&header).map_err(why)
+    file.rewind()?;
+    file.write_all(&header)
 }
 
 /// The same in the first bytes of a file; `None` if the header goes on after them.

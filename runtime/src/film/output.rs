@@ -4,6 +4,7 @@
 //! renamed, so that a full disk or an interruption leaves an older picture as it was.
 
 use std::ffi::{OsStr, OsString};
+use std::fmt;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -46,6 +47,56 @@ pub fn read(path: &Path, what: &str) -> Result<Film, SceneError> {
     })
 }
 
+/// Why a file could not be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unwritten {
+    /// In a few words.
+    pub reason: String,
+    /// May it be written on another try?
+    pub transient: bool,
+}
+
+impl fmt::Display for Unwritten {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.reason)
+    }
+}
+
+impl From<Unwritten> for String {
+    fn from(unwritten: Unwritten) -> String {
+        unwritten.reason
+    }
+}
+
+impl From<std::io::Error> for Unwritten {
+    fn from(error: std::io::Error) -> Self {
+        Self {
+            reason: input::reason(&error),
+            transient: input::is_transient(&error),
+        }
+    }
+}
+
+impl From<String> for Unwritten {
+    fn from(reason: String) -> Self {
+        Self {
+            reason,
+            transient: false,
+        }
+    }
+}
+
+impl Unwritten {
+    /// The error that the file at `path` is not written.
+    pub(crate) fn at(self, path: &Path) -> RuntimeError {
+        RuntimeError::Output {
+            path: path.to_path_buf(),
+            reason: self.reason,
+            transient: self.transient,
+        }
+    }
+}
+
 /// The formats by the extension of a file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
@@ -58,15 +109,16 @@ enum Format {
 /// Writes `film` to `path`, as its extension says: `.exr` holds linear radiance, `.png` what
 /// a screen shows after `exposure` stops (a factor of two each). The folder must exist.
 pub fn write(film: &Film, path: &Path, exposure: f32) -> Result<(), RuntimeError> {
-    let failure = |reason: String| RuntimeError::Output {
-        path: path.to_path_buf(),
-        reason,
-    };
+    let failure = |why: Unwritten| why.at(path);
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     let format = match extension.to_ascii_lowercase().as_str() {
         "exr" => Format::Exr,
         "png" => Format::Png,
-        _ => return Err(failure("its name should end in .exr or .png".into())),
+        _ => {
+            return Err(failure(
+                "its name should end in .exr or .png".to_owned().into(),
+            ));
+        }
     };
     replace(path, |file| match format {
         Format::Exr => write_exr(film, file),
@@ -85,9 +137,8 @@ const UNFINISHED: &str = ".impasto-";
 /// Why it could not be written.
 pub fn replace(
     path: &Path,
-    content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
-) -> Result<(), String> {
-    let text = |e: std::io::Error| input::reason(&e);
+    content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), Unwritten>,
+) -> Result<(), Unwritten> {
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let prefix = unfinished(&target);
     let mut builder = tempfile::Builder::new();
@@ -98,13 +149,13 @@ pub fn replace(
         // As for any new file, less what the user's mask takes away.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder_of(&target)).map_err(text)?;
+    let mut file = builder.tempfile_in(folder_of(&target))?;
     let mut writer = BufWriter::new(file.as_file_mut());
     content(&mut writer)?;
-    writer.flush().map_err(text)?;
+    writer.flush()?;
     drop(writer);
-    file.as_file().sync_all().map_err(text)?;
-    file.persist(&target).map_err(|e| text(e.error))?;
+    file.as_file().sync_all()?;
+    file.persist(&target).map_err(|e| e.error)?;
     sync_folder(folder_of(&target));
     Ok(())
 }
@@ -156,7 +207,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), String> {
+fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), Unwritten> {
     // The encoder seeks, which a file can and a pipe could not.
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::codecs::openexr::OpenExrEncoder::new(&mut bytes)
@@ -167,11 +218,10 @@ fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), String>
             ExtendedColorType::Rgb32F,
         )
         .map_err(|e| e.to_string())?;
-    file.write_all(bytes.get_ref())
-        .map_err(|e| input::reason(&e))
+    Ok(file.write_all(bytes.get_ref())?)
 }
 
-fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Result<(), String> {
+fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Result<(), Unwritten> {
     let scale = exposure.exp2();
     let bytes: Vec<u8> = film
         .pixels
@@ -183,7 +233,7 @@ fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Res
     image::codecs::png::PngEncoder::new(&mut encoded)
         .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
-    file.write_all(&encoded).map_err(|e| input::reason(&e))
+    Ok(file.write_all(&encoded)?)
 }
 
 /// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1]: the curve of docs/outputs.md, "The PNG".
@@ -291,10 +341,12 @@ mod tests {
         let path = folder.path().join("a.exr");
         std::fs::write(&path, "old").expect("written");
         let full = replace(&path, |file| {
-            file.write_all(b"half").map_err(|e| e.to_string())?;
-            Err("No space left on device".to_string())
+            file.write_all(b"half")?;
+            Err(std::io::Error::from(std::io::ErrorKind::StorageFull).into())
         });
-        assert_eq!(full, Err("No space left on device".to_string()));
+        let full = full.expect_err("the disk is full");
+        assert_eq!(full.reason, "no space left on the device");
+        assert!(full.transient);
         assert_eq!(std::fs::read(&path).expect("readable"), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1);
     }

@@ -15,6 +15,7 @@ pub(crate) mod resources;
 pub(crate) mod schedule;
 pub mod selection;
 pub(crate) mod shader;
+mod spirv;
 pub(crate) mod statistics;
 pub(crate) mod submission;
 mod timing;
@@ -84,6 +85,7 @@ impl Failure {
 pub(crate) const USED_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
     .union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES)
+    .union(wgpu::Features::PASSTHROUGH_SHADERS)
     .union(SUBGROUPS);
 
 /// What kernels need to work together within a subgroup.

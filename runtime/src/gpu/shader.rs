@@ -4,9 +4,10 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use naga::valid::ModuleInfo;
 use wgpu::naga;
 
-use super::Gpu;
+use super::{Gpu, spirv};
 use crate::error::RuntimeError;
 use crate::kernels::validate::validate;
 use crate::world::bvh;
@@ -49,15 +50,15 @@ impl Gpu {
         if let Some(known) = self.pipelines.get(wgsl) {
             return Ok(known);
         }
-        let (module, _) = validate(kernel, wgsl)?;
-        let build = || Ok(self.build_pipeline(kernel, wgsl, &module, layout));
+        let (module, info) = validate(kernel, wgsl)?;
+        let build = || Ok(self.build_pipeline(kernel, wgsl, (&module, &info), layout));
         Ok(match self.guarded(build) {
             Ok(pipeline) => {
                 self.pipelines.keep(wgsl, &pipeline);
                 pipeline
             }
             // Once more, so that whoever listens hears of it.
-            Err(_) => self.build_pipeline(kernel, wgsl, &module, layout),
+            Err(_) => self.build_pipeline(kernel, wgsl, (&module, &info), layout),
         })
     }
 
@@ -65,12 +66,14 @@ impl Gpu {
         &self,
         kernel: &str,
         wgsl: &str,
-        module: &naga::Module,
+        (module, info): (&naga::Module, &ModuleInfo),
         layout: &wgpu::BindGroupLayout,
     ) -> wgpu::ComputePipeline {
-        let module = self.shader_module(kernel, module);
+        let zero_workgroup = self.checked || !bvh::shares_stack(wgsl);
+        let uncontracted = self.uncontracted(kernel, (module, info), zero_workgroup);
+        let module = uncontracted.unwrap_or_else(|| self.shader_module(kernel, module));
         let compilation_options = wgpu::PipelineCompilationOptions {
-            zero_initialize_workgroup_memory: self.checked || !bvh::shares_stack(wgsl),
+            zero_initialize_workgroup_memory: zero_workgroup,
             ..Default::default()
         };
         let layout = self
@@ -91,6 +94,42 @@ impl Gpu {
             })
     }
 
+    /// The module whose arithmetic is rounded as it is written, where the GPU takes one.
+    #[allow(unsafe_code)]
+    fn uncontracted(
+        &self,
+        kernel: &str,
+        (module, info): (&naga::Module, &ModuleInfo),
+        zero_workgroup: bool,
+    ) -> Option<wgpu::ShaderModule> {
+        let takes = self
+            .device
+            .features()
+            .contains(wgpu::Features::PASSTHROUGH_SHADERS);
+        if !takes || self.adapter.get_info().backend != wgpu::Backend::Vulkan {
+            return None;
+        }
+        let kind = spirv::Kind {
+            checked: self.checked,
+            zero_workgroup,
+        };
+        let words = spirv::write(module, info, kind, &bvh::is_traversal).ok()?;
+        let entry = module.entry_points.first()?;
+        let [x, y, z] = entry.workgroup_size;
+        let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
+            label: Some(kernel),
+            entry_points: Cow::Owned(vec![wgpu::PassthroughShaderEntryPoint {
+                name: entry.name.as_str().into(),
+                workgroup_size: (x, y, z),
+            }]),
+            spirv: Some(Cow::Owned(words)),
+            ..Default::default()
+        };
+        // SAFETY: naga wrote the module, of text that it validated, and what was added are decorations of results. Why
+        // checks are left out is said below.
+        Some(unsafe { self.device.create_shader_module_passthrough(descriptor) })
+    }
+
     /// Of what was parsed to be validated: wgpu would parse the text again, which takes longer than to
     /// copy the module.
     #[allow(unsafe_code)]
@@ -109,5 +148,107 @@ impl Gpu {
         // the language demands a bound of every loop and traversal descends a finite tree.
         // Divisors are constants or guarded.
         unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::GpuOptions;
+
+    /// A product and a sum, each rounded: 1 + 2^-12 squared is a tie between 1 + 2^-11 and its neighbour, so that a sum
+    /// that took the product unrounded would be 2^-24 off. And a sum that a difference does not undo.
+    const WGSL: &str = "
+        @group(0) @binding(3) var<storage, read_write> values: array<f32>;
+        @group(0) @binding(7) var<storage, read> factors: array<f32>;
+        fn scaled(x: f32, y: f32, z: f32) -> f32 {
+            return x * y + z;
+        }
+        fn absorbed(x: f32, y: f32) -> f32 {
+            return (x + y) - x;
+        }
+        @compute @workgroup_size(4)
+        fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+            let x = factors[id.x];
+            if id.x % 2u == 0u {
+                values[id.x] = scaled(x, x, -(1.0 + 0.00048828125));
+            } else {
+                values[id.x] = absorbed(x, x * 1e-9);
+            }
+        }";
+
+    #[test]
+    fn arithmetic_is_rounded_as_it_is_written() {
+        for checked in [false, true] {
+            let gpu = Gpu::new(&GpuOptions {
+                checked,
+                ..GpuOptions::default()
+            })
+            .unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(computed(&gpu, 1.0 + 1.0 / 4096.0), [0.0; 4], "{checked}");
+            // And bindings are where they should be.
+            let product = 4.0 - 1.000_488_3;
+            assert_eq!(computed(&gpu, 2.0), [product, 0.0, product, 0.0]);
+        }
+    }
+
+    /// What the kernel makes of four equal factors.
+    fn computed(gpu: &Gpu, factor: f32) -> [f32; 4] {
+        let storage = |binding, read_only| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let layout = gpu
+            .device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: None,
+                entries: &[storage(7, true), storage(3, false)],
+            });
+        let pipeline = gpu
+            .pipeline("test", WGSL, &layout)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let buffer = |usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size: 16,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        let values = buffer(storage | wgpu::BufferUsages::COPY_SRC);
+        let factors = buffer(storage | wgpu::BufferUsages::COPY_DST);
+        let read = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
+        gpu.queue
+            .write_buffer(&factors, 0, bytemuck::cast_slice(&[factor; 4]));
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &layout,
+            entries: &[entry(3, &values), entry(7, &factors)],
+        });
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        drop(pass);
+        encoder.copy_buffer_to_buffer(&values, 0, &read, 0, 16);
+        let index = gpu.queue.submit([encoder.finish()]);
+        let take = |bytes: &[u8]| bytemuck::pod_read_unaligned(bytes);
+        gpu.read(&read, index, 16, take)
+            .unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn entry(binding: u32, buffer: &wgpu::Buffer) -> wgpu::BindGroupEntry<'_> {
+        wgpu::BindGroupEntry {
+            binding,
+            resource: buffer.as_entire_binding(),
+        }
     }
 }

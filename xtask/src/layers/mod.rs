@@ -112,7 +112,7 @@ const CRATES: &[Crate] = &[
             &["error", "files", "ir_text", "cost", "plot", "docs", "trace"],
             &["driver", "plan", "starter"],
             &["converge", "measure", "shot"],
-            &["calibrate"],
+            &["calibrate", "farm"],
             &["cli"],
         ],
     },

@@ -128,6 +128,29 @@ impl FilmFile {
         self.about.samples()
     }
 
+    /// What a file says of itself. Its length is that of a whole film, and its sums are not read.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no film, or is cut.
+    pub fn about(path: &Path) -> Result<About, RuntimeError> {
+        let part = Part::open(path).map(|part| part.header.about);
+        part.map_err(|reason| unusable(path, reason))
+    }
+
+    /// What a file says of itself, if all of it is as it was written. It is read piece by piece.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no film that was written whole.
+    pub fn check(path: &Path) -> Result<About, RuntimeError> {
+        let whole = |part: Part<_>| {
+            let about = part.header.about.clone();
+            let all = part.planes(&mut |_, _, _| (), &mut |_| ControlFlow::Continue(()));
+            all.map(|_| about)
+        };
+        let about = Part::open(path).and_then(whole);
+        about.map_err(|reason| unusable(path, reason))
+    }
+
     /// Reads a file. Whatever its bytes are, the answer is a film or an error that names the file.
     ///
     /// # Errors
@@ -137,10 +160,7 @@ impl FilmFile {
         let whole = |part| Self::of(part, &mut |_| ControlFlow::Continue(()));
         let read = Part::open(path).and_then(whole);
         read.map(|(film, _)| film)
-            .map_err(|reason| RuntimeError::FilmFile {
-                path: path.to_path_buf(),
-                reason,
-            })
+            .map_err(|reason| unusable(path, reason))
     }
 
     /// The film of a file, which is whole unless `watch` broke it off.
@@ -156,6 +176,13 @@ impl FilmFile {
         };
         let end = part.planes(&mut take, watch)?;
         Ok((Self { about, sums }, end))
+    }
+}
+
+fn unusable(path: &Path, reason: String) -> RuntimeError {
+    RuntimeError::FilmFile {
+        path: path.to_path_buf(),
+        reason,
     }
 }
 

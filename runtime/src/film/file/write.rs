@@ -8,7 +8,6 @@ use crate::error::RuntimeError;
 use crate::film::file::Range;
 use crate::film::output;
 use crate::fingerprint::Running;
-use crate::input;
 use crate::technique::Choice;
 
 impl FilmFile {
@@ -17,13 +16,8 @@ impl FilmFile {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RuntimeError> {
-        let written = output::replace(path, |file| {
-            self.write_to(file).map_err(|error| input::reason(&error))
-        });
-        written.map_err(|reason| RuntimeError::Output {
-            path: path.to_path_buf(),
-            reason,
-        })
+        let written = output::replace(path, |file| Ok(self.write_to(file)?));
+        written.map_err(|why| why.at(path))
     }
 
     pub(super) fn write_to(&self, to: &mut impl Write) -> std::io::Result<()> {

@@ -25,7 +25,7 @@ pub(crate) use build::binary_tree;
 pub use kept::Trees;
 pub use levels::{Levels, ObjectTree};
 pub use native::{Caster, Hit, Instructions, NO_PRIMITIVE, Rays};
-pub(crate) use text::{asks_for_lane, provides_steps, shares_stack};
+pub(crate) use text::{asks_for_lane, is_traversal, provides_steps, shares_stack};
 
 /// The parent of the root, which nobody asks for.
 const NO_PARENT: u32 = 0;

@@ -67,6 +67,22 @@ pub(crate) fn asks_for_lane(part: &ShaderPart) -> bool {
     mentions(&part.wgsl, "walk_lane")
 }
 
+/// Whether this is the name of a function that casts rays, or of a part of one: it has the same text in every kernel.
+pub(crate) fn is_traversal(function: &str) -> bool {
+    let defined = format!("fn {function}(");
+    FILES.iter().any(|text| text.contains(&defined))
+}
+
+/// The text of all of them.
+const FILES: [&str; 6] = [
+    include_str!("binary.wgsl"),
+    include_str!("cast.wgsl"),
+    include_str!("placed.wgsl"),
+    include_str!("stack.wgsl"),
+    include_str!("triangle.wgsl"),
+    include_str!("wide.wgsl"),
+];
+
 /// Whether a kernel has a stack in workgroup memory, which need not be cleared: an entry is
 /// written before it is read.
 pub(crate) fn shares_stack(wgsl: &str) -> bool {
