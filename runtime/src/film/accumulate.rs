@@ -1,19 +1,33 @@
 //! Adding films plane by plane and piece by piece, as they are read: a part of a picture of any size takes a piece of
 //! memory to be added, and not as much as the picture.
 
+use crate::film::file::Piece;
 use crate::film::layers::Layers;
 use crate::film::outputs::{ID_SLOTS, Kind, SUM_WORDS};
 use crate::film::{COUNT_PLANE, Sums};
+
+/// Pixels to which it pays to add the words of all films before the next: their sums stay in the nearest cache.
+pub(super) const BLOCK: usize = 1024;
 
 /// Sums to which planes of other films are added. Pieces of a film come in the order of its planes.
 pub(super) struct Accumulator<'s> {
     sums: &'s mut Sums,
     roles: Vec<Role>,
-    /// The ids of a slot, until the samples come that they count; empty until there are any.
-    ids: Vec<u32>,
-    /// The plane that those are of.
-    ids_of: Option<usize>,
+    /// Of each film that is being added, where the ids of its last slot went.
+    homes: Vec<Homes>,
 }
+
+/// Where the ids of a slot went, until the samples come that they count.
+#[derive(Default)]
+struct Homes {
+    /// The plane of the ids.
+    of: Option<usize>,
+    /// Of each pixel a slot among those there are, or [`LOST`].
+    slots: Vec<u8>,
+}
+
+/// The place after all slots, which counts samples whose id found no room.
+const LOST: u8 = ID_SLOTS as u8;
 
 /// How the words of a plane are added to those there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,9 +38,9 @@ enum Role {
     Count,
     /// The complement of a distance, of which the largest is kept.
     Nearest,
-    /// The id of a slot, whose number of samples is in the next plane.
-    Id,
-    /// The number of samples of the id before, in a list of slots that begins with a plane.
+    /// The id of a slot of a list that begins with a plane. Its number of samples is in the next plane.
+    Id(usize),
+    /// The number of samples of the id before.
     IdCount(usize),
 }
 
@@ -35,36 +49,52 @@ impl<'s> Accumulator<'s> {
         Self {
             roles: roles(sums.layers()),
             sums,
-            ids: Vec::new(),
-            ids_of: None,
+            homes: Vec::new(),
         }
     }
 
-    /// Adds `words` of a plane, which are those of the pixels from `pixel` on. Words beyond the last pixel are none.
-    pub(super) fn add(&mut self, plane: usize, pixel: usize, words: &[u32]) {
+    /// Adds `words` of a plane of a film, which are those of the pixels from `pixel` on. Words beyond the last pixel are
+    /// none. Films are numbers, by which those are told apart that are added side by side.
+    pub(super) fn add(&mut self, film: usize, plane: usize, pixel: usize, words: &[u32]) {
         let count = self.sums.pixel_count();
         let words = &words[..words.len().min(count.saturating_sub(pixel))];
-        let Some(role) = self.roles.get(plane) else {
+        let Some(role) = self.roles.get(plane).copied() else {
             return;
         };
-        match *role {
-            Role::Word(word) => self.add_word(plane, SUM_WORDS - 1 - word, pixel, words),
-            Role::Count => self.combine(plane, pixel, words, u32::saturating_add),
-            Role::Nearest => self.combine(plane, pixel, words, u32::max),
-            Role::Id => {
-                self.ids.resize(count, 0);
-                self.ids[pixel..][..words.len()].copy_from_slice(words);
-                self.ids_of = Some(plane);
+        let blocks = words.chunks(BLOCK).zip((pixel..).step_by(BLOCK));
+        for (words, pixel) in blocks {
+            match role {
+                Role::Word(word) => self.add_word(plane, SUM_WORDS - 1 - word, pixel, words),
+                Role::Count => self.combine(plane, pixel, words, u32::saturating_add),
+                Role::Nearest => self.combine(plane, pixel, words, u32::max),
+                Role::Id(first) => self.place_ids(film, plane, first, pixel, words),
+                Role::IdCount(first) => self.count_ids(film, plane, first, pixel, words),
             }
-            Role::IdCount(first) if self.ids_of == plane.checked_sub(1) => {
-                self.add_ids(first, pixel, words)
-            }
-            // Ids of no plane are none.
-            Role::IdCount(_) => {}
         }
     }
 
-    fn combine(&mut self, plane: usize, pixel: usize, words: &[u32], with: fn(u32, u32) -> u32) {
+    /// Adds a piece of several films.
+    pub(super) fn add_piece(&mut self, piece: &Piece) {
+        for first in (0..piece.length()).step_by(BLOCK) {
+            let block = first..piece.length().min(first + BLOCK);
+            for (film, words) in piece.words() {
+                self.add(
+                    film,
+                    piece.plane,
+                    piece.pixel + first,
+                    &words[block.clone()],
+                );
+            }
+        }
+    }
+
+    fn combine(
+        &mut self,
+        plane: usize,
+        pixel: usize,
+        words: &[u32],
+        with: impl Fn(u32, u32) -> u32,
+    ) {
         let own = &mut self.sums.plane_mut(plane)[pixel..];
         for (own, word) in own.iter_mut().zip(words) {
             *own = with(*own, *word);
@@ -73,19 +103,14 @@ impl<'s> Accumulator<'s> {
 
     /// Adds one word of sums, which `above` more words follow in the next planes.
     fn add_word(&mut self, plane: usize, above: usize, pixel: usize, words: &[u32]) {
-        let count = self.sums.pixel_count();
-        let mut at = pixel;
-        for block in words.chunks(BLOCK) {
-            let own = &mut self.sums.words[plane * count + at..][..block.len()];
-            let mut carries = 0;
-            for (own, word) in own.iter_mut().zip(block) {
-                *own = own.wrapping_add(*word);
-                carries |= u32::from(*own < *word);
-            }
-            if carries != 0 && above > 0 {
-                self.carry(plane, above, at, block);
-            }
-            at += block.len();
+        let own = &mut self.sums.plane_mut(plane)[pixel..];
+        let mut carries = 0;
+        for (own, word) in own.iter_mut().zip(words) {
+            *own = own.wrapping_add(*word);
+            carries |= u32::from(*own < *word);
+        }
+        if carries != 0 && above > 0 {
+            self.carry(plane, above, pixel, words);
         }
     }
 
@@ -110,25 +135,71 @@ impl<'s> Accumulator<'s> {
         }
     }
 
-    /// Puts the ids of a slot into the lists there are; what finds no room is counted as it is where samples are taken.
-    fn add_ids(&mut self, first: usize, pixel: usize, words: &[u32]) {
+    /// Puts the ids of a slot into the lists there are. What finds no room is counted as it is where samples are taken.
+    fn place_ids(&mut self, film: usize, plane: usize, first: usize, pixel: usize, ids: &[u32]) {
         let count = self.sums.pixel_count();
+        if self.homes.len() <= film {
+            self.homes.resize_with(film + 1, Homes::default);
+        }
+        let homes = &mut self.homes[film];
+        homes.of = Some(plane);
+        homes.slots.resize(count, 0);
+        let homes = &mut homes.slots[pixel..][..ids.len()];
+        // Most pixels have the ids that they had in the film before, in the same slots.
+        let same = (plane - first) / 2;
+        homes.fill(same as u8);
+        let own = &self.sums.plane(plane)[pixel..];
+        let differ = |(own, id): (&u32, &u32)| u32::from(*own != *id && *id != 0);
+        if own
+            .iter()
+            .zip(ids)
+            .map(differ)
+            .fold(0, std::ops::BitOr::bitor)
+            == 0
+        {
+            return;
+        }
         let slots = &mut self.sums.words[first * count..];
-        let ids = &self.ids[pixel..];
-        for (at, (id, samples)) in ids.iter().zip(words).enumerate() {
-            if *id == 0 {
+        for (at, (id, home)) in ids.iter().zip(homes).enumerate() {
+            let place = |slot: usize| 2 * slot * count + pixel + at;
+            if *id == 0 || slots[place(same)] == *id {
                 continue;
             }
-            let place = |plane: usize| plane * count + pixel + at;
-            let has_room = |slot: &usize| [0, *id].contains(&slots[place(2 * slot)]);
-            let to = match (0..ID_SLOTS).find(has_room) {
+            let has_room = |slot: &usize| [0, *id].contains(&slots[place(*slot)]);
+            *home = match (0..ID_SLOTS).find(has_room) {
                 Some(slot) => {
-                    slots[place(2 * slot)] = *id;
-                    2 * slot + 1
+                    slots[place(slot)] = *id;
+                    slot as u8
                 }
-                None => 2 * ID_SLOTS,
+                None => LOST,
             };
-            slots[place(to)] = slots[place(to)].saturating_add(*samples);
+        }
+    }
+
+    /// Counts the samples of ids that were put into the lists.
+    fn count_ids(&mut self, film: usize, plane: usize, first: usize, pixel: usize, words: &[u32]) {
+        let count = self.sums.pixel_count();
+        let homes = self.homes.get(film);
+        let homes = homes.filter(|homes| homes.of == plane.checked_sub(1));
+        // Samples of no id are none.
+        let Some(homes) = homes.map(|homes| &homes.slots[pixel..][..words.len()]) else {
+            return;
+        };
+        let plane_of = |home: u8| match home {
+            LOST => first + 2 * ID_SLOTS,
+            slot => first + 2 * usize::from(slot) + 1,
+        };
+        let home = homes[0];
+        if homes
+            .iter()
+            .fold(0, |differ, other| differ | (home ^ other))
+            == 0
+        {
+            return self.combine(plane_of(home), pixel, words, u32::saturating_add);
+        }
+        for (at, (home, samples)) in homes.iter().zip(words).enumerate() {
+            let own = &mut self.sums.words[plane_of(*home) * count + pixel + at];
+            *own = own.saturating_add(*samples);
         }
     }
 
@@ -137,9 +208,6 @@ impl<'s> Accumulator<'s> {
         self.sums.sort_all_ids();
     }
 }
-
-/// Pixels whose carries are looked for together: a block stays in the nearest cache.
-const BLOCK: usize = 1024;
 
 /// The roles of all planes.
 fn roles(layers: &Layers) -> Vec<Role> {
@@ -154,7 +222,7 @@ fn roles(layers: &Layers) -> Vec<Role> {
             Kind::Share => roles.push(Role::Count),
             Kind::Nearest => roles.push(Role::Nearest),
             Kind::Ids => {
-                roles.extend((0..ID_SLOTS).flat_map(|_| [Role::Id, Role::IdCount(first)]));
+                roles.extend((0..ID_SLOTS).flat_map(|_| [Role::Id(first), Role::IdCount(first)]));
                 roles.push(Role::Count);
             }
             Kind::Samples => {}
@@ -197,11 +265,11 @@ mod tests {
         let mut accumulator = Accumulator::new(&mut pieces);
         for plane in 0..b.sums.layers().planes() {
             for (pixel, word) in b.sums.plane(plane).iter().enumerate() {
-                accumulator.add(plane, pixel, &[*word]);
+                accumulator.add(0, plane, pixel, &[*word]);
             }
         }
-        accumulator.add(usize::MAX, 0, &[1]);
-        accumulator.add(0, 2, &[1]);
+        accumulator.add(0, usize::MAX, 0, &[1]);
+        accumulator.add(0, 0, 2, &[1]);
         accumulator.finish();
         assert_eq!(pieces, whole);
         assert_ne!(whole, a.sums);

@@ -5,6 +5,7 @@
 //! Ranks are the ids of a pixel by falling coverage, two to a layer of four channels.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::film::Sums;
 use crate::film::layers::Layer;
@@ -56,10 +57,12 @@ pub fn key(layer: &str) -> String {
     format!("{:08x}", hash(layer))[..7].to_owned()
 }
 
-/// The channels of a layer with their values: `NAME00.R` to `NAME03.A`.
-pub fn channels(sums: &Sums, layer: &Layer) -> Vec<(String, Vec<f32>)> {
+/// The channels of a layer with their values in some pixels: `NAME00.R` to `NAME03.A`.
+pub fn channels(sums: &Sums, layer: &Layer, pixels: Range<usize>) -> Vec<(String, Vec<f32>)> {
     let ids: Vec<f32> = layer.names.iter().map(|name| id(name)).collect();
-    let ranks = ranks(sums, layer, &ids);
+    let ranks: Vec<_> = pixels
+        .map(|pixel| ranks(sums, layer, &ids, pixel))
+        .collect();
     let name = layer.output.channels[0];
     let mut channels = Vec::new();
     for rank in 0..ID_SLOTS {
@@ -72,28 +75,24 @@ pub fn channels(sums: &Sums, layer: &Layer) -> Vec<(String, Vec<f32>)> {
     channels
 }
 
-/// Of each pixel its ids with their coverage, by falling coverage.
-fn ranks(sums: &Sums, layer: &Layer, ids: &[f32]) -> Vec<[[f32; 2]; ID_SLOTS]> {
-    let (width, height) = sums.size();
-    let pixel = |pixel: usize| {
-        let samples = f64::from(sums.count(pixel).max(1));
-        let mut ranks = [[0.0; 2]; ID_SLOTS];
-        // Names that are equal are one id.
-        let mut found: Vec<(f32, u32)> = Vec::new();
-        for counted in sums.ids(&layer.name, pixel) {
-            let id = ids.get(counted.id as usize).copied().unwrap_or(0.0);
-            match found.iter_mut().find(|(known, _)| *known == id) {
-                Some((_, count)) => *count += counted.count,
-                None => found.push((id, counted.count)),
-            }
+/// The ids of a pixel with their coverage, by falling coverage.
+fn ranks(sums: &Sums, layer: &Layer, ids: &[f32], pixel: usize) -> [[f32; 2]; ID_SLOTS] {
+    let samples = f64::from(sums.count(pixel).max(1));
+    let mut ranks = [[0.0; 2]; ID_SLOTS];
+    // Names that are equal are one id.
+    let mut found: Vec<(f32, u32)> = Vec::new();
+    for counted in sums.ids(&layer.name, pixel) {
+        let id = ids.get(counted.id as usize).copied().unwrap_or(0.0);
+        match found.iter_mut().find(|(known, _)| *known == id) {
+            Some((_, count)) => *count += counted.count,
+            None => found.push((id, counted.count)),
         }
-        found.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-        for (rank, (id, count)) in ranks.iter_mut().zip(found) {
-            *rank = [id, (f64::from(count) / samples) as f32];
-        }
-        ranks
-    };
-    (0..width as usize * height as usize).map(pixel).collect()
+    }
+    found.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    for (rank, (id, count)) in ranks.iter_mut().zip(found) {
+        *rank = [id, (f64::from(count) / samples) as f32];
+    }
+    ranks
 }
 
 #[cfg(test)]
@@ -155,7 +154,7 @@ mod tests {
         words.push(0);
         let layers = Layers::new(vec![layer.clone()]);
         let sums = Sums::new(1, 1, layers, words).expect("a pixel's words");
-        let found = channels(&sums, &layer);
+        let found = channels(&sums, &layer, 0..1);
         let values: Vec<f32> = found.iter().map(|(_, values)| values[0]).collect();
         let expected = [id("leaf"), 0.5, id("floor"), 0.4, id("stem"), 0.1];
         assert_eq!(values[..6], expected);

@@ -1,15 +1,22 @@
 //! OpenEXR files of films: the picture as `R`, `G`, `B`, a layer for each output beside it under its usual names,
 //! and what all that is of as metadata.
 
-use std::io::{Cursor, Write};
+use std::io::{Read, Seek, Write};
+use std::ops::Range;
 use std::path::Path;
 
-use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer as ExrLayer};
-use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
-use exr::meta::header::LayerAttributes;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::image::write::channels::{ChannelsWriter, WritableChannels};
+use exr::image::{Encoding, Image, Layer as ExrLayer};
+use exr::math::RoundingMode;
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, ChannelList, Chromaticities, LevelMode, SampleType, Text,
+};
+use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::WritableImage;
 
 use crate::error::RuntimeError;
+use crate::film::Sums;
 use crate::film::cryptomatte;
 use crate::film::file::{FilmFile, Maker};
 use crate::film::output;
@@ -25,16 +32,17 @@ const REC_709: [(f32, f32); 4] = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3
 /// # Errors
 /// The file cannot be written.
 pub fn write(film: &FilmFile, path: &Path) -> Result<(), RuntimeError> {
-    let failure = |why: Unwritten| why.at(path);
-    let bytes = encode(film).map_err(|reason| failure(reason.into()))?;
-    output::replace(path, |file| Ok(file.write_all(&bytes)?)).map_err(failure)
+    let written = output::replace(path, |file| {
+        encode(film, &mut *file)?;
+        file.flush()?;
+        Ok(sort_attributes(file.get_mut())?)
+    });
+    written.map_err(|why| why.at(path))
 }
 
-fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
+/// Writes a file whose attributes are in some order.
+fn encode(film: &FilmFile, to: impl Write + Seek) -> Result<(), Unwritten> {
     let (width, height) = film.sums.size();
-    let channel =
-        |(name, values): (String, Vec<f32>)| AnyChannel::new(text(&name), FlatSamples::F32(values));
-    let channels = channels(film).into_iter().map(channel).collect();
     let mut attributes = LayerAttributes::default();
     let version = env!("CARGO_PKG_VERSION");
     attributes.software_name = Some(text(&format!("impasto {version}")));
@@ -43,7 +51,7 @@ fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
         attributes,
         // Lossless, since ids are no amounts.
         Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(channels),
+        Values(&film.sums),
     );
     let mut image = Image::from_layer(layer);
     let [red, green, blue, white] = REC_709.map(Into::into);
@@ -56,21 +64,35 @@ fn encode(film: &FilmFile) -> Result<Vec<u8>, String> {
     for (key, value) in metadata(film) {
         image.attributes.other.insert(text(&key), value);
     }
-    // The encoder seeks, which a file can and a pipe could not.
-    let mut bytes = Cursor::new(Vec::new());
-    let written = image.write().to_buffered(&mut bytes);
-    written.map_err(|e| e.to_string())?;
-    let mut bytes = bytes.into_inner();
-    sort_attributes(&mut bytes).ok_or("what was encoded has no whole header")?;
-    Ok(bytes)
+    image.write().to_buffered(to).map_err(|error| match error {
+        exr::error::Error::Io(error) => error.into(),
+        error => error.to_string().into(),
+    })
 }
 
 /// Bytes before the first attribute: the magic number and the version.
 const BEFORE_ATTRIBUTES: usize = 8;
+/// Bytes that most headers have room in.
+const HEADER: u64 = 1 << 16;
 
 /// Puts the attributes of a file with one header in the order of their names, so that equal films give equal
-/// files: the encoder takes our own attributes from a hash map. `None` if the header is not whole.
-fn sort_attributes(file: &mut [u8]) -> Option<()> {
+/// files: the encoder takes our own attributes from a hash map.
+fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> std::io::Result<()> {
+    let mut header = Vec::new();
+    file.rewind()?;
+    while sort_header(&mut header).is_none() {
+        let more = Read::by_ref(file).take(HEADER).read_to_end(&mut header)?;
+        if more == 0 {
+            let lacks = "what was encoded has no whole header";
+            return Err(std::io::Error::other(lacks));
+        }
+    }
+    file.rewind()?;
+    file.write_all(&header)
+}
+
+/// The same in the first bytes of a file; `None` if the header goes on after them.
+fn sort_header(file: &mut [u8]) -> Option<()> {
     let mut rest = file.get(BEFORE_ATTRIBUTES..)?;
     let mut attributes = Vec::new();
     // A 0 in place of a name ends the header.
@@ -96,12 +118,60 @@ fn attribute_length(bytes: &[u8]) -> Option<usize> {
     value.checked_add(after_type + 1 + 4)
 }
 
-/// Every channel with its values.
-fn channels(film: &FilmFile) -> Vec<(String, Vec<f32>)> {
-    let sums = &film.sums;
-    let pixels = sums.picture().pixels;
+/// The values of a film, of which the encoder has a few rows at a time: all of them would be as large as the film.
+struct Values<'f>(&'f Sums);
+
+impl Values<'_> {
+    /// Every channel with its values in some pixels, in the order of the names.
+    fn sorted(&self, pixels: Range<usize>) -> Vec<(Text, Vec<f32>)> {
+        let channels = channels(self.0, pixels).into_iter();
+        let mut channels: Vec<_> = channels.map(|(name, v)| (text(&name), v)).collect();
+        channels.sort_by(|(a, _), (b, _)| a.cmp(b));
+        channels
+    }
+}
+
+impl<'f> WritableChannels<'f> for Values<'f> {
+    type Writer = Values<'f>;
+
+    fn infer_channel_list(&self) -> ChannelList {
+        let names = self.sorted(0..0).into_iter().map(|(name, _)| name);
+        let channel = |name| ChannelDescription::named(name, SampleType::F32);
+        ChannelList::new(names.map(channel).collect())
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_writer(&'f self, _: &Header) -> Self::Writer {
+        Values(self.0)
+    }
+}
+
+impl ChannelsWriter for Values<'_> {
+    fn extract_uncompressed_block(&self, header: &Header, block: BlockIndex) -> Vec<u8> {
+        // Blocks are whole rows.
+        let width = header.layer_size.0;
+        let first = width * block.pixel_position.1;
+        let channels = self.sorted(first..first + width * block.pixel_size.1);
+        UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
+            let at = line.location;
+            let row = width * (at.position.1 - block.pixel_position.1);
+            let values = &channels[at.channel].1[row..][..width];
+            let bytes = line.value.chunks_exact_mut(size_of::<f32>());
+            for (bytes, value) in bytes.zip(values) {
+                bytes.copy_from_slice(&value.to_ne_bytes());
+            }
+        })
+    }
+}
+
+/// Every channel with its values in some pixels.
+fn channels(sums: &Sums, pixels: Range<usize>) -> Vec<(String, Vec<f32>)> {
+    let picture: Vec<[f32; 3]> = pixels.clone().map(|pixel| sums.mean(pixel)).collect();
     let beauty = |(channel, name): (usize, &str)| {
-        let values = pixels.iter().map(|pixel| pixel[channel]).collect();
+        let values = picture.iter().map(|pixel| pixel[channel]).collect();
         (name.to_owned(), values)
     };
     let mut channels: Vec<_> = ["R", "G", "B"]
@@ -111,9 +181,9 @@ fn channels(film: &FilmFile) -> Vec<(String, Vec<f32>)> {
         .collect();
     for layer in sums.layers().iter() {
         if layer.output.kind == Kind::Ids {
-            channels.extend(cryptomatte::channels(sums, layer));
+            channels.extend(cryptomatte::channels(sums, layer, pixels.clone()));
         } else {
-            let values = sums.values(&layer.name);
+            let values = sums.values_in(&layer.name, pixels.clone());
             channels.extend(layer.channels().into_iter().zip(values));
         }
     }
@@ -158,6 +228,9 @@ fn text(value: &str) -> Text {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
+    use exr::image::FlatSamples;
     use exr::prelude::read_first_flat_layer_from_file;
 
     use super::*;
@@ -166,15 +239,50 @@ mod tests {
     #[test]
     fn equal_films_are_equal_files() {
         let film = with_outputs(0, 2, 3, &["albedo", "material", "object"]);
-        let first = encode(&film).expect("encoded");
+        let encoded = || {
+            let mut bytes = Cursor::new(Vec::new());
+            encode(&film, &mut bytes).expect("encoded");
+            sort_attributes(&mut bytes).expect("a header");
+            bytes.into_inner()
+        };
+        let first = encoded();
         for _ in 0..8 {
-            assert!(encode(&film).expect("encoded") == first);
+            assert!(encoded() == first);
         }
         let [seed, version] = ["impasto/seed", "impasto/version"].map(|name| {
             let found = first.windows(name.len()).position(|w| w == name.as_bytes());
             found.unwrap_or_else(|| panic!("{name}"))
         });
         assert!(seed < version);
+    }
+
+    /// The encoder asks for a few rows at a time, and gets those of the film.
+    #[test]
+    fn every_row_of_every_channel_is_that_of_the_film() {
+        let small = with_outputs(0, 2, 3, &["albedo", "depth", "material", "variance"]);
+        let (width, height) = (3, 77);
+        let layers = small.sums.layers().clone();
+        let mut film = small;
+        film.sums = Sums::empty(width, height, layers).expect("memory");
+        for plane in 0..film.sums.layers().planes() {
+            let words = film.sums.plane_mut(plane).iter_mut().enumerate();
+            words.for_each(|(at, word)| *word = (plane + 1) as u32 * at as u32 % 61);
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.exr");
+        write(&film, &path).expect("written");
+        let image = read_first_flat_layer_from_file(&path).expect("an EXR");
+        let read = &image.layer_data.channel_data.list;
+        let expected = Values(&film.sums).sorted(0..(width * height) as usize);
+        assert_eq!(read.len(), expected.len());
+        for (read, (name, values)) in read.iter().zip(expected) {
+            assert_eq!(read.name, name);
+            let FlatSamples::F32(samples) = &read.sample_data else {
+                panic!("{name} is no float");
+            };
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(samples), bits(&values), "{name}");
+        }
     }
 
     /// A film without outputs has the picture that other files of it have, and says what it is of.

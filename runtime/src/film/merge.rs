@@ -1,17 +1,18 @@
 //! Which films are parts of one render, and what they are together: the very bits of a render of all
 //! their samples.
 //!
-//! Files are merged by adding one after another to one film, piece by piece, so that the memory does not grow with
+//! Files are merged by adding a few at a time to one film, piece by piece, so that the memory does not grow with
 //! their number. What they are of is looked at before anything is added: it is little, and most of what can be wrong
 //! with a merge shows there.
 
+use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::error::RuntimeError;
 use crate::film::Sums;
 use crate::film::accumulate::Accumulator;
-use crate::film::file::{About, FilmFile, Header, Identity, Maker, Part};
+use crate::film::file::{About, FilmFile, Header, Identity, Maker, Part, Wrong, side_by_side};
 use crate::film::layers::Layers;
 use crate::film::ranges::{self, Range};
 use crate::technique::Choice;
@@ -193,37 +194,57 @@ pub fn merge_files(
 ) -> Result<Option<(FilmFile, Together)>, RuntimeError> {
     let mut together: Option<Together> = None;
     let mut sums: Option<Sums> = None;
-    for path in paths {
-        let part = Part::open(path).map_err(|reason| unusable(path, reason))?;
-        let part = take_up(&mut together, path, part)?;
-        let end = match &mut sums {
-            None => FilmFile::of(part, watch).map(|(film, end)| {
-                sums = Some(film.sums);
-                end
-            }),
-            Some(sums) => {
-                let mut accumulator = Accumulator::new(sums);
-                let mut add = |plane: usize, pixel: usize, words: &[u32]| {
-                    accumulator.add(plane, pixel, words);
-                };
-                part.planes(&mut add, watch)
-            }
+    let mut rest = paths;
+    while let Some(first) = rest.first() {
+        let group;
+        (group, rest) = rest.split_at(group_length(rest));
+        let mut parts = Vec::with_capacity(group.len());
+        for path in group {
+            let part = Part::open(path).map_err(|reason| unusable(path, reason))?;
+            parts.push(take_up(&mut together, path, part)?);
+        }
+        let sums = match &mut sums {
+            Some(sums) => sums,
+            None => sums.insert(parts[0].empty().map_err(|reason| unusable(first, reason))?),
         };
-        if end.map_err(|reason| unusable(path, reason))?.is_break() {
+        let end =
+            add(parts, sums, watch).map_err(|(film, reason)| unusable(&group[film], reason))?;
+        if end.is_break() {
             return Err(RuntimeError::Stopped);
         }
     }
     let Some((mut sums, together)) = sums.zip(together) else {
         return Ok(None);
     };
-    // Ids are in order; those that were added come after the first film's until now.
+    // Ids come in the order in which films have them until now.
     Accumulator::new(&mut sums).finish();
     let about = together.about.clone();
     Ok(Some((FilmFile { about, sums }, together)))
 }
 
+/// Adds the sums of some films, read side by side.
+pub(super) fn add<R: Read + Send>(
+    parts: Vec<Part<R>>,
+    sums: &mut Sums,
+    watch: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<ControlFlow<()>, Wrong> {
+    let mut accumulator = Accumulator::new(sums);
+    side_by_side(parts, &mut |piece| accumulator.add_piece(piece), watch)
+}
+
+/// The most films that are read side by side. A number that does not depend on the machine, since where a pixel has more
+/// ids than find room the order counts in which they come.
+pub(super) const SIDE_BY_SIDE: usize = 4;
+
+/// How many of some films are read side by side, beginning with the first. Those that are no files are read alone: who
+/// writes one may wait with the next until it is read.
+fn group_length(paths: &[PathBuf]) -> usize {
+    let group = paths.iter().take(SIDE_BY_SIDE);
+    group.take_while(|path| !is_stream(path)).count().max(1)
+}
+
 /// Takes up another film, which is given back.
-fn take_up<R: std::io::Read>(
+fn take_up<R: Read>(
     together: &mut Option<Together>,
     path: &Path,
     part: Part<R>,
@@ -315,6 +336,7 @@ impl FilmFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PLANES;
     use crate::film::file::tests::{maker, part, with_outputs};
     use crate::technique::Sampler;
 
@@ -433,6 +455,63 @@ mod tests {
         assert!(merge_files(&[], &mut |_| ControlFlow::Continue(())).is_ok_and(|m| m.is_none()));
         let stopped = merge_files(&paths, &mut |_| ControlFlow::Break(()));
         assert!(matches!(stopped, Err(RuntimeError::Stopped)), "{stopped:?}");
+    }
+
+    /// More than are read side by side: some with planes that others lack, and ids in other slots.
+    #[test]
+    fn many_files_merge_in_any_order_to_the_same() {
+        let names = ["albedo", "depth", "material"];
+        let film = |first: u64| {
+            let mut film = with_outputs(first, 1, (first as u32).wrapping_mul(0x5bd1_e995), &names);
+            // Four ids in all, so that each finds room.
+            let ids = film.sums.layers().placed().last().expect("a layer").0;
+            for plane in ids..film.sums.layers().planes() {
+                let word = |pixel: u64| match (plane - ids) / 2 {
+                    slot @ 0..2 if (plane - ids) % 2 == 0 => 1 + (first + pixel + slot as u64) % 4,
+                    0..2 => 1,
+                    _ => 0,
+                };
+                let words = [0, 1].map(|pixel| word(pixel) as u32);
+                film.sums.plane_mut(plane).copy_from_slice(&words);
+            }
+            if first % 3 == 1 {
+                film.sums.plane_mut(PLANES).fill(0);
+            }
+            film.sums.sort_all_ids();
+            film
+        };
+        let films: Vec<FilmFile> = (0..11).map(film).collect();
+        let mut whole = films[0].clone();
+        for other in &films[1..] {
+            whole.merge(other).expect("they merge");
+        }
+        assert_eq!(whole.sums.lost_ids(), 0);
+        let (_folder, mut paths) = files(&films.iter().collect::<Vec<_>>());
+        for turn in 0..paths.len() {
+            paths.rotate_left(turn);
+            assert_eq!(merged(&paths).expect("they merge").0, whole);
+            paths.reverse();
+        }
+    }
+
+    /// Wherever it is among those that are read side by side, and wherever the damage is.
+    #[test]
+    fn a_damaged_file_among_many_is_found_and_named() {
+        let films: Vec<FilmFile> = (0..7).map(|first| part(first, 1, 9)).collect();
+        let (_folder, paths) = files(&films.iter().collect::<Vec<_>>());
+        for (at, path) in paths.iter().enumerate() {
+            let good = std::fs::read(path).expect("a file");
+            for back in [1, 9, 40] {
+                let mut bad = good.clone();
+                let place = bad.len() - back;
+                bad[place] ^= 1;
+                std::fs::write(path, bad).expect("written");
+                let error = merged(&paths).expect_err("it is damaged");
+                let named = error.contains(&format!("{at}.film")) && error.contains("damaged");
+                assert!(named, "{at}, {back}: {error}");
+            }
+            std::fs::write(path, good).expect("written");
+        }
     }
 
     #[test]

@@ -133,21 +133,25 @@ impl Sums {
 
     /// Means of the samples.
     pub fn picture(&self) -> Film {
-        let samples = self.plane(COUNT_PLANE).to_vec();
-        let pixel = |i: usize| [0, 1, 2].map(|channel| mean(self.sum(channel, i), samples[i]));
         Film {
             width: self.width,
             height: self.height,
-            pixels: (0..self.pixel_count()).map(pixel).collect(),
-            samples,
+            pixels: (0..self.pixel_count()).map(|i| self.mean(i)).collect(),
+            samples: self.plane(COUNT_PLANE).to_vec(),
         }
+    }
+
+    /// The mean of a pixel's samples.
+    fn mean(&self, pixel: usize) -> [f32; 3] {
+        let samples = self.count(pixel);
+        [0, 1, 2].map(|channel| mean(self.sum(channel, pixel), samples))
     }
 
     /// Adds the sums of other samples of a picture of the same size and outputs.
     pub(crate) fn add(&mut self, other: &Sums) {
         let mut accumulator = Accumulator::new(self);
         for plane in 0..other.layers.planes() {
-            accumulator.add(plane, 0, other.plane(plane));
+            accumulator.add(0, plane, 0, other.plane(plane));
         }
         accumulator.finish();
     }

@@ -1,5 +1,10 @@
 //! What the planes of outputs amount to: the values of a picture's pixels.
 
+use std::ops::{BitOr, Range};
+
+use rayon::prelude::*;
+
+use crate::film::accumulate::BLOCK;
 use crate::film::layers::Layer;
 use crate::film::outputs::{ID_SLOTS, Kind, Of, SUM_WORDS};
 use crate::film::{Sums, UNIT};
@@ -17,27 +22,21 @@ impl Sums {
     /// Puts the ids of every pixel in order, so that equal samples give equal words: which slot an id gets
     /// is up to the sample that comes first.
     pub(crate) fn sort_all_ids(&mut self) {
-        let layers = self.layers.clone();
-        for (first, _) in layers.placed().filter(|(_, l)| l.output.kind == Kind::Ids) {
-            for pixel in 0..self.pixel_count() {
-                self.sort_ids(first, pixel);
-            }
-        }
-    }
-
-    fn sort_ids(&mut self, first: usize, pixel: usize) {
         let count = self.pixel_count();
-        let at = |plane: usize| (first + plane) * count + pixel;
-        let mut slots = [[0u32; 2]; ID_SLOTS];
-        for (slot, words) in slots.iter_mut().enumerate() {
-            *words = [0, 1].map(|word| self.words[at(2 * slot + word)]);
-        }
-        // Free slots, whose id is 0, come last.
-        slots.sort_unstable_by_key(|[id, _]| id.wrapping_sub(1));
-        for (slot, words) in slots.iter().enumerate() {
-            for (word, value) in words.iter().enumerate() {
-                self.words[at(2 * slot + word)] = *value;
+        let layers = self.layers.placed();
+        let ids = layers.filter(|(_, layer)| layer.output.kind == Kind::Ids);
+        let firsts: Vec<usize> = ids.map(|(first, _)| first).collect();
+        for first in firsts {
+            let slots = &mut self.words[first * count..(first + 2 * ID_SLOTS) * count];
+            // Pixels side by side, of all planes.
+            let mut blocks: Vec<Vec<&mut [u32]>> = Vec::new();
+            blocks.resize_with(count.div_ceil(BLOCK), || Vec::with_capacity(2 * ID_SLOTS));
+            for plane in slots.chunks_exact_mut(count.max(1)) {
+                let pieces = blocks.iter_mut().zip(plane.chunks_mut(BLOCK));
+                pieces.for_each(|(block, piece)| block.push(piece));
             }
+            let in_order = |block: &mut Vec<&mut [u32]>| sort_ids(block);
+            blocks.par_iter_mut().for_each(in_order);
         }
     }
 
@@ -67,13 +66,18 @@ impl Sums {
 
     /// The values of a layer, a list for each of its channels; empty for ids, and if there is no such layer.
     pub fn values(&self, name: &str) -> Vec<Vec<f32>> {
+        self.values_in(name, 0..self.pixel_count())
+    }
+
+    /// The same of some pixels.
+    pub(super) fn values_in(&self, name: &str, pixels: Range<usize>) -> Vec<Vec<f32>> {
         let found = self.layers.placed().find(|(_, l)| l.name == name);
         let Some((first, layer)) = found.filter(|(_, l)| l.output.kind != Kind::Ids) else {
             return Vec::new();
         };
         let channels = 0..layer.output.channels.len();
         let of_channel = |channel: usize| {
-            let pixels = 0..self.pixel_count();
+            let pixels = pixels.clone();
             pixels
                 .map(|pixel| self.value(first, layer, channel, pixel))
                 .collect()
@@ -114,6 +118,39 @@ impl Sums {
         alpha
             .next()
             .map_or_else(|| self.count(pixel), |(first, _)| self.plane(first)[pixel])
+    }
+}
+
+/// Puts the ids of some pixels in order, which are in every second of these planes, each before its number of samples.
+fn sort_ids(planes: &mut [&mut [u32]]) {
+    // Free slots, whose id is 0, come last.
+    let rank = |id: u32| id.wrapping_sub(1);
+    let after = |(before, next): (&u32, &u32)| u32::from(rank(*before) > rank(*next));
+    let ids = || planes.iter().step_by(2);
+    let pairs = ids().zip(ids().skip(1));
+    let wrong = pairs.map(|(before, next)| {
+        before
+            .iter()
+            .zip(next.iter())
+            .map(after)
+            .fold(0, BitOr::bitor)
+    });
+    // A pixel is rarely out of order, and a block of them is soon looked through.
+    if wrong.fold(0, BitOr::bitor) == 0 {
+        return;
+    }
+    for pixel in 0..planes.first().map_or(0, |plane| plane.len()) {
+        let mut slots = [[0u32; 2]; ID_SLOTS];
+        for (slot, words) in slots.iter_mut().zip(planes.chunks_exact(2)) {
+            *slot = [words[0][pixel], words[1][pixel]];
+        }
+        if slots.is_sorted_by_key(|[id, _]| rank(*id)) {
+            continue;
+        }
+        slots.sort_unstable_by_key(|[id, _]| rank(*id));
+        for (slot, words) in slots.iter().zip(planes.chunks_exact_mut(2)) {
+            (words[0][pixel], words[1][pixel]) = (slot[0], slot[1]);
+        }
     }
 }
 

@@ -13,6 +13,7 @@
 //!
 //! Files are read and written piece by piece (`read`, `write`): they are longer than what one wants to hold twice.
 
+mod planes;
 mod read;
 mod write;
 
@@ -24,6 +25,7 @@ use crate::error::RuntimeError;
 use crate::film::Sums;
 use crate::technique::Sampler;
 
+pub(super) use planes::{Piece, Wrong, side_by_side};
 use read::OnRead;
 pub(super) use read::{Header, Part};
 
@@ -55,6 +57,12 @@ pub struct Identity {
     pub sampler: Sampler,
     /// A fingerprint of scene and materials as kernels see them.
     pub scene: u64,
+}
+
+impl Identity {
+    fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
 }
 
 /// A device that took samples. Others may round otherwise.
@@ -156,14 +164,12 @@ impl FilmFile {
     }
 
     /// The film of a file, which is whole unless `watch` broke it off.
-    pub(super) fn of<R: std::io::Read>(
+    pub(super) fn of<R: std::io::Read + Send>(
         part: Part<R>,
         watch: OnRead<'_>,
     ) -> Result<(Self, ControlFlow<()>), String> {
-        let header = &part.header;
-        let (about, layers) = (header.about.clone(), header.layers.clone());
-        let Identity { width, height, .. } = about.identity;
-        let mut sums = Sums::empty(width, height, layers)?;
+        let about = part.header.about.clone();
+        let mut sums = part.empty()?;
         let mut take = |plane: usize, pixel: usize, words: &[u32]| {
             let place = sums.plane_mut(plane).get_mut(pixel..pixel + words.len());
             place.into_iter().for_each(|p| p.copy_from_slice(words));

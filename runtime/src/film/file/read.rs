@@ -11,11 +11,12 @@ use std::path::Path;
 use super::{
     About, BEFORE_DEVICES, BEFORE_OUTPUTS, Identity, MAGIC, MAX_RANGES, Maker, PIECE,
     SAMPLER_BYTES, VERSION, damaged,
+    planes::{self, Piece},
 };
-use crate::film::COUNT_PLANE;
 use crate::film::layers::{Layer, Layers};
 use crate::film::outputs::Output;
 use crate::film::ranges::{self, Range};
+use crate::film::{COUNT_PLANE, Sums};
 use crate::fingerprint::Running;
 use crate::input;
 use crate::technique::{Choice, Sampler};
@@ -39,7 +40,7 @@ pub(crate) struct Header {
 #[derive(Debug)]
 pub(crate) struct Part<R> {
     pub(crate) header: Header,
-    source: Source<R>,
+    pub(super) source: Source<R>,
 }
 
 impl Part<BufReader<File>> {
@@ -78,6 +79,13 @@ impl<R: Read> Part<R> {
         self.source.why(reason)
     }
 
+    /// A film of its size and outputs, without samples. Fails, in words, if there is no memory for that.
+    pub(crate) fn empty(&self) -> Result<Sums, String> {
+        let Header { about, layers, .. } = &self.header;
+        let Identity { width, height, .. } = about.identity;
+        Sums::empty(width, height, layers.clone())
+    }
+
     /// Bytes that are still to be read.
     pub(crate) fn bytes_left(&self) -> u64 {
         4 * self.header.words().unwrap_or(0) + 8
@@ -86,37 +94,26 @@ impl<R: Read> Part<R> {
     /// Reads the planes: gives `take` each piece with its plane and its first pixel. Fails, in words, if they are not
     /// what was written; what was taken is then of no use.
     pub(crate) fn planes(
-        mut self,
+        self,
         take: &mut dyn FnMut(usize, usize, &[u32]),
         watch: OnRead<'_>,
-    ) -> Result<ControlFlow<()>, String> {
-        let (about, planes) = (&self.header.about, self.header.layers.planes());
-        let pixels = about.identity.width as usize * about.identity.height as usize;
-        let samples = about.samples() as u32;
-        let mut words = vec![0u32; PIECE.min(pixels)];
-        for plane in (0..planes).filter(|plane| self.header.has(*plane)) {
-            for pixel in (0..pixels).step_by(PIECE) {
-                let words = &mut words[..PIECE.min(pixels - pixel)];
-                self.source.words(words)?;
-                // Every pixel has taken all of the samples, or the film was not written by a render.
-                if plane == COUNT_PLANE && words.iter().any(|count| *count != samples) {
-                    return Err(damaged());
-                }
-                take(plane, pixel, words);
-                if watch(4 * words.len() as u64).is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
-            }
-        }
-        if !self.source.ends_as_written()? {
-            return Err(damaged());
-        }
-        Ok(ControlFlow::Continue(()))
+    ) -> Result<ControlFlow<()>, String>
+    where
+        R: Send,
+    {
+        let mut take_piece = |piece: &Piece| {
+            let (plane, pixel) = (piece.plane, piece.pixel);
+            piece
+                .words()
+                .for_each(|(_, words)| take(plane, pixel, words));
+        };
+        let read = planes::side_by_side(vec![self], &mut take_piece, watch);
+        read.map_err(|(_, reason)| reason)
     }
 }
 
 impl Header {
-    fn has(&self, plane: usize) -> bool {
+    pub(super) fn has(&self, plane: usize) -> bool {
         let bits = self.present.get(plane / 32).copied().unwrap_or(0);
         bits >> (plane % 32) & 1 == 1
     }
@@ -134,7 +131,7 @@ impl Header {
 
 /// Bytes that come one after another, and the fingerprint of those that have come.
 #[derive(Debug)]
-struct Source<R> {
+pub(super) struct Source<R> {
     from: R,
     fingerprint: Running,
     read: u64,
@@ -162,12 +159,16 @@ impl<R: Read> Source<R> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
-    fn words(&mut self, words: &mut [u32]) -> Result<(), String> {
-        self.fill(bytemuck::cast_slice_mut(words))?;
-        words
-            .iter_mut()
-            .for_each(|word| *word = u32::from_le(*word));
-        Ok(())
+    /// Reads words as they stand in the file. They count when their bytes are added to the fingerprint, which comes
+    /// with them.
+    pub(super) fn words<'w>(
+        &mut self,
+        words: &'w mut [u32],
+    ) -> Result<(&mut Running, &'w [u8]), String> {
+        let bytes = bytemuck::cast_slice_mut(words);
+        self.from.read_exact(bytes).map_err(why_unread)?;
+        self.read += bytes.len() as u64;
+        Ok((&mut self.fingerprint, bytes))
     }
 
     fn version(&mut self) -> Result<u32, String> {
@@ -326,7 +327,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Whether what is left is the fingerprint of all before it, and nothing more.
-    fn ends_as_written(&mut self) -> Result<bool, String> {
+    pub(super) fn ends_as_written(&mut self) -> Result<bool, String> {
         let sum = self.fingerprint.finish();
         let is_written = self.long()? == sum;
         let more = self.from.by_ref().take(1).read_to_end(&mut Vec::new());
