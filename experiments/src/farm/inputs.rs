@@ -1,5 +1,7 @@
 //! What goes into the simulation: films, farms, and where each number is from.
 
+use std::fmt::Write as _;
+
 use super::sim::{Farm, Job, NODE};
 
 /// The films of a kind of picture.
@@ -7,35 +9,35 @@ use super::sim::{Farm, Job, NODE};
 pub(super) struct Film {
     pub name: &'static str,
     pub size: (u32, u32),
-    /// The outputs beside the picture.
-    pub outputs: &'static [&'static str],
     /// Planes that its file holds: those that are not all zero.
     pub planes: u32,
     /// Planes of the film on the GPU.
     pub all_planes: u32,
+    /// Seconds between two checkpoints.
+    pub every: f64,
 }
 
 pub(super) const FILMS: [Film; 2] = [
     Film {
         name: "HD",
         size: (1920, 1080),
-        outputs: &[],
         planes: 7,
         all_planes: 10,
+        every: 60.0,
     },
     Film {
         name: "4K with outputs",
         size: (3840, 2160),
-        outputs: &["albedo", "normal", "position", "depth", "material"],
         planes: 32,
         all_planes: 56,
+        every: 60.0,
     },
 ];
 
 /// Seconds in which a byte of a film is read from the GPU and put in order.
 const GATHER: f64 = 3.8 / 1.83e9;
-/// Seconds between two checkpoints, unless something else is said.
-pub(super) const EVERY: f64 = 60.0;
+/// Seconds between two failures of a node: 6.5 in a thousand days of a node.
+pub(super) const FAILURES: f64 = 24_000.0 / 6.5 * 3600.0;
 /// Farms of so many GPUs, and the bytes a second of their file systems.
 pub(super) const SIZES: [(usize, f64); 4] =
     [(10, 1.2e9), (100, 5e9), (1000, 20e9), (10_000, 100e9)];
@@ -61,7 +63,7 @@ impl Film {
             pictures,
             parts,
             seconds: 60.0 * minutes,
-            every: EVERY,
+            every: self.every,
             film: self.bytes(),
             gather: self.gather(),
             fan_in: usize::MAX,
@@ -82,7 +84,7 @@ pub(super) fn farm((gpus, bandwidth): (usize, f64)) -> Farm {
         gpus,
         start: 5.0,
         spread: 0.1,
-        failures: 24_000.0 / 6.5 * 3600.0,
+        failures: FAILURES,
         notice: 300.0,
         repair: 3600.0,
         dispatch: 20.0,
@@ -92,4 +94,22 @@ pub(super) fn farm((gpus, bandwidth): (usize, f64)) -> Farm {
         merge_start: 1.0,
         seed: 1,
     }
+}
+
+/// What goes in, for the page.
+pub(super) fn section() -> String {
+    let mut text = String::from(super::prose::INPUTS);
+    for film in FILMS {
+        let (width, height) = film.size;
+        let _ = writeln!(
+            text,
+            "| {} | {width} x {height} | {} of {} | {:.3} GB | {:.1} s |",
+            film.name,
+            film.planes,
+            film.all_planes,
+            film.bytes() / 1e9,
+            film.gather()
+        );
+    }
+    text + super::prose::ASSUMED
 }

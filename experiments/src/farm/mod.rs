@@ -5,6 +5,8 @@
 
 mod inputs;
 mod page;
+mod plot;
+mod prose;
 mod sim;
 
 use std::path::PathBuf;

@@ -541,7 +541,13 @@ mod tests {
 
     #[test]
     fn tasks_alone_take_as_many_rounds_as_there_are() {
-        for (gpus, pictures, parts) in [(1, 1, 1), (7, 3, 5), (8, 4, 4), (16, 2, 40), (100, 3, 4)] {
+        for (gpus, pictures, parts) in [
+            (1usize, 1usize, 1usize),
+            (7, 3, 5),
+            (8, 4, 4),
+            (16, 2, 40),
+            (100, 3, 4),
+        ] {
             let farm = Farm {
                 start: 5.0,
                 ..ideal(gpus)

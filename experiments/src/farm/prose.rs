@@ -1,0 +1,141 @@
+//! What the page says around its tables. The conclusions are read again whenever the tables change.
+
+pub(super) const CONCLUSIONS: &str = "\
+# What many GPUs would do with renders in parts
+
+`cargo experiments farm` writes this page. It measures nothing: it simulates farms of up to 10,000 GPUs, from numbers that were
+measured on one or two and from others that are assumed ([both are listed](#what-goes-in)). A job is pictures in parts of
+some minutes ([parts.md](parts.md)). A task renders a part on one GPU and writes a film; a merge for each picture adds its films.
+
+*Times* are the time until the last picture is written, over the time in which the same GPUs would take the samples and do
+nothing else. 1 is ideal.
+
+## What follows
+
+- **Minutes of a task.** Five are good for up to 1,000 GPUs, and ten from there on. For other jobs, take the square root of twice
+  the seconds in which a GPU of a task does not render (start, and writing the film: 5 to 11 s) times the seconds of the whole
+  job. Nothing is gained by less than GPUs divided by the tasks that the scheduler starts a second: 10,000 GPUs and 20 tasks a
+  second make 8 minutes.
+- **Checkpoints.** A GPU stands still while its film is written. With 4K and five outputs that is 5 s of each minute. With
+  `--checkpoint-every 300` times go from 1.17 to 1.11 on 10 GPUs and from 1.39 to 1.26 on 1,000, and a GPU whose node fails loses
+  two minutes more.
+- **Slurm's queue.** It takes 10,000 tasks by default (`MaxJobCount`). An hour of 1,000 GPUs is 12,000 tasks of five minutes: take
+  ten, or have it raised.
+- **Merges.** With many pictures, merge all films of each at once: a tree reads and writes more, and ends no sooner. For one picture
+  that takes 0.93 s a film of 4K with outputs, and 0.05 s a film of HD. So a tree pays from some tens of large films on: 1,000 of
+  them take 933 s at once, and 81 s in merges of 32 (`impasto merge --out F.film` makes the inner films). Let merges run on all
+  nodes: with one at a time, a job of 300 pictures takes three times as long.
+- **Failures.** At rates that clusters report, a node of 1,000 GPUs fails every 30 hours, which loses four minutes of a GPU.
+  Checkpoints matter for tasks of 40 minutes on machines that fail daily, such as those that are lent until somebody pays more.
+  Tasks of five minutes need none.
+
+What breaks first, with tasks of five minutes:
+
+| GPUs | HD | 4K with five outputs |
+|---|---|---|
+| 10 | nothing: 1.06, of which unequal speeds are most | checkpoints, for which GPUs wait: 1.17 |
+| 100 | nothing: 1.07 | checkpoints: 1.18 |
+| 1,000 | Slurm's queue, which takes 10,000 tasks by default (`MaxJobCount`): an hour has 12,000 | the queue; then the file system, full of checkpoints: 1.39 at 20 GB/s |
+| 10,000 | the scheduler, at 20 tasks a second: 1.79 | the file system, at 100 GB/s: 2.71; then the scheduler |
+
+Three things of the program cost time here. A task writes its last checkpoint and then the same samples again as its film, which is
+one of the three films that a short task moves. GPUs wait while films are gathered and written. A merge begins when the last film
+of its picture is there.
+";
+
+pub(super) const MINUTES: &str = "\
+## Minutes of a task
+
+Times of jobs that take every GPU an hour, in pictures of 200 minutes of a GPU. Bold are those within 1 % of the best. The last
+column is the rule above, or the minutes from which the file system takes all films and checkpoints, whichever is more; *none* is
+where checkpoints alone are too much for it. Where the scheduler or the file system decide, twice the rule is better.
+
+| film | checkpoints, s | GPUs | 1 min | 2 min | 5 min | 10 min | 20 min | 40 min | rule, min |
+|---|---|---|---|---|---|---|---|---|---|
+";
+
+pub(super) const LIMITS: &str = "\
+## What breaks first
+
+Times with tasks of five minutes, and without one limit at a time. The last column is the one without which it is fastest.
+Without the scheduler's limit all GPUs begin, and so write their films, at the same moment: that may be slower.
+
+| film | checkpoints, s | GPUs | with all | without start | gathering | checkpoints | file system | scheduler | unequal speeds | first |
+|---|---|---|---|---|---|---|---|---|---|---|
+";
+
+pub(super) const TRAFFIC: &str = "\
+## Films, files and the queue
+
+Films that a task moves: checkpoints on the way, the last one, its film, and that film again when it is merged. The next columns
+are megabytes a second of a GPU, and how many GPUs fill 10 GB/s. The others are of an hour of 1,000 GPUs: tasks (bold if they are
+more than Slurm's queue takes by default), arrays, files (film, record and two logs of a part; two pictures, record and two logs of a
+merge), and terabytes of films until someone removes them. Arrays of at most 1,000 tasks are no limit: `impasto farm submit`
+needs few of them.
+
+| film | minutes | checkpoints, s | films | MB/s | GPUs at 10 GB/s | tasks | arrays | files | TB |
+|---|---|---|---|---|---|---|---|---|---|
+";
+
+pub(super) const MERGES: &str = "\
+## Merging
+
+Seconds from the last part to the picture, for one picture of 4K with outputs and 1,000 GPUs, of which each renders one part at most.
+The last two columns are times of 300 pictures of 40 films each: with a merge on each node, and with one merge at a time.
+
+| films of a merge | 8 films | 32 films | 128 films | 512 films | 1000 films | 300 pictures | one at a time |
+|---|---|---|---|---|---|---|---|
+";
+
+pub(super) const FAILURES: &str = "\
+## Failures
+
+Eight hours of 1,000 GPUs, HD. A node that fails takes 8 tasks along, is noticed after 300 s and is back after an hour, so that a
+part of the times is GPUs that are away. The cells are GPU hours (of 8,000) that were rendered again, and times.
+
+| hours between failures of a node | failures | 5 min, checkpoints 60 s | 5 min, none | 40 min, checkpoints 60 s | 40 min, none |
+|---|---|---|---|---|---|
+";
+
+pub(super) const INPUTS: &str = "\
+## What goes in
+
+Measured:
+
+- Planes of films ([parts.md](parts.md), \"The file\"): bytes of `impasto render examples/cornell/scene.toml --device cpu --size 64x64
+  --spp 16 --out F.film`, without outputs and with `--aov albedo,normal,position,depth,material`, by 4 x 64 x 64.
+- Gathering a film on the processor: 3.8 s for 1.83 GB ([measurements.md](measurements.md), \"Several GPUs of one host\"). That
+  includes the picture, and so is too much for a part.
+- A stream of a film, read or written: 1.14 GB/s, as fast as films in memory merge ([measurements.md](measurements.md), \"Merging
+  films\", has the command).
+
+| film | size | planes, of all | file | gathering |
+|---|---|---|---|---|
+";
+
+pub(super) const ASSUMED: &str = "
+Assumed:
+
+| what | value | why |
+|---|---|---|
+| start of a task | 5 s | pipelines are built in 0.2 to 0.6 s (measurements.md); the rest is Slurm, scene and trees |
+| start of a merge | 1 s | |
+| file system | 1.2, 5, 20 and 100 GB/s for 10, 100, 1,000 and 10,000 GPUs | the first is a server at 10 Gbit/s |
+| tasks started a second | 20 | Slurm was validated at 500 simple ones (its High Throughput Computing guide) after tuning |
+| an array, the queue, a lost node | 1,001 elements, 10,000 tasks, noticed after 300 s | defaults of slurm.conf: MaxArraySize, MaxJobCount, SlurmdTimeout |
+| failures | 6.5 in 1,000 days of a node, that is one in 3,692 h | Kokolis et al. 2025, \"Revisiting Reliability in Large-Scale Machine Learning Research Clusters\", RSC-1 |
+| repair | 1 h | |
+| GPUs of a node; merges at a time | 8; one a node | |
+| speeds of GPUs, costs of pictures | even within 10 % of the mean | |
+| the seed | 1 | by four others, times of five minutes differ by less than 0.02 with 10 GPUs, and 0.01 with more |
+
+Arrays are submitted as `impasto farm` does: a part of all pictures after another, or, with more parts than pictures, all parts
+of a picture. A lost part goes on from its last checkpoint, before all that wait.
+
+Left out: metadata of the file system and its servers' caches, the network within a node, failures of merges, of the file system and
+of the scheduler, other users, pictures that take several times as long as others, and several GPUs in a task. The file system
+shares its bandwidth evenly, which no real one does when it is full.
+
+The unit tests of `experiments/src/farm/sim.rs` hold the simulation to closed forms: rounds of tasks, a writer and many bound
+by bandwidth, a scheduler, levels of a tree, and the expected number and loss of failures.
+";
