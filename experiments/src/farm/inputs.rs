@@ -23,14 +23,14 @@ pub(super) const FILMS: [Film; 2] = [
         size: (1920, 1080),
         planes: 7,
         all_planes: 10,
-        every: 60.0,
+        every: 30.0,
     },
     Film {
         name: "4K with outputs",
         size: (3840, 2160),
         planes: 32,
         all_planes: 56,
-        every: 60.0,
+        every: 30.0,
     },
 ];
 
@@ -67,6 +67,7 @@ impl Film {
             film: self.bytes(),
             gather: self.gather(),
             fan_in: usize::MAX,
+            in_turn: false,
         }
     }
 

@@ -181,10 +181,10 @@ fn traffic() -> String {
     let mut text = String::from(super::prose::TRAFFIC);
     for film in FILMS {
         for (minutes, every) in [
-            (1f64, 60.0),
-            (5.0, 60.0),
+            (1f64, 30.0),
+            (5.0, 30.0),
             (5.0, 300.0),
-            (20.0, 60.0),
+            (20.0, 30.0),
             (20.0, 300.0),
         ] {
             // Checkpoints on the way, the last one, the film, and its merge.
@@ -216,7 +216,7 @@ fn traffic() -> String {
 fn merges() -> (String, Vec<Line>) {
     let mut text = String::from(super::prose::MERGES);
     let after = |outcome: Outcome| outcome.done - outcome.rendered;
-    let (farm, film) = (farm(THOUSAND), FILMS[1]);
+    let (farm, film) = (farm(THOUSAND), KINDS[2]);
     let mut all = Vec::new();
     for fan_in in FAN_INS {
         let name = if fan_in == usize::MAX {
@@ -235,9 +235,14 @@ fn merges() -> (String, Vec<Line>) {
             fan_in,
             ..film.work(THOUSAND.0, HOUR, USUAL)
         };
-        let (many, alone) = (run(&farm, &many), run(&Farm { mergers: 1, ..farm }, &many));
+        let in_turn = Job {
+            in_turn: true,
+            ..many
+        };
+        let alone = Farm { mergers: 1, ..farm };
+        let many = [run(&farm, &many), run(&farm, &in_turn), run(&alone, &many)];
         let cells = one.map(|(_, seconds)| format!("{seconds:.0}")).into_iter();
-        let many = [many, alone].map(|outcome| format!("{:.2}", outcome.times));
+        let many = many.map(|outcome| format!("{:.2}", outcome.times));
         text += &row([name.clone()].into_iter().chain(cells).chain(many));
         all.push((name, one.to_vec()));
     }
@@ -256,9 +261,9 @@ fn failures() -> String {
         };
         let mut cells = vec![grouped(hours)];
         for (minutes, every) in [
-            (5.0, 60.0),
+            (5.0, 30.0),
             (5.0, f64::INFINITY),
-            (40.0, 60.0),
+            (40.0, 30.0),
             (40.0, f64::INFINITY),
         ] {
             let job = Job {

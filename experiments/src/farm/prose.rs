@@ -16,31 +16,34 @@ nothing else. 1 is ideal.
   the seconds in which a GPU of a task does not render (start, and writing the film: 5 to 11 s) times the seconds of the whole
   job. Nothing is gained by less than GPUs divided by the tasks that the scheduler starts a second: 10,000 GPUs and 20 tasks a
   second make 8 minutes.
-- **Checkpoints.** A GPU stands still while its film is written. With 4K and five outputs that is 5 s of each minute. With
-  `--checkpoint-every 300` times go from 1.17 to 1.11 on 10 GPUs and from 1.39 to 1.26 on 1,000, and a GPU whose node fails loses
-  two minutes more.
+- **Checkpoints.** `impasto farm new` keeps one every 30 s, and a GPU stands still while its film is gathered and written. That is
+  nothing for HD. With 4K and five outputs it is up to 5 s each time, and 1,000 GPUs write 35 GB/s. With `--checkpoint-every 300`
+  times go from 1.27 to 1.11 on 10 GPUs and from 2.23 to 1.26 on 1,000. A GPU whose node fails then loses 2.5 minutes in
+  place of a quarter of one.
 - **Slurm's queue.** It takes 10,000 tasks by default (`MaxJobCount`). An hour of 1,000 GPUs is 12,000 tasks of five minutes: take
   ten, or have it raised.
-- **Merges.** With many pictures, merge all films of each at once: a tree reads and writes more, and ends no sooner. For one picture
-  that takes 0.93 s a film of 4K with outputs, and 0.05 s a film of HD. So a tree pays from some tens of large films on: 1,000 of
-  them take 933 s at once, and 81 s in merges of 32 (`impasto merge --out F.film` makes the inner films). Let merges run on all
-  nodes: with one at a time, a job of 300 pictures takes three times as long.
-- **Failures.** At rates that clusters report, a node of 1,000 GPUs fails every 30 hours, which loses four minutes of a GPU.
-  Checkpoints matter for tasks of 40 minutes on machines that fail daily, such as those that are lent until somebody pays more.
-  Tasks of five minutes need none.
+- **Merges of many pictures.** Merge all films of each at once, and on all nodes: with one merge at a time, a job of 300 pictures
+  takes three times as long. Arrays of a part of all pictures, as `impasto farm submit` makes them, leave all merges until the
+  end, and films of 4K then wait for the file system: 1.26. Picture after picture it is 1.11; a tree of 32 films a merge makes it
+  1.16, since its first merges run beside renders.
+- **Merges of one picture** take 0.93 s a film of 4K with outputs, and 0.05 s a film of HD. So a tree pays from some tens of large
+  films on: 1,000 of them take 933 s at once, and 81 s in merges of 32 (`impasto merge --out F.film` makes the inner films).
+- **Failures.** At rates that clusters report, a node of 1,000 GPUs fails every 30 hours, which loses minutes of a GPU. Checkpoints
+  matter for tasks of 40 minutes on machines that fail daily, such as those that are lent until somebody pays more. Tasks of five
+  minutes need none.
 
-What breaks first, with tasks of five minutes:
+What breaks first, with tasks of five minutes and checkpoints every 30 s:
 
 | GPUs | HD | 4K with five outputs |
 |---|---|---|
-| 10 | nothing: 1.06, of which unequal speeds are most | checkpoints, for which GPUs wait: 1.17 |
-| 100 | nothing: 1.07 | checkpoints: 1.18 |
-| 1,000 | Slurm's queue, which takes 10,000 tasks by default (`MaxJobCount`): an hour has 12,000 | the queue; then the file system, full of checkpoints: 1.39 at 20 GB/s |
-| 10,000 | the scheduler, at 20 tasks a second: 1.79 | the file system, at 100 GB/s: 2.71; then the scheduler |
+| 10 | nothing: 1.07, of which unequal speeds are most | checkpoints, for which GPUs wait: 1.27 |
+| 100 | nothing: 1.07 | checkpoints: 1.29 |
+| 1,000 | Slurm's queue | the queue; then the file system of 20 GB/s, full of checkpoints: 2.23 |
+| 10,000 | the queue; then the scheduler, at 20 tasks a second: 1.79 | the queue; then the file system of 100 GB/s: 4.46, and 1.89 without so many checkpoints; then the scheduler |
 
-Three things of the program cost time here. A task writes its last checkpoint and then the same samples again as its film, which is
-one of the three films that a short task moves. GPUs wait while films are gathered and written. A merge begins when the last film
-of its picture is there.
+Four things of the program cost time here. The default of checkpoints does not ask how large a film is. A task writes its last
+checkpoint and then the same samples again as its film, which is one of the three films that a short task moves. GPUs wait while
+films are gathered and written. Merges wait until all parts of all pictures are rendered.
 ";
 
 pub(super) const MINUTES: &str = "\
@@ -81,9 +84,10 @@ pub(super) const MERGES: &str = "\
 ## Merging
 
 Seconds from the last part to the picture, for one picture of 4K with outputs and 1,000 GPUs, of which each renders one part at most.
-The last two columns are times of 300 pictures of 40 films each: with a merge on each node, and with one merge at a time.
+The last columns are times of 300 pictures of 40 films each: as they are submitted, with all parts of a picture before those of the
+next (in turn), and with one merge at a time on the whole farm. Checkpoints are 300 s apart.
 
-| films of a merge | 8 films | 32 films | 128 films | 512 films | 1000 films | 300 pictures | one at a time |
+| films of a merge | 8 films | 32 films | 128 films | 512 films | 1000 films | 300 pictures | in turn | one merge at a time |
 |---|---|---|---|---|---|---|---|
 ";
 
@@ -93,7 +97,7 @@ pub(super) const FAILURES: &str = "\
 Eight hours of 1,000 GPUs, HD. A node that fails takes 8 tasks along, is noticed after 300 s and is back after an hour, so that a
 part of the times is GPUs that are away. The cells are GPU hours (of 8,000) that were rendered again, and times.
 
-| hours between failures of a node | failures | 5 min, checkpoints 60 s | 5 min, none | 40 min, checkpoints 60 s | 40 min, none |
+| hours between failures of a node | failures | 5 min, checkpoints 30 s | 5 min, none | 40 min, checkpoints 30 s | 40 min, none |
 |---|---|---|---|---|---|
 ";
 

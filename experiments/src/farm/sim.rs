@@ -6,7 +6,7 @@
 //! nodes, and are never lost; pictures are counted as if they were as large as films.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashMap, VecDeque};
 
 /// The most elements of an array of Slurm, which counts from 0 and of which the first is not used.
 pub(super) const ARRAY: usize = 1000;
@@ -51,6 +51,8 @@ pub(super) struct Job {
     pub gather: f64,
     /// Films that one merge reads at most.
     pub fan_in: usize,
+    /// All parts of a picture come before those of the next, however many there are.
+    pub in_turn: bool,
 }
 
 /// What came of it.
@@ -81,7 +83,7 @@ impl Job {
 
     /// Pictures of parts in the order of the arrays: a part of all pictures where these are more, else all parts of one.
     fn order(&self) -> Vec<usize> {
-        if self.pictures < self.parts {
+        if self.in_turn || self.pictures < self.parts {
             return (0..self.pictures)
                 .flat_map(|picture| vec![picture; self.parts])
                 .collect();
@@ -162,7 +164,7 @@ struct Disk {
     next: u64,
     /// By the number of bytes at which they end.
     ends: BinaryHeap<Reverse<(u64, u64)>>,
-    live: BTreeMap<u64, Of>,
+    live: HashMap<u64, Of>,
 }
 
 impl Disk {
@@ -528,6 +530,7 @@ mod tests {
             film: 1e9,
             gather: 0.0,
             fan_in: usize::MAX,
+            in_turn: false,
         }
     }
 
@@ -677,5 +680,10 @@ mod tests {
         );
         assert_eq!(job(2, 3).order(), [0, 0, 0, 1, 1, 1]);
         assert_eq!(job(3, 2).order(), [0, 1, 2, 0, 1, 2]);
+        let in_turn = Job {
+            in_turn: true,
+            ..job(3, 2)
+        };
+        assert_eq!(in_turn.order(), [0, 0, 1, 1, 2, 2]);
     }
 }
