@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn another_seed_says_the_same() {
         for film in FILMS {
-            for (size, most) in SIZES.into_iter().zip([0.02, 0.01, 0.01]) {
+            for (size, most) in SIZES.into_iter().zip([0.03, 0.02, 0.01]) {
                 let (one, job) = (farm(size), film.work(size.0, HOUR, USUAL));
                 let seeds = [77, 154, 231, 308].map(|seed| run(&Farm { seed, ..one }, &job).times);
                 let off = seeds.map(|times| (times - run(&one, &job).times).abs());
