@@ -1,6 +1,6 @@
 //! The report of a render by several devices.
 
-use super::Given;
+use super::common::Given;
 use crate::kernels::dropped::Dropped;
 use crate::render::report::{DeviceReport, Report};
 
