@@ -552,15 +552,14 @@ fn rendered_on(report: &Report) -> String {
 
 /// Warnings of devices that were lost, where others went on.
 fn lost(report: &Report) -> impl Iterator<Item = String> {
-    let lost = report.devices.iter().filter_map(|device| {
+    report.devices.iter().filter_map(|device| {
         let why = device.lost.as_ref()?.lines().next()?;
         let id = device.adapter_id.as_deref().unwrap_or_default();
         Some(format!(
             "warning: {} (`{id}`) was lost after {} samples, and others took over the rest: {why}",
             device.adapter.name, device.samples
         ))
-    });
-    lost
+    })
 }
 
 /// What became of the automatic plan.
