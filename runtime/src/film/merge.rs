@@ -467,7 +467,9 @@ mod tests {
             let ids = film.sums.layers().placed().last().expect("a layer").0;
             for plane in ids..film.sums.layers().planes() {
                 let word = |pixel: u64| match (plane - ids) / 2 {
-                    slot @ 0..2 if (plane - ids) % 2 == 0 => 1 + (first + pixel + slot as u64) % 4,
+                    slot @ 0..2 if (plane - ids).is_multiple_of(2) => {
+                        1 + (first + pixel + slot as u64) % 4
+                    }
                     0..2 => 1,
                     _ => 0,
                 };

@@ -116,10 +116,12 @@ impl Board {
         }
         let member = &mut self.members[index];
         if member.rest.is_empty() {
-            return match holds {
-                true => Step::Put,
-                false if self.is_over() => Step::Done,
-                false => Step::Wait,
+            return if holds {
+                Step::Put
+            } else if self.is_over() {
+                Step::Done
+            } else {
+                Step::Wait
             };
         }
         let first = member.rest[0].count.min(LONGEST);

@@ -182,13 +182,13 @@ fn who_cannot_keep_ends_the_render() {
 #[test]
 fn a_stopped_render_is_one_of_the_samples_that_it_names() {
     let devices = &kinds()[0];
-    let rendering =
-        renderer(devices, &samples(1 << 20)).render(&mut |progress| match progress.paths
-            > 16 * 8 * 30
-        {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        });
+    let rendering = renderer(devices, &samples(1 << 20)).render(&mut |progress| {
+        if progress.paths > 16 * 8 * 30 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
     let stopped = rendering.unwrap_or_else(|e| panic!("{e}")).sums;
     assert!((30..1 << 20).contains(&stopped.samples()));
     assert_eq!(
