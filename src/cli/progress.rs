@@ -26,7 +26,7 @@ const STEPS: u64 = 10_000;
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// What is locked here is whole after a panic too.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::{ArgGroup, Args, ValueEnum};
@@ -22,7 +22,7 @@ use impasto::shot::{self, Studio, Subject};
 use impasto::{FileLoader, MaterialRequest, Rendering, Scene, SceneError, files, requests};
 
 use super::outputs::Outputs;
-use super::progress::{Meter, Part, samples_taken, share};
+use super::progress::{Meter, Part, lock, samples_taken, share};
 use super::render::{self, COMPILING, RenderArgs};
 use super::{Failure, Global, Outcome, interrupt};
 
@@ -469,11 +469,6 @@ struct Shooting<'a> {
     done: Mutex<Vec<u32>>,
     /// What ends the work on others.
     failed: Mutex<Option<Failure>>,
-}
-
-/// What is locked here is whole after a panic too.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shooting<'_> {

@@ -54,9 +54,7 @@ impl About {
         self.clamped = self.clamped.saturating_add(other.clamped);
         self.ranges = ranges::joined(&self.ranges, &other.ranges);
         self.asked = ranges::joined(&self.asked, &other.asked);
-        self.makers.extend(other.makers.iter().cloned());
-        self.makers.sort_unstable();
-        self.makers.dedup();
+        self.makers = Maker::distinct(self.makers.iter().chain(&other.makers).cloned());
         Ok(())
     }
 }

@@ -56,31 +56,16 @@ pub(super) fn write(
     kind: Kind,
     contracts: &dyn Fn(&str) -> bool,
 ) -> Result<Vec<u32>, String> {
-    let policy = if kind.checked {
-        BoundsCheckPolicy::Restrict
-    } else {
-        BoundsCheckPolicy::Unchecked
-    };
     let options = spv::Options {
-        // The least that has subgroups.
-        lang_version: (1, 3),
         // Functions are told by their names.
         flags: spv::WriterFlags::DEBUG,
         binding_map: bindings(module),
-        bounds_check_policies: BoundsCheckPolicies {
-            index: policy,
-            buffer: policy,
-            image_load: policy,
-            binding_array: policy,
-        },
         zero_initialize_workgroup_memory: if kind.zero_workgroup {
             spv::ZeroInitializeWorkgroupMemoryMode::Polyfill
         } else {
             spv::ZeroInitializeWorkgroupMemoryMode::None
         },
-        force_loop_bounding: kind.checked,
-        emit_int_div_checks: kind.checked,
-        ..spv::Options::default()
+        ..options(kind.checked)
     };
     let entry = spv::PipelineOptions {
         shader_stage: ShaderStage::Compute,
@@ -91,6 +76,29 @@ pub(super) fn write(
     };
     let words = spv::write_vec(module, info, &options, Some(&entry)).map_err(|e| e.to_string())?;
     Ok(uncontracted(words, contracts))
+}
+
+/// What naga is told of any kernel: with checks of array bounds, loops and divisors or without.
+pub(super) fn options(checked: bool) -> spv::Options<'static> {
+    let policy = if checked {
+        BoundsCheckPolicy::Restrict
+    } else {
+        BoundsCheckPolicy::Unchecked
+    };
+    spv::Options {
+        // The least that has subgroups.
+        lang_version: (1, 3),
+        flags: spv::WriterFlags::empty(),
+        bounds_check_policies: BoundsCheckPolicies {
+            index: policy,
+            buffer: policy,
+            image_load: policy,
+            binding_array: policy,
+        },
+        force_loop_bounding: checked,
+        emit_int_div_checks: checked,
+        ..spv::Options::default()
+    }
 }
 
 /// Where wgpu puts the bindings of a layout: in their order, numbered from 0 on.

@@ -67,9 +67,7 @@ impl Common {
         let gave = |(given, maker): (&Given, &Maker)| (given.samples > 0).then(|| maker.clone());
         let makers = self.given.iter().zip(&facts.makers).filter_map(gave);
         let resumed = &facts.resumed;
-        let mut makers: Vec<Maker> = makers.chain(resumed.makers.iter().cloned()).collect();
-        makers.sort_unstable();
-        makers.dedup();
+        let makers = Maker::distinct(makers.chain(resumed.makers.iter().cloned()));
         let counted = || self.given.iter().map(|given| given.counted);
         About {
             identity: facts.identity,

@@ -19,7 +19,7 @@ use impasto_compiler::partition::Plan;
 
 use crate::device::DeviceRef;
 use crate::error::RuntimeError;
-use crate::film::file::{Identity, Maker};
+use crate::film::file::Maker;
 use crate::film::ranges;
 use crate::options::{Progress, RenderOptions};
 use crate::parallel;
@@ -43,14 +43,6 @@ pub struct MultiRenderer<'g> {
 }
 
 impl<'g> MultiRenderer<'g> {
-    /// Of one device.
-    pub fn alone(renderer: Renderer<'g>) -> Self {
-        Self {
-            members: vec![renderer],
-            worthwhile: WORTHWHILE,
-        }
-    }
-
     /// Prepares to render `scene`, whose materials compiled to `program`, by a plan for each device.
     ///
     /// # Errors
@@ -139,22 +131,9 @@ impl<'g> MultiRenderer<'g> {
         self.members[0].kernels()
     }
 
-    /// How many devices render.
-    pub fn devices(&self) -> usize {
-        self.members.len()
-    }
-
     /// The devices that render, as films name them.
     pub fn makers(&self) -> Vec<Maker> {
-        let mut makers: Vec<Maker> = self.members.iter().map(Renderer::maker).collect();
-        makers.sort_unstable();
-        makers.dedup();
-        makers
-    }
-
-    /// What the samples of this render must have in common with others to be merged with them.
-    pub fn identity(&self) -> &Identity {
-        self.members[0].identity()
+        Maker::distinct(self.members.iter().map(Renderer::maker))
     }
 
     /// Lets each device renew its plan once in the midst of the next render, by what `replanning` makes for the one of

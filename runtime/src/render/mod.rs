@@ -352,11 +352,7 @@ impl<'g> Renderer<'g> {
 
     /// The devices that took samples: this one, and those of what was gone on from.
     fn makers(&self, resumed: &Resumed) -> Vec<Maker> {
-        let mut makers = resumed.makers.clone();
-        makers.push(self.maker());
-        makers.sort_unstable();
-        makers.dedup();
-        makers
+        Maker::distinct(resumed.makers.iter().cloned().chain([self.maker()]))
     }
 
     /// How many pixels are rendered.

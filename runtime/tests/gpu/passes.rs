@@ -12,7 +12,7 @@ use impasto_runtime::render::passes::Keeping;
 use impasto_runtime::render::until::Goals;
 use impasto_runtime::render::{Renderer, Rendering};
 
-fn room() -> Room {
+pub(super) fn room() -> Room {
     Room {
         plate: true,
         emitters: vec![3],
@@ -25,7 +25,7 @@ fn room() -> Room {
     }
 }
 
-fn surfaces() -> Materials {
+pub(super) fn surfaces() -> Materials {
     materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror])
 }
 

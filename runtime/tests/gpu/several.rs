@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use crate::gpu::passes::{room, surfaces};
 use crate::gpu::stub::{Kind, Room, materials, plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::cpu::{Cpu, CpuOptions};
@@ -17,19 +18,6 @@ use impasto_runtime::options::{Progress, RenderOptions};
 use impasto_runtime::render::passes::Keeping;
 use impasto_runtime::render::until::{Ending, Goals};
 use impasto_runtime::render::{NOBODY, Rendering};
-
-fn room() -> Room {
-    Room {
-        plate: true,
-        emitters: vec![3],
-        max_depth: 5,
-        roulette_start: 2,
-        width: 16,
-        height: 8,
-        materials: [0, 1, 0, 0, 1, 0, 2],
-        ..Room::default()
-    }
-}
 
 /// A GPU of its own, that can be lost without harm to other tests.
 fn open() -> Gpu {
@@ -56,7 +44,7 @@ fn processors() -> &'static [Cpu; 2] {
 
 /// Each by another plan: plans have the same bits.
 fn renderer<'g>(devices: &[DeviceRef<'g>], options: &RenderOptions) -> MultiRenderer<'g> {
-    let surfaces = materials(&[Kind::Diffuse(0.6), Kind::Failing(0.5), Kind::Mirror]);
+    let surfaces = surfaces();
     let plans = [Strategy::OWN, Strategy::MEGA, Strategy::OWN].map(|s| plan(s, &surfaces));
     let devices: Vec<_> = devices.iter().copied().zip(&plans).collect();
     MultiRenderer::build(&devices, &room().world(), &surfaces, options, NOBODY)

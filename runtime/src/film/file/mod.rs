@@ -76,6 +76,16 @@ pub struct Maker {
     pub driver: String,
 }
 
+impl Maker {
+    /// Each once, in the order in which films name them.
+    pub(crate) fn distinct(makers: impl Iterator<Item = Self>) -> Vec<Self> {
+        let mut makers: Vec<Self> = makers.collect();
+        makers.sort_unstable();
+        makers.dedup();
+        makers
+    }
+}
+
 impl fmt::Display for Maker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {

@@ -135,23 +135,11 @@ impl Drop for Statistics<'_> {
     }
 }
 
-/// The same code that wgpu gives the driver for trusted modules.
+/// The code that renders give the driver, as naga writes it: bindings keep their numbers, and arithmetic may be
+/// contracted.
 fn spirv(name: &str, wgsl: &str) -> Option<Vec<u32>> {
     let (module, info) = crate::kernels::validate::validate(name, wgsl).ok()?;
-    let unchecked = wgpu::naga::proc::BoundsCheckPolicies {
-        index: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,
-        buffer: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,
-        image_load: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,
-        binding_array: wgpu::naga::proc::BoundsCheckPolicy::Unchecked,
-    };
-    let options = spv::Options {
-        lang_version: (1, 3),
-        flags: spv::WriterFlags::empty(),
-        bounds_check_policies: unchecked,
-        force_loop_bounding: false,
-        emit_int_div_checks: false,
-        ..spv::Options::default()
-    };
+    let options = crate::gpu::spirv::options(false);
     let entry = spv::PipelineOptions {
         shader_stage: wgpu::naga::ShaderStage::Compute,
         entry_point: "main".into(),
