@@ -2,7 +2,7 @@
 
 use crate::ir::ops::Op;
 
-pub use super::expr::NO_MEDIUM;
+pub use super::expr::{NO_MEDIUM, PICTURES};
 use super::types::NAMED;
 use super::{array, inputs, matrix, outputs};
 
