@@ -1,5 +1,6 @@
 //! An editor at the other end of a connection.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -63,6 +64,8 @@ pub struct Client {
     /// What came while something else was waited for.
     pub notices: Vec<Notification>,
     version: i32,
+    /// The version that each open file has.
+    versions: HashMap<String, i32>,
     /// The folder that it works in.
     pub folder: tempfile::TempDir,
 }
@@ -102,6 +105,7 @@ impl Client {
             next: 0,
             notices: Vec::new(),
             version: 0,
+            versions: HashMap::new(),
             folder,
         };
         client.ask("initialize", params);
@@ -131,6 +135,7 @@ impl Client {
     /// The same by its URI.
     pub fn open_uri(&mut self, uri: &str, text: &str) {
         self.version += 1;
+        self.versions.insert(uri.to_owned(), self.version);
         let document =
             json!({ "uri": uri, "languageId": "impasto", "version": self.version, "text": text });
         self.tell("textDocument/didOpen", json!({ "textDocument": document }));
@@ -144,6 +149,7 @@ impl Client {
     /// Changes an open file.
     pub fn change_by(&mut self, uri: &str, changes: Value) {
         self.version += 1;
+        self.versions.insert(uri.to_owned(), self.version);
         let document = json!({ "uri": uri, "version": self.version });
         let params = json!({ "textDocument": document, "contentChanges": changes });
         self.tell("textDocument/didChange", params);
@@ -220,7 +226,7 @@ impl Client {
                 && n.params["version"].as_i64() == Some(version.into())
         };
         loop {
-            let version = self.version;
+            let version = self.versions.get(uri).copied().unwrap_or(0);
             let known = self.notices.iter().rposition(|n| is_it(n, version));
             if let Some(known) = known {
                 let list = self.notices[known].params["diagnostics"]

@@ -46,8 +46,16 @@ fn requests_for_files_that_are_not_open_have_no_answer_and_no_error() {
     let mut client = Client::new();
     let never = client.uri("never.impasto");
     let closed = client.open("closed.impasto", "material m {}");
-    client.tell("textDocument/didClose", json!({ "textDocument": { "uri": closed } }));
-    for uri in [never.as_str(), closed.as_str(), "untitled:Untitled-1", "impasto-std:/no/such.impasto"] {
+    client.tell(
+        "textDocument/didClose",
+        json!({ "textDocument": { "uri": closed } }),
+    );
+    for uri in [
+        never.as_str(),
+        closed.as_str(),
+        "untitled:Untitled-1",
+        "impasto-std:/no/such.impasto",
+    ] {
         for method in FEATURES {
             let answer = client.try_ask(method, about(uri, 0, 0));
             let is_nothing = matches!(&answer, Ok(v) if v.is_null() || *v == json!([]));
@@ -61,7 +69,13 @@ fn requests_for_files_that_are_not_open_have_no_answer_and_no_error() {
 fn positions_that_a_text_does_not_have_are_taken_to_the_nearest() {
     let mut client = Client::new();
     let uri = client.open("m.impasto", "// 😀 ä\nmaterial m { let a = position; }\r\n");
-    for (line, character) in [(0, 4), (0, 999), (1, u64::from(u32::MAX)), (77, 3), (u64::from(u32::MAX), 0)] {
+    for (line, character) in [
+        (0, 4),
+        (0, 999),
+        (1, u64::from(u32::MAX)),
+        (77, 3),
+        (u64::from(u32::MAX), 0),
+    ] {
         for method in FEATURES {
             let answer = client.try_ask(method, about(&uri, line, character));
             let is_refused = answer.as_ref().is_err_and(|e| e.contains("no name here"));
@@ -80,16 +94,34 @@ fn positions_that_a_text_does_not_have_are_taken_to_the_nearest() {
 fn messages_that_make_no_sense_are_errors_or_ignored() {
     let mut client = Client::new();
     assert!(client.try_ask("textDocument/nothing", json!({})).is_err());
-    assert!(client.try_ask("textDocument/hover", json!({ "position": 3 })).is_err());
+    assert!(
+        client
+            .try_ask("textDocument/hover", json!({ "position": 3 }))
+            .is_err()
+    );
     assert!(client.try_ask("textDocument/hover", Value::Null).is_err());
     client.tell("textDocument/didOpen", json!(17));
     client.tell("textDocument/didChange", json!({ "contentChanges": "?" }));
     client.tell("$/whatever", Value::Null);
     client.tell("workspace/didChangeConfiguration", json!({ "settings": 5 }));
     client.tell("workspace/didChangeWatchedFiles", json!({ "changes": [] }));
-    assert!(client.try_ask("impasto/libraryText", json!({ "uri": "impasto-std:/bsdf/../../x" })).is_err());
-    let text = client.ask("impasto/libraryText", json!({ "uri": "impasto-std:/bsdf/diffuse.impasto" }));
-    assert!(text["text"].as_str().is_some_and(|t| t.contains("bsdf diffuse")));
+    assert!(
+        client
+            .try_ask(
+                "impasto/libraryText",
+                json!({ "uri": "impasto-std:/bsdf/../../x" })
+            )
+            .is_err()
+    );
+    let text = client.ask(
+        "impasto/libraryText",
+        json!({ "uri": "impasto-std:/bsdf/diffuse.impasto" }),
+    );
+    assert!(
+        text["text"]
+            .as_str()
+            .is_some_and(|t| t.contains("bsdf diffuse"))
+    );
 }
 
 #[test]
@@ -112,7 +144,10 @@ fn a_thousand_edits_are_a_few_checks() {
     client.notices.clear();
     for i in 0..1000u64 {
         let at = json!({ "line": 1, "character": 31 + i });
-        client.change_by(&uri, json!([{ "range": { "start": at, "end": at }, "text": "0" }]));
+        client.change_by(
+            &uri,
+            json!([{ "range": { "start": at, "end": at }, "text": "0" }]),
+        );
     }
     client.diagnostics(&uri);
     let checks = client.notices.len();
@@ -125,7 +160,9 @@ fn a_cancelled_request_is_not_begun() {
     let uri = client.open("m.impasto", "material m { }");
     // While this one is answered, the others lie in wait.
     let first = client.send("workspace/symbol", json!({ "query": "a" }));
-    let ids: Vec<i32> = (0..50).map(|_| client.send("textDocument/completion", about(&uri, 0, 13))).collect();
+    let ids: Vec<i32> = (0..50)
+        .map(|_| client.send("textDocument/completion", about(&uri, 0, 13)))
+        .collect();
     let last = ids[ids.len() - 1];
     client.tell("$/cancelRequest", json!({ "id": last }));
     assert!(client.answer(first).is_ok());
@@ -150,7 +187,11 @@ fn files_that_come_and_go_are_read_anew() {
     };
     client.write("helper.impasto", "fn half(x: float) -> float = 0.5 * x;\n");
     changed(&mut client);
-    assert!(client.diagnostics_where(&uri, <[Value]>::is_empty).is_empty());
+    assert!(
+        client
+            .diagnostics_where(&uri, <[Value]>::is_empty)
+            .is_empty()
+    );
     // Half saved, then another kind of thing, then gone.
     client.write("helper.impasto", "fn half(x: fl");
     changed(&mut client);

@@ -19,7 +19,9 @@ fn begin(scene: &str) -> (Client, String) {
 fn labels(client: &mut Client, uri: &str, text: &str, at: usize) -> Vec<String> {
     let list = client.ask("textDocument/completion", Client::at(uri, text, at));
     let items = list["items"].as_array().cloned().unwrap_or_default();
-    let labels = items.iter().filter_map(|i| i["label"].as_str().map(str::to_owned));
+    let labels = items
+        .iter()
+        .filter_map(|i| i["label"].as_str().map(str::to_owned));
     labels.collect()
 }
 
@@ -34,7 +36,12 @@ fn what_is_wrong_is_shown_at_its_place_with_what_may_be_meant() {
     for (from, to, word, instead) in [
         ("fov", "fof", "fof", Some("fov")),
         ("room.obj", "rom.obj", "rom.obj", Some("room.obj")),
-        ("wall.impasto", "wal.impasto", "wal.impasto", Some("wall.impasto")),
+        (
+            "wall.impasto",
+            "wal.impasto",
+            "wal.impasto",
+            Some("wall.impasto"),
+        ),
         ("tint =", "tnt =", "tnt", Some("tint")),
         ("[camera]", "[camera", "", None),
         ("40", "400", "400", None),
@@ -45,7 +52,10 @@ fn what_is_wrong_is_shown_at_its_place_with_what_may_be_meant() {
         let found = client.diagnostics_where(&uri, |list| !list.is_empty());
         let (start, end) = (&found[0]["range"]["start"], &found[0]["range"]["end"]);
         let place = &text[offset(&text, start)..offset(&text, end)];
-        assert!(word.is_empty() || place.contains(word), "{to}: {place}: {found:?}");
+        assert!(
+            word.is_empty() || place.contains(word),
+            "{to}: {place}: {found:?}"
+        );
         let Some(instead) = instead else { continue };
         let params = json!({
             "textDocument": { "uri": uri },
@@ -72,10 +82,20 @@ fn a_binding_that_nothing_uses_is_faded() {
 fn keys_parameters_and_files_are_proposed() {
     for (from, to, wanted, unwanted) in [
         ("fov = 40", "fov = 40\nap<|>", "aperture", "radiance"),
-        ("tint = [0.5, 0.25, 0.1], size = \"2 cm\"", "ti<|>", "tint", "fov"),
+        (
+            "tint = [0.5, 0.25, 0.1], size = \"2 cm\"",
+            "ti<|>",
+            "tint",
+            "fov",
+        ),
         ("wall.impasto", "<|>", "wall.impasto", "room.obj"),
         ("room.obj", "<|>", "room.obj", "wall.impasto"),
-        ("[[geometry]]", "[[geometry]]\nmaterial = \"<|>\"", "a", "wall"),
+        (
+            "[[geometry]]",
+            "[[geometry]]\nmaterial = \"<|>\"",
+            "a",
+            "wall",
+        ),
         ("[camera]", "[cam<|>", "camera", "fov"),
     ] {
         let text = SCENE.replacen(from, to, 1);
@@ -98,7 +118,11 @@ fn keys_and_parameters_say_what_they_are() {
     };
     assert!(hover("fov").contains("vertical field of view"));
     assert!(hover("tint").contains("How bright."));
-    assert!(hover("size").contains("Range: `1 cm"), "{}", hover("size"));
+    assert!(
+        hover("size").contains("Range: `0.1 cm"),
+        "{}",
+        hover("size")
+    );
     assert!(hover("wall.impasto").contains("A wall."));
 }
 
@@ -108,7 +132,13 @@ fn a_scene_leads_to_its_files_and_to_parameters() {
     let mut leads = |word: &str| {
         let at = SCENE.find(word).expect("it is there") + 1;
         let found = client.ask("textDocument/definition", Client::at(&uri, SCENE, at));
-        let file = found["uri"].as_str().unwrap_or("-").rsplit('/').next().unwrap_or("-").to_owned();
+        let file = found["uri"]
+            .as_str()
+            .unwrap_or("-")
+            .rsplit('/')
+            .next()
+            .unwrap_or("-")
+            .to_owned();
         (file, found["range"]["start"]["line"].as_u64().unwrap_or(0))
     };
     assert_eq!(leads("wall.impasto"), ("wall.impasto".into(), 3));

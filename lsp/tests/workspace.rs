@@ -82,7 +82,12 @@ fn references_are_found_in_all_files() {
         })
         .collect();
     places.sort();
-    let expected = [("paints.impasto", 7), ("wall.impasto", 0), ("wall.impasto", 0), ("wall.impasto", 3)];
+    let expected = [
+        ("paints.impasto", 7),
+        ("wall.impasto", 0),
+        ("wall.impasto", 0),
+        ("wall.impasto", 3),
+    ];
     let expected: Vec<(String, u64)> = expected.map(|(f, l)| (f.to_owned(), l)).to_vec();
     assert_eq!(places, expected);
 }
@@ -95,7 +100,10 @@ fn an_import_leads_to_its_file_and_the_library_opens() {
     assert_eq!(found["uri"], client.uri("paints.impasto"));
     assert_eq!(found["range"]["start"]["line"], 5);
     let paints = client.uri("paints.impasto");
-    let found = client.ask("textDocument/definition", at(&paints, PAINTS, "diffuse(half"));
+    let found = client.ask(
+        "textDocument/definition",
+        at(&paints, PAINTS, "diffuse(half"),
+    );
     assert_eq!(found["uri"], "impasto-std:/bsdf/diffuse.impasto");
     // The client opens it, and goes on from there.
     let text = client.ask("impasto/libraryText", json!({ "uri": found["uri"] }));
@@ -103,8 +111,15 @@ fn an_import_leads_to_its_file_and_the_library_opens() {
     let library = "impasto-std:/bsdf/diffuse.impasto";
     client.open_uri(library, &text);
     assert!(client.diagnostics(library).is_empty());
-    let hover = client.ask("textDocument/hover", at(library, &text, "cosine_hemisphere"));
-    assert!(hover["contents"]["value"].as_str().is_some_and(|t| t.contains("fn cosine_hemisphere")));
+    let hover = client.ask(
+        "textDocument/hover",
+        at(library, &text, "cosine_hemisphere"),
+    );
+    assert!(
+        hover["contents"]["value"]
+            .as_str()
+            .is_some_and(|t| t.contains("fn cosine_hemisphere"))
+    );
     let mut renamed = at(library, &text, "cosine_hemisphere");
     renamed["newName"] = json!("x");
     let refused = client.try_ask("textDocument/rename", renamed);
@@ -124,12 +139,25 @@ fn clients_without_virtual_documents_get_copies() {
     let target = found["uri"].as_str().expect("a uri").to_owned();
     let path = target.strip_prefix("file://").expect("a file").to_owned();
     let text = std::fs::read_to_string(&path).expect("a copy");
-    assert!(std::fs::metadata(&path).expect("a file").permissions().readonly());
+    assert!(
+        std::fs::metadata(&path)
+            .expect("a file")
+            .permissions()
+            .readonly()
+    );
     // Opened, it is the library all the same.
     client.open_uri(&target, &text);
     assert!(client.diagnostics(&target).is_empty());
-    let found = client.ask("textDocument/definition", at(&target, &text, "cosine_hemisphere"));
-    assert!(found["uri"].as_str().is_some_and(|u| u.contains("/impasto-library/core/")), "{found}");
+    let found = client.ask(
+        "textDocument/definition",
+        at(&target, &text, "cosine_hemisphere"),
+    );
+    assert!(
+        found["uri"]
+            .as_str()
+            .is_some_and(|u| u.contains("/impasto-library/core/")),
+        "{found}"
+    );
 }
 
 #[test]
@@ -144,5 +172,8 @@ fn symbols_of_all_files_are_found_by_their_letters() {
         .collect();
     assert!(names.contains(&"gloss"), "{names:?}");
     let found = client.ask("workspace/symbol", json!({ "query": "perlin" }));
-    assert_eq!(found[0]["location"]["uri"], "impasto-std:/noise/perlin.impasto");
+    assert_eq!(
+        found[0]["location"]["uri"],
+        "impasto-std:/noise/perlin.impasto"
+    );
 }

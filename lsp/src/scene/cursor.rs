@@ -212,7 +212,7 @@ mod tests {
             (
                 "[[geometry]]\nplacements = [\n  { translate = [0, 0, 0] },\n  { sca|",
                 &["geometry"],
-                &[],
+                &["placements"],
                 Part::Key,
             ),
             ("[camera] # a\n# fo|", &["camera"], &[], Part::Nothing),
