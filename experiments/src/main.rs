@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod editor;
 mod farm;
 mod gallery;
 mod paper;
@@ -33,6 +34,8 @@ enum Experiment {
     Partition(partition::PartitionArgs),
     /// Run the tests of numerical stability at full effort, and write docs/stability.md
     Stress(stress::StressArgs),
+    /// Time what an editor waits for, and print a table
+    Editor(editor::EditorArgs),
     /// Simulate farms of many GPUs, and write docs/farm-scale.md
     Farm(farm::FarmArgs),
     /// Render everything in the library, and write docs/library
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         Experiment::Paper(args) => paper::run(&args),
         Experiment::Partition(args) => partition::run(&args),
         Experiment::Stress(args) => stress::run(&args),
+        Experiment::Editor(args) => editor::run(&args),
         Experiment::Farm(args) => farm::run(&args),
         Experiment::Gallery(args) => gallery::run(&args),
     })
