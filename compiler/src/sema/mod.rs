@@ -50,8 +50,10 @@ mod varying;
 
 use called::MaterialSignature;
 pub use called::{Declared, Origin};
+pub use inputs::{MOMENT, names as input_names};
 pub use metadata::Metadata;
 pub use modules::{ItemRef, ModuleId, std_path};
+pub use outputs::OUTPUTS;
 use modules::{Loading, ModuleData};
 use types::Ty;
 
