@@ -92,9 +92,9 @@ fn the_scanners_units_are_the_compilers() {
     }
 }
 
-/// Every word that a pattern of alternatives in a file for editors has: `\b(a|b)\b`.
+/// The words of the last group of a pattern: `(a|b)`.
 fn alternatives(pattern: &str) -> Words {
-    let inner = pattern.split_once('(').map_or(pattern, |(_, rest)| rest);
+    let inner = pattern.rsplit_once('(').map_or(pattern, |(_, rest)| rest);
     let inner = inner.trim_start_matches("?:");
     set(inner.split(')').next().unwrap_or("").split('|'))
 }

@@ -1,0 +1,186 @@
+-- The language server of Impasto in Neovim from 0.7 on: `require("impasto").setup()`.
+
+local M = {}
+
+-- Settings of the server, with their defaults. docs/editors.md says what they do.
+local settings = {
+  path = "impasto",
+  scene = "",
+  cost = { inlayHints = false, lens = true },
+}
+
+--- Is a buffer of TOML a scene? Those have cameras and materials.
+local function is_scene(buffer)
+  for _, line in ipairs(vim.api.nvim_buf_get_lines(buffer, 0, -1, false)) do
+    if line:match("^%s*%[%s*camera%s*%]") or line:match("^%s*%[%s*materials%s*[%.%]]") then
+      return true
+    end
+  end
+  return vim.fn.fnamemodify(vim.api.nvim_buf_get_name(buffer), ":t") == "scene.toml"
+end
+
+--- Has the server anything to say of a buffer?
+local function is_ours(buffer)
+  local kind = vim.bo[buffer].filetype
+  return kind == "impasto" or (kind == "toml" and is_scene(buffer))
+end
+
+--- The folder that a file belongs to: that of the repository, or its own.
+local function root_of(buffer)
+  local name = vim.api.nvim_buf_get_name(buffer)
+  local folder = vim.fn.fnamemodify(name, ":p:h")
+  local above = vim.fn.finddir(".git", folder .. ";")
+  return above ~= "" and vim.fn.fnamemodify(above, ":p:h:h") or folder
+end
+
+--- What `vim.lsp.config` and `vim.lsp.start_client` take.
+function M.config()
+  return {
+    name = "impasto",
+    cmd = { settings.path, "lsp" },
+    filetypes = { "impasto", "toml" },
+    -- Neovim 0.11 asks for each buffer; one that is not ours has no folder, and no server.
+    root_dir = function(buffer, give)
+      if is_ours(buffer) then
+        give(root_of(buffer))
+      end
+    end,
+    settings = { impasto = settings },
+    -- Definitions of the library are buffers without a file: see `read_library`.
+    init_options = { virtualDocuments = true },
+  }
+end
+
+--- The server that runs, or nil.
+local function client()
+  local all = vim.lsp.get_clients and vim.lsp.get_clients({ name = "impasto" }) or vim.lsp.get_active_clients()
+  for _, one in pairs(all) do
+    if one.name == "impasto" then
+      return one
+    end
+  end
+end
+
+--- Fills a buffer named `impasto-std:/folder/name.impasto` with the text that the server has.
+local function read_library(buffer, uri)
+  local server = client()
+  if not server then
+    return
+  end
+  local id = server.id
+  local function show(problem, answer)
+    if not vim.api.nvim_buf_is_valid(buffer) then
+      return
+    end
+    local text = answer and answer.text or ("// " .. (problem and problem.message or "The library has no such file."))
+    vim.bo[buffer].modifiable = true
+    vim.api.nvim_buf_set_lines(buffer, 0, -1, false, vim.split(text:gsub("\n$", ""), "\n", { plain = true }))
+    vim.bo[buffer].modified = false
+    vim.bo[buffer].modifiable = false
+    vim.bo[buffer].readonly = true
+    vim.bo[buffer].swapfile = false
+    vim.bo[buffer].filetype = "impasto"
+    vim.lsp.buf_attach_client(buffer, id)
+  end
+  local answer, problem
+  local done = false
+  local function take(err, result)
+    problem, answer, done = err, result, true
+  end
+  -- The jump to a line follows at once, so the text has to be there.
+  if vim.fn.has("nvim-0.11") == 1 then
+    server:request("impasto/libraryText", { uri = uri }, take, buffer)
+  else
+    server.request("impasto/libraryText", { uri = uri }, take, buffer)
+  end
+  vim.wait(2000, function()
+    return done
+  end, 5)
+  show(problem, answer)
+end
+
+--- The server of a buffer before Neovim 0.11: one for each folder.
+local started = {}
+local function start(buffer)
+  local root = root_of(buffer)
+  local config = M.config()
+  config.root_dir = root
+  config.workspace_folders = { { uri = vim.uri_from_fname(root), name = root } }
+  config.on_exit = function()
+    started[root] = nil
+  end
+  local id = started[root] or vim.lsp.start_client(config)
+  started[root] = id
+  if id then
+    vim.lsp.buf_attach_client(buffer, id)
+  end
+end
+
+--- Runs the command on the buffer's file. Its output is a buffer beside it.
+local function printed(arguments, kind)
+  local file = vim.api.nvim_buf_get_name(0)
+  local command = vim.list_extend({ settings.path }, arguments(file))
+  local text = vim.fn.systemlist(command)
+  vim.cmd("vnew")
+  vim.api.nvim_buf_set_lines(0, 0, -1, false, text)
+  vim.bo.buftype, vim.bo.bufhidden, vim.bo.swapfile = "nofile", "wipe", false
+  vim.bo.filetype = kind
+end
+
+--- Commands of buffers of Impasto.
+local function commands()
+  vim.api.nvim_create_user_command("ImpastoPreview", function()
+    vim.fn.jobstart({ settings.path, "view", vim.api.nvim_buf_get_name(0) })
+  end, { desc = "Open the preview of the file, which follows each save" })
+  vim.api.nvim_create_user_command("ImpastoWgsl", function()
+    printed(function(file)
+      return { "emit", file, "--what", "wgsl" }
+    end, "wgsl")
+  end, { desc = "Show the generated shader" })
+  vim.api.nvim_create_user_command("ImpastoCost", function()
+    printed(function(file)
+      return { "cost", file }
+    end, "")
+  end, { desc = "Show what the file's materials cost" })
+end
+
+--- Lenses name this command, which the client runs: the window belongs to the editor.
+local function client_commands()
+  vim.lsp.commands["impasto.showPreview"] = function(command)
+    local uri = command.arguments and command.arguments[1]
+    if uri then
+      vim.fn.jobstart({ settings.path, "view", vim.uri_to_fname(uri) })
+    end
+  end
+end
+
+--- Starts the server for sources and scenes. `options` are settings: `path`, `scene`, `cost.inlayHints`, `cost.lens`.
+function M.setup(options)
+  settings = vim.tbl_deep_extend("force", settings, options or {})
+  commands()
+  client_commands()
+  local group = vim.api.nvim_create_augroup("impasto", { clear = true })
+  vim.api.nvim_create_autocmd("BufReadCmd", {
+    group = group,
+    pattern = "impasto-std:*",
+    callback = function(event)
+      read_library(event.buf, event.match)
+    end,
+  })
+  if vim.lsp.config then
+    vim.lsp.config("impasto", M.config())
+    vim.lsp.enable("impasto")
+    return
+  end
+  vim.api.nvim_create_autocmd("FileType", {
+    group = group,
+    pattern = { "impasto", "toml" },
+    callback = function(event)
+      if is_ours(event.buf) and vim.fn.executable(settings.path) == 1 then
+        start(event.buf)
+      end
+    end,
+  })
+end
+
+return M
