@@ -94,8 +94,9 @@ fn an_incomplete_source_has_error_nodes() {
     }
 }
 
-/// Lines that somebody has not finished. (`for i in` is not here: it takes the next block for its own.)
-const HALF_TYPED: [&str; 31] = [
+/// Lines that somebody has not finished. (Heads of loops from `in` on are not
+/// here: they take the next block for their own.)
+const HALF_TYPED: [&str; 30] = [
     "let",
     "let x",
     "let x =",
@@ -118,7 +119,6 @@ const HALF_TYPED: [&str; 31] = [
     "if a {",
     "if a { x = 1; } else",
     "for",
-    "for i in 0 .. 8",
     "for i in 0 .. 8 {",
     "while a",
     "surface",
@@ -159,7 +159,7 @@ fn few_half_typed_lines_at_the_end_of_a_block_cost_what_follows() {
         !definitions(&text).iter().any(|n| n == "after")
     });
     let lost: Vec<&&str> = lost.collect();
-    assert!(lost.len() <= 11, "{lost:?}");
+    assert!(lost.len() <= 10, "{lost:?}");
 }
 
 /// One wrong token costs few of the other definitions.

@@ -4,6 +4,7 @@ mod agreement;
 mod broken;
 mod corpus;
 mod editors;
+mod installed;
 mod printed;
 mod queries;
 mod random;

@@ -350,9 +350,10 @@ impl<'t> Printer<'t> {
         if node.kind() == "block" {
             return self.block("else", node);
         }
-        let inner = match self.has_value(node) {
-            true => list(["value".to_owned(), self.expression(node)]),
-            false => self.expression(node),
+        let inner = if self.has_value(node) {
+            list(["value".to_owned(), self.expression(node)])
+        } else {
+            self.expression(node)
         };
         list(["else".to_owned(), inner])
     }
