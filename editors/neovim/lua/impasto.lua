@@ -25,12 +25,31 @@ local function is_ours(buffer)
   return kind == "impasto" or (kind == "toml" and is_scene(buffer))
 end
 
---- The folder that a file belongs to: that of the repository, or its own.
+--- A server that runs, or nil.
+local function running()
+  local all = vim.lsp.get_clients and vim.lsp.get_clients() or vim.lsp.get_active_clients()
+  for _, client in pairs(all) do
+    if client.name == "impasto" then
+      return client
+    end
+  end
+end
+
+--- The folder that a file belongs to: that of its repository, that of a server that runs (a file of the library has no
+--- repository), or its own.
 local function root_of(buffer)
-  local name = vim.api.nvim_buf_get_name(buffer)
-  local folder = vim.fn.fnamemodify(name, ":p:h")
+  local folder = vim.fn.fnamemodify(vim.api.nvim_buf_get_name(buffer), ":p:h")
   local above = vim.fn.finddir(".git", folder .. ";")
-  return above ~= "" and vim.fn.fnamemodify(above, ":p:h:h") or folder
+  if above ~= "" then
+    return vim.fn.fnamemodify(above, ":p:h:h")
+  end
+  -- In a worktree it is a file.
+  above = vim.fn.findfile(".git", folder .. ";")
+  if above ~= "" then
+    return vim.fn.fnamemodify(above, ":p:h")
+  end
+  local server = running()
+  return server and server.config.root_dir or folder
 end
 
 --- What `vim.lsp.config` and `vim.lsp.start_client` take.
@@ -46,57 +65,9 @@ function M.config()
       end
     end,
     settings = { impasto = settings },
-    -- Definitions of the library are buffers without a file: see `read_library`.
-    init_options = { virtualDocuments = true },
+    -- Definitions of the library are files of a cache: Neovim takes `impasto-std:/...` for a relative path.
+    init_options = { virtualDocuments = false },
   }
-end
-
---- The server that runs, or nil.
-local function client()
-  local all = vim.lsp.get_clients and vim.lsp.get_clients({ name = "impasto" }) or vim.lsp.get_active_clients()
-  for _, one in pairs(all) do
-    if one.name == "impasto" then
-      return one
-    end
-  end
-end
-
---- Fills a buffer named `impasto-std:/folder/name.impasto` with the text that the server has.
-local function read_library(buffer, uri)
-  local server = client()
-  if not server then
-    return
-  end
-  local id = server.id
-  local function show(problem, answer)
-    if not vim.api.nvim_buf_is_valid(buffer) then
-      return
-    end
-    local text = answer and answer.text or ("// " .. (problem and problem.message or "The library has no such file."))
-    vim.bo[buffer].modifiable = true
-    vim.api.nvim_buf_set_lines(buffer, 0, -1, false, vim.split(text:gsub("\n$", ""), "\n", { plain = true }))
-    vim.bo[buffer].modified = false
-    vim.bo[buffer].modifiable = false
-    vim.bo[buffer].readonly = true
-    vim.bo[buffer].swapfile = false
-    vim.bo[buffer].filetype = "impasto"
-    vim.lsp.buf_attach_client(buffer, id)
-  end
-  local answer, problem
-  local done = false
-  local function take(err, result)
-    problem, answer, done = err, result, true
-  end
-  -- The jump to a line follows at once, so the text has to be there.
-  if vim.fn.has("nvim-0.11") == 1 then
-    server:request("impasto/libraryText", { uri = uri }, take, buffer)
-  else
-    server.request("impasto/libraryText", { uri = uri }, take, buffer)
-  end
-  vim.wait(2000, function()
-    return done
-  end, 5)
-  show(problem, answer)
 end
 
 --- The server of a buffer before Neovim 0.11: one for each folder.
@@ -159,21 +130,13 @@ function M.setup(options)
   settings = vim.tbl_deep_extend("force", settings, options or {})
   commands()
   client_commands()
-  local group = vim.api.nvim_create_augroup("impasto", { clear = true })
-  vim.api.nvim_create_autocmd("BufReadCmd", {
-    group = group,
-    pattern = "impasto-std:*",
-    callback = function(event)
-      read_library(event.buf, event.match)
-    end,
-  })
   if vim.lsp.config then
     vim.lsp.config("impasto", M.config())
     vim.lsp.enable("impasto")
     return
   end
   vim.api.nvim_create_autocmd("FileType", {
-    group = group,
+    group = vim.api.nvim_create_augroup("impasto", { clear = true }),
     pattern = { "impasto", "toml" },
     callback = function(event)
       if is_ours(event.buf) and vim.fn.executable(settings.path) == 1 then
