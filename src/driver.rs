@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use impasto_compiler::partition::{Plan, PlanError, PlanInputs, Strategy};
-use impasto_compiler::{Compilation, MaterialRequest, Parameters, Program};
+use impasto_compiler::{Compilation, MaterialRequest, Program};
 use impasto_runtime::device::{Device, DeviceOptions};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::film::outputs;
@@ -22,23 +22,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 
 /// The materials that a scene binds, as the compiler is asked for them.
 pub fn requests(scene: &Scene) -> Vec<MaterialRequest> {
-    let bindings = scene.materials.iter().cloned();
-    bindings
-        .map(|binding| MaterialRequest {
-            apart: false,
-            moment: None,
-            name: binding.name,
-            file: binding.file,
-            material: binding.material,
-            params: binding.params,
-            written: binding.written,
-            parameters: match (binding.bake, binding.has_keys) {
-                (_, true) => Parameters::Table,
-                (true, false) => Parameters::Baked,
-                (false, false) => Parameters::Agreed,
-            },
-        })
-        .collect()
+    scene.requests()
 }
 
 /// The materials of a file with their defaults, as the compiler is asked for them. A file without any is

@@ -50,6 +50,7 @@ pub mod converge;
 pub mod cost;
 pub mod docs;
 mod driver;
+pub mod editor;
 mod error;
 pub mod farm;
 pub mod files;

@@ -178,6 +178,21 @@ pub struct Label {
     pub message: String,
 }
 
+/// A change that may repair a source: what a hint says, for editors to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fix {
+    /// What it does, in the imperative: `write `perlin``.
+    pub title: String,
+    /// What is replaced; empty to insert.
+    pub span: Span,
+    /// What must stand there, or the change is not the one that was meant.
+    pub was: Option<String>,
+    /// What takes its place.
+    pub text: String,
+    /// What to import for that, as paths: `std::noise::perlin`.
+    pub imports: Vec<String>,
+}
+
 /// One problem of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
@@ -193,6 +208,8 @@ pub struct Diagnostic {
     pub hint: Option<String>,
     /// Other places that matter.
     pub labels: Vec<Label>,
+    /// Changes that may repair it, the likeliest first.
+    pub fixes: Vec<Fix>,
 }
 
 impl Diagnostic {
@@ -214,6 +231,7 @@ impl Diagnostic {
             expected: None,
             hint: None,
             labels: Vec::new(),
+            fixes: Vec::new(),
         }
     }
 
@@ -236,9 +254,66 @@ impl Diagnostic {
         candidates: impl IntoIterator<Item = &'a str>,
     ) -> Self {
         match nearest(name, candidates) {
-            Some(best) => self.hint(format!("did you mean `{best}`?")),
+            Some(best) => self.meant(name, best),
             None => self,
         }
+    }
+
+    /// Asks whether `best` was meant by `name`, which stands where the diagnostic is.
+    pub fn meant(self, name: &str, best: &str) -> Self {
+        let fixed = match self.span {
+            Some(span) => self.replaced(span, Some(name), best),
+            None => self,
+        };
+        fixed.hint(format!("did you mean `{best}`?"))
+    }
+
+    /// Offers to write `text` at `span`, where `was` stands if that is said.
+    pub fn replaced(mut self, span: Span, was: Option<&str>, text: &str) -> Self {
+        self.fixes.push(Fix {
+            title: format!("write `{text}`"),
+            span,
+            was: was.map(str::to_owned),
+            text: text.to_owned(),
+            imports: Vec::new(),
+        });
+        self
+    }
+
+    /// Offers a change.
+    pub fn fix(mut self, fix: Fix) -> Self {
+        self.fixes.push(fix);
+        self
+    }
+
+    /// Hints that what is at `path`, such as `std::noise::perlin`, must be imported.
+    pub fn imported(self, path: &str) -> Self {
+        let hinted = self.hint(format!("import it: `use {path};`"));
+        match hinted.span {
+            Some(span) => hinted.fix(Fix {
+                title: format!("import `{path}`"),
+                span: Span {
+                    end: span.start,
+                    ..span
+                },
+                was: None,
+                text: String::new(),
+                imports: vec![path.to_owned()],
+            }),
+            None => hinted,
+        }
+    }
+
+    /// The same where `name` at `span` may have been meant for the name at its end.
+    pub fn import_of(self, path: &str, span: Span, name: &str, best: &str) -> Self {
+        let hinted = self.hint(format!("import it: `use {path};`"));
+        hinted.fix(Fix {
+            title: format!("write `{best}`, and import `{path}`"),
+            span,
+            was: Some(name.to_owned()),
+            text: best.to_owned(),
+            imports: vec![path.to_owned()],
+        })
     }
 
     /// Points at a second place.
@@ -259,6 +334,13 @@ impl Diagnostic {
 /// Does any of `diagnostics` stop the compilation?
 pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
     diagnostics.iter().any(Diagnostic::is_error)
+}
+
+/// Drops the warnings that an error may be the cause of: what did not check uses nothing.
+pub fn drop_unsure(diagnostics: &mut Vec<Diagnostic>) {
+    if has_errors(diagnostics) {
+        diagnostics.retain(|d| d.code != Code::Unused);
+    }
 }
 
 /// The candidate with the smallest edit distance to `name`, if at most a third of it differs.

@@ -134,7 +134,7 @@ fn compile_as<'a>(
     let mut checker = Checker::with_progress(loader, progress);
     let program = compile_all(&mut checker, requests, looks);
     let program = program.filter(|_| !diag::has_errors(&checker.diagnostics));
-    drop_unsure(&mut checker.diagnostics);
+    diag::drop_unsure(&mut checker.diagnostics);
     Compilation {
         program,
         sources: checker.sources,
@@ -164,7 +164,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);
     }
-    drop_unsure(&mut checker.diagnostics);
+    diag::drop_unsure(&mut checker.diagnostics);
     let Checker {
         sources,
         diagnostics,
@@ -199,13 +199,6 @@ pub fn after_pass(
         if let Some((module, state)) = state {
             look(module, &state);
         }
-    }
-}
-
-/// Drops the warnings that an error may be the cause of: what did not check uses nothing.
-fn drop_unsure(diagnostics: &mut Vec<Diagnostic>) {
-    if diag::has_errors(diagnostics) {
-        diagnostics.retain(|d| d.code != Code::Unused);
     }
 }
 

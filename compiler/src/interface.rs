@@ -217,7 +217,7 @@ const FOR_TESTS: [&str; 9] = [
 
 /// A doc comment as a person reads it: without what is for tests, which goes on to the next empty line
 /// or the next word of the kind.
-fn prose(lines: &[String]) -> String {
+pub fn prose(lines: &[String]) -> String {
     let mut shown: Vec<&str> = Vec::new();
     let mut hidden = false;
     for line in lines {

@@ -20,6 +20,7 @@
 //! ```
 
 pub mod abi;
+pub mod analysis;
 pub mod ast;
 mod build;
 pub mod closure;

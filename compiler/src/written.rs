@@ -62,8 +62,13 @@ impl Written {
         // Escapes are the one way in which a text is not what the scene says.
         let within = self.text[value.clone()].find(sources.file(snippet).text.as_str());
         for diagnostic in diagnostics {
+            if within.is_none() {
+                // What would be changed is not what the scene says.
+                diagnostic.fixes.retain(|fix| fix.span.file != snippet);
+            }
             let labels = diagnostic.labels.iter_mut().map(|l| &mut l.span);
-            for span in labels.chain(&mut diagnostic.span) {
+            let fixes = diagnostic.fixes.iter_mut().map(|f| &mut f.span);
+            for span in labels.chain(fixes).chain(&mut diagnostic.span) {
                 if span.file != snippet {
                     continue;
                 }

@@ -1,6 +1,7 @@
 //! All tests of the compiler but those of `limits.rs`, in one program: it is linked once, and what one test has
 //! prepared the next one finds.
 
+mod analysis;
 mod bad_input;
 mod called;
 mod closures;

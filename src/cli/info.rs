@@ -74,10 +74,9 @@ impl DeviceArgs {
         self.device == Some(Kind::Cpu)
     }
 
-    /// The device that was asked for.
-    pub(super) fn open(&self, global: &Global) -> Result<Device, Failure> {
-        self.check()?;
-        let options = DeviceOptions {
+    /// Which device is asked for.
+    pub(super) fn options(&self) -> DeviceOptions {
+        DeviceOptions {
             choice: match self.device {
                 None => Choice::Best,
                 Some(Kind::Gpu) => Choice::Gpu,
@@ -92,7 +91,13 @@ impl DeviceArgs {
                     Width::Best
                 },
             },
-        };
+        }
+    }
+
+    /// The device that was asked for.
+    pub(super) fn open(&self, global: &Global) -> Result<Device, Failure> {
+        self.check()?;
+        let options = self.options();
         let mut note = |line: &str| global.note(line);
         let device = Device::open_noting(&options, &mut note).map_err(super::runtime)?;
         if let (Device::Gpu(gpu), Some(_)) = (&device, self.threads) {

@@ -29,6 +29,7 @@ mod farm;
 mod fmt;
 mod info;
 mod interrupt;
+mod lsp;
 mod merge;
 mod needs;
 mod new;
@@ -132,6 +133,8 @@ enum Command {
     /// Render on a farm of machines: jobs for Slurm and OpenJD, and here
     #[command(subcommand)]
     Farm(Box<farm::FarmCommand>),
+    /// Serve an editor: the language server, on standard input and output
+    Lsp(lsp::LspArgs),
     /// Show the device that would render, with its limits, and the others
     Info(info::DeviceArgs),
     /// Explain a diagnostic code, such as E0201; without one, list all
@@ -226,6 +229,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Rays(args) => rays::run(&args, &global),
         Command::Merge(args) => merge::run(&args, &global),
         Command::Farm(command) => farm::run(&command, &global),
+        Command::Lsp(args) => lsp::run(&args),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),

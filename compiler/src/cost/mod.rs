@@ -17,18 +17,22 @@ use crate::ir::interp::{Interpreter, OutOfFuel};
 use crate::ir::ops::Counts;
 use crate::program::Program;
 
+mod difference;
 mod inputs;
 mod lines;
 mod live;
+mod materials;
 mod measure;
 mod size;
 mod subgroups;
 mod vector;
 mod walk;
 
+pub use difference::{Change, Difference, LineChange, difference};
 pub use inputs::Inputs;
 pub use lines::LineCost;
 pub use live::live;
+pub use materials::{Effort, MaterialCost, anywhere, measure};
 pub use measure::Measured;
 pub use vector::{Cost, LANES};
 pub use walk::Walks;

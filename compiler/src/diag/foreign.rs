@@ -4,6 +4,9 @@
 //! name becomes a real one never answers again, and a test asks for its removal. Another test
 //! compiles what each row says to write.
 
+use super::Fix;
+use crate::source::Span;
+
 /// Where a word of the table stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
@@ -68,14 +71,39 @@ impl Foreign {
         }
         hint
     }
+
+    /// What to write in the place of the word at `span`, where one word or value does it.
+    pub fn fix(&self, name: &str, span: Span) -> Option<Fix> {
+        let text = match self.used {
+            Use::Value | Use::Type => self.instead,
+            // Arguments are the author's; the callee is what has another name.
+            Use::Call => self.instead.split_once('(')?.0,
+            _ => return None,
+        };
+        let is_call = self.used == Use::Call;
+        let is_name = |c: char| c == '_' || c.is_alphanumeric();
+        if text.is_empty() || (is_call && !text.chars().all(is_name)) {
+            return None;
+        }
+        Some(Fix {
+            title: format!("write `{text}`"),
+            span,
+            was: Some(name.to_owned()),
+            text: text.to_owned(),
+            imports: self.imports.iter().map(|p| (*p).to_owned()).collect(),
+        })
+    }
 }
 
 /// The hint for a word that stands in one of `places` and means nothing there.
 pub fn hint(name: &str, places: &[Use]) -> Option<String> {
-    let row = TABLE
-        .iter()
-        .find(|row| row.names.contains(&name) && places.contains(&row.used))?;
-    Some(row.hint(name))
+    Some(row(name, places)?.hint(name))
+}
+
+/// The row of a word that stands in one of `places`.
+pub fn row(name: &str, places: &[Use]) -> Option<&'static Foreign> {
+    let mut rows = TABLE.iter();
+    rows.find(|row| row.names.contains(&name) && places.contains(&row.used))
 }
 
 macro_rules! table {

@@ -9,7 +9,7 @@
 use std::collections::BTreeSet;
 
 use super::lines::Lines;
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{Code, Diagnostic, Fix};
 use crate::lexer::Token;
 use crate::source::{FileId, Span};
 
@@ -317,6 +317,13 @@ fn unclosed(open: Open, at: Span, place: &str) -> Diagnostic {
     Diagnostic::new(Code::Unclosed, open.span, message)
         .expected(format!("`{closer}` {place}"))
         .label(at, format!("`{closer}` is missing {place}"))
+        .fix(Fix {
+            title: format!("close it: `{closer}`"),
+            span: at,
+            was: None,
+            text: closer.to_owned(),
+            imports: Vec::new(),
+        })
 }
 
 /// `wrong` is the bracket of another kind that `closer` would have to close.
@@ -330,8 +337,16 @@ fn stray(closer: Token, span: Span, wrong: Option<Open>) -> Diagnostic {
             let partner = open.token.closer().and_then(Token::spelling);
             diagnostic
                 .label(open.span, format!("this `{other}` is still open"))
-                .hint(format!("did you mean `{}`?", partner.unwrap_or_default()))
+                .meant(spelling, partner.unwrap_or_default())
         }
-        None => diagnostic.hint(format!("remove this `{spelling}`")),
+        None => diagnostic
+            .hint(format!("remove this `{spelling}`"))
+            .fix(Fix {
+                title: format!("remove this `{spelling}`"),
+                span,
+                was: Some(spelling.to_owned()),
+                text: String::new(),
+                imports: Vec::new(),
+            }),
     }
 }

@@ -124,8 +124,12 @@ fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic 
         }
         _ => None,
     };
+    let whole = number.to(span);
+    let fixed = |diagnostic: Diagnostic, text: String| diagnostic.replaced(whole, None, &text);
     match known {
-        Some(unit) => diagnostic.hint(format!("did you mean `{digits} {unit}`?")),
-        None => diagnostic.hint(format!("to multiply, write `{digits} * {name}`")),
+        Some(unit) => fixed(diagnostic, format!("{digits} {unit}"))
+            .hint(format!("did you mean `{digits} {unit}`?")),
+        None => fixed(diagnostic, format!("{digits} * {name}"))
+            .hint(format!("to multiply, write `{digits} * {name}`")),
     }
 }

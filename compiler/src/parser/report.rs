@@ -193,7 +193,11 @@ fn diagnose(source: &Source<'_>, error: SyntaxError) -> Diagnostic {
             let end = previous as usize;
             let after = Span::new(source.file, end..end);
             let message = format!("{missing} is missing here");
-            Diagnostic::new(Code::Syntax, after, message).expected(missing)
+            let lacking = Diagnostic::new(Code::Syntax, after, message).expected(missing);
+            match missing.strip_prefix('`').and_then(|m| m.strip_suffix('`')) {
+                Some(mark) => lacking.replaced(after, None, mark),
+                None => lacking,
+            }
         }
         _ => {
             let message = format!("unexpected {}", found(source, error.found, index));

@@ -174,13 +174,23 @@ impl<'c, 'l> Body<'c, 'l> {
             }
             let message = format!("`{}` is never used", entry.name);
             let unused = Diagnostic::new(Code::Unused, entry.span, message)
-                .hint(format!("remove it, or call it `_{}`", entry.name));
+                .hint(format!("remove it, or call it `_{}`", entry.name))
+                .replaced(entry.span, Some(&entry.name), &format!("_{}", entry.name));
             self.cx.report(unused);
         }
     }
 
     /// Brings a name into the innermost scope.
     pub fn bind(&mut self, name: &Name, binding: Binding, watched: bool) {
+        let ty = match binding {
+            Binding::Fixed(operand) => Some(operand.ty()),
+            Binding::Variable(_, ty) => Some(ty),
+            Binding::Counter(_) => Some(Ty::Int),
+            Binding::Broken => None,
+        };
+        if let (Some(ty), Some(notes)) = (ty, self.notes()) {
+            notes.bindings.insert(name.span, ty);
+        }
         let entry = Entry {
             name: name.node.clone(),
             binding,
@@ -240,17 +250,23 @@ impl<'c, 'l> Body<'c, 'l> {
         Some(Operand::Value(id, to))
     }
 
+    /// The text at a span.
+    pub fn written(&self, span: Span) -> String {
+        let text = &self.cx.sources.file(span.file).text;
+        text.get(span.range()).unwrap_or_default().to_owned()
+    }
+
     /// Warns of a hexadecimal number as a color, which is a grey of that brightness.
     fn note_hexadecimal(&mut self, span: Span) {
-        let source = self.cx.sources.file(span.file);
-        let text = source.text.get(span.range()).unwrap_or_default().to_owned();
+        let text = self.written(span);
         if !text.starts_with("0x") && !text.starts_with("0X") {
             return;
         }
         let message = format!("the number {text} as a color is a grey of that brightness");
         let grey = Diagnostic::new(Code::AboveOne, span, message)
             .expected("a color")
-            .hint(format!("write `srgb({text})`"));
+            .hint(format!("write `srgb({text})`"))
+            .replaced(span, Some(&text), &format!("srgb({text})"));
         self.report::<()>(grey);
     }
 
@@ -270,6 +286,12 @@ impl<'c, 'l> Body<'c, 'l> {
         };
         let wrong = Diagnostic::new(code, span, format!("{place} is {a_found}, not {a_wanted}"))
             .expected(a_wanted);
+        let written = self.written(span);
+        let wrong = match to {
+            Ty::Length if number => with_units(wrong, span, &written, &["cm", "mm", "m"]),
+            Ty::Angle if number => with_units(wrong, span, &written, &["deg", "rad"]),
+            _ => wrong,
+        };
         let wrong = match (from, to) {
             (Ty::Color, Ty::Float) if place == "`opacity`" => wrong.hint(
                 "a filter of some color is a surface, `mix(transparent(color: tint), diffuse(0.5), 0.5)`, after \
@@ -281,19 +303,27 @@ impl<'c, 'l> Body<'c, 'l> {
             (_, Ty::Angle) if number => wrong.hint(
                 "write an angle with its unit, as in `30 deg`, or multiply by one: `x * 1 rad`",
             ),
-            (d, Ty::Float) if d.is_dimension() => wrong.hint(format!(
-                "`float({found})` gives {}",
-                if d == Ty::Length { "metres" } else { "radians" }
-            )),
+            (d, Ty::Float) if d.is_dimension() => wrong
+                .hint(format!(
+                    "`float({found})` gives {}",
+                    if d == Ty::Length { "metres" } else { "radians" }
+                ))
+                .replaced(span, Some(&written), &format!("float({written})")),
             (v, Ty::Float) if v.is_vector() => {
                 wrong.hint("take a component, as in `.x`, or `luminance(...)` of a color")
             }
             (Ty::Int, Ty::Uint) => {
                 wrong.hint("`uint(...)` takes its 32 bits; a literal ends in `u`")
             }
-            (Ty::Uint, Ty::Int) => wrong.hint("`int(...)` takes its 32 bits"),
-            (Ty::Float, Ty::Uint) => wrong.hint("`uint(...)` drops the fraction"),
-            (Ty::Float, Ty::Int) => wrong.hint("`int(...)` drops the fraction"),
+            (Ty::Uint, Ty::Int) => wrong
+                .hint("`int(...)` takes its 32 bits")
+                .replaced(span, Some(&written), &format!("int({written})")),
+            (Ty::Float, Ty::Uint) => wrong
+                .hint("`uint(...)` drops the fraction")
+                .replaced(span, Some(&written), &format!("uint({written})")),
+            (Ty::Float, Ty::Int) => wrong
+                .hint("`int(...)` drops the fraction")
+                .replaced(span, Some(&written), &format!("int({written})")),
             (Ty::Material, _) => wrong
                 .hint("take an output of it: `.surface`, `.emission`, `.interior` or `.opacity`"),
             (_, Ty::Material) => {
@@ -304,7 +334,11 @@ impl<'c, 'l> Body<'c, 'l> {
             (Ty::Medium, t) if t.is_closure() => wrong.hint("assign a medium to `interior`"),
             (_, Ty::Medium) => wrong.hint("`medium(absorption: ..., ior: ...)` makes a medium"),
             (f, t) if f.ir().is_some() && t.ir().is_some() && f.ir() == t.ir() => {
-                wrong.hint(format!("convert it: `{wanted}(...)`"))
+                wrong.hint(format!("convert it: `{wanted}(...)`")).replaced(
+                    span,
+                    Some(&written),
+                    &format!("{wanted}({written})"),
+                )
             }
             (Ty::Array(_), Ty::Color) => wrong.hint(
                 "a color is `color(1.0, 0.5, 0.0)`, linear; one in bytes is `srgb(0xff8000)`",
@@ -320,13 +354,24 @@ impl<'c, 'l> Body<'c, 'l> {
             (Ty::Float | Ty::Int | Ty::Color, Ty::Bsdf) => {
                 wrong.hint("a matte surface is `diffuse(0.5)`, after `use std::bsdf::diffuse;`")
             }
-            (Ty::Float | Ty::Int, t) if t.is_vector() => {
-                wrong.hint(format!("`{wanted}(x)` fills all components with x"))
-            }
+            (Ty::Float | Ty::Int, t) if t.is_vector() => wrong
+                .hint(format!("`{wanted}(x)` fills all components with x"))
+                .replaced(span, Some(&written), &format!("{wanted}({written})")),
             _ => wrong,
         };
         self.report(wrong)
     }
+}
+
+/// Offers a plain number with each of some units.
+fn with_units(wrong: Diagnostic, span: Span, number: &str, units: &[&str]) -> Diagnostic {
+    if number.parse::<f64>().is_err() {
+        return wrong;
+    }
+    let with = |wrong: Diagnostic, unit: &&str| {
+        wrong.replaced(span, Some(number), &format!("{number} {unit}"))
+    };
+    units.iter().fold(wrong, with)
 }
 
 impl Checker<'_> {

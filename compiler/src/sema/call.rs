@@ -11,7 +11,9 @@ use super::array;
 use super::body::{Body, Operand};
 use super::inputs;
 use super::matrix::FUNCTIONS;
+use super::notes::Meaning;
 use super::types::{NAMED, Ty};
+use super::words;
 use super::{Checked, Param};
 
 /// Arguments by the parameters that they are for.
@@ -28,6 +30,7 @@ impl Body<'_, '_> {
     /// A call of anything.
     pub fn call(&mut self, callee: &Name, args: &[Arg], span: Span) -> Option<Operand> {
         if let Some(item) = self.cx.lookup(self.module, &callee.node) {
+            self.note_name(callee.span, Meaning::Item(item));
             return match self.cx.demand(item, Some(callee.span)) {
                 Some(Checked::Function(id)) => {
                     let signature = self.cx.signatures[&id].clone();
@@ -243,7 +246,12 @@ impl Body<'_, '_> {
                 let message = format!("`{callee}` takes its arguments by position");
                 let named = Diagnostic::new(Code::UnknownArgument, name.span, message)
                     .expected("arguments without names")
-                    .hint(format!("remove `{}:`", name.node));
+                    .hint(format!("remove `{}:`", name.node))
+                    .replaced(
+                        name.span.to(arg.value.span),
+                        None,
+                        &self.written(arg.value.span),
+                    );
                 self.report::<()>(named);
                 ok = false;
             }
@@ -369,19 +377,26 @@ impl Body<'_, '_> {
         in_scope: impl IntoIterator<Item = &'n str>,
         places: &[Use],
     ) -> Diagnostic {
-        let import = |path| format!("import it: `{path}`");
-        let exact = self.cx.in_library(name).map(import);
-        let foreign = || foreign::hint(name, places);
-        let near = || diag::nearest(name, in_scope).map(|best| format!("did you mean `{best}`?"));
-        let importable = || self.cx.importable(name).map(import);
-        let is_called = places.contains(&Use::Call);
-        let hint = exact
-            .or_else(foreign)
-            .or_else(near)
-            .or_else(|| is_called.then(importable).flatten());
-        match hint {
-            Some(hint) => unknown.hint(hint),
-            None => unknown,
+        if let Some(path) = self.cx.in_library(name) {
+            return unknown.imported(&path);
+        }
+        if let Some(row) = foreign::row(name, places) {
+            let fix = unknown.span.and_then(|span| row.fix(name, span));
+            let hinted = unknown.hint(row.hint(name));
+            return fix.into_iter().fold(hinted, Diagnostic::fix);
+        }
+        if let Some(best) = diag::nearest(name, in_scope) {
+            return unknown.meant(name, best);
+        }
+        match self.cx.importable(name) {
+            Some(path) if places.contains(&Use::Call) => {
+                let best = path.rsplit("::").next().unwrap_or(name).to_owned();
+                match unknown.span {
+                    Some(span) => unknown.import_of(&path, span, name, &best),
+                    None => unknown,
+                }
+            }
+            _ => unknown,
         }
     }
 
@@ -390,16 +405,8 @@ impl Body<'_, '_> {
         let mut names = self.cx.visible(self.module, |k| {
             !matches!(k, ItemKind::Const(_) | ItemKind::Material(_))
         });
-        names.extend(
-            Op::ALL
-                .iter()
-                .filter(|op| op.info().callable)
-                .map(|op| op.info().text.to_owned()),
-        );
-        names.extend(NAMED.iter().map(|(n, _)| (*n).to_owned()));
-        names.extend(FUNCTIONS.map(String::from));
-        names.extend(["filter_width", "gradient", "layer", "medium", "srgb"].map(String::from));
-        names.extend(inputs::FUNCTIONS.map(String::from));
+        let own = words::built_in_functions().chain(words::type_names());
+        names.extend(own.map(String::from));
         let unknown = Diagnostic::new(
             Code::UnknownName,
             callee.span,

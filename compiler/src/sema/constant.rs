@@ -54,6 +54,11 @@ impl Checker<'_> {
                 value.ok().and_then(|value| plain(&value, ty))
             }
         };
+        if let (Some([value]), Some(notes)) = (value.as_deref(), self.notes.as_mut())
+            && notes.module == module
+        {
+            notes.constants.insert(expr.span, value.clone());
+        }
         match value {
             Some(values) if values.iter().all(is_finite) => Some(values),
             Some(_) => {

@@ -10,6 +10,7 @@ use crate::source::Span;
 use super::Checked;
 use super::body::{Binding, Body, Operand, Place};
 use super::inputs;
+use super::notes::Meaning;
 use super::stmt::component;
 use super::types::Ty;
 
@@ -36,13 +37,13 @@ impl Body<'_, '_> {
             ));
         }
         if ty == Ty::Texture && self.is_bare_file(expr) {
-            let text = &self.cx.sources.file(expr.span.file).text;
-            let hint = text
-                .get(expr.span.range())
-                .map(|f| format!("write `\"{f}\"`"));
+            let file = self.written(expr.span);
+            let quoted = format!("\"{file}\"");
             let bare = Diagnostic::new(Code::TypeMismatch, expr.span, "files are named in quotes")
-                .expected("a text");
-            return self.report(bare.hint(hint.unwrap_or_default()));
+                .expected("a text")
+                .hint(format!("write `{quoted}`"))
+                .replaced(expr.span, Some(&file), &quoted);
+            return self.report(bare);
         }
         let operand = match (&expr.kind, ty.array()) {
             (ExprKind::Array(elements), Some(id)) => {
@@ -74,7 +75,9 @@ impl Body<'_, '_> {
 
     /// Checks an expression.
     pub fn expr(&mut self, expr: &Expr) -> Option<Operand> {
-        stacker::maybe_grow(128 << 10, 1 << 20, || self.expr_inner(expr))
+        let operand = stacker::maybe_grow(128 << 10, 1 << 20, || self.expr_inner(expr))?;
+        self.note_expr(expr.span, operand);
+        Some(operand)
     }
 
     fn expr_inner(&mut self, expr: &Expr) -> Option<Operand> {
@@ -136,12 +139,13 @@ impl Body<'_, '_> {
         if op != BinaryOp::Div || !is_position || !is_number {
             return;
         }
-        let source = self.cx.sources.file(b.span.file);
-        let number = source.text.get(b.span.range()).unwrap_or_default();
+        let number = self.written(b.span);
         let message = format!("`position` over a plain number: features are {number} m large");
         let plain = Diagnostic::new(Code::PlainSize, span, message)
             .expected("a length")
-            .hint(format!("write its unit, as in `position / {number} cm`"));
+            .hint(format!("write its unit, as in `position / {number} cm`"))
+            .replaced(b.span, Some(&number), &format!("{number} cm"))
+            .replaced(b.span, Some(&number), &format!("{number} mm"));
         self.report::<()>(plain);
     }
 
@@ -181,6 +185,9 @@ impl Body<'_, '_> {
     }
 
     fn name(&mut self, name: &str, span: Span) -> Option<Operand> {
+        if let Some(defined) = self.scopes.defined(name) {
+            self.note_name(span, Meaning::Local(defined));
+        }
         match self.local(name) {
             Some(Binding::Fixed(operand)) => return Some(operand),
             Some(Binding::Variable(local, ty)) => {
@@ -211,6 +218,7 @@ impl Body<'_, '_> {
                 _ => self.unknown_name(name, span),
             };
         };
+        self.note_name(span, Meaning::Item(item));
         match self.cx.demand(item, Some(span))? {
             Checked::Const(values, ty) => {
                 let values = values.into_iter().map(|value| self.constant(value, span));
@@ -270,6 +278,9 @@ impl Body<'_, '_> {
             let fields = &self.cx.fields[s.index()];
             if let Some(index) = fields.iter().position(|f| f.name == part.node) {
                 let ty = fields[index].ty;
+                if let Some(notes) = self.notes() {
+                    notes.fields.insert(part.span, (s, index));
+                }
                 return Some(Operand::Value(
                     self.builder.field(&self.cx.ir, id, index, span),
                     ty,

@@ -44,7 +44,11 @@ impl Checker<'_> {
         let unknown = Diagnostic::new(Code::UnknownImport, wanted.span, message)
             .expected(format!("one of {}", list(names.iter().map(String::as_str))));
         self.report(match elsewhere {
-            Some(other) => unknown.hint(format!("it is in `std::{other}`")),
+            Some(other) => unknown.hint(format!("it is in `std::{other}`")).replaced(
+                folder.span,
+                Some(&folder.node),
+                other,
+            ),
             None => unknown.did_you_mean(&wanted.node, names.iter().map(String::as_str)),
         });
         None
@@ -168,17 +172,16 @@ impl Checker<'_> {
         names
     }
 
-    /// The `use` that brings the definition of the standard library whose name is `name`.
+    /// The path of the definition of the standard library whose name is `name`.
     pub(super) fn in_library(&self, name: &str) -> Option<String> {
         let files = impasto_stdlib::files();
         let file = files
             .iter()
             .find(|f| f.name == name && f.folder != "core")?;
-        Some(format!("use std::{}::{};", file.folder, file.name))
+        Some(format!("std::{}::{}", file.folder, file.name))
     }
 
-    /// The `use` that brings the definition of the standard library whose name is `name`, or
-    /// near it.
+    /// The path of the definition of the standard library whose name is `name`, or near it.
     pub(super) fn importable(&self, name: &str) -> Option<String> {
         let files = || {
             impasto_stdlib::files()
@@ -187,7 +190,7 @@ impl Checker<'_> {
         };
         let nearest = diag::nearest(name, files().map(|f| f.name))?;
         let file = files().find(|f| f.name == nearest)?;
-        Some(format!("use std::{}::{};", file.folder, file.name))
+        Some(format!("std::{}::{}", file.folder, file.name))
     }
 }
 

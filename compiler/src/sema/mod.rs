@@ -36,6 +36,7 @@ mod matrix;
 mod medium;
 mod metadata;
 mod modules;
+pub mod notes;
 mod outputs;
 mod params;
 mod scopes;
@@ -47,14 +48,14 @@ pub mod types;
 mod unroll;
 mod unsigned;
 mod varying;
+pub mod words;
 
 use called::MaterialSignature;
 pub use called::{Declared, Origin};
-pub use inputs::{MOMENT, names as input_names};
 pub use metadata::Metadata;
 pub use modules::{ItemRef, ModuleId, std_path};
-pub use outputs::OUTPUTS;
 use modules::{Loading, ModuleData};
+use notes::Notes;
 use types::Ty;
 
 /// Everything known while a compilation's sources are checked.
@@ -102,6 +103,8 @@ pub struct Checker<'a> {
     warnings: usize,
     /// Expressions that evaluating constants took.
     evaluated: u64,
+    /// What is kept of the checking of one file, if anything is.
+    pub(crate) notes: Option<Notes>,
 }
 
 /// Errors of checking that are reported; what is as wrong as that is not looked at further.
@@ -176,6 +179,7 @@ impl<'a> Checker<'a> {
             errors: 0,
             warnings: 0,
             evaluated: 0,
+            notes: None,
         };
         checker.add_std_sources();
         checker.load_core();
@@ -214,7 +218,8 @@ impl<'a> Checker<'a> {
             }
             let message = format!("`{}` is private and never used", name.node);
             let unused = Diagnostic::new(Code::Unused, name.span, message)
-                .hint(format!("remove it, or call it `_{}`", name.node));
+                .hint(format!("remove it, or call it `_{}`", name.node))
+                .replaced(name.span, Some(&name.node), &format!("_{}", name.node));
             self.report(unused);
         }
     }
@@ -390,8 +395,13 @@ impl<'a> Checker<'a> {
             .chain(structs.iter().map(String::as_str));
         let unknown = Diagnostic::new(Code::UnknownType, span, format!("unknown type `{name}`"))
             .expected("a type such as float, color, vec3, length or a struct");
-        let unknown = match foreign::hint(name, &[foreign::Use::Type]) {
-            Some(hint) => unknown.hint(hint),
+        let unknown = match foreign::row(name, &[foreign::Use::Type]) {
+            Some(row) => {
+                let hinted = unknown.hint(row.hint(name));
+                row.fix(name, span)
+                    .into_iter()
+                    .fold(hinted, Diagnostic::fix)
+            }
             None => unknown.did_you_mean(name, known),
         };
         self.report(unknown);

@@ -33,6 +33,8 @@ pub struct ItemRef {
 
 /// A loaded file and its names.
 pub struct ModuleData {
+    /// Its text.
+    pub file: FileId,
     /// Its syntax tree.
     pub ast: Arc<ast::Module>,
     /// Path it was loaded by.
@@ -142,7 +144,11 @@ impl Checker<'_> {
     /// Hints at the module that a name for one that is not there may mean.
     fn suggest_module(&mut self, problem: Diagnostic, path: &str, name: &str) -> Diagnostic {
         if folders().contains(&name) {
-            return problem.hint(format!("the library is in `std`: `use std::{name}::...;`"));
+            let fixed = match problem.span {
+                Some(span) => problem.replaced(span, Some(name), &format!("std::{name}")),
+                None => problem,
+            };
+            return fixed.hint(format!("the library is in `std`: `use std::{name}::...;`"));
         }
         let beside = self.loader.beside(path);
         let own = self.importing.iter().rev().nth(1);
@@ -161,20 +167,21 @@ impl Checker<'_> {
         let (ast, diagnostics) = parser::parse(file, text);
         self.progress.enter(before);
         let is_std = path.starts_with("std::");
-        self.define_module(path, Arc::new(ast), diagnostics, is_std)
+        self.define_module(path, file, (Arc::new(ast), diagnostics), is_std)
     }
 
     fn define_module(
         &mut self,
         path: &str,
-        ast: Arc<ast::Module>,
-        diagnostics: Vec<Diagnostic>,
+        file: FileId,
+        (ast, diagnostics): (Arc<ast::Module>, Vec<Diagnostic>),
         is_std: bool,
     ) -> ModuleId {
         let id = ModuleId(self.modules.len());
         self.leave_out_broken(id, &ast, &diagnostics);
         diagnostics.into_iter().for_each(|d| self.report(d));
         self.modules.push(ModuleData {
+            file,
             ast: ast.clone(),
             path: path.to_owned(),
             is_std,
@@ -262,8 +269,8 @@ impl Checker<'_> {
                 let before = self.progress.enter(Stage::Parse);
                 let parsed = parsed_std(file);
                 self.progress.enter(before);
-                let (ast, diagnostics) = parsed?;
-                Some(self.define_module(&path, ast, diagnostics, true))
+                let (file, parsed) = parsed?;
+                Some(self.define_module(&path, file, parsed, true))
             }
         }
     }
@@ -321,17 +328,18 @@ impl Checker<'_> {
 
 /// The syntax tree of a standard library file with its errors: parsed at most once a process,
 /// since the library never changes and its files have the same ids in every compilation.
-fn parsed_std(file: &StdFile) -> Option<(Arc<ast::Module>, Vec<Diagnostic>)> {
+fn parsed_std(file: &StdFile) -> Option<(FileId, (Arc<ast::Module>, Vec<Diagnostic>))> {
     type Parsed = OnceLock<(Arc<ast::Module>, Vec<Diagnostic>)>;
     static TREES: OnceLock<Vec<Parsed>> = OnceLock::new();
     let files = impasto_stdlib::files();
     let trees = TREES.get_or_init(|| files.iter().map(|_| OnceLock::new()).collect());
     let index = files.iter().position(|f| f == file)?;
+    let id = FileId(index as u32);
     let parse = || {
-        let (ast, diagnostics) = parser::parse(FileId(index as u32), file.text);
+        let (ast, diagnostics) = parser::parse(id, file.text);
         (Arc::new(ast), diagnostics)
     };
-    Some(trees[index].get_or_init(parse).clone())
+    Some((id, trees[index].get_or_init(parse).clone()))
 }
 
 /// The path of a standard library file in diagnostics.

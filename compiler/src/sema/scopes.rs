@@ -78,6 +78,12 @@ impl Scopes {
         Some(entry.binding)
     }
 
+    /// Where the name that a name stands for is defined.
+    pub fn defined(&self, name: &str) -> Option<Span> {
+        let (scope, at) = self.place(name)?;
+        Some(self.entries[scope][at].span)
+    }
+
     fn place(&self, name: &str) -> Option<Place> {
         self.places.get(name)?.last().copied()
     }

@@ -4,9 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use impasto_compiler::ast::Unit;
-use impasto_compiler::ir::surface::NAMED;
 use impasto_compiler::lexer::Token;
-use impasto_compiler::sema::{MOMENT, OUTPUTS, input_names};
+use impasto_compiler::sema::words::{input_names, output_names, type_names};
 use serde_json::Value;
 use tree_sitter::Language;
 
@@ -28,9 +27,7 @@ fn units() -> Words {
 
 /// What a material can ask of its surface, and what it assigns.
 pub(crate) fn inputs_and_outputs() -> Words {
-    set(input_names()
-        .chain(MOMENT)
-        .chain(OUTPUTS.map(|(name, _)| name)))
+    set(input_names().chain(output_names()))
 }
 
 fn json(path: &str) -> Value {
@@ -123,7 +120,7 @@ fn the_textmate_grammars_words_are_the_compilers() {
             .collect::<Words>()
     };
     assert_eq!(all("keywords"), keywords());
-    assert_eq!(all("types"), set(NAMED.iter().map(|(name, _)| *name)));
+    assert_eq!(all("types"), set(type_names()));
     assert_eq!(all("surface"), inputs_and_outputs());
     assert_eq!(all("units"), units());
 }
@@ -151,10 +148,7 @@ fn emacss_words_are_the_compilers() {
         ))
     };
     assert_eq!(words("impasto-keywords"), keywords());
-    assert_eq!(
-        words("impasto-types"),
-        set(NAMED.iter().map(|(name, _)| *name))
-    );
+    assert_eq!(words("impasto-types"), set(type_names()));
     assert_eq!(words("impasto-surface"), inputs_and_outputs());
     assert_eq!(words("impasto-units"), units());
 }
@@ -184,7 +178,7 @@ fn vims_words_are_the_compilers() {
         .collect::<Words>();
     assert_eq!(all, keywords());
     // `bsdf` and `edf` are keywords to Vim.
-    let types = set(NAMED.iter().map(|(name, _)| *name));
+    let types = set(type_names());
     assert_eq!(
         words("impastoType"),
         types.difference(&keywords()).cloned().collect()
@@ -219,7 +213,7 @@ fn kates_words_are_the_compilers() {
         .flat_map(words)
         .collect();
     assert_eq!(all, keywords());
-    let types = set(NAMED.iter().map(|(name, _)| *name));
+    let types = set(type_names());
     assert_eq!(
         words("types"),
         types.difference(&keywords()).cloned().collect()

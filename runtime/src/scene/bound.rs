@@ -1,10 +1,32 @@
-//! Which materials the triangles of a scene bind: paths can hit no other.
+//! What a scene binds, as the compiler is asked for it, and what its triangles bind of that: paths can hit no other.
 
 use impasto_compiler::abi::InstanceInfo;
+use impasto_compiler::{MaterialRequest, Parameters};
 
 use super::{Mesh, NO_MATERIAL, Scene};
 
 impl Scene {
+    /// The materials that it binds, as the compiler is asked for them.
+    pub fn requests(&self) -> Vec<MaterialRequest> {
+        let bindings = self.materials.iter().cloned();
+        bindings
+            .map(|binding| MaterialRequest {
+                apart: false,
+                moment: None,
+                name: binding.name,
+                file: binding.file,
+                material: binding.material,
+                params: binding.params,
+                written: binding.written,
+                parameters: match (binding.bake, binding.has_keys) {
+                    (_, true) => Parameters::Table,
+                    (true, false) => Parameters::Baked,
+                    (false, false) => Parameters::Agreed,
+                },
+            })
+            .collect()
+    }
+
     /// The indices, ascending, of those of `materials` materials that no triangle binds, when the
     /// scene's bindings compiled to `instances` of them. Such a material needs no kernel: it fills
     /// what the camera is in, or nothing at all.

@@ -38,6 +38,21 @@ pub fn load_with(
     SceneFile::read_with(path, formats, lights)?.into_scene()
 }
 
+/// Reads the text of a scene file, and nothing that it names.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn check_text(
+    path: &Path,
+    text: &str,
+    formats: &[Format],
+    lights: &[LightReader],
+) -> Result<(), SceneError> {
+    let document = Document::new(path, text);
+    let frame = Asked::default().frame;
+    Description::read(&document, formats, lights, frame).map(drop)
+}
+
 /// What is asked of a scene file beside what it says.
 #[derive(Clone, Debug, Default)]
 pub struct Asked {

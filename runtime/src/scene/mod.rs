@@ -31,7 +31,7 @@ pub(crate) use document::{Table, Value};
 pub use labels::Labels;
 pub(crate) use lights::ReadLight;
 pub use lights::{Light, LightReader, SceneLight};
-pub use load::{Asked, GivenParam, SceneFile, load_with};
+pub use load::{Asked, GivenParam, SceneFile, check_text, load_with};
 pub(crate) use mesh::{MAX_TRIANGLES, has_area};
 pub use mesh::{Mesh, NO_MATERIAL};
 pub use transform::Transform;

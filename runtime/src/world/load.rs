@@ -36,6 +36,22 @@ pub fn open_text<'f>(
     SceneFile::of_text(path, text, formats, &readers(LIGHT_KINDS))
 }
 
+/// The text of a scene that may be read with every format of geometry, in place of what is at `path`.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn open_edited(path: &Path, text: String) -> Result<SceneFile<'static>, SceneError> {
+    open_text(path, text, FORMATS).map_err(explain_generated)
+}
+
+/// Reads the text of a scene, and none of the files that it names.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn check_text(path: &Path, text: &str) -> Result<(), SceneError> {
+    crate::scene::check_text(path, text, FORMATS, &readers(LIGHT_KINDS))
+}
+
 /// The folder of an example whose files are too large to be kept with it.
 const GENERATED: &str = "generated";
 

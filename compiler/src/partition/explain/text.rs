@@ -237,3 +237,9 @@ pub(super) fn grouped(number: u64) -> String {
 fn names(names: &[String]) -> String {
     super::super::error::list(names.iter().map(String::as_str))
 }
+
+impl fmt::Display for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_kernel(f, self)
+    }
+}

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use impasto_compiler::cost::{Cost, LineCost, Walks};
 use serde::Serialize;
 
-use super::MaterialCost;
+use super::{Cost, LineCost, MaterialCost, Walks};
 
 /// How the materials of two sources differ in what they cost; materials of one name belong together.
 #[derive(Clone, Debug, Serialize)]

@@ -1,0 +1,203 @@
+//! Diagnostics of open files, as they are typed.
+
+use gen_lsp_types as lsp;
+use impasto_compiler::diag::{Code, Diagnostic, Severity};
+use impasto_compiler::source::{FileId, SourceMap, Span};
+use serde_json::{Value, json};
+
+use super::{Server, convert};
+use crate::documents::Language;
+use crate::library;
+use crate::scene::features::Problem;
+use crate::text::Text;
+
+impl Server<'_> {
+    /// Sends the diagnostics of all files that changed.
+    pub(super) fn publish_dirty(&mut self) {
+        for path in std::mem::take(&mut self.dirty) {
+            let Some(document) = self.documents.at(&path) else {
+                continue;
+            };
+            let (uri, version, language) =
+                (document.uri.clone(), document.version, document.language);
+            let found = match language {
+                // Nobody can change the library.
+                Language::Material if library::file_of(&path).is_some() => Vec::new(),
+                Language::Material => self.of_source(&path),
+                Language::Scene => self.of_scene(&path),
+                Language::Other => Vec::new(),
+            };
+            self.publish(&uri, Some(version), found);
+        }
+    }
+
+    pub(super) fn publish(&self, uri: &lsp::Uri, version: Option<i32>, diagnostics: Vec<Value>) {
+        let mut params = json!({ "uri": uri, "diagnostics": diagnostics });
+        if let Some(version) = version {
+            params["version"] = json!(version);
+        }
+        self.notify("textDocument/publishDiagnostics", params);
+    }
+
+    fn of_source(&mut self, path: &str) -> Vec<Value> {
+        let Some(analysis) = self.documents.analysis(path) else {
+            return Vec::new();
+        };
+        let Some(document) = self.documents.at(path) else {
+            return Vec::new();
+        };
+        let text = &document.text;
+        let mut found: Vec<Value> = Vec::new();
+        for diagnostic in &analysis.diagnostics {
+            let own = analysis.file();
+            found.push(
+                self.diagnostic(text, &analysis.sources, own, diagnostic, |other| {
+                    // Of an imported file: at the import that leads to it.
+                    let module = analysis.modules.iter().position(|m| m.file == other);
+                    import_of(&analysis, module)
+                }),
+            );
+        }
+        // What only code generation finds, while the text is the one that it was found in.
+        let deep = self
+            .deep
+            .get(path)
+            .filter(|d| d.version == document.version);
+        for diagnostic in deep.iter().flat_map(|d| &d.found.diagnostics) {
+            let sources = &deep.map(|d| &d.found.sources);
+            let Some(sources) = sources else { continue };
+            let own = sources
+                .files()
+                .find(|(_, f)| f.name == path)
+                .map(|(id, _)| id);
+            let value = self.diagnostic(text, sources, own, diagnostic, |_| None);
+            if !found.contains(&value) {
+                found.push(value);
+            }
+        }
+        found
+    }
+
+    fn of_scene(&mut self, path: &str) -> Vec<Value> {
+        let Some(document) = self.documents.at(path) else {
+            return Vec::new();
+        };
+        let text = document.text.clone();
+        let version = document.version;
+        let mut problems = self.with_scene(path, |scene| scene.problems());
+        let deep = self.deep.get(path).filter(|d| d.version == version);
+        for problem in deep.iter().flat_map(|d| &d.problems) {
+            let is_known = |p: &Problem| p.place == problem.place;
+            if problem.is_warning || !problems.iter().any(is_known) {
+                problems.push(problem.clone());
+            }
+        }
+        let mut found: Vec<Value> = problems.iter().map(|p| of_problem(&text, p)).collect();
+        for diagnostic in deep.iter().flat_map(|d| &d.found.diagnostics) {
+            let Some(sources) = deep.map(|d| &d.found.sources) else {
+                continue;
+            };
+            let own = sources
+                .files()
+                .find(|(_, f)| f.name == path)
+                .map(|(id, _)| id);
+            let is_of_scene = diagnostic.span.is_none_or(|s| Some(s.file) == own);
+            if is_of_scene {
+                found.push(self.diagnostic(&text, sources, own, diagnostic, |_| None));
+            }
+        }
+        found
+    }
+
+    /// A diagnostic in the file `own` with this `text`. Where it is in another file, `place` may tell where this one leads
+    /// there.
+    fn diagnostic(
+        &self,
+        text: &Text,
+        sources: &SourceMap,
+        own: Option<FileId>,
+        diagnostic: &Diagnostic,
+        place: impl Fn(FileId) -> Option<Span>,
+    ) -> Value {
+        let mut message = diagnostic.message.clone();
+        if let Some(expected) = &diagnostic.expected {
+            message += &format!("\nexpected: {expected}");
+        }
+        if let Some(hint) = &diagnostic.hint {
+            message += &format!("\nhint: {hint}");
+        }
+        let mut related: Vec<Value> = Vec::new();
+        let mut relate = |span: Span, message: &str| {
+            let file = sources.file(span.file);
+            let there = Text::new(file.text.as_str(), self.documents.encoding());
+            let uri = convert::uri_of(&file.name, None);
+            let Some(uri) = uri else { return };
+            let location = json!({ "uri": uri, "range": there.range(span.range()) });
+            related.push(json!({ "location": location, "message": message }));
+        };
+        for label in &diagnostic.labels {
+            relate(label.span, &label.message);
+        }
+        let range = match diagnostic.span {
+            Some(span) if Some(span.file) == own => span.range(),
+            Some(span) => {
+                relate(span, &diagnostic.message);
+                message = format!("in {}: {message}", sources.file_line(span));
+                place(span.file).map_or(0..0, Span::range)
+            }
+            None => 0..0,
+        };
+        let severity = match diagnostic.code.severity() {
+            Severity::Error => 1,
+            Severity::Warning => 2,
+        };
+        let is_unused = matches!(diagnostic.code, Code::Unused | Code::LobesNeverSampled);
+        let mut value = json!({
+            "range": text.range(range),
+            "severity": severity,
+            "code": diagnostic.code.id(),
+            "source": "impasto",
+            "message": message,
+        });
+        if !related.is_empty() {
+            value["relatedInformation"] = json!(related);
+        }
+        if is_unused {
+            value["tags"] = json!([1]);
+        }
+        value
+    }
+}
+
+/// Where the analysed file names a file that it imports, directly.
+fn import_of(
+    analysis: &impasto_compiler::analysis::Analysis,
+    module: Option<usize>,
+) -> Option<Span> {
+    let module = module?;
+    let leads = |o: &&impasto_compiler::analysis::Occurrence| match &o.symbol {
+        impasto_compiler::analysis::Symbol::File(m) => m.0 == module,
+        impasto_compiler::analysis::Symbol::Item(item) => item.module.0 == module,
+        _ => false,
+    };
+    analysis.occurrences.iter().find(leads).map(|o| o.span)
+}
+
+fn of_problem(text: &Text, problem: &Problem) -> Value {
+    let mut message = problem.message.clone();
+    if let Some(instead) = &problem.instead
+        && !message.contains("did you mean")
+    {
+        message += &format!("\nhint: did you mean `{instead}`?");
+    }
+    let mut value = json!({
+        "range": text.range(problem.place.clone()),
+        "severity": if problem.is_warning { 2 } else { 1 },
+        "source": "impasto",
+        "message": message,
+    });
+    if problem.is_warning && problem.message.contains("nothing uses") {
+        value["tags"] = json!([1]);
+    }
+    value
+}

@@ -1,0 +1,227 @@
+//! Texts as a client edits them: lines, positions, and changes.
+//!
+//! A client counts columns in units of UTF-16, or of UTF-8 if both sides have agreed on that. Positions that
+//! no text has are taken to the nearest one that it has: clients and servers are out of step for moments.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use gen_lsp_types as lsp;
+
+/// In what a client counts columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Bytes.
+    Utf8,
+    /// Units of UTF-16.
+    Utf16,
+}
+
+/// A text with the starts of its lines.
+#[derive(Clone, Debug)]
+pub struct Text {
+    text: Arc<str>,
+    starts: Vec<usize>,
+    encoding: Encoding,
+}
+
+impl Text {
+    /// A text, of a client that counts in `encoding`.
+    pub fn new(text: impl Into<Arc<str>>, encoding: Encoding) -> Self {
+        let text = text.into();
+        let breaks = text.match_indices('\n').map(|(at, _)| at + 1);
+        let starts = std::iter::once(0).chain(breaks).collect();
+        Self {
+            text,
+            starts,
+            encoding,
+        }
+    }
+
+    /// The text itself.
+    pub fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    /// The text, to keep.
+    pub fn shared(&self) -> Arc<str> {
+        self.text.clone()
+    }
+
+    /// How many lines there are, at least one.
+    pub fn lines(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// The line, from 0, that a byte is in.
+    pub fn line_of(&self, at: usize) -> usize {
+        self.starts.partition_point(|start| *start <= at).max(1) - 1
+    }
+
+    /// The bytes of a line, without its break; empty behind the last line.
+    pub fn line(&self, line: usize) -> Range<usize> {
+        let Some(start) = self.starts.get(line).copied() else {
+            return self.text.len()..self.text.len();
+        };
+        let end = self.starts.get(line + 1).copied();
+        let whole = &self.text[start..end.unwrap_or(self.text.len())];
+        start..start + whole.trim_end_matches(['\n', '\r']).len()
+    }
+
+    /// The byte at a position.
+    pub fn offset(&self, position: lsp::Position) -> usize {
+        let range = self.line(position.line as usize);
+        let line = &self.text[range.clone()];
+        let wanted = position.character as usize;
+        match self.encoding {
+            Encoding::Utf8 => range.start + line.floor_char_boundary(wanted.min(line.len())),
+            Encoding::Utf16 => {
+                let mut units = 0;
+                for (at, c) in line.char_indices() {
+                    units += c.len_utf16();
+                    if units > wanted {
+                        return range.start + at;
+                    }
+                }
+                range.end
+            }
+        }
+    }
+
+    /// The position of a byte.
+    pub fn position(&self, at: usize) -> lsp::Position {
+        let at = self.text.floor_char_boundary(at.min(self.text.len()));
+        let line = self.line_of(at);
+        let before = &self.text[self.starts[line]..at];
+        let character = match self.encoding {
+            Encoding::Utf8 => before.len(),
+            Encoding::Utf16 => before.encode_utf16().count(),
+        };
+        lsp::Position::new(line as u32, character as u32)
+    }
+
+    /// The positions of a range of bytes.
+    pub fn range(&self, bytes: Range<usize>) -> lsp::Range {
+        let start = self.position(bytes.start);
+        lsp::Range::new(start, self.position(bytes.end.max(bytes.start)))
+    }
+
+    /// How many units of the client a range of bytes has.
+    pub fn width(&self, bytes: Range<usize>) -> u32 {
+        let part = self.text.get(bytes).unwrap_or_default();
+        match self.encoding {
+            Encoding::Utf8 => part.len() as u32,
+            Encoding::Utf16 => part.encode_utf16().count() as u32,
+        }
+    }
+
+    /// The text after a client has changed a range of it, and which lines that were: the first, how many there
+    /// were, and how many there are now.
+    pub fn changed(&self, range: lsp::Range, new: &str) -> (Self, Change) {
+        let start = self.offset(range.start);
+        let end = self.offset(range.end).max(start);
+        let mut text = String::with_capacity(self.text.len() + new.len());
+        text.push_str(&self.text[..start]);
+        text.push_str(new);
+        text.push_str(&self.text[end..]);
+        let first = self.line_of(start);
+        let change = Change {
+            first,
+            old: self.line_of(end) - first,
+            new: new.matches('\n').count(),
+        };
+        (Self::new(text, self.encoding), change)
+    }
+
+    /// The edits that make `new` of this text, line by line, so that cursors and marks elsewhere stay.
+    pub fn edits_to(&self, new: &str) -> Vec<lsp::TextEdit> {
+        let diff = similar::TextDiff::from_lines(self.as_str(), new);
+        let line = |at: usize| lsp::Position::new(at as u32, 0);
+        let new_lines: Vec<&str> = new.split_inclusive('\n').collect();
+        let ops = diff.ops().iter();
+        let changes = ops.filter(|op| op.tag() != similar::DiffTag::Equal);
+        let edit = |op: &similar::DiffOp| {
+            let (old, new) = (op.old_range(), op.new_range());
+            let end = if old.end >= self.lines() {
+                self.position(self.text.len())
+            } else {
+                line(old.end)
+            };
+            let text = new_lines.get(new).unwrap_or_default().concat();
+            lsp::TextEdit::new(lsp::Range::new(line(old.start), end), text)
+        };
+        changes.map(edit).collect()
+    }
+}
+
+/// Which lines a change was to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// The first, from 0.
+    pub first: usize,
+    /// How many line breaks went.
+    pub old: usize,
+    /// How many came.
+    pub new: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(line: u32, character: u32) -> lsp::Position {
+        lsp::Position::new(line, character)
+    }
+
+    #[test]
+    fn columns_are_counted_as_the_client_counts() {
+        let text = "a😀b\r\nçx\n";
+        let wide = Text::new(text, Encoding::Utf16);
+        for (byte, position) in [
+            (0, at(0, 0)),
+            (1, at(0, 1)),
+            (5, at(0, 3)),
+            (8, at(1, 0)),
+            (10, at(1, 1)),
+            (12, at(2, 0)),
+        ] {
+            assert_eq!(wide.position(byte), position, "byte {byte}");
+            assert_eq!(wide.offset(position), byte, "{position:?}");
+        }
+        let bytes = Text::new(text, Encoding::Utf8);
+        assert_eq!(bytes.position(5), at(0, 5));
+        assert_eq!(bytes.offset(at(1, 2)), 10);
+    }
+
+    #[test]
+    fn positions_that_there_are_not_are_taken_to_the_nearest() {
+        let text = Text::new("a😀b\nc", Encoding::Utf16);
+        // Within a pair of units, behind a line, behind the text.
+        assert_eq!(text.offset(at(0, 2)), 1);
+        assert_eq!(text.offset(at(0, 99)), 6);
+        assert_eq!(text.offset(at(9, 9)), 8);
+        let bytes = Text::new("a😀b\nc", Encoding::Utf8);
+        assert_eq!(bytes.offset(at(0, 3)), 1);
+        let (changed, _) = text.changed(lsp::Range::new(at(7, 7), at(0, 0)), "!");
+        assert_eq!(changed.as_str(), "a😀b\nc!");
+    }
+
+    #[test]
+    fn edits_make_the_new_text() {
+        for (old, new) in [
+            ("a\nb\nc\n", "a\nB\nc\n"),
+            ("a\nb", "a\nb\n"),
+            ("", "x\ny\n"),
+            ("a\nb\n", ""),
+            ("x\n\n\ny", "x\ny\n"),
+        ] {
+            let mut text = Text::new(old, Encoding::Utf16);
+            let mut edits = text.edits_to(new);
+            edits.reverse();
+            for edit in edits {
+                text = text.changed(edit.range, &edit.new_text).0;
+            }
+            assert_eq!(text.as_str(), new, "of {old:?}");
+        }
+    }
+}
