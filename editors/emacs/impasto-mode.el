@@ -236,7 +236,7 @@
 
 (defun impasto-workspace-configuration (&rest _)
   "The settings of the server, for `eglot-workspace-configuration'."
-  `(:impasto (:path ,impasto-command :scene ,impasto-scene)))
+  `(:impasto (:scene ,impasto-scene)))
 
 (defvar eglot-server-programs)
 (with-eval-after-load 'eglot

@@ -6,7 +6,7 @@ local M = {}
 local settings = {
   path = "impasto",
   scene = "",
-  cost = { inlayHints = false, lens = true },
+  cost = { inlayHints = true, lens = true },
 }
 
 --- Is a buffer of TOML a scene? Those have cameras and materials.
@@ -65,8 +65,14 @@ function M.config()
       end
     end,
     settings = { impasto = settings },
-    -- Definitions of the library are files of a cache: Neovim takes `impasto-std:/...` for a relative path.
-    init_options = { virtualDocuments = false },
+    init_options = {
+      -- Definitions of the library are files of a cache: Neovim takes `impasto-std:/...` for a relative path.
+      virtualDocuments = false,
+      -- Lenses may name the commands of `client_commands`.
+      commands = true,
+      scene = settings.scene,
+      cost = settings.cost,
+    },
   }
 end
 
@@ -115,8 +121,11 @@ local function commands()
   end, { desc = "Show what the file's materials cost" })
 end
 
---- Lenses name this command, which the client runs: the window belongs to the editor.
+--- Lenses name these commands, which the client runs.
 local function client_commands()
+  vim.lsp.commands["impasto.explain"] = function(command)
+    vim.notify(command.arguments and command.arguments[1] or "")
+  end
   vim.lsp.commands["impasto.showPreview"] = function(command)
     local uri = command.arguments and command.arguments[1]
     if uri then

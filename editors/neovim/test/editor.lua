@@ -105,7 +105,7 @@ local ok, problem = pcall(function()
     local config = vim.lsp.config.impasto
     check("command", config.cmd, { program, "lsp" })
     check("settings", config.settings.impasto.scene, "scene.toml")
-    check("documents of the library", config.init_options, { virtualDocuments = false })
+    check("options", config.init_options.scene, "scene.toml")
     check("it is on", vim.lsp.is_enabled("impasto"), true)
     local function roots(lines, name, kind)
       local buffer = vim.api.nvim_create_buf(true, false)

@@ -17,6 +17,8 @@ export function registerCommands(context, server, output) {
   context.subscriptions.push(previews, ...printed);
   register("impasto.restartServer", () => server.restart());
   register("impasto.showPreview", (uri) => previews.show(uri));
+  // Lenses of the server name this one: why a material is in its kernel.
+  register("impasto.explain", (text) => explain(String(text)));
   register("impasto.showWgsl", (uri) => printed[0].show(uri));
   register("impasto.showCost", (uri) => printed[1].show(uri));
 }
@@ -32,6 +34,12 @@ async function savedFile(uri) {
   const open = vscode.workspace.textDocuments.find((d) => d.uri.toString() === target.toString());
   if (open?.isDirty) await open.save();
   return target;
+}
+
+/** Shows a text of several lines: the first as the title. */
+function explain(text) {
+  const [title, ...rest] = text.trim().split("\n");
+  return vscode.window.showInformationMessage(title, { modal: true, detail: rest.join("\n") });
 }
 
 /** Windows of `impasto view`, one a file. The window follows the file by itself, at each save. */

@@ -109,7 +109,11 @@ export class Server {
         // Scenes may have any name: `middleware` leaves other TOML files out.
         { scheme: "file", pattern: "**/*.toml" },
       ],
-      initializationOptions: { virtualDocuments: true },
+      // The settings, too: the server shows costs from the first document on.
+      initializationOptions: () => {
+        const { scene, cost } = vscode.workspace.getConfiguration("impasto");
+        return { virtualDocuments: true, commands: true, scene, cost };
+      },
       outputChannel: this.#output,
       synchronize: {
         configurationSection: "impasto",

@@ -34,6 +34,16 @@ impl Extension for Impasto {
         })
     }
 
+    /// The server takes its settings at the start, too.
+    fn language_server_initialization_options(
+        &mut self,
+        id: &LanguageServerId,
+        worktree: &Worktree,
+    ) -> Result<Option<serde_json::Value>> {
+        let settings = LspSettings::for_worktree(id.as_ref(), worktree)?;
+        Ok(settings.initialization_options.or(settings.settings))
+    }
+
     fn language_server_workspace_configuration(
         &mut self,
         id: &LanguageServerId,
