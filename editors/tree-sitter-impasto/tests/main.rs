@@ -8,6 +8,7 @@ mod installed;
 mod printed;
 mod queries;
 mod random;
+mod snippets;
 mod sources;
 mod words;
 
