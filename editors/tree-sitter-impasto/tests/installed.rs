@@ -2,6 +2,7 @@
 //! error, and what was not tried.
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use crate::root;
@@ -78,5 +79,28 @@ fn emacs_compiles_the_mode_without_a_warning() {
             copy,
         ],
     );
+    fs::remove_dir_all(&folder).expect("the folder is removed");
+}
+
+/// Whoever changes the grammar has the generator, and is told to run it.
+#[test]
+fn the_parser_is_that_of_the_grammar() {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = std::env::temp_dir().join(format!("impasto-parser-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a folder for temporary files");
+    let grammar = own.join("grammar.js");
+    let paths = [&folder, &grammar].map(|path| path.to_str().expect("a path in UTF-8"));
+    run(
+        "whether src/parser.c is that of grammar.js",
+        "tree-sitter",
+        &["generate", "--output", paths[0], paths[1]],
+    );
+    for name in ["parser.c", "grammar.json"] {
+        let made = folder.join(name);
+        if made.exists() {
+            let same = fs::read(made).ok() == fs::read(own.join("src").join(name)).ok();
+            assert!(same, "src/{name} is old: run `tree-sitter generate`");
+        }
+    }
     fs::remove_dir_all(&folder).expect("the folder is removed");
 }
