@@ -57,6 +57,9 @@ macro_rules! tokens {
             /// Every keyword in the order of the reference.
             pub const KEYWORDS: &'static [&'static str] = &[$($keyword_text),*];
 
+            /// Every other token with one spelling, in the order of their declarations.
+            pub const MARKS: &'static [&'static str] = &[$($mark_text),*];
+
             /// Every kind, by its number.
             pub(crate) const ALL: &'static [Token] = &[
                 Token::Ident, Token::Int, Token::Hex, Token::Float, Token::Str,

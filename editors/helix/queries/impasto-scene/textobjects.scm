@@ -1,0 +1,3 @@
+; A scene is TOML.
+
+; inherits: toml

@@ -1,0 +1,187 @@
+; Generated from editors/tree-sitter-impasto/queries/highlights.scm by
+; `cargo run -p tree-sitter-impasto --example queries`. Change that file, not this one.
+
+; Comments
+
+[
+  (line_comment)
+  (block_comment)
+] @comment
+
+(doc_comment) @comment.block.documentation
+
+; Literals
+
+(integer) @constant.numeric.integer
+
+(float) @constant.numeric.float
+
+(unit) @type
+
+(boolean) @constant.builtin.boolean
+
+(string) @string
+
+; Types
+
+(type_identifier) @type
+
+; Names that are defined
+
+(material_definition
+  name: (name) @type)
+
+(struct_definition
+  name: (name) @type)
+
+(closure_definition
+  name: (name) @function)
+
+(function_definition
+  name: (name) @function)
+
+(method_definition
+  name: (name) @function.method)
+
+(constant_definition
+  name: (name) @constant)
+
+(param_declaration
+  name: (name) @variable.parameter)
+
+(parameter
+  name: (name) @variable.parameter)
+
+(method_parameters
+  (name) @variable.parameter)
+
+(field_declaration
+  name: (field_identifier) @variable.other.member)
+
+(metadata_entry
+  key: (field_identifier) @variable.other.member)
+
+; Names that are used
+
+(module_identifier) @namespace
+
+(function_identifier) @function
+
+(named_argument
+  name: (field_identifier) @variable.parameter)
+
+(field_expression
+  field: (field_identifier) @variable.other.member)
+
+(whole_material) @variable.builtin
+
+((identifier) @constant
+  (#match? @constant "^_*[A-Z][A-Z0-9_]*$"))
+
+; What a material can ask of its surface, and what it assigns.
+((identifier) @variable.builtin
+  (#any-of? @variable.builtin
+    "position" "normal" "geometric_normal" "tangent" "uv" "exterior_ior" "view" "instance_id" "object_position"
+    "object_scale" "uv1" "vertex_color" "facing" "object_normal" "time" "frame"
+    "surface" "emission" "interior" "opacity"))
+
+; Keywords
+
+[
+  "material"
+  "struct"
+] @keyword.storage.type
+
+(closure_kind
+  [
+    "bsdf"
+    "delta"
+    "edf"
+  ] @keyword.storage.type)
+
+"fn" @keyword.function
+
+[
+  "const"
+  "private"
+] @keyword.storage.modifier
+
+[
+  "use"
+  "as"
+] @keyword.control.import
+
+[
+  "param"
+  "let"
+  "var"
+] @keyword
+
+[
+  "if"
+  "else"
+  "when"
+] @keyword.control.conditional
+
+[
+  "for"
+  "in"
+  "while"
+  "limit"
+  "break"
+  "continue"
+] @keyword.control.repeat
+
+; Marks
+
+[
+  "="
+  "+="
+  "-="
+  "*="
+  "/="
+  "%="
+  "&="
+  "|="
+  "^="
+  "<<="
+  ">>="
+  "||"
+  "&&"
+  "=="
+  "!="
+  "<"
+  "<="
+  ">"
+  ">="
+  "|"
+  "^"
+  "&"
+  "<<"
+  ">>"
+  "+"
+  "-"
+  "*"
+  "/"
+  "%"
+  "!"
+  ".."
+  "->"
+] @operator
+
+[
+  ","
+  ";"
+  ":"
+  "::"
+  "."
+] @punctuation.delimiter
+
+[
+  "("
+  ")"
+  "["
+  "]"
+  "{"
+  "}"
+] @punctuation.bracket

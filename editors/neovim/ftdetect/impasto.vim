@@ -1,0 +1,2 @@
+" Sources of Impasto. This also works in Vim.
+autocmd BufRead,BufNewFile *.impasto setfiletype impasto

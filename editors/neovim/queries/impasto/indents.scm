@@ -1,0 +1,44 @@
+; Generated from editors/tree-sitter-impasto/queries/indents.scm by
+; `cargo run -p tree-sitter-impasto --example queries`. Change that file, not this one.
+
+[
+  (use_list)
+  (material_body)
+  (closure_body)
+  (field_list)
+  (metadata)
+  (parameters)
+  (method_parameters)
+  (block)
+  (arguments)
+  (array_expression)
+  (parenthesized_expression)
+] @indent.begin
+
+; A value on the lines below its name.
+[
+  (let_statement)
+  (var_statement)
+  (assignment_statement)
+  (param_declaration)
+  (constant_definition)
+] @indent.begin
+
+[
+  "}"
+  ")"
+  "]"
+] @indent.branch @indent.end
+
+[
+  (line_comment)
+  (block_comment)
+  (string)
+] @indent.ignore
+
+(ERROR
+  [
+    "{"
+    "("
+    "["
+  ]) @indent.begin

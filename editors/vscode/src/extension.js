@@ -1,0 +1,29 @@
+// The extension: it starts the language server (`impasto lsp`), and adds what a server cannot do: windows, terminals of
+// messages, and documents that exist on no disk.
+
+import * as vscode from "vscode";
+
+import { registerCommands } from "./commands.js";
+import { registerLibrary } from "./library.js";
+import { Server } from "./server.js";
+
+let server;
+
+export async function activate(context) {
+  const output = vscode.window.createOutputChannel("Impasto", { log: true });
+  server = new Server(output);
+  context.subscriptions.push(output, server);
+  registerLibrary(context, server);
+  registerCommands(context, server, output);
+  context.subscriptions.push(
+    vscode.workspace.onDidChangeConfiguration((event) => {
+      if (event.affectsConfiguration("impasto.path")) server.restart();
+    }),
+    vscode.workspace.onDidGrantWorkspaceTrust(() => server.restart()),
+  );
+  await server.start();
+}
+
+export async function deactivate() {
+  await server?.stop();
+}

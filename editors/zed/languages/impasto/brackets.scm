@@ -1,0 +1,14 @@
+; Pairs that Zed jumps between.
+
+("(" @open
+  ")" @close)
+
+("[" @open
+  "]" @close)
+
+("{" @open
+  "}" @close)
+
+(string
+  "\"" @open
+  "\"" @close)
