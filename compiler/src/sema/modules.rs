@@ -174,7 +174,7 @@ impl Checker<'_> {
         &mut self,
         path: &str,
         file: FileId,
-        (ast, diagnostics): (Arc<ast::Module>, Vec<Diagnostic>),
+        (ast, diagnostics): Parsed,
         is_std: bool,
     ) -> ModuleId {
         let id = ModuleId(self.modules.len());
@@ -326,11 +326,13 @@ impl Checker<'_> {
     }
 }
 
+/// A syntax tree with its errors.
+type Parsed = (Arc<ast::Module>, Vec<Diagnostic>);
+
 /// The syntax tree of a standard library file with its errors: parsed at most once a process,
 /// since the library never changes and its files have the same ids in every compilation.
-fn parsed_std(file: &StdFile) -> Option<(FileId, (Arc<ast::Module>, Vec<Diagnostic>))> {
-    type Parsed = OnceLock<(Arc<ast::Module>, Vec<Diagnostic>)>;
-    static TREES: OnceLock<Vec<Parsed>> = OnceLock::new();
+fn parsed_std(file: &StdFile) -> Option<(FileId, Parsed)> {
+    static TREES: OnceLock<Vec<OnceLock<Parsed>>> = OnceLock::new();
     let files = impasto_stdlib::files();
     let trees = TREES.get_or_init(|| files.iter().map(|_| OnceLock::new()).collect());
     let index = files.iter().position(|f| f == file)?;

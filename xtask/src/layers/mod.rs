@@ -50,7 +50,7 @@ const CRATES: &[Crate] = &[
             &["closure", "lexer", "loader", "parameters", "written"],
             &["parser", "passes", "program"],
             &["codegen", "format", "oracle", "sema"],
-            &["build", "interface"],
+            &["analysis", "build", "interface"],
             &["driver"],
             &["inspect"],
             &["cost"],
@@ -105,6 +105,18 @@ const CRATES: &[Crate] = &[
         ],
     },
     Crate {
+        name: "impasto-lsp",
+        folder: "lsp/src",
+        layers: &[
+            &["host", "library", "text"],
+            &["margin"],
+            &["documents"],
+            &["material", "symbols"],
+            &["scene", "worker"],
+            &["server"],
+        ],
+    },
+    Crate {
         name: "impasto",
         folder: "src",
         layers: &[
@@ -112,7 +124,7 @@ const CRATES: &[Crate] = &[
             &["error", "files", "ir_text", "cost", "plot", "docs", "trace"],
             &["driver", "plan", "starter"],
             &["converge", "measure", "shot"],
-            &["calibrate", "farm"],
+            &["calibrate", "editor", "farm"],
             &["cli"],
         ],
     },
