@@ -16,6 +16,7 @@ use super::casts::{ANSWERED, Casts};
 use crate::error::RuntimeError;
 use crate::gpu::submission::Done;
 use crate::kernels::buffers::{ARGUMENT_BYTES, BUFFERS, BufferId, Cleared};
+use crate::kernels::camera;
 use crate::kernels::modules::Composer;
 use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::run;
@@ -73,7 +74,11 @@ struct OwnPool {
 fn is_shared(id: BufferId) -> bool {
     matches!(
         id,
-        BufferId::Run | BufferId::Film | BufferId::PixelList | BufferId::QueueTable
+        BufferId::Run
+            | BufferId::Camera
+            | BufferId::Film
+            | BufferId::PixelList
+            | BufferId::QueueTable
     )
 }
 
@@ -138,6 +143,7 @@ impl Work {
             _casts: casts,
         };
         work.set_run(options);
+        work.set_camera(&camera::words(composer.world));
         if let Some(pixels) = &options.pixels {
             work.set_pixels(pixels);
         }
@@ -250,6 +256,11 @@ impl Work {
     /// Writes the settings that kernels read.
     pub(crate) fn set_run(&self, options: &RenderOptions) {
         self.shared[BufferId::Run.index()].write(0, &run::words(options));
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, words: &camera::Words) {
+        self.shared[BufferId::Camera.index()].write(0, words);
     }
 
     /// Writes which pixels are rendered.

@@ -4,6 +4,7 @@ use crate::cpu;
 use crate::error::RuntimeError;
 use crate::gpu;
 use crate::gpu::submission::Done;
+use crate::kernels::camera;
 use crate::kernels::layout::PlanLayout;
 use crate::options::RenderOptions;
 
@@ -110,6 +111,14 @@ impl Work {
         match self {
             Work::Gpu(work) => work.set_run(options),
             Work::Cpu(work) => work.set_run(options),
+        }
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, words: &camera::Words) {
+        match self {
+            Work::Gpu(work) => work.set_camera(words),
+            Work::Cpu(work) => work.set_camera(words),
         }
     }
 

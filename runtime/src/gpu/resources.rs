@@ -3,6 +3,7 @@
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::kernels::buffers::{Access, BUFFERS, Buffer, BufferId, Cleared, Owner, Reader};
+use crate::kernels::camera;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Composer, Kernel};
 use crate::kernels::queues::Scalar;
@@ -44,6 +45,7 @@ impl Resources {
         gpu.check()?;
         let resources = Self { buffers };
         resources.set_run(gpu, options);
+        resources.set_camera(gpu, &camera::words(composer.world));
         if let Some(pixels) = &options.pixels {
             resources.set_pixels(gpu, pixels);
         }
@@ -68,6 +70,13 @@ impl Resources {
         let buffer = self.buffer(BufferId::Run);
         gpu.queue
             .write_buffer(buffer, 0, bytemuck::cast_slice(&words));
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, gpu: &Gpu, words: &camera::Words) {
+        let buffer = self.buffer(BufferId::Camera);
+        gpu.queue
+            .write_buffer(buffer, 0, bytemuck::cast_slice(words));
     }
 
     /// Writes which pixels are rendered.

@@ -1,6 +1,7 @@
 //! The kernels of a plan as text: which there are, what each is made of, and what they share.
 
 pub(crate) mod buffers;
+pub(crate) mod camera;
 mod check;
 pub(crate) mod compose;
 pub(crate) mod cones;

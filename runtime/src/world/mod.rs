@@ -162,7 +162,7 @@ impl World {
             lights: self.parts.lights.traits(),
             media: self.parts.media.traits(),
             surface: self.parts.surface.traits(),
-            lens: self.camera.lens_radius > 0.0,
+            lens: self.camera.has_lens(),
             max_depth: self.max_depth,
             roulette_start: self.roulette_start,
             materials,
