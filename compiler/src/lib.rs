@@ -45,6 +45,7 @@ mod random;
 pub mod sema;
 pub mod source;
 pub mod stages;
+mod values;
 mod written;
 
 pub use driver::{
@@ -55,4 +56,5 @@ pub use loader::{Loader, MemoryLoader, library_text};
 pub use moment::Moment;
 pub use parameter_value::ParameterValue;
 pub use program::Program;
+pub use values::{Unfit, with_values};
 pub use written::{Written, WrittenParam};

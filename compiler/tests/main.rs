@@ -28,6 +28,7 @@ mod render;
 mod slopes;
 mod stdlib;
 mod textures;
+mod values;
 mod widths;
 
 #[test]

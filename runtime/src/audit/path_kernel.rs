@@ -94,7 +94,7 @@ impl PathKernel {
             size: [world.width, world.height],
             max_depth: world.max_depth,
             instances: instances.collect(),
-            camera: camera::words(world),
+            camera: composer.camera(),
             scene: composer.scene_buffers().map(words).collect(),
             counters: layout.counters,
         })

@@ -22,7 +22,7 @@ use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::run;
 use crate::options::RenderOptions;
 
-/// How long threads go on before they are asked again.
+/// How long threads go on before they are asked again, unless they are to answer sooner.
 const TURN: Duration = Duration::from_millis(30);
 
 /// One dispatch of an iteration.
@@ -52,7 +52,10 @@ pub(crate) struct Work {
     threads: Arc<[Mutex<OwnPool>]>,
     /// Buffers that threads share, by their ids; empty ones in place of those that they do not.
     shared: Vec<Arc<Buffer>>,
+    /// Those of the scene.
+    scene: Vec<Arc<Buffer>>,
     counters: Counters,
+    turn: Duration,
     /// The first pixel and sample that nobody has taken yet.
     left: Arc<Mutex<[u32; 2]>>,
     /// Answers the ray casts of kernels, unless they cast rays themselves.
@@ -138,12 +141,14 @@ impl Work {
             threads: threads?,
             steps: steps.into(),
             shared,
+            scene: scene.into_iter().map(|(_, buffer)| buffer).collect(),
             counters: composer.layout.counters,
+            turn: TURN,
             left: Arc::default(),
             _casts: casts,
         };
         work.set_run(options);
-        work.set_camera(&camera::words(composer.world));
+        work.set_camera(&composer.camera());
         if let Some(pixels) = &options.pixels {
             work.set_pixels(pixels);
         }
@@ -167,7 +172,7 @@ impl Work {
                 self.iterate(&mut own);
                 iterations += 1;
                 let is_idle = self.is_idle(&own, samples);
-                if is_idle || begin.elapsed() > TURN {
+                if is_idle || begin.elapsed() > self.turn {
                     break;
                 }
             }
@@ -261,6 +266,18 @@ impl Work {
     /// Writes from where the picture is seen.
     pub(crate) fn set_camera(&self, words: &camera::Words) {
         self.shared[BufferId::Camera.index()].write(0, words);
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        if let Some(buffer) = self.scene.get(place) {
+            buffer.write(0, &bytemuck::pod_collect_to_vec(bytes));
+        }
+    }
+
+    /// Threads go on for so long before they are asked again.
+    pub(crate) fn set_turn(&mut self, turn: Duration) {
+        self.turn = turn;
     }
 
     /// Writes which pixels are rendered.

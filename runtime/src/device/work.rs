@@ -1,5 +1,7 @@
 //! A plan that is ready to run on a device.
 
+use std::time::Duration;
+
 use crate::cpu;
 use crate::error::RuntimeError;
 use crate::gpu;
@@ -119,6 +121,21 @@ impl Work {
         match self {
             Work::Gpu(work) => work.set_camera(words),
             Work::Cpu(work) => work.set_camera(words),
+        }
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        match self {
+            Work::Gpu(work) => work.set_scene_buffer(place, bytes),
+            Work::Cpu(work) => work.set_scene_buffer(place, bytes),
+        }
+    }
+
+    /// How long the processor goes on before it is asked again; a GPU is given iterations.
+    pub(crate) fn set_turn(&mut self, turn: Duration) {
+        if let Work::Cpu(work) = self {
+            work.set_turn(turn);
         }
     }
 

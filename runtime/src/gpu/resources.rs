@@ -45,7 +45,7 @@ impl Resources {
         gpu.check()?;
         let resources = Self { buffers };
         resources.set_run(gpu, options);
-        resources.set_camera(gpu, &camera::words(composer.world));
+        resources.set_camera(gpu, &composer.camera());
         if let Some(pixels) = &options.pixels {
             resources.set_pixels(gpu, pixels);
         }
@@ -77,6 +77,16 @@ impl Resources {
         let buffer = self.buffer(BufferId::Camera);
         gpu.queue
             .write_buffer(buffer, 0, bytemuck::cast_slice(words));
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, gpu: &Gpu, place: usize, bytes: &[u8]) {
+        let Some(buffer) = self.buffers.get(BUFFERS.len() + place) else {
+            return;
+        };
+        let mut bytes = bytes.to_vec();
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        gpu.queue.write_buffer(buffer, 0, &bytes);
     }
 
     /// Writes which pixels are rendered.

@@ -96,6 +96,11 @@ impl Work {
         self.resources.set_camera(&self.gpu, words);
     }
 
+    /// Writes one of the scene's buffers.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        self.resources.set_scene_buffer(&self.gpu, place, bytes);
+    }
+
     /// Writes which pixels are rendered.
     pub(crate) fn set_pixels(&self, pixels: &[u32]) {
         self.resources.set_pixels(&self.gpu, pixels);

@@ -3,34 +3,34 @@
 use glam::Vec3;
 
 use crate::kernels::cones;
-use crate::world::World;
 use crate::world::camera::CameraFrame;
 
-/// The members of four words: a vector and a number, by their names, and how they follow from a world.
+/// The members of four words: a vector and a number, by their names, and how they follow from a camera and
+/// columns and rows of a picture.
 struct Row {
     vector: (&'static str, fn(&CameraFrame) -> Vec3),
-    number: (&'static str, fn(&World) -> f32),
+    number: (&'static str, fn(&CameraFrame, [u32; 2]) -> f32),
 }
 
 /// The members.
 const ROWS: [Row; 4] = [
     Row {
         vector: ("position", |camera| camera.position),
-        number: ("lens_radius", |world| world.camera.lens()[0]),
+        number: ("lens_radius", |camera, _| camera.lens()[0]),
     },
     Row {
         vector: ("forward", |camera| camera.forward),
-        number: ("focus_distance", |world| world.camera.lens()[1]),
+        number: ("focus_distance", |camera, _| camera.lens()[1]),
     },
     Row {
         vector: ("right", |camera| camera.right),
-        number: ("pixel_angle", |world| {
-            cones::pixel_angle(&world.camera, world.width, world.height)
+        number: ("pixel_angle", |camera, [width, height]| {
+            cones::pixel_angle(camera, width, height)
         }),
     },
     Row {
         vector: ("up", |camera| camera.up),
-        number: ("none", |_| 0.0),
+        number: ("none", |_, _| 0.0),
     },
 ];
 
@@ -40,11 +40,14 @@ pub(crate) type Words = [u32; 4 * ROWS.len()];
 /// Its size.
 pub(crate) const BYTES: u64 = size_of::<Words>() as u64;
 
-/// Its words for a world. Denormals, which hardware may make 0 of, are 0.
-pub(crate) fn words(world: &World) -> Words {
+/// Its words for a camera and a picture of some size. Denormals, which hardware may make 0 of, are 0.
+pub(crate) fn words(camera: &CameraFrame, width: u32, height: u32) -> Words {
     let mut words = [0; 4 * ROWS.len()];
     for (out, row) in words.chunks_exact_mut(4).zip(&ROWS) {
-        let (vector, number) = ((row.vector.1)(&world.camera), (row.number.1)(world));
+        let (vector, number) = (
+            (row.vector.1)(camera),
+            (row.number.1)(camera, [width, height]),
+        );
         for (word, value) in out.iter_mut().zip(vector.extend(number).to_array()) {
             *word = if value.is_normal() {
                 value.to_bits()

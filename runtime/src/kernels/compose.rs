@@ -7,7 +7,6 @@
 use impasto_compiler::abi::{InputSet, MATERIAL_OF};
 
 use crate::film;
-use crate::fingerprint::Fingerprint;
 use crate::kernels::buffers::{Access, BUFFERS, BufferId};
 use crate::kernels::camera;
 use crate::kernels::cones;
@@ -214,32 +213,14 @@ impl Composer<'_> {
             .chain(self.tables)
     }
 
-    /// A fingerprint of what is rendered: everything that decides what a path is worth, and
-    /// nothing of how the work is organised.
-    pub(crate) fn fingerprint(&self) -> u64 {
+    /// The words of the uniform `camera`.
+    pub(crate) fn camera(&self) -> camera::Words {
         let world = self.world;
-        let all: Vec<usize> = (0..self.materials.len()).collect();
-        let mut fingerprint = Fingerprint::new();
-        for number in [world.max_depth, world.roulette_start] {
-            fingerprint.add(&number.to_le_bytes());
-        }
-        let rays = camera_rays(world.width, world.height, world.camera.has_lens());
-        fingerprint.add(rays.as_bytes());
-        fingerprint.add(bytemuck::cast_slice(&camera::words(world)));
-        fingerprint.add(self.source.wgsl(&all).as_bytes());
-        fingerprint.add(self.source.lookup_wgsl().as_bytes());
-        for part in self.read_parts() {
-            fingerprint.add(part.wgsl.as_bytes());
-        }
-        for buffer in self.scene_buffers() {
-            fingerprint.add(buffer.name.as_bytes());
-            fingerprint.add(&buffer.bytes);
-        }
-        fingerprint.finish()
+        camera::words(&world.camera, world.width, world.height)
     }
 
     /// Random numbers and the parts of the scene.
-    fn read_parts(&self) -> impl Iterator<Item = &ShaderPart> {
+    pub(crate) fn read_parts(&self) -> impl Iterator<Item = &ShaderPart> {
         std::iter::once(self.random).chain(self.parts.all())
     }
 }

@@ -11,6 +11,7 @@ pub(crate) mod modules;
 pub(crate) mod order;
 pub(crate) mod outputs;
 pub(crate) mod parts;
+pub(crate) mod prints;
 pub(crate) mod profile;
 pub(crate) mod queues;
 pub mod random;

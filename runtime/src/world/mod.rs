@@ -30,7 +30,7 @@ use impasto_compiler::partition::Plan;
 
 use crate::error::SceneError;
 use crate::film::layers::Layers;
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 use crate::technique::Technique;
 use crate::world::bvh::Trees;
 use crate::world::camera::CameraFrame;
@@ -107,6 +107,11 @@ impl World {
         let (infos, textures) = (program.infos(), program.textures());
         let compiled = (&infos[..], instances, &textures[..]);
         Self::recording(scene, compiled, technique, layers, trees)
+    }
+
+    /// Looks at it from elsewhere.
+    pub fn look(&mut self, camera: &Camera) {
+        self.camera = CameraFrame::new(camera, self.width as f32 / self.height as f32);
     }
 
     /// The plan that gives a kernel to each of `materials` that is on some surface.
