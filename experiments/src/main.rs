@@ -10,6 +10,7 @@ use clap::{Parser, Subcommand};
 
 mod farm;
 mod gallery;
+mod live;
 mod paper;
 mod partition;
 mod process;
@@ -35,6 +36,8 @@ enum Experiment {
     Stress(stress::StressArgs),
     /// Simulate farms of many GPUs, and write docs/farm-scale.md
     Farm(farm::FarmArgs),
+    /// Measure how soon a new picture is there while one looks around, drags values and edits sources
+    Live(live::LiveArgs),
     /// Render everything in the library, and write docs/library
     Gallery(gallery::GalleryArgs),
 }
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         Experiment::Partition(args) => partition::run(&args),
         Experiment::Stress(args) => stress::run(&args),
         Experiment::Farm(args) => farm::run(&args),
+        Experiment::Live(args) => live::run(&args),
         Experiment::Gallery(args) => gallery::run(&args),
     })
 }
