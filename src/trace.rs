@@ -22,7 +22,10 @@ use impasto_runtime::world::World;
 use impasto_trace::{Float, Parting, Path, Replayer, parting, with_room};
 use serde::Serialize;
 
+mod text;
+
 pub use impasto_trace::{self as path, MaterialCode, TraceError};
+pub use text::text;
 
 /// Which path, and how it is replayed.
 #[derive(Clone, Copy, Debug)]

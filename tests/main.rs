@@ -6,6 +6,7 @@ mod documentation;
 mod filtering;
 mod generated;
 mod instances;
+mod live;
 mod needs;
 mod plans;
 mod probe;

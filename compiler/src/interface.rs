@@ -85,6 +85,20 @@ pub enum Value {
     Text(String),
 }
 
+impl Value {
+    /// A constant; a texture is not.
+    pub fn of(value: &Const) -> Self {
+        match value {
+            Const::Bool(b) => Self::Bool(*b),
+            Const::Int(i) => Self::Int(*i),
+            Const::Float(v) => match v.as_slice() {
+                [x] => Self::Number(*x as f32),
+                all => Self::Components(all.iter().map(|&x| x as f32).collect()),
+            },
+        }
+    }
+}
+
 /// Reads the materials of the file at `path`. Of what they compute, nothing is checked.
 pub fn interface(path: &str, loader: &mut dyn Loader) -> Interface {
     let mut checker = Checker::new(loader);
@@ -166,14 +180,9 @@ fn limits((low, high): (f64, f64)) -> [f32; 2] {
 }
 
 fn value(value: &Const, written: &Expr) -> Value {
-    match (value, &written.kind) {
-        (_, ExprKind::Str(path)) => Value::Text(path.clone()),
-        (Const::Bool(b), _) => Value::Bool(*b),
-        (Const::Int(i), _) => Value::Int(*i),
-        (Const::Float(v), _) => match v.as_slice() {
-            [x] => Value::Number(*x as f32),
-            all => Value::Components(all.iter().map(|&x| x as f32).collect()),
-        },
+    match &written.kind {
+        ExprKind::Str(path) => Value::Text(path.clone()),
+        _ => Value::of(value),
     }
 }
 

@@ -46,6 +46,7 @@ mod random;
 pub mod sema;
 pub mod source;
 pub mod stages;
+mod values;
 mod written;
 
 pub use driver::{
@@ -56,4 +57,5 @@ pub use loader::{Loader, MemoryLoader, library_text};
 pub use moment::Moment;
 pub use parameter_value::ParameterValue;
 pub use program::Program;
+pub use values::{Unfit, with_values};
 pub use written::{Written, WrittenParam};

@@ -29,6 +29,7 @@ mod render;
 mod slopes;
 mod stdlib;
 mod textures;
+mod values;
 mod widths;
 
 #[test]

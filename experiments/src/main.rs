@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 mod editor;
 mod farm;
 mod gallery;
+mod live;
 mod paper;
 mod partition;
 mod process;
@@ -38,6 +39,8 @@ enum Experiment {
     Editor(editor::EditorArgs),
     /// Simulate farms of many GPUs, and write docs/farm-scale.md
     Farm(farm::FarmArgs),
+    /// Measure how soon a new picture is there while one looks around, drags values and edits sources
+    Live(live::LiveArgs),
     /// Render everything in the library, and write docs/library
     Gallery(gallery::GalleryArgs),
 }
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         Experiment::Stress(args) => stress::run(&args),
         Experiment::Editor(args) => editor::run(&args),
         Experiment::Farm(args) => farm::run(&args),
+        Experiment::Live(args) => live::run(&args),
         Experiment::Gallery(args) => gallery::run(&args),
     })
 }

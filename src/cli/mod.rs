@@ -44,7 +44,6 @@ mod sources;
 mod strategy;
 mod technique;
 mod trace;
-mod trace_text;
 mod until;
 
 /// A material language and a wavefront path tracer for it.

@@ -9,7 +9,7 @@ use impasto::runtime::technique::Sampler;
 use impasto::trace::{self, MaterialCode, Request};
 
 use super::technique::{default_name, named};
-use super::{Failure, Global, Outcome, print, trace_text};
+use super::{Failure, Global, Outcome, print};
 
 #[derive(Args)]
 pub(super) struct TraceArgs {
@@ -91,7 +91,7 @@ pub(super) fn run(args: &TraceArgs, global: &Global) -> Outcome {
         global.detail(&format!("f{bits}: {steps} steps in {milliseconds:.1} ms"));
     }
     if !global.json() {
-        return print(&trace_text::text(&replay));
+        return print(&trace::text(&replay));
     }
     let json = serde_json::to_string_pretty(&replay);
     let json = json.map_err(|e| Failure::Error(format!("cannot write the path as JSON: {e}")))?;

@@ -69,6 +69,15 @@ impl Watched {
         changed
     }
 
+    /// Takes over how files look in `other`, of those that both have.
+    pub fn update(&mut self, other: &Self) {
+        for (path, last) in &mut self.files {
+            if let Some(now) = other.files.get(path) {
+                last.clone_from(now);
+            }
+        }
+    }
+
     /// The same, while others are still looking.
     pub fn has_changed(&self) -> bool {
         let mut files = self.files.iter();

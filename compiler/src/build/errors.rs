@@ -35,7 +35,7 @@ pub(super) fn too_large(material: &Material, size: u64) -> Diagnostic {
 }
 
 /// A material whose parameters take too long to work with.
-pub(super) fn too_long(material: &Material, instance: &str) -> Diagnostic {
+pub(crate) fn too_long(material: &Material, instance: &str) -> Diagnostic {
     let message = format!("what depends only on the parameters of `{instance}` takes too long");
     Diagnostic::new(Code::TooLarge, material.span, message)
         .expected(format!("at most {HOIST_FUEL} operations"))

@@ -6,8 +6,9 @@ use super::{errors, interior};
 use crate::abi::{Emission, InstanceInfo};
 use crate::closure;
 use crate::diag::Diagnostic;
-use crate::ir::{Const, Material, Module};
-use crate::passes::MaterialState;
+use crate::ir::interp::OutOfFuel;
+use crate::ir::{Const, Function, Material, Module};
+use crate::passes::{Hoisted, MaterialState};
 use crate::program::Instance;
 
 /// Values for a material's parameters, and who wants them.
@@ -42,41 +43,54 @@ pub(super) fn instances(
     settings: &[Setting],
     number: usize,
 ) -> Result<Vec<Instance>, Diagnostic> {
-    let instances = settings.iter().map(|s| instance(module, state, s, number));
-    let mut instances: Vec<Instance> = instances.collect::<Result<_, _>>()?;
-    // Where one instance must be evaluated as it is hit, the code for it is there for all.
+    let made = |setting: &Setting| {
+        let parts = (&state.material, &state.hoisted[..], state.emission());
+        let too_long = |_| errors::too_long(&state.material, &setting.name);
+        let name = setting.name.clone();
+        instance(module, parts, name, &setting.values, number).map_err(too_long)
+    };
+    let mut instances: Vec<Instance> = settings.iter().map(made).collect::<Result<_, _>>()?;
+    share_emission(instances.iter_mut());
+    Ok(instances)
+}
+
+/// Where one instance of a material must be evaluated as it is hit, the code for it is there for all.
+pub(crate) fn share_emission<'i>(instances: impl Iterator<Item = &'i mut Instance>) {
+    let instances: Vec<&mut Instance> = instances.collect();
     if instances
         .iter()
         .any(|i| i.info.emission == Emission::Varying)
     {
         let emitting = instances
-            .iter_mut()
+            .into_iter()
             .filter(|i| i.info.emission != Emission::None);
         emitting.for_each(|i| i.info.emission = Emission::Varying);
     }
-    Ok(instances)
 }
 
-fn instance(
+/// An instance of material number `number`: the material with what the host computes of its parameters, and its
+/// emission.
+pub(crate) fn instance(
     module: &Module,
-    state: &MaterialState,
-    setting: &Setting,
+    (material, hoisted, emission): (&Material, &[Hoisted], Option<&Function>),
+    name: String,
+    parameters: &[Const],
     number: usize,
-) -> Result<Instance, Diagnostic> {
-    let too_long = |_| errors::too_long(&state.material, &setting.name);
+) -> Result<Instance, OutOfFuel> {
     let mut values = Vec::new();
-    for part in &state.hoisted {
-        values.extend(part.evaluate(module, &setting.values).map_err(too_long)?);
+    for part in hoisted {
+        values.extend(part.evaluate(module, parameters)?);
     }
-    let medium = interior::medium(module, &state.material, &setting.values).map_err(too_long)?;
-    let emission = closure::emission_kind(module, state.emission(), &values);
+    let medium = interior::medium(module, material, parameters)?;
+    let emission = closure::emission_kind(module, emission, &values);
     Ok(Instance {
         info: InstanceInfo {
-            name: setting.name.clone(),
+            name,
             material: number,
             emission,
             medium,
         },
+        parameters: parameters.to_vec(),
         values,
         row: 0,
     })

@@ -2,6 +2,7 @@
 //! to its instances.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::abi::{Emission, Input, MaterialInfo};
 use crate::closure::{self, Core, Excess};
@@ -10,14 +11,14 @@ use crate::diag::Diagnostic;
 use crate::ir::{self, Function, Module};
 use crate::parameters::TableLayout;
 use crate::passes::{self, MaterialState, Pass};
-use crate::program::{CompiledMaterial, Instance, Names, Program, unique};
+use crate::program::{CompiledMaterial, Instance, Names, Program, Recipe, unique};
 use crate::sema::Checker;
 use crate::stages::{Progress, Stage};
 
 pub(crate) mod alike;
-mod errors;
+pub(crate) mod errors;
 mod functions;
-mod instances;
+pub(crate) mod instances;
 mod interior;
 mod lookups;
 
@@ -46,6 +47,7 @@ pub(crate) struct ProgramBuilder {
     core: Core,
     functions: Functions,
     materials: Vec<CompiledMaterial>,
+    recipes: Vec<Arc<Recipe>>,
     instances: Vec<Instance>,
     names: BTreeMap<String, u32>,
     /// Are there functions that say how materials look?
@@ -68,6 +70,7 @@ impl ProgramBuilder {
             core,
             functions: Functions::default(),
             materials: Vec::new(),
+            recipes: Vec::new(),
             instances: Vec::new(),
             names: BTreeMap::from([("material".to_owned(), 1)]),
             looks: false,
@@ -263,6 +266,11 @@ impl ProgramBuilder {
         };
         let mut functions = functions.into_iter();
         if let Some(evaluate) = functions.next() {
+            self.recipes.push(Arc::new(Recipe {
+                material: state.material,
+                constants: state.constants,
+                hoisted: state.hoisted,
+            }));
             self.materials.push(CompiledMaterial {
                 info,
                 evaluate,
@@ -302,6 +310,7 @@ impl ProgramBuilder {
             module,
             core: self.core,
             materials: self.materials,
+            recipes: self.recipes,
             instances: self.instances,
             textures,
             sources: checker.sources.clone(),

@@ -5,10 +5,13 @@
 //! in it; what depends on nothing but the others is computed on the host, once an instance, and read
 //! by the kernel from the parameter table (see [`crate::parameters`]).
 
+use std::sync::Arc;
+
 use crate::abi::{self, InstanceInfo, Lookups, MaterialInfo, Table, TextureRef, TextureSpace};
 use crate::closure;
-use crate::ir::{Const, Function, Module};
+use crate::ir::{Const, Function, Material, Module};
 use crate::parameters::TableLayout;
+use crate::passes::Hoisted;
 use crate::source::{SourceMap, Span};
 
 mod names;
@@ -22,6 +25,8 @@ pub struct Program {
     pub(crate) names: Names,
     pub(crate) core: closure::Core,
     pub(crate) materials: Vec<CompiledMaterial>,
+    /// What instances of each are made by.
+    pub(crate) recipes: Vec<Arc<Recipe>>,
     pub(crate) instances: Vec<Instance>,
     /// Textures that some material may read and how, in the order of their slots.
     pub(crate) textures: Vec<Slot>,
@@ -49,11 +54,24 @@ pub struct CompiledMaterial {
     pub layout: TableLayout,
 }
 
+/// What the values of a material's instances are computed by.
+#[derive(Clone, Debug)]
+pub(crate) struct Recipe {
+    /// The material as passes left it.
+    pub material: Material,
+    /// The values of its parameters that are constants of its code.
+    pub constants: Vec<Option<Const>>,
+    /// What the host computes for each instance.
+    pub hoisted: Vec<Hoisted>,
+}
+
 /// An instance of a material.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// What the renderer must know.
     pub info: InstanceInfo,
+    /// The values of the material's parameters.
+    pub(crate) parameters: Vec<Const>,
     /// What it has in the parameter table.
     pub values: Vec<Const>,
     /// Its first row in the parameter table.
@@ -74,6 +92,34 @@ impl Program {
     /// The instances, in the order of the requests.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
+    }
+
+    /// The values of an instance's parameters by their names, in the order in which they are declared; without those
+    /// that only callers give.
+    pub fn parameters(&self, instance: usize) -> impl Iterator<Item = (&str, &Const)> {
+        let instance = self.instances.get(instance);
+        let own = instance.into_iter().flat_map(|instance| {
+            let params = &self.recipes[instance.info.material].material.params;
+            params.iter().zip(&instance.parameters)
+        });
+        let own = own.filter(|(param, _)| !param.is_input && !param.name.contains(' '));
+        own.map(|(param, value)| (param.name.as_str(), value))
+    }
+
+    /// The file of a texture that is a parameter's value, as the source or scene names it.
+    pub fn texture(&self, value: &Const) -> Option<&str> {
+        let Const::Int(texture) = value else {
+            return None;
+        };
+        let texture = usize::try_from(*texture).ok()?;
+        self.module.textures.get(texture).map(String::as_str)
+    }
+
+    /// The file and the line, from 1, where a material is defined.
+    pub fn place(&self, material: usize) -> Option<(String, u32)> {
+        let span = self.recipes.get(material)?.material.span;
+        let file = self.sources.file(span.file).name.clone();
+        Some((file, self.sources.line_column(span).0 as u32))
     }
 
     /// The materials with their functions, for interpreters and analyses.

@@ -11,7 +11,7 @@ use crate::film::{self, Sums};
 use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::validate::validate;
-use crate::kernels::{dropped, run};
+use crate::kernels::{camera, dropped, run};
 use crate::options::RenderOptions;
 use crate::render::{CompositionInputs, settings};
 use crate::technique::{Regeneration, Sampler, Technique};
@@ -41,6 +41,8 @@ pub struct PathKernel {
     pub max_depth: u32,
     /// The scene's bindings of materials, each with the name of its material.
     pub instances: Vec<(String, String)>,
+    /// The words of the uniform that says from where it is seen.
+    camera: camera::Words,
     /// The buffers of the scene, as words.
     scene: Vec<(&'static str, Vec<u32>)>,
     counters: Counters,
@@ -92,6 +94,7 @@ impl PathKernel {
             size: [world.width, world.height],
             max_depth: world.max_depth,
             instances: instances.collect(),
+            camera: composer.camera(),
             scene: composer.scene_buffers().map(words).collect(),
             counters: layout.counters,
         })
@@ -101,6 +104,7 @@ impl PathKernel {
     pub fn buffer(&self, name: &str) -> Option<Vec<u32>> {
         match name {
             "run" => Some(run::words(&RenderOptions::default()).to_vec()),
+            "camera" => Some(self.camera.to_vec()),
             "counters" => Some(vec![0; self.counters.len()]),
             "film" => Some(vec![0; self.pixels() * film::PLANES]),
             _ => {

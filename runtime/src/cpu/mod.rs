@@ -44,6 +44,8 @@ const MOST_KEPT: usize = 64;
 #[derive(Debug)]
 pub struct Cpu {
     threads: Arc<ThreadPool>,
+    /// Those that make machine code: a render that goes on meanwhile does not wait for them.
+    compilers: ThreadPool,
     width: Width,
     /// Kernels that were built before, by their text and whether their ray casts are answered.
     kernels: Mutex<HashMap<(String, bool), Arc<impasto_cpu::Kernel>>>,
@@ -64,17 +66,20 @@ impl Cpu {
                 expected: format!("1 to {MOST_THREADS}"),
             });
         }
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .stack_size(STACK_BYTES)
-            .thread_name(|index| format!("render {index}"))
-            .build();
-        let pool = pool.map_err(|e| RuntimeError::Threads {
-            threads,
-            reason: e.to_string(),
-        })?;
+        let pool = |what: &'static str, threads: usize| {
+            let pool = ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .stack_size(STACK_BYTES)
+                .thread_name(move |index| format!("{what} {index}"))
+                .build();
+            pool.map_err(|e| RuntimeError::Threads {
+                threads,
+                reason: e.to_string(),
+            })
+        };
         Ok(Self {
-            threads: Arc::new(pool),
+            threads: Arc::new(pool("render", threads)?),
+            compilers: pool("compile", threads.min(cores()))?,
             width: options.width,
             kernels: Mutex::default(),
         })
@@ -196,7 +201,7 @@ impl Cpu {
         let code = impasto_cpu::lower(&module, &info, &names, &hooks).map_err(refused)?;
         let answers: Vec<_> = answered.iter().map(|(_, answer)| *answer).collect();
         let build = || impasto_cpu::Kernel::build(&code, &answers, work::is_alone, self.width);
-        let built = Arc::new(self.threads.install(build).map_err(refused)?);
+        let built = Arc::new(self.compilers.install(build).map_err(refused)?);
         let mut kept = kept();
         if kept.len() >= MOST_KEPT {
             kept.clear();

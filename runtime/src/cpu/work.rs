@@ -16,12 +16,13 @@ use super::casts::{ANSWERED, Casts};
 use crate::error::RuntimeError;
 use crate::gpu::submission::Done;
 use crate::kernels::buffers::{ARGUMENT_BYTES, BUFFERS, BufferId, Cleared};
+use crate::kernels::camera;
 use crate::kernels::modules::Composer;
 use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::run;
 use crate::options::RenderOptions;
 
-/// How long threads go on before they are asked again.
+/// How long threads go on before they are asked again, unless they are to answer sooner.
 const TURN: Duration = Duration::from_millis(30);
 
 /// One dispatch of an iteration.
@@ -51,7 +52,10 @@ pub(crate) struct Work {
     threads: Arc<[Mutex<OwnPool>]>,
     /// Buffers that threads share, by their ids; empty ones in place of those that they do not.
     shared: Vec<Arc<Buffer>>,
+    /// Those of the scene.
+    scene: Vec<Arc<Buffer>>,
     counters: Counters,
+    turn: Duration,
     /// The first pixel and sample that nobody has taken yet.
     left: Arc<Mutex<[u32; 2]>>,
     /// Answers the ray casts of kernels, unless they cast rays themselves.
@@ -73,7 +77,11 @@ struct OwnPool {
 fn is_shared(id: BufferId) -> bool {
     matches!(
         id,
-        BufferId::Run | BufferId::Film | BufferId::PixelList | BufferId::QueueTable
+        BufferId::Run
+            | BufferId::Camera
+            | BufferId::Film
+            | BufferId::PixelList
+            | BufferId::QueueTable
     )
 }
 
@@ -133,11 +141,14 @@ impl Work {
             threads: threads?,
             steps: steps.into(),
             shared,
+            scene: scene.into_iter().map(|(_, buffer)| buffer).collect(),
             counters: composer.layout.counters,
+            turn: TURN,
             left: Arc::default(),
             _casts: casts,
         };
         work.set_run(options);
+        work.set_camera(&composer.camera());
         if let Some(pixels) = &options.pixels {
             work.set_pixels(pixels);
         }
@@ -161,7 +172,7 @@ impl Work {
                 self.iterate(&mut own);
                 iterations += 1;
                 let is_idle = self.is_idle(&own, samples);
-                if is_idle || begin.elapsed() > TURN {
+                if is_idle || begin.elapsed() > self.turn {
                     break;
                 }
             }
@@ -250,6 +261,23 @@ impl Work {
     /// Writes the settings that kernels read.
     pub(crate) fn set_run(&self, options: &RenderOptions) {
         self.shared[BufferId::Run.index()].write(0, &run::words(options));
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, words: &camera::Words) {
+        self.shared[BufferId::Camera.index()].write(0, words);
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        if let Some(buffer) = self.scene.get(place) {
+            buffer.write(0, &bytemuck::pod_collect_to_vec(bytes));
+        }
+    }
+
+    /// Threads go on for so long before they are asked again.
+    pub(crate) fn set_turn(&mut self, turn: Duration) {
+        self.turn = turn;
     }
 
     /// Writes which pixels are rendered.

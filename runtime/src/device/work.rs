@@ -1,9 +1,12 @@
 //! A plan that is ready to run on a device.
 
+use std::time::Duration;
+
 use crate::cpu;
 use crate::error::RuntimeError;
 use crate::gpu;
 use crate::gpu::submission::Done;
+use crate::kernels::camera;
 use crate::kernels::layout::PlanLayout;
 use crate::options::RenderOptions;
 
@@ -110,6 +113,29 @@ impl Work {
         match self {
             Work::Gpu(work) => work.set_run(options),
             Work::Cpu(work) => work.set_run(options),
+        }
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, words: &camera::Words) {
+        match self {
+            Work::Gpu(work) => work.set_camera(words),
+            Work::Cpu(work) => work.set_camera(words),
+        }
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        match self {
+            Work::Gpu(work) => work.set_scene_buffer(place, bytes),
+            Work::Cpu(work) => work.set_scene_buffer(place, bytes),
+        }
+    }
+
+    /// How long the processor goes on before it is asked again; a GPU is given iterations.
+    pub(crate) fn set_turn(&mut self, turn: Duration) {
+        if let Work::Cpu(work) = self {
+            work.set_turn(turn);
         }
     }
 

@@ -17,6 +17,8 @@ pub mod ranges;
 mod speed;
 mod values;
 
+use rayon::prelude::*;
+
 use accumulate::Accumulator;
 use layers::Layers;
 use outputs::SUM_WORDS;
@@ -91,6 +93,15 @@ impl Sums {
         })
     }
 
+    /// Those of no samples of a picture of this size, without outputs.
+    pub fn emptied(&self) -> Self {
+        Self {
+            layers: Layers::default(),
+            words: vec![0; PLANES * self.pixel_count()],
+            ..*self
+        }
+    }
+
     /// The outputs beside the picture.
     pub fn layers(&self) -> &Layers {
         &self.layers
@@ -136,8 +147,21 @@ impl Sums {
         Film {
             width: self.width,
             height: self.height,
-            pixels: (0..self.pixel_count()).map(|i| self.mean(i)).collect(),
+            pixels: (0..self.pixel_count())
+                .into_par_iter()
+                .with_min_len(1 << 12)
+                .map(|i| self.mean(i))
+                .collect(),
             samples: self.plane(COUNT_PLANE).to_vec(),
+        }
+    }
+
+    /// The mean of a pixel's samples, and how many they are.
+    pub fn pixel(&self, pixel: usize) -> ([f32; 3], u32) {
+        if pixel < self.pixel_count() {
+            (self.mean(pixel), self.count(pixel))
+        } else {
+            ([0.0; 3], 0)
         }
     }
 

@@ -148,7 +148,7 @@ pub static OUTPUTS: [Output; 12] = [
         channels: &["Z"],
         kind: Kind::Nearest,
         at: At::FirstHit,
-        value: "dot(position - CAMERA_POSITION, CAMERA_FORWARD)",
+        value: "dot(position - camera.position, camera.forward)",
         bare: "",
         asks: &[],
     },

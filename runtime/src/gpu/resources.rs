@@ -3,6 +3,7 @@
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::kernels::buffers::{Access, BUFFERS, Buffer, BufferId, Cleared, Owner, Reader};
+use crate::kernels::camera;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Composer, Kernel};
 use crate::kernels::queues::Scalar;
@@ -44,6 +45,7 @@ impl Resources {
         gpu.check()?;
         let resources = Self { buffers };
         resources.set_run(gpu, options);
+        resources.set_camera(gpu, &composer.camera());
         if let Some(pixels) = &options.pixels {
             resources.set_pixels(gpu, pixels);
         }
@@ -68,6 +70,23 @@ impl Resources {
         let buffer = self.buffer(BufferId::Run);
         gpu.queue
             .write_buffer(buffer, 0, bytemuck::cast_slice(&words));
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, gpu: &Gpu, words: &camera::Words) {
+        let buffer = self.buffer(BufferId::Camera);
+        gpu.queue
+            .write_buffer(buffer, 0, bytemuck::cast_slice(words));
+    }
+
+    /// Writes the scene's buffer at a place among those of its parts and tables.
+    pub(crate) fn set_scene_buffer(&self, gpu: &Gpu, place: usize, bytes: &[u8]) {
+        let Some(buffer) = self.buffers.get(BUFFERS.len() + place) else {
+            return;
+        };
+        let mut bytes = bytes.to_vec();
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        gpu.queue.write_buffer(buffer, 0, &bytes);
     }
 
     /// Writes which pixels are rendered.

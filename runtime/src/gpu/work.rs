@@ -5,6 +5,7 @@ use super::schedule::{Schedule, Step};
 use super::submission::{Done, Submission};
 use super::{Gpu, Timing};
 use crate::error::RuntimeError;
+use crate::kernels::camera;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::queues::Counters;
 use crate::options::RenderOptions;
@@ -88,6 +89,16 @@ impl Work {
     /// Writes the settings that kernels read.
     pub(crate) fn set_run(&self, options: &RenderOptions) {
         self.resources.set_run(&self.gpu, options);
+    }
+
+    /// Writes from where the picture is seen.
+    pub(crate) fn set_camera(&self, words: &camera::Words) {
+        self.resources.set_camera(&self.gpu, words);
+    }
+
+    /// Writes one of the scene's buffers.
+    pub(crate) fn set_scene_buffer(&self, place: usize, bytes: &[u8]) {
+        self.resources.set_scene_buffer(&self.gpu, place, bytes);
     }
 
     /// Writes which pixels are rendered.

@@ -3,7 +3,7 @@
 
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Composer;
-use crate::kernels::{order, run};
+use crate::kernels::{camera, order, run};
 use crate::world::needs::Need;
 
 /// What kernels may do with a buffer.
@@ -101,6 +101,8 @@ use Size::{InAll, OfPath};
 buffers! {
     /// The settings that do not change a kernel's text.
     Run, "run", "Run", Uniform, Host, World, Never, InAll(|_| run::BYTES);
+    /// From where the picture is seen.
+    Camera, "camera", "Camera", Uniform, Host, World, Never, InAll(|_| camera::BYTES);
     /// The state of paths.
     State, "state", "array<vec4<u32>>", ReadWrite, Host, World, ByPass, OfPath(PlanLayout::path_bytes);
     /// What stages ask of each other.

@@ -7,8 +7,8 @@
 use impasto_compiler::abi::{InputSet, MATERIAL_OF};
 
 use crate::film;
-use crate::fingerprint::Fingerprint;
-use crate::kernels::buffers::{Access, BUFFERS};
+use crate::kernels::buffers::{Access, BUFFERS, BufferId};
+use crate::kernels::camera;
 use crate::kernels::cones;
 use crate::kernels::modules::{Composer, Kernel, KernelDesc};
 use crate::kernels::order;
@@ -22,6 +22,7 @@ use crate::wgsl;
 use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::camera::wgsl as camera_rays;
 use crate::world::media;
 use crate::world::needs::Need;
 
@@ -106,7 +107,7 @@ impl Composer<'_> {
             out += &format!("const CAMERA_MEDIA = vec4<u32>({a}u, {b}u, {c}u, {d}u);\n");
         }
         if self.layout.needs.has(Need::RayCones) {
-            out += &cones::constants(&world.camera, world.width, world.height);
+            out += &cones::constants();
         }
         out + &self.layout.counters.constants() + &state::constants()
     }
@@ -124,7 +125,7 @@ impl Composer<'_> {
             Part::Random => self.random.wgsl.clone(),
             Part::Camera => {
                 let lens = self.layout.needs.has(Need::Lens);
-                world.camera.wgsl(world.width, world.height, lens)
+                camera_rays(world.width, world.height, lens)
             }
             Part::Film => {
                 let flags: Vec<Flag> = self.layout.needs.flags().collect();
@@ -189,7 +190,7 @@ impl Composer<'_> {
             }
             let space = match access {
                 Access::Uniform => {
-                    out += &run::declaration(ty);
+                    out += &uniform(name, ty);
                     "uniform"
                 }
                 Access::Read => "storage, read",
@@ -212,36 +213,24 @@ impl Composer<'_> {
             .chain(self.tables)
     }
 
-    /// A fingerprint of what is rendered: everything that decides what a path is worth, and
-    /// nothing of how the work is organised.
-    pub(crate) fn fingerprint(&self) -> u64 {
+    /// The words of the uniform `camera`.
+    pub(crate) fn camera(&self) -> camera::Words {
         let world = self.world;
-        let all: Vec<usize> = (0..self.materials.len()).collect();
-        let mut fingerprint = Fingerprint::new();
-        for number in [world.max_depth, world.roulette_start] {
-            fingerprint.add(&number.to_le_bytes());
-        }
-        fingerprint.add(
-            world
-                .camera
-                .wgsl(world.width, world.height, world.camera.lens_radius > 0.0)
-                .as_bytes(),
-        );
-        fingerprint.add(self.source.wgsl(&all).as_bytes());
-        fingerprint.add(self.source.lookup_wgsl().as_bytes());
-        for part in self.read_parts() {
-            fingerprint.add(part.wgsl.as_bytes());
-        }
-        for buffer in self.scene_buffers() {
-            fingerprint.add(buffer.name.as_bytes());
-            fingerprint.add(&buffer.bytes);
-        }
-        fingerprint.finish()
+        camera::words(&world.camera, world.width, world.height)
     }
 
     /// Random numbers and the parts of the scene.
-    fn read_parts(&self) -> impl Iterator<Item = &ShaderPart> {
+    pub(crate) fn read_parts(&self) -> impl Iterator<Item = &ShaderPart> {
         std::iter::once(self.random).chain(self.parts.all())
+    }
+}
+
+/// The structure of the uniform of a name.
+fn uniform(name: &str, ty: &str) -> String {
+    if name == BufferId::Camera.row().name {
+        camera::declaration(ty)
+    } else {
+        run::declaration(ty)
     }
 }
 

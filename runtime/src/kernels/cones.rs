@@ -16,16 +16,15 @@ const WIDEST: f32 = 1.0;
 /// The longest footprint, in widths of its cone.
 const LONGEST: f32 = 16.0;
 
-/// The constants of the stages that make and widen cones.
-pub(crate) fn constants(camera: &CameraFrame, width: u32, height: u32) -> String {
-    constant_f32("PIXEL_ANGLE", pixel_angle(camera, width, height))
-        + &constant_f32("CONE_RAYS", RAYS)
+/// The constants of the stages that widen cones.
+pub(crate) fn constants() -> String {
+    constant_f32("CONE_RAYS", RAYS)
         + &constant_f32("WIDEST_CONE", WIDEST)
         + &constant_f32("LONGEST_FOOTPRINT", LONGEST)
 }
 
 /// The square root of the solid angle of the pixel in the middle of a picture, in radians.
-fn pixel_angle(camera: &CameraFrame, width: u32, height: u32) -> f32 {
+pub(crate) fn pixel_angle(camera: &CameraFrame, width: u32, height: u32) -> f32 {
     let across = 2.0 * camera.right.length() / width as f32;
     let down = 2.0 * camera.up.length() / height as f32;
     across.sqrt() * down.sqrt()

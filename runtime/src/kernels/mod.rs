@@ -1,6 +1,7 @@
 //! The kernels of a plan as text: which there are, what each is made of, and what they share.
 
 pub(crate) mod buffers;
+pub(crate) mod camera;
 mod check;
 pub(crate) mod compose;
 pub(crate) mod cones;
@@ -10,6 +11,7 @@ pub(crate) mod modules;
 pub(crate) mod order;
 pub(crate) mod outputs;
 pub(crate) mod parts;
+pub(crate) mod prints;
 pub(crate) mod profile;
 pub(crate) mod queues;
 pub mod random;

@@ -32,8 +32,8 @@ fn new_path(slot: u32, item: u32) {
 #endif
 #if ray_cones
     // The pixel's solid angle, seen from a point of the lens, falls with the third power of the cosine.
-    let cosine = dot(ray.direction, CAMERA_FORWARD);
-    store_cone(slot, PathCone(0.0, PIXEL_ANGLE * cosine * sqrt(cosine), 0u, 0u));
+    let cosine = dot(ray.direction, camera.forward);
+    store_cone(slot, PathCone(0.0, camera.pixel_angle * cosine * sqrt(cosine), 0u, 0u));
 #endif
     request_extension(ray.origin, ray.direction, NOTHING);
 }

@@ -21,6 +21,7 @@ use crate::kernels::buffers::ARGUMENT_BYTES;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::{Composer, DispatchSource, Kernel, Sizes};
 use crate::kernels::parts;
+use crate::kernels::prints::Prints;
 use crate::kernels::random::{self, Demand};
 use crate::render::pool;
 use crate::render::report::MaterialReport;
@@ -144,6 +145,27 @@ impl<'g> Renderer<'g> {
         Self::build(device.into(), world, source, plan, options, NOBODY)
     }
 
+    /// The same beside other work on the device, whose errors this does not take for its own, and under the eyes of
+    /// `watch`, which can break it off.
+    ///
+    /// # Errors
+    /// Also [`RuntimeError::Interrupted`] if `watch` did.
+    pub fn from_world_beside(
+        device: impl Into<DeviceRef<'g>>,
+        world: &World,
+        source: &dyn MaterialSource,
+        plan: &Plan,
+        options: &RenderOptions,
+        watch: Watch<'_>,
+    ) -> Result<Self, RuntimeError> {
+        let device = device.into();
+        let build = || Self::build(device, world, source, plan, options, watch);
+        match device {
+            DeviceRef::Gpu(gpu) => gpu.guarded(build),
+            DeviceRef::Cpu(_) => build(),
+        }
+    }
+
     pub(crate) fn build(
         device: DeviceRef<'g>,
         world: &World,
@@ -212,6 +234,7 @@ impl<'g> Renderer<'g> {
             },
             replan: None,
             replanned: None,
+            pace: pool::LONG,
         })
     }
 }
@@ -335,7 +358,8 @@ impl ReportInputs {
     /// What is known before kernels are built, which takes yet unknown time.
     fn of(composer: &Composer<'_>, options: &RenderOptions) -> Self {
         let world = composer.world;
-        let scene = composer.fingerprint();
+        let prints = Prints::of(composer);
+        let scene = prints.scene();
         let (width, height) = (world.width, world.height);
         Self {
             strategy: composer.plan.strategy.clone(),
@@ -349,8 +373,9 @@ impl ReportInputs {
                 height,
                 seed: options.seed,
                 sampler: composer.technique.sampler,
-                scene: options.fingerprint(scene),
+                scene: options.fingerprint(scene, width, height),
             },
+            prints,
             scene,
             name: String::new(),
             layers: world.outputs.layers.clone(),

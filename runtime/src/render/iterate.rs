@@ -52,7 +52,7 @@ impl Renderer<'_> {
         let mut run = Run {
             now: self.progress(None, pass),
             finished_at: status.iterations,
-            pace: Pace::new(self.built.work.max_iterations()),
+            pace: Pace::new(self.built.work.max_iterations(), self.pace),
             in_flight: VecDeque::new(),
             spare: Vec::new(),
             going: true,
@@ -68,8 +68,10 @@ impl Renderer<'_> {
             }
             if let Some(submission) = run.in_flight.pop_front() {
                 run.wait(self, submission)?;
-                if watcher.look(&run.now) == Order::Halt {
-                    (run.going, run.halted) = (false, true);
+                match watcher.look(&run.now) {
+                    Order::GoOn => {}
+                    Order::Halt => (run.going, run.halted) = (false, true),
+                    Order::Drop => return Ok(()),
                 }
             } else if changes {
                 self.change_plan(run.status, run.now.elapsed);
@@ -111,7 +113,7 @@ impl Renderer<'_> {
     fn progress(&self, status: Option<&Status>, pass: &Pass) -> Progress {
         let layout = &self.built.layout;
         let pixels = self.pixels();
-        let before = pixels * u64::from(pass.done);
+        let before = pass.paths;
         let paths = status.map_or(before, |status| {
             let words = &status.counters;
             let scalar = |s| u64::from(layout.counters.scalar(words, s));
@@ -135,7 +137,8 @@ impl Renderer<'_> {
         if now.paths == 0 {
             return 0.0;
         }
-        let all = self.pixels() * u64::from(pass.expected.max(pass.done + pass.samples));
+        let rest = u64::from(pass.expected.max(pass.done + pass.samples) - pass.done);
+        let all = pass.paths + self.pixels() * rest;
         let left = all.saturating_sub(now.paths) as f64;
         now.elapsed.as_secs_f64() * left / now.paths as f64
     }

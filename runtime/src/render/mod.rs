@@ -8,10 +8,12 @@ mod iterate;
 mod observe;
 pub mod passes;
 pub(crate) mod pool;
+mod renew;
 mod replan;
 pub mod report;
 mod selection;
 pub(crate) mod settings;
+mod sitting;
 pub(crate) mod status;
 pub mod until;
 pub(crate) mod workload;
@@ -21,9 +23,10 @@ pub use build::{NOBODY, Watch, identity};
 pub use observe::profile_workload;
 pub use replan::{Planner, Replanning};
 pub use selection::Samples;
+pub use sitting::{Portion, Sitting};
 
 use std::ops::ControlFlow;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use impasto_compiler::partition::Workload;
 
@@ -33,6 +36,7 @@ use crate::film::file::{About, FilmFile, Identity, Maker, Range};
 use crate::film::layers::Layers;
 use crate::film::{Film, Sums, ranges};
 use crate::kernels::dropped::Dropped;
+use crate::kernels::prints::Prints;
 use crate::kernels::queues::Scalar;
 use crate::options::{Progress, RenderOptions};
 use crate::render::passes::{Keeping, Pass, Passes, Stopping, Watcher};
@@ -66,6 +70,8 @@ pub struct Renderer<'g> {
     texts: Option<World>,
     replan: Option<Replan>,
     replanned: Option<Change>,
+    /// How long a submission may take.
+    pace: Duration,
 }
 
 /// What a renderer has taken of a render so far.
@@ -109,7 +115,9 @@ struct ReportInputs {
     /// Iterations that the longest path takes.
     longest_path: u64,
     identity: Identity,
-    /// The fingerprint of all pixels.
+    /// The fingerprints of what is rendered.
+    prints: Prints,
+    /// Together the fingerprint of all pixels.
     scene: u64,
     /// The scene's name.
     name: String,
@@ -298,13 +306,14 @@ impl<'g> Renderer<'g> {
         samples: u32,
         watcher: &mut dyn Watcher,
     ) -> Result<u32, RuntimeError> {
+        let pixels = self.pixels();
         let pass = &mut taking.pass;
         // Ranges are of samples that were asked for, whose indices are words.
         pass.first = range.first as u32;
         pass.samples = samples.min(u32::try_from(range.count).unwrap_or(u32::MAX));
         self.run(pass, &mut taking.status, watcher)?;
         let (taken, all) = (pass.range(), pass.samples);
-        pass.advance();
+        pass.advance(pixels);
         taking.taken = ranges::joined(&taking.taken, taken.as_slice());
         Ok(all)
     }
@@ -315,7 +324,11 @@ impl<'g> Renderer<'g> {
         taking: &Taking,
         resumed: &Resumed,
     ) -> Result<FilmFile, RuntimeError> {
-        let sums = self.sums()?;
+        Ok(self.about(taking, self.sums()?, resumed))
+    }
+
+    /// Sums as a film that says what they are of.
+    pub(crate) fn about(&self, taking: &Taking, sums: Sums, resumed: &Resumed) -> FilmFile {
         let counted = self.counted(&taking.status);
         let about = About {
             identity: self.facts.identity,
@@ -326,7 +339,7 @@ impl<'g> Renderer<'g> {
             asked: vec![self.asked()],
             makers: self.makers(resumed),
         };
-        Ok(FilmFile { about, sums })
+        FilmFile { about, sums }
     }
 
     /// The sums of all samples since the film was emptied.

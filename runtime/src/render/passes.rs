@@ -68,7 +68,9 @@ pub(crate) struct Pass {
     pub begin: Instant,
     /// Samples that this device took before the pass.
     pub done: u32,
-    /// Those that it is expected to take in all.
+    /// Paths that it finished before the pass.
+    pub paths: u64,
+    /// Samples that it is expected to take in all.
     pub expected: u32,
     /// Index of the first sample of the pass.
     pub first: u32,
@@ -84,6 +86,7 @@ impl Pass {
         Self {
             begin,
             done: 0,
+            paths: 0,
             expected,
             first: 0,
             samples: 0,
@@ -91,9 +94,10 @@ impl Pass {
         }
     }
 
-    /// Goes on to the next.
-    pub(crate) fn advance(&mut self) {
+    /// Goes on to the next, after one of so many pixels.
+    pub(crate) fn advance(&mut self, pixels: u64) {
         self.done += self.samples;
+        self.paths += pixels * u64::from(self.samples);
         self.number += 1;
     }
 
@@ -129,6 +133,8 @@ pub(crate) enum Order {
     GoOn,
     /// Shorter than it was meant to be.
     Halt,
+    /// Not at all: what is under way is for nothing.
+    Drop,
 }
 
 /// Lets a pass end with the samples that are begun once `progress` breaks.

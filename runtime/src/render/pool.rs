@@ -36,9 +36,8 @@ const PORTION: u32 = 16;
 /// Paths of a dispatch there, for each thread: they take some milliseconds.
 const PATHS_OF_THREAD: u32 = 4096;
 
-/// A submission is made longer below the first and shorter above the second.
-const SHORT: Duration = Duration::from_millis(20);
-const LONG: Duration = Duration::from_millis(100);
+/// A submission is made shorter above this time unless another is asked for, and longer below a fifth of it.
+pub(crate) const LONG: Duration = Duration::from_millis(100);
 /// Iterations in a submission: at most, and at least when the end is near.
 pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
@@ -153,14 +152,17 @@ pub(crate) struct Pace {
     iterations: u32,
     /// The most that will be asked for.
     pub max: u32,
+    /// The time that it may take.
+    long: Duration,
     last: Instant,
 }
 
 impl Pace {
-    /// At most `max` iterations, starting with one.
-    pub(crate) fn new(max: u32) -> Self {
+    /// At most `max` iterations, starting with one, which take about `long` at most.
+    pub(crate) fn new(max: u32, long: Duration) -> Self {
         Self {
             iterations: 1,
+            long,
             max: max.clamp(1, MAX_ITERATIONS),
             last: Instant::now(),
         }
@@ -176,9 +178,9 @@ impl Pace {
     pub(crate) fn adapt(&mut self) {
         let took = self.last.elapsed();
         self.last = Instant::now();
-        if took < SHORT {
+        if took < self.long / 5 {
             self.iterations = (2 * self.iterations).min(self.max);
-        } else if took > LONG {
+        } else if took > self.long {
             self.iterations = (self.iterations / 2).max(1);
         }
     }
@@ -206,6 +208,7 @@ mod tests {
         let pace = Pace {
             iterations: 64,
             max: 64,
+            long: LONG,
             last: Instant::now(),
         };
         let after = |paths| Progress {

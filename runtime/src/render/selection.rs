@@ -26,10 +26,12 @@ impl RenderOptions {
         self.pixels.as_ref().map_or(all, |some| some.len() as u64)
     }
 
-    /// The fingerprint of a scene of which these pixels are rendered: films of some pixels are no part
-    /// of films of others.
-    pub(crate) fn fingerprint(&self, scene: u64) -> u64 {
-        let Some(pixels) = &self.pixels else {
+    /// The fingerprint of a scene of which these pixels of a picture of some size are rendered: films of some pixels
+    /// are no part of films of others.
+    pub(crate) fn fingerprint(&self, scene: u64, width: u32, height: u32) -> u64 {
+        let all = u64::from(width) * u64::from(height);
+        let some = self.pixels.as_ref();
+        let Some(pixels) = some.filter(|some| (some.len() as u64) < all) else {
             return scene;
         };
         let mut fingerprint = Fingerprint::new();
@@ -73,7 +75,8 @@ impl Renderer<'_> {
         }
         self.built.work.set_pixels(&pixels);
         self.options.pixels = Some(pixels);
-        self.facts.identity.scene = self.options.fingerprint(self.facts.scene);
+        let (width, height) = (self.facts.width, self.facts.height);
+        self.facts.identity.scene = self.options.fingerprint(self.facts.scene, width, height);
         Ok(())
     }
 }

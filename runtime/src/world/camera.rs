@@ -1,10 +1,12 @@
-//! The camera as the kernels see it: a frame of vectors, printed as WGSL constants.
+//! The camera as the kernels see it: a frame of vectors, which they read of the uniform `camera`
+//! (`kernels/camera.rs`), so that one looks from elsewhere without building any. The size of the picture, and
+//! whether there is a lens, are part of their text.
 
 use glam::Vec3;
 
 use crate::scene::Camera;
+use crate::wgsl::constants_u32;
 use crate::wgsl::template::template;
-use crate::wgsl::{constant_f32, constant_u32, constant_vec3};
 
 /// A pinhole or thin-lens camera. A ray through the picture at (x, y) in [-1, 1]^2, y up, goes
 /// towards `forward + x right + y up`.
@@ -39,19 +41,24 @@ impl CameraFrame {
         }
     }
 
-    /// Camera rays, from points of a lens if `lens` is set.
-    pub(crate) fn wgsl(&self, width: u32, height: u32, lens: bool) -> String {
-        let mut out = constant_u32("WIDTH", width) + &constant_u32("HEIGHT", height);
-        out += &constant_vec3("CAMERA_POSITION", self.position);
-        out += &constant_vec3("CAMERA_FORWARD", self.forward);
-        out += &constant_vec3("CAMERA_RIGHT", self.right);
-        out += &constant_vec3("CAMERA_UP", self.up);
-        if lens {
-            let pinhole = self.lens_radius <= 0.0;
-            let focus = if pinhole { 1.0 } else { self.focus_distance };
-            out += &constant_f32("LENS_RADIUS", self.lens_radius);
-            out += &constant_f32("FOCUS_DISTANCE", focus);
+    /// The radius of the lens and the distance that it is focused on, as kernels compute with them. A pinhole stays
+    /// one whatever it is focused on.
+    pub(crate) fn lens(&self) -> [f32; 2] {
+        if self.has_lens() {
+            [self.lens_radius, self.focus_distance]
+        } else {
+            [0.0, 1.0]
         }
-        out + &template!("camera.wgsl").wgsl(&[("lens", lens)])
     }
+
+    /// Whether rays begin at points of a lens, not in one.
+    pub(crate) fn has_lens(&self) -> bool {
+        self.lens_radius > 0.0
+    }
+}
+
+/// Camera rays of a picture, from points of a lens if `lens` is set.
+pub(crate) fn wgsl(width: u32, height: u32, lens: bool) -> String {
+    constants_u32(&[("WIDTH", width), ("HEIGHT", height)])
+        + &template!("camera.wgsl").wgsl(&[("lens", lens)])
 }

@@ -8,16 +8,16 @@ fn camera_ray(pixel: u32, u: vec4<f32>) -> CameraRay {
     let row = f32(pixel / WIDTH) + u.z;
     let x = 2.0 * column / f32(WIDTH) - 1.0;
     let y = 1.0 - 2.0 * row / f32(HEIGHT);
-    let towards = CAMERA_FORWARD + x * CAMERA_RIGHT + y * CAMERA_UP;
+    let towards = camera.forward + x * camera.right + y * camera.up;
 #if lens
     // Everything on the plane of focus stays where the pinhole sees it.
-    let radius = LENS_RADIUS * sqrt(u.x);
+    let radius = camera.lens_radius * sqrt(u.x);
     let angle = 6.2831853 * u.w;
-    let right = normalize(CAMERA_RIGHT);
-    let up = normalize(CAMERA_UP);
+    let right = normalize(camera.right);
+    let up = normalize(camera.up);
     let offset = radius * (cos(angle) * right + sin(angle) * up);
-    return CameraRay(CAMERA_POSITION + offset, normalize(FOCUS_DISTANCE * towards - offset));
+    return CameraRay(camera.position + offset, normalize(camera.focus_distance * towards - offset));
 #else
-    return CameraRay(CAMERA_POSITION, normalize(towards));
+    return CameraRay(camera.position, normalize(towards));
 #endif
 }

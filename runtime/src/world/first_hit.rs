@@ -1,4 +1,4 @@
-//! Which material each pixel of a picture sees first, found on the host.
+//! Which material each pixel of a picture sees first, found on the host; and what lies at one of them.
 //!
 //! Rays go where the camera's do, from the centre of its lens, through four places of a pixel; the material
 //! that most of them meet is the pixel's. Placed objects are not copied: a ray is taken to where they are.
@@ -10,7 +10,7 @@ use obvhs::ray::{INVALID_ID, Ray, RayHit};
 use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 
-use crate::scene::{Mesh, NO_MATERIAL, Placement, Scene, Transform};
+use crate::scene::{Camera, Mesh, NO_MATERIAL, Placement, Scene, Transform};
 use crate::world::bvh;
 use crate::world::camera::CameraFrame;
 
@@ -39,6 +39,40 @@ pub fn materials(scene: &Scene) -> Vec<Option<u32>> {
     (0..width * height).into_par_iter().map(seen).collect()
 }
 
+/// What lies at a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// The index into [`Scene::materials`]; `None` for a light.
+    pub material: Option<u32>,
+    /// The object's name.
+    pub object: String,
+    /// The point, in the scene's coordinates.
+    pub position: Vec3,
+    /// Its distance along the camera's view, in metres.
+    pub depth: f32,
+}
+
+/// What the middle of a pixel of the scene's picture shows, from a camera; `None` where that is what surrounds
+/// everything, or no pixel.
+pub fn at(scene: &Scene, camera: &Camera, [column, row]: [u32; 2]) -> Option<Seen> {
+    let (width, height) = (scene.film.width, scene.film.height);
+    if column >= width || row >= height {
+        return None;
+    }
+    let frame = CameraFrame::new(camera, width as f32 / height as f32);
+    let across = 2.0 * (column as f32 + 0.5) / width as f32 - 1.0;
+    let up = 1.0 - 2.0 * (row as f32 + 0.5) / height as f32;
+    let direction = (frame.forward + across * frame.right + up * frame.up).normalize_or_zero();
+    let met = Caster::new(scene).meets(frame.position, direction)?;
+    let names = scene.object_names();
+    Some(Seen {
+        material: Some(met.material).filter(|m| *m != NO_MATERIAL),
+        object: names.get(met.object as usize).cloned().unwrap_or_default(),
+        position: frame.position + met.t * direction,
+        depth: met.t * direction.dot(frame.forward),
+    })
+}
+
 /// The value that occurs most often, the first of several.
 fn most_frequent(found: [Option<u32>; 4]) -> Option<u32> {
     let count = |value: &Option<u32>| found.iter().filter(|f| *f == value).count();
@@ -60,12 +94,24 @@ struct Caster<'s> {
     upper: Bvh2,
     /// From the world to each placement's object.
     inverses: Vec<Inverse>,
+    /// The first name of each placement.
+    firsts: Vec<u32>,
 }
 
 /// A mesh, with a tree over its triangles.
 struct Tree<'s> {
     mesh: &'s Mesh,
     bvh: Bvh2,
+}
+
+/// What a ray meets first.
+struct Met {
+    /// How far along the ray.
+    t: f32,
+    /// The index into [`Scene::materials`], or [`NO_MATERIAL`].
+    material: u32,
+    /// The index among the names of objects.
+    object: u32,
 }
 
 /// A hit: how far along the ray, and the index of the triangle in its mesh.
@@ -102,37 +148,50 @@ impl<'s> Caster<'s> {
             objects,
             upper: bvh::binary_tree(&boxes),
             inverses: scene.placements.iter().map(inverse).collect(),
+            firsts: scene.first_objects(),
         }
     }
 
     /// The material that a ray meets first.
     fn material(&self, origin: Vec3, direction: Vec3) -> Option<u32> {
-        let mut ray = Ray::new_inf(origin.into(), direction.normalize_or_zero().into());
-        let mut material = None;
+        let met = self.meets(origin, direction.normalize_or_zero())?;
+        Some(met.material).filter(|m| *m != NO_MATERIAL)
+    }
+
+    /// What a ray of a unit direction meets first.
+    fn meets(&self, origin: Vec3, direction: Vec3) -> Option<Met> {
+        let mut ray = Ray::new_inf(origin.into(), direction.into());
+        let mut first = None;
         if let Some(hit) = self.world.closest(&ray) {
             ray.tmax = hit.t;
-            material = self
-                .world
-                .mesh
-                .materials
-                .get(hit.triangle as usize)
-                .copied();
+            let mesh = self.world.mesh;
+            first = Some(Met {
+                t: hit.t,
+                material: *mesh.materials.get(hit.triangle as usize)?,
+                object: mesh
+                    .objects
+                    .get(hit.triangle as usize)
+                    .copied()
+                    .unwrap_or(0),
+            });
         }
         let meet = |ray: &Ray, place: usize| {
             let index = self.upper.primitive_indices[place] as usize;
-            let found = self.meet(ray, index);
-            let (t, met) = found.unwrap_or((f32::INFINITY, None));
+            let Some(met) = self.meet(ray, index) else {
+                return f32::INFINITY;
+            };
+            let t = met.t;
             if t < ray.tmax {
-                material = met;
+                first = Some(met);
             }
             t
         };
         self.upper.ray_traverse(ray, &mut RayHit::none(), meet);
-        material.filter(|m| *m != NO_MATERIAL)
+        first
     }
 
     /// Where a ray meets a placement, and what.
-    fn meet(&self, ray: &Ray, index: usize) -> Option<(f32, Option<u32>)> {
+    fn meet(&self, ray: &Ray, index: usize) -> Option<Met> {
         let placement = &self.scene.placements[index];
         let tree = self.objects.get(placement.object as usize)?;
         let inverse = &self.inverses[index];
@@ -148,8 +207,16 @@ impl<'s> Caster<'s> {
         );
         let hit = tree.closest(&local)?;
         let own = *tree.mesh.materials.get(hit.triangle as usize)?;
-        let t = (f64::from(hit.t) / scale) as f32;
-        Some((t, placement.materials.get(own as usize).copied()))
+        let part = tree.mesh.objects.get(hit.triangle as usize).copied();
+        Some(Met {
+            t: (f64::from(hit.t) / scale) as f32,
+            material: placement
+                .materials
+                .get(own as usize)
+                .copied()
+                .unwrap_or(NO_MATERIAL),
+            object: self.firsts.get(index).copied().unwrap_or(0) + part.unwrap_or(0),
+        })
     }
 }
 

@@ -30,7 +30,7 @@ use impasto_compiler::partition::Plan;
 
 use crate::error::SceneError;
 use crate::film::layers::Layers;
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 use crate::technique::Technique;
 use crate::world::bvh::Trees;
 use crate::world::camera::CameraFrame;
@@ -109,6 +109,11 @@ impl World {
         Self::recording(scene, compiled, technique, layers, trees)
     }
 
+    /// Looks at it from elsewhere.
+    pub fn look(&mut self, camera: &Camera) {
+        self.camera = CameraFrame::new(camera, self.width as f32 / self.height as f32);
+    }
+
     /// The plan that gives a kernel to each of `materials` that is on some surface.
     pub(crate) fn own_plan(&self, materials: &[MaterialInfo]) -> Plan {
         let names: Vec<String> = materials.iter().map(|m| m.name.clone()).collect();
@@ -162,7 +167,7 @@ impl World {
             lights: self.parts.lights.traits(),
             media: self.parts.media.traits(),
             surface: self.parts.surface.traits(),
-            lens: self.camera.lens_radius > 0.0,
+            lens: self.camera.has_lens(),
             max_depth: self.max_depth,
             roulette_start: self.roulette_start,
             materials,

@@ -368,7 +368,7 @@ fn what_a_scene_does_not_need_is_absent_from_its_kernels() {
         assert!(glowing.contains("(material_emission("));
         assert!(!shadowed.contains("material_emission("));
         // The stub's materials neither transmit nor need a lens.
-        assert!(!shadowed.contains("let entered") && !shadowed.contains("LENS_RADIUS"));
+        assert!(!shadowed.contains("let entered") && !shadowed.contains("camera.lens_radius"));
     }
 }
 

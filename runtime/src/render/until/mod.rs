@@ -67,7 +67,7 @@ pub struct Check {
 
 impl Goals {
     /// Which error, if one, is small enough.
-    pub(crate) fn reached(&self, check: &Check) -> Option<Ending> {
+    pub fn reached(&self, check: &Check) -> Option<Ending> {
         let below = |goal: Option<f64>, error: f64| goal.is_some_and(|goal| error <= goal);
         if check.samples < LEAST_SAMPLES {
             None
@@ -98,7 +98,7 @@ pub fn second_seed(seed: u32) -> u32 {
 }
 
 /// Sums of the samples of two independent halves.
-pub(crate) struct Halves {
+pub struct Halves {
     /// Of the first half.
     first: Sums,
     /// Of both.
@@ -107,7 +107,7 @@ pub(crate) struct Halves {
 
 impl Halves {
     /// Of pictures like `empty`, which has no samples.
-    pub(crate) fn new(empty: &Sums) -> Self {
+    pub fn new(empty: &Sums) -> Self {
         let empty = empty.without_outputs();
         Self {
             first: empty.clone(),
@@ -116,7 +116,7 @@ impl Halves {
     }
 
     /// Takes note of the film after samples were added by one of the halves.
-    pub(crate) fn update(&mut self, half: usize, film: &Sums) {
+    pub fn update(&mut self, half: usize, film: &Sums) {
         let film = film.without_outputs();
         if half == 0 {
             // What the film has gained is the first half's.
@@ -135,7 +135,7 @@ impl Halves {
     /// What an error is relative to is not known, and must not depend on it: a pixel that is bright by
     /// chance, divided by its own brightness, would hide that it is wrong. The median of A, B and the mean of
     /// the pixels around is near the truth even then, and becomes the truth with more samples.
-    pub(crate) fn errors(&self) -> Option<[f64; 2]> {
+    pub fn errors(&self) -> Option<[f64; 2]> {
         let (width, height) = self.all.size();
         let means = Means::of(&self.all, width as usize);
         let (mut sums, mut counted) = ([0.0; 2], 0.0);
@@ -209,7 +209,7 @@ fn median(a: f64, b: f64, c: f64) -> f64 {
 
 /// How many samples each half takes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Next {
+pub struct Next {
     /// Of each half.
     pub samples: u32,
     /// Of both, until the render is expected to end.
@@ -218,7 +218,7 @@ pub(crate) struct Next {
 
 /// Plans passes: they double, but end where the error is expected to be small enough or the time to be
 /// over.
-pub(crate) fn next(goals: &Goals, checks: &[Check], done: u32, limit: u32) -> Next {
+pub fn next(goals: &Goals, checks: &[Check], done: u32, limit: u32) -> Next {
     let left = (limit - done.min(limit)).max(2);
     let Some(last) = checks.last() else {
         return Next {

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use impasto::trace::Replay;
-use impasto::trace::path::{Light, Path, Triple, Vertex};
+use impasto_trace::{Light, Path, Triple, Vertex};
+
+use super::Replay;
 
 /// What is said of a number that is no light.
 const NOT_FINITE: &str = "not finite";
@@ -44,7 +45,8 @@ fn light(name: &'static str, numbers: &[f64]) -> Row {
     }
 }
 
-pub(super) fn text(replay: &Replay) -> String {
+/// A replay for people.
+pub fn text(replay: &Replay) -> String {
     let paths: Vec<&Path> = [&replay.double, &replay.single]
         .into_iter()
         .flatten()

@@ -1,0 +1,237 @@
+//! Kernels that are built for a scene, and what they show of it: camera and values of parameters, which change without
+//! others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use impasto_compiler::abi::InstanceInfo;
+use impasto_compiler::source::SourceMap;
+use impasto_compiler::{
+    MaterialRequest, Moment, ParameterValue, Parameters, Program, Unfit, with_values,
+};
+use impasto_runtime::error::RuntimeError;
+use impasto_runtime::render::Renderer;
+use impasto_runtime::scene::{Camera, Scene};
+use impasto_runtime::technique::Technique;
+use impasto_runtime::world::bvh::Trees;
+use impasto_runtime::world::{MaterialSource, World};
+use impasto_viewer::engine::{ParamId, Problem};
+
+use super::pixels::{Pixels, Some as SomePixels};
+use super::problems;
+use super::project::Described;
+
+/// A submission takes about so long at most, so that orders are heard soon.
+const ANSWER: Duration = Duration::from_millis(10);
+
+/// Values of parameters, by what they are of.
+pub(super) type Values = BTreeMap<ParamId, ParameterValue>;
+
+/// Where values of parameters are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Code {
+    /// In tables, so that they change without other code. Modules of the library, whose tables are long, have those
+    /// that were set there.
+    Open,
+    /// As `impasto render` has them, with all that is known in the code.
+    Final,
+}
+
+/// Kernels and what they show.
+pub(super) struct Built<'d> {
+    pub renderer: Renderer<'d>,
+    pub code: Code,
+    pub scene: Arc<Scene>,
+    pub program: Arc<Program>,
+    /// The requests that the program is of.
+    pub requests: Vec<MaterialRequest>,
+    /// What was set in these.
+    pub values: Values,
+    pub camera: Camera,
+    pub described: Arc<Described>,
+    /// Why materials share kernels as they do.
+    pub reasons: Vec<String>,
+    trees: Arc<Trees>,
+    technique: Technique,
+    outputs: Vec<String>,
+    /// Pixels that are selected.
+    selected: Option<(Pixels, SomePixels)>,
+}
+
+/// What kernels are built of.
+pub(super) struct Ingredients {
+    pub code: Code,
+    pub scene: Scene,
+    pub program: Arc<Program>,
+    pub requests: Vec<MaterialRequest>,
+    pub values: Values,
+    pub described: Described,
+    pub reasons: Vec<String>,
+    pub trees: Arc<Trees>,
+    pub technique: Technique,
+    pub outputs: Vec<String>,
+}
+
+/// Whether something could be taken over.
+pub(super) enum Applied {
+    /// It is as it was.
+    Same,
+    /// The picture is another one.
+    Changed,
+    /// It takes other kernels.
+    OtherKernels,
+    /// It is wrong; nothing changed.
+    Wrong(Vec<Problem>),
+}
+
+impl<'d> Built<'d> {
+    /// What a maker made.
+    pub(super) fn new(mut renderer: Renderer<'d>, of: Ingredients) -> Self {
+        renderer.answer_within(ANSWER);
+        Self {
+            renderer,
+            code: of.code,
+            camera: of.scene.camera,
+            scene: Arc::new(of.scene),
+            program: of.program,
+            requests: of.requests,
+            values: of.values,
+            described: Arc::new(of.described),
+            reasons: of.reasons,
+            trees: of.trees,
+            technique: of.technique,
+            outputs: of.outputs,
+            selected: None,
+        }
+    }
+
+    /// Columns and rows of the picture.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [self.scene.film.width, self.scene.film.height]
+    }
+
+    /// The camera that the scene has.
+    pub(super) fn written_camera(&self) -> Camera {
+        self.described.project.camera.unwrap_or(self.scene.camera)
+    }
+
+    /// Looks from elsewhere.
+    pub(super) fn look(&mut self, camera: Option<Camera>) -> Applied {
+        let camera = camera.unwrap_or_else(|| self.written_camera());
+        if camera == self.camera {
+            return Applied::Same;
+        }
+        if !self.renderer.look(&camera) {
+            return Applied::OtherKernels;
+        }
+        self.camera = camera;
+        Applied::Changed
+    }
+
+    /// Gives parameters other values.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn set(&mut self, values: &Values) -> Result<Applied, RuntimeError> {
+        let values = settable(values, &self.described);
+        if values == self.values {
+            return Ok(Applied::Same);
+        }
+        if self.code == Code::Final {
+            return Ok(Applied::OtherKernels);
+        }
+        let mut requests = self.requests.clone();
+        give(&mut requests, &self.scene, &values);
+        let next = match with_values(&self.program, &requests) {
+            Ok(next) => next,
+            Err(Unfit::Code(_)) => return Ok(Applied::OtherKernels),
+            Err(Unfit::Wrong(sources, found)) => return Ok(Applied::Wrong(said(&sources, &found))),
+        };
+        if !self.take(&next)? {
+            return Ok(Applied::OtherKernels);
+        }
+        self.program = Arc::new(next);
+        self.requests = requests;
+        self.values = values;
+        Ok(Applied::Changed)
+    }
+
+    /// Lets kernels read the values of `next`; `false` if they cannot.
+    fn take(&mut self, next: &Program) -> Result<bool, RuntimeError> {
+        let about = |program: &Program| -> Vec<String> {
+            let instances = MaterialSource::instances(program);
+            let of = |i: &InstanceInfo| format!("{:?} {:?}", i.emission, i.medium);
+            instances.iter().map(of).collect()
+        };
+        if about(next) == about(&self.program) {
+            return Ok(self.renderer.set_tables(&next.tables()));
+        }
+        // Lights and media follow from values.
+        let instances = MaterialSource::instances(next);
+        let (scene, technique, outputs) = (&self.scene, &self.technique, &self.outputs);
+        let mut world =
+            World::of_instances(scene, next, &instances, technique, outputs, &self.trees)?;
+        world.look(&self.camera);
+        self.renderer.renew(&world, next)
+    }
+
+    /// Renders these pixels from now on.
+    ///
+    /// # Errors
+    /// If there are no such pixels.
+    pub(super) fn select(&mut self, pixels: Pixels, some: SomePixels) -> Result<(), RuntimeError> {
+        if self.selected != Some((pixels, some)) {
+            self.renderer.select_pixels(pixels.list(some))?;
+            self.selected = Some((pixels, some));
+        }
+        Ok(())
+    }
+}
+
+/// What is said of values.
+fn said(sources: &SourceMap, found: &[impasto_compiler::diag::Diagnostic]) -> Vec<Problem> {
+    problems::of_sources(sources, found)
+}
+
+/// Those of some values that there are parameters for.
+pub(super) fn settable(values: &Values, described: &Described) -> Values {
+    let mut some = values.clone();
+    some.retain(|id, _| described.settable.contains(id));
+    some
+}
+
+/// The requests for the materials of a scene as its file has it, with some values in the place of what it says.
+pub(super) fn requests(
+    scene: &Scene,
+    values: &Values,
+    code: Code,
+    moment: Option<Moment>,
+) -> Vec<MaterialRequest> {
+    let touched: BTreeSet<&str> = values.keys().map(|id| id.binding.as_str()).collect();
+    let mut requests = match code {
+        Code::Open => crate::shot::open_requests(scene),
+        Code::Final => crate::driver::requests(scene),
+    };
+    for request in &mut requests {
+        request.moment = moment;
+        if code == Code::Open && touched.contains(request.name.as_str()) {
+            request.parameters = Parameters::Table;
+        }
+    }
+    give(&mut requests, scene, values);
+    requests
+}
+
+/// Gives the requests for a scene's materials what the scene says and what was set.
+fn give(requests: &mut [MaterialRequest], scene: &Scene, values: &Values) {
+    for (request, binding) in requests.iter_mut().zip(&scene.materials) {
+        request.params.clone_from(&binding.params);
+        for (id, value) in values.iter().filter(|(id, _)| id.binding == binding.name) {
+            request.params.retain(|(name, _)| *name != id.param);
+            let origin = format!("{}.{}", id.binding, id.param);
+            let value = ParameterValue::From(origin, Box::new(value.clone()));
+            request.params.push((id.param.clone(), value));
+        }
+    }
+}

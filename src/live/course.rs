@@ -1,0 +1,263 @@
+//! In which portions samples are taken, and when a picture of them is handed out.
+//!
+//! A picture begins coarse where all of its pixels would take long: one pixel of each square, then the others. From then
+//! on portions grow, so that pictures are soon and then seldom, and handing them out takes little of the time.
+
+use std::time::{Duration, Instant};
+
+use impasto_runtime::film::Sums;
+use impasto_runtime::render::until::{Check, Goals, Halves, next, second_seed};
+use impasto_runtime::render::{Portion, Sitting};
+
+use super::pixels::{Pixels, Some as SomePixels};
+
+/// The first picture is to be there after this time.
+const FIRST: Duration = Duration::from_millis(40);
+/// Pixels a side of the coarsest squares.
+const COARSEST: u32 = 8;
+/// The shortest and the longest time between two pictures.
+const BETWEEN: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)];
+/// Handing out pictures takes at most so much of the time.
+const SHARE: u32 = 16;
+
+/// How fast samples were taken lately.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Speed {
+    /// Paths a second, of the first portion of a picture.
+    first: f64,
+    /// Of the others.
+    steady: f64,
+    /// How long it took to hand out a picture.
+    handing_out: Duration,
+}
+
+impl Speed {
+    /// What is assumed of a device before it is known.
+    pub(super) fn assumed(is_fast: bool) -> Self {
+        let paths = if is_fast { 1e8 } else { 3e5 };
+        Self {
+            first: paths,
+            steady: paths,
+            handing_out: Duration::ZERO,
+        }
+    }
+
+    pub(super) fn took(&mut self, step: &Step, paths: u64, time: Duration) {
+        let rate = paths as f64 / time.as_secs_f64().max(1e-6);
+        match step.some {
+            SomePixels::Coarse(_) => self.first = rate,
+            SomePixels::Rest(_) => self.steady = rate,
+            SomePixels::All => {
+                self.steady = rate;
+                if step.portion.first == 0 && step.portion.count == 1 {
+                    self.first = rate;
+                }
+            }
+        }
+    }
+
+    pub(super) fn handed_out(&mut self, time: Duration) {
+        self.handing_out = time;
+    }
+
+    /// The squares of which a pixel each can be had in time.
+    fn stride(&self, pixels: u64) -> u32 {
+        let room = self.first * FIRST.as_secs_f64();
+        let fits = |stride: &u32| pixels as f64 / f64::from(stride * stride) <= room;
+        let mut strides = [1, 2, 4].into_iter();
+        strides.find(fits).unwrap_or(COARSEST)
+    }
+}
+
+/// A portion of samples of some pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    pub some: SomePixels,
+    pub portion: Portion,
+    /// Which half of the samples it is of, where an error is estimated.
+    half: usize,
+}
+
+/// What was asked of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Asked {
+    pub seed: u32,
+    pub samples: u32,
+    pub goals: Option<Goals>,
+    pub pixels: Pixels,
+}
+
+/// A picture under way.
+pub(super) struct Course {
+    pub sitting: Sitting,
+    pub begun: Instant,
+    /// Samples that each pixel has of each seed.
+    taken: [u32; 2],
+    /// The side of the squares of which one pixel has a sample, if not all have.
+    coarse: Option<u32>,
+    /// Samples that the next half is to have as well.
+    pair: Option<u32>,
+    halves: Option<Halves>,
+    pub checks: Vec<Check>,
+    pub is_reached: bool,
+    /// Pictures that were handed out.
+    pub pictures: u32,
+    /// Samples below which none is handed out: a picture of as many is shown that is the same but for its last bits.
+    pub silent_below: u32,
+}
+
+impl Course {
+    /// Nothing yet.
+    pub(super) fn new(sitting: Sitting, silent_below: u32) -> Self {
+        Self {
+            sitting,
+            begun: Instant::now(),
+            taken: [0; 2],
+            coarse: None,
+            pair: None,
+            halves: None,
+            checks: Vec::new(),
+            is_reached: false,
+            pictures: 0,
+            silent_below,
+        }
+    }
+
+    /// Samples that every pixel has.
+    pub(super) fn samples(&self) -> u32 {
+        self.taken[0] + self.taken[1]
+    }
+
+    /// The side of the squares of a coarse picture; 1 of one that is not.
+    pub(super) fn stride(&self) -> u32 {
+        self.coarse.unwrap_or(1)
+    }
+
+    /// What to do next; `None` if all is done.
+    pub(super) fn next(&self, asked: &Asked, speed: &Speed) -> Option<Step> {
+        if let Some(stride) = self.coarse {
+            return Some(step(asked, SomePixels::Rest(stride), 0, 0, 1));
+        }
+        let done = self.samples();
+        if done >= asked.samples || self.is_reached {
+            return None;
+        }
+        if let Some(count) = self.pair {
+            return Some(step(asked, SomePixels::All, 1, self.taken[1], count));
+        }
+        if done == 0 {
+            let stride = match self.silent_below {
+                0 => speed.stride(asked.pixels.count()),
+                _ => 1,
+            };
+            let some = match stride {
+                1 => SomePixels::All,
+                stride => SomePixels::Coarse(stride),
+            };
+            return Some(step(asked, some, 0, 0, 1));
+        }
+        let left = asked.samples - done;
+        let count = match &asked.goals {
+            Some(goals) => next(goals, &self.checks, done, asked.samples).samples,
+            None => self.portion(asked, speed).min(left),
+        };
+        Some(step(asked, SomePixels::All, 0, self.taken[0], count))
+    }
+
+    /// How many samples are taken until the next picture.
+    fn portion(&self, asked: &Asked, speed: &Speed) -> u32 {
+        let [least, most] = BETWEEN;
+        let between = (self.begun.elapsed() / 3).max(SHARE * speed.handing_out);
+        let between = between.clamp(least, most.max(SHARE * speed.handing_out));
+        let paths = speed.steady * between.as_secs_f64();
+        // Conversion saturates.
+        ((paths / asked.pixels.count() as f64) as u32).clamp(1, 1 << 16)
+    }
+
+    /// Notes that a step was taken. Whether there is a picture to be handed out.
+    pub(super) fn took(&mut self, step: &Step, asked: &Asked) -> bool {
+        match step.some {
+            SomePixels::Coarse(stride) => {
+                self.coarse = Some(stride);
+                return true;
+            }
+            SomePixels::Rest(_) => self.coarse = None,
+            SomePixels::All => {}
+        }
+        self.taken[step.half] += step.portion.count;
+        let is_pair = asked.goals.is_some();
+        self.pair = (is_pair && step.half == 0).then_some(step.portion.count);
+        let is_last = self.samples() >= asked.samples;
+        is_last
+            || (self.samples() >= self.silent_below && (self.pair.is_none() || self.samples() == 1))
+    }
+
+    /// Looks at the error after a half: the film holds the samples of both.
+    pub(super) fn look(&mut self, step: &Step, asked: &Asked, sums: &Sums) {
+        let (Some(goals), None) = (&asked.goals, self.coarse) else {
+            return;
+        };
+        let halves = self
+            .halves
+            .get_or_insert_with(|| Halves::new(&sums.emptied()));
+        halves.update(step.half, sums);
+        let seconds = self.begun.elapsed();
+        if step.half == 1
+            && let Some([mse, relmse]) = halves.errors()
+        {
+            let check = Check {
+                samples: self.samples(),
+                seconds: seconds.as_secs_f64(),
+                gpu_seconds: 0.0,
+                relmse,
+                rmse: mse.sqrt(),
+            };
+            self.checks.push(check);
+            self.is_reached = goals.reached(&check).is_some();
+        }
+        let is_over = |time: Duration| seconds >= time;
+        self.is_reached |= goals.time.is_some_and(is_over);
+    }
+
+    /// Must sums be read after a step even if nobody is shown them?
+    pub(super) fn needs_look(&self, asked: &Asked) -> bool {
+        asked.goals.is_some() && self.coarse.is_none()
+    }
+}
+
+fn step(asked: &Asked, some: SomePixels, half: usize, first: u32, count: u32) -> Step {
+    let seed = match half {
+        0 => asked.seed,
+        _ => second_seed(asked.seed),
+    };
+    Step {
+        some,
+        portion: Portion {
+            seed,
+            first,
+            count,
+            completes: half == 0 && !matches!(some, SomePixels::Coarse(_)),
+        },
+        half,
+    }
+}
+
+/// Whether a picture is done.
+pub(super) fn is_done(course: &Course, asked: &Asked) -> bool {
+    course.coarse.is_none() && (course.samples() >= asked.samples || course.is_reached)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_devices_begin_with_coarse_squares() {
+        let pixels = 480 * 360;
+        assert_eq!(Speed::assumed(true).stride(pixels), 1);
+        let slow = Speed::assumed(false);
+        assert_eq!(slow.stride(pixels), 4);
+        assert_eq!(slow.stride(16), 1);
+        assert_eq!(slow.stride(1 << 24), COARSEST);
+    }
+}

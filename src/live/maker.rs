@@ -1,0 +1,499 @@
+//! Reads files, compiles materials and builds kernels, on a thread beside the one that renders.
+//!
+//! There is one job at a time: a newer one takes the place of what is still waiting, and of what is under way. What one
+//! job has of the one before is kept: files that did not change, the program, trees over geometry; and the device
+//! keeps kernels.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+
+use impasto_compiler::diag;
+use impasto_compiler::partition::{Plan, PlanInputs, Requires, Strategy};
+use impasto_compiler::{self as compiler, MaterialRequest, Moment, Program};
+use impasto_runtime::device::Device;
+use impasto_runtime::error::{RuntimeError, SceneError};
+use impasto_runtime::film::outputs::ask_for_looks;
+use impasto_runtime::options::RenderOptions;
+use impasto_runtime::render::Renderer;
+use impasto_runtime::scene::{Asked, FilmSettings, Scene};
+use impasto_runtime::world::bvh::Trees;
+use impasto_runtime::world::{MaterialSource, World};
+use impasto_viewer::engine::{Problem, State};
+
+use super::built::{Built, Code, Ingredients, requests, settable};
+use super::kernels;
+use super::pixels::{Pixels, Some as SomePixels};
+use super::problems;
+use super::project::describe;
+use super::shared::{Shared, lock};
+use super::wanted::Wanted;
+use super::{LiveOptions, POINTS};
+use crate::files::FileLoader;
+use crate::plan::{self, SceneMaterials};
+use crate::set::Sample;
+use crate::shot::{self, Subject};
+
+/// Kernels to be made.
+#[derive(Clone)]
+pub(super) struct Job {
+    pub wanted: Wanted,
+    pub code: Code,
+    /// The job that it follows: kernels of final code are made for what another job read.
+    pub of: u64,
+    pub number: u64,
+}
+
+/// What became of a job.
+pub(super) struct Made<'d> {
+    pub job: Job,
+    pub outcome: Outcome<'d>,
+}
+
+/// The end of a job.
+pub(super) enum Outcome<'d> {
+    /// Kernels, and what there is to say of the files.
+    Built(Box<Built<'d>>, Vec<Problem>),
+    /// Final code is what is open, since nothing is left in tables.
+    Same,
+    /// The files have errors.
+    Wrong(Vec<Problem>),
+    /// The device fails.
+    Failed(RuntimeError),
+}
+
+/// A job that came to no kernels.
+enum Stop {
+    Cancelled,
+    Same,
+    Wrong(Vec<Problem>),
+    Failed(RuntimeError),
+}
+
+impl From<SceneError> for Stop {
+    fn from(error: SceneError) -> Self {
+        Self::Wrong(vec![problems::of_scene(&error)])
+    }
+}
+
+impl From<RuntimeError> for Stop {
+    fn from(error: RuntimeError) -> Self {
+        match error {
+            RuntimeError::Interrupted => Self::Cancelled,
+            RuntimeError::Scene(error) => error.into(),
+            error => Self::Failed(error),
+        }
+    }
+}
+
+/// What passes between the maker and whoever renders.
+pub(super) struct Mailbox<'d> {
+    inside: Mutex<Inside<'d>>,
+    bell: Condvar,
+    /// Is the job under way for nothing?
+    cancelled: AtomicBool,
+    has_made: AtomicBool,
+    /// Does what was made make another picture?
+    is_other: AtomicBool,
+}
+
+struct Inside<'d> {
+    job: Option<Job>,
+    /// The code of the job under way.
+    at_work: Option<Code>,
+    made: Option<Made<'d>>,
+    ended: bool,
+}
+
+impl<'d> Mailbox<'d> {
+    pub(super) fn new() -> Self {
+        Self {
+            inside: Mutex::new(Inside {
+                job: None,
+                at_work: None,
+                made: None,
+                ended: false,
+            }),
+            bell: Condvar::new(),
+            cancelled: AtomicBool::new(false),
+            has_made: AtomicBool::new(false),
+            is_other: AtomicBool::new(false),
+        }
+    }
+
+    /// Asks for kernels, in the place of those that were asked for before.
+    pub(super) fn ask(&self, job: Job) {
+        let mut inside = lock(&self.inside);
+        inside.job = Some(job);
+        inside.made = None;
+        self.has_made.store(false, Ordering::SeqCst);
+        self.cancelled.store(true, Ordering::SeqCst);
+        self.bell.notify_all();
+    }
+
+    /// The code that is being made, or is to be.
+    pub(super) fn at_work(&self) -> Option<Code> {
+        let inside = lock(&self.inside);
+        let waiting = inside.job.as_ref().map(|job| job.code);
+        waiting.or(inside.at_work)
+    }
+
+    /// Takes what was made.
+    pub(super) fn take(&self) -> Option<Made<'d>> {
+        if !self.has_made.swap(false, Ordering::SeqCst) {
+            return None;
+        }
+        lock(&self.inside).made.take()
+    }
+
+    /// Is there something made by which the picture is not what it was?
+    pub(super) fn has_other(&self) -> bool {
+        self.has_made.load(Ordering::SeqCst) && self.is_other.load(Ordering::SeqCst)
+    }
+
+    /// Gives up final kernels that are being made or are to be.
+    pub(super) fn drop_final(&self) {
+        let mut inside = lock(&self.inside);
+        inside.job.take_if(|job| job.code == Code::Final);
+        if inside.at_work == Some(Code::Final) {
+            self.cancelled.store(true, Ordering::SeqCst);
+        }
+    }
+
+    /// Gives up what is under way, and ends the thread.
+    pub(super) fn end(&self) {
+        lock(&self.inside).ended = true;
+        self.cancelled.store(true, Ordering::SeqCst);
+        self.bell.notify_all();
+    }
+
+    fn next(&self) -> Option<Job> {
+        let mut inside = lock(&self.inside);
+        loop {
+            if inside.ended {
+                return None;
+            }
+            if let Some(job) = inside.job.take() {
+                inside.at_work = Some(job.code);
+                self.cancelled.store(false, Ordering::SeqCst);
+                return Some(job);
+            }
+            inside = self
+                .bell
+                .wait(inside)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn put(&self, made: Option<Made<'d>>, is_other: bool) {
+        let mut inside = lock(&self.inside);
+        inside.at_work = None;
+        // Of a job that another one has replaced, nobody wants to hear.
+        if let Some(made) = made.filter(|_| inside.job.is_none()) {
+            inside.made = Some(made);
+            self.is_other.store(is_other, Ordering::SeqCst);
+            self.has_made.store(true, Ordering::SeqCst);
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::SeqCst)
+    }
+}
+
+/// The maker, and what it keeps from job to job.
+pub(super) struct Maker<'d, 's> {
+    pub device: &'d Device,
+    pub shared: &'s Shared,
+    pub mailbox: &'s Mailbox<'d>,
+    pub path: &'s PathBuf,
+    pub options: &'s LiveOptions,
+    trees: Arc<Trees>,
+    /// What was read, and at which count of [`Wanted::reads`].
+    read: Option<(u64, Arc<Subject>)>,
+    /// How often files were read.
+    readings: u64,
+    /// Of the last kernels that were made.
+    last_print: Option<u64>,
+    /// The last open and the last final program.
+    compiled: [Option<Compiled>; 2],
+}
+
+/// A program, and what it was compiled from.
+struct Compiled {
+    reading: u64,
+    requests: Vec<MaterialRequest>,
+    looks: bool,
+    program: Arc<Program>,
+    problems: Vec<Problem>,
+}
+
+impl<'d, 's> Maker<'d, 's> {
+    pub(super) fn new(
+        device: &'d Device,
+        shared: &'s Shared,
+        mailbox: &'s Mailbox<'d>,
+        path: &'s PathBuf,
+        options: &'s LiveOptions,
+    ) -> Self {
+        Self {
+            device,
+            shared,
+            mailbox,
+            path,
+            options,
+            trees: Arc::default(),
+            read: None,
+            readings: 0,
+            last_print: None,
+            compiled: [None, None],
+        }
+    }
+
+    /// Does jobs until the end.
+    pub(super) fn work(mut self) {
+        while let Some(job) = self.mailbox.next() {
+            let outcome = match self.make(&job) {
+                Ok((built, problems)) => Some(Outcome::Built(Box::new(built), problems)),
+                Err(Stop::Cancelled) => None,
+                Err(Stop::Same) => Some(Outcome::Same),
+                Err(Stop::Wrong(problems)) => Some(Outcome::Wrong(problems)),
+                Err(Stop::Failed(error)) => Some(Outcome::Failed(error)),
+            };
+            let is_other = match &outcome {
+                Some(Outcome::Built(built, _)) => {
+                    let print = Some(built.renderer.fingerprint_but_camera());
+                    std::mem::replace(&mut self.last_print, print) != print
+                }
+                Some(Outcome::Failed(_)) => true,
+                _ => false,
+            };
+            let made = outcome.map(|outcome| Made { job, outcome });
+            self.mailbox.put(made, is_other);
+            self.shared.ring();
+        }
+    }
+
+    fn make(&mut self, job: &Job) -> Result<(Built<'d>, Vec<Problem>), Stop> {
+        let wanted = &job.wanted;
+        let is_shown = job.code == Code::Open;
+        self.tell(is_shown, State::Reading);
+        let subject = self.subject(wanted.reads)?;
+        let asked = Asked {
+            frame: wanted.frame.unwrap_or(0).into(),
+            ..Asked::default()
+        };
+        let mut scene = subject.scene(&asked)?;
+        let is_scene = matches!(*subject, Subject::Scene(_));
+        let mut described = describe(self.path, is_scene, &scene);
+        if let Some([width, height]) = wanted.size {
+            scene.film = FilmSettings { width, height };
+        }
+        scene.camera = wanted.camera.unwrap_or(scene.camera);
+        let rate = subject.animation().frames_per_second;
+        let moment = wanted
+            .frame
+            .map(|frame| Moment::of_frame(frame.into(), rate));
+        let values = settable(&wanted.values, &described);
+        let requests = requests(&scene, &values, job.code, moment);
+        self.check_cancelled()?;
+        self.tell(is_shown, State::Compiling);
+        let (program, mut problems) = self.program(&scene, &requests, job.code, &wanted.outputs)?;
+        let open = self.compiled[Code::Open as usize].as_ref();
+        if job.code == Code::Final && open.is_some_and(|open| is_same(&open.program, &program)) {
+            return Err(Stop::Same);
+        }
+        problems.extend(scene.warnings.iter().map(|w| problems::warning(w)));
+        self.tell(is_shown, State::Building);
+        let options = self.render_options(&scene, wanted);
+        let instances = MaterialSource::instances(&*program);
+        let (technique, outputs) = (&options.technique, &options.outputs);
+        let world = World::of_instances(
+            &scene,
+            &program,
+            &instances,
+            technique,
+            outputs,
+            &self.trees,
+        )?;
+        described.project.bounds = Some(world.parts.bounds.map(|corner| corner.to_array()));
+        self.check_cancelled()?;
+        let plan = planned(wanted.strategy, &scene, &program, self.device);
+        let plan = plan.map_err(|why| Stop::Wrong(vec![problems::of_order(why)]))?;
+        let watch = |_, _| match self.mailbox.is_cancelled() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let renderer =
+            Renderer::from_world_beside(self.device, &world, &*program, &plan, &options, &watch)?;
+        let reasons = kernels::reasons(&plan, renderer.plan(), &program, self.device);
+        let built = Built::new(
+            renderer.named(&scene.name),
+            Ingredients {
+                code: job.code,
+                scene,
+                program,
+                requests,
+                values,
+                described,
+                reasons,
+                trees: self.trees.clone(),
+                technique: options.technique,
+                outputs: options.outputs,
+            },
+        );
+        Ok((built, problems))
+    }
+
+    fn check_cancelled(&self) -> Result<(), Stop> {
+        if self.mailbox.is_cancelled() {
+            Err(Stop::Cancelled)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Says what the engine is at. Nobody waits for final code.
+    fn tell(&self, is_shown: bool, state: State) {
+        if is_shown {
+            self.shared.tell(|news| news.state = state);
+        }
+    }
+
+    /// What is rendered, read again if that was asked for since it was.
+    fn subject(&mut self, reads: u64) -> Result<Arc<Subject>, Stop> {
+        if let Some((at, subject)) = &self.read
+            && *at == reads
+        {
+            return Ok(subject.clone());
+        }
+        self.readings += 1;
+        self.read = None;
+        self.shared.watch([self.path.clone()]);
+        let subject = self.open().inspect_err(|error| {
+            // A file that the scene names and that is not there may yet come.
+            self.shared.watch(error.path.clone());
+        })?;
+        self.shared.watch(subject.files().to_vec());
+        let subject = Arc::new(subject);
+        self.read = Some((reads, subject.clone()));
+        Ok(subject)
+    }
+
+    fn open(&self) -> Result<Subject, SceneError> {
+        if !shot::is_material(self.path) {
+            return Subject::of_scene(self.path);
+        }
+        let sample = Sample {
+            file: self.path.to_string_lossy().into_owned(),
+            material: self.options.material.clone(),
+            turntable: self.options.turntable,
+        };
+        Subject::on(self.options.set, &sample)
+    }
+
+    /// The program of some requests, compiled unless it is there, and the compiler's warnings.
+    fn program(
+        &mut self,
+        scene: &Scene,
+        requests: &[MaterialRequest],
+        code: Code,
+        outputs: &[String],
+    ) -> Result<(Arc<Program>, Vec<Problem>), Stop> {
+        let looks = ask_for_looks(outputs);
+        if let Some(known) = &self.compiled[code as usize]
+            && (known.reading, known.looks) == (self.readings, looks)
+            && known.requests == requests
+        {
+            return Ok((known.program.clone(), known.problems.clone()));
+        }
+        let mut loader = FileLoader::new(&scene.base);
+        let mailbox = self.mailbox;
+        let compiled =
+            compiler::compile_until(requests, &mut loader, looks, &|| mailbox.is_cancelled());
+        self.shared.watch(loader.asked());
+        self.check_cancelled()?;
+        let problems = problems::of_sources(&compiled.sources, &compiled.diagnostics);
+        if compiled.program.is_none() || diag::has_errors(&compiled.diagnostics) {
+            return Err(Stop::Wrong(problems));
+        }
+        let Some(program) = compiled.program else {
+            return Err(Stop::Wrong(problems));
+        };
+        self.shared.watch(shot::textures(scene, &program));
+        let program = Arc::new(program);
+        self.compiled[code as usize] = Some(Compiled {
+            reading: self.readings,
+            requests: requests.to_vec(),
+            looks,
+            program: program.clone(),
+            problems: problems.clone(),
+        });
+        Ok((program, problems))
+    }
+
+    fn render_options(&self, scene: &Scene, wanted: &Wanted) -> RenderOptions {
+        let size = [scene.film.width, scene.film.height];
+        RenderOptions {
+            samples: wanted.most_samples(),
+            seed: self.options.seed,
+            pool: self.options.pool.or_else(|| pool(self.device)),
+            technique: self.options.technique,
+            outputs: wanted.outputs.clone(),
+            // All of them, so that others can be chosen.
+            pixels: Some(Pixels::new(size, None).list(SomePixels::All)),
+            ..RenderOptions::default()
+        }
+    }
+}
+
+/// Paths in flight. A GPU in software takes fewer than for a render, since an iteration is what one waits for.
+fn pool(device: &Device) -> Option<u32> {
+    const SOFTWARE: u32 = 1 << 14;
+    match device {
+        Device::Gpu(gpu) if gpu.info().kind == "software" => Some(SOFTWARE),
+        _ => None,
+    }
+}
+
+/// Do two programs compute the same by the same code?
+fn is_same(a: &Program, b: &Program) -> bool {
+    let text = |program: &Program| {
+        let all: Vec<usize> = (0..program.materials().len()).collect();
+        program.wgsl(&all)
+    };
+    a.tables() == b.tables() && text(a) == text(b)
+}
+
+/// The plan of a strategy. Those that must know how paths hit materials have a kernel a material: what `auto` would
+/// change in the midst of a render is not worth as much to who changes the scene all the time.
+fn planned(
+    strategy: Option<Strategy>,
+    scene: &Scene,
+    program: &Program,
+    device: &Device,
+) -> Result<Plan, String> {
+    let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
+    let unused = plan::unused(scene, program);
+    let strategy = strategy.unwrap_or_else(|| device.strategy());
+    let inputs = PlanInputs {
+        unused: &unused,
+        ..PlanInputs::of_names(&names)
+    };
+    let planned = |inputs: &PlanInputs<'_>| strategy.plan(inputs).map_err(|e| e.to_string());
+    match strategy.requires() {
+        Requires::Nothing => planned(&inputs),
+        Requires::Costs => {
+            let materials = SceneMaterials::new(scene, program, POINTS);
+            planned(&PlanInputs {
+                costs: Some(&materials.costs),
+                ..inputs
+            })
+        }
+        Requires::Workload | Requires::Measurements => Ok(Plan {
+            strategy: strategy.to_string(),
+            ..Plan::few_kernels(&names, &unused)
+        }),
+    }
+}

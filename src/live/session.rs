@@ -1,0 +1,671 @@
+//! Renders on an open device, follows orders, and hands out pictures, until the end or until the device is lost.
+//!
+//! There are two sets of kernels. Open ones read the values of parameters from tables: they are there soon after a file
+//! was saved, and whoever drags a slider sees them. Once a hand has rested for a while, final ones are built beside
+//! the render, which are those of `impasto render`. They begin the picture again, without anybody noticing: the
+//! picture by open kernels stays until theirs has as many samples. So what is left alone has in the end the bits of
+//! `impasto render`, and no picture gets worse on the way.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use impasto_runtime::device::Device;
+use impasto_runtime::error::RuntimeError;
+use impasto_runtime::film::Sums;
+use impasto_viewer::engine::{ErrorPoint, Picture, Problem, State};
+
+use super::LiveOptions;
+use super::built::{Applied, Built, Code, settable};
+use super::course::{Asked, Course, Speed, Step, is_done};
+use super::kernels;
+use super::maker::{Job, Mailbox, Maker, Outcome};
+use super::pixels::Pixels;
+use super::problems;
+use super::project;
+use super::shared::{Shared, Shown};
+use super::wanted::Wanted;
+
+/// A hand has rested when it has done nothing for so long; where the processor renders, making kernels takes its time,
+/// and the hand may soon move again.
+const RESTED: Duration = Duration::from_millis(500);
+const RESTED_LONG: Duration = Duration::from_millis(1500);
+/// A picture rests for so long at most while others kernels are made.
+const HELD: Duration = Duration::from_secs(2);
+/// How long to wait for something to do.
+const IDLE: Duration = Duration::from_millis(50);
+/// How often it is told which kernels take how long.
+const KERNELS_EVERY: Duration = Duration::from_millis(300);
+
+/// Why a session ended.
+pub(super) enum End {
+    /// It was asked to.
+    Quit,
+    /// The device is lost.
+    Lost(RuntimeError),
+}
+
+/// Renders until the end.
+pub(super) fn run(device: &Device, shared: &Shared, path: &PathBuf, options: &LiveOptions) -> End {
+    let mailbox = Mailbox::new();
+    let builder = std::thread::Builder::new()
+        .name("make".into())
+        .stack_size(super::STACK_BYTES);
+    std::thread::scope(|scope| {
+        let maker = Maker::new(device, shared, &mailbox, path, options);
+        if let Err(error) = builder.spawn_scoped(scope, move || maker.work()) {
+            let why = RuntimeError::Threads {
+                threads: 1,
+                reason: error.to_string(),
+            };
+            return End::Lost(why);
+        }
+        let mut session = Session::new(device, shared, &mailbox, options);
+        let end = session.render();
+        mailbox.end();
+        end
+    })
+}
+
+struct Session<'d, 's> {
+    device: &'d Device,
+    shared: &'s Shared,
+    mailbox: &'s Mailbox<'d>,
+    options: &'s LiveOptions,
+    /// What is followed, and the number of the order that it came to be by.
+    following: Wanted,
+    pictures: u64,
+    open: Option<Built<'d>>,
+    last: Option<Built<'d>>,
+    /// Whether the final kernels render.
+    on_last: bool,
+    /// Whether the open kernels are as good as final ones.
+    open_is_final: bool,
+    /// Counts jobs.
+    jobs: u64,
+    /// When the last one was given.
+    asked_at: Instant,
+    /// The job that made the open kernels.
+    open_job: u64,
+    course: Option<Course>,
+    /// Samples of the last picture that was handed out of what is shown now.
+    handed: u32,
+    speed: Speed,
+    /// Whether a GPU of its own renders.
+    is_fast: bool,
+    /// What is wrong with the files, and with values.
+    of_files: Vec<Problem>,
+    of_values: Vec<Problem>,
+    /// What keeps the device from rendering these kernels.
+    failed: Option<String>,
+    number: u64,
+    shown: Option<Arc<Picture>>,
+    told_kernels: Option<Instant>,
+}
+
+impl<'d, 's> Session<'d, 's> {
+    fn new(
+        device: &'d Device,
+        shared: &'s Shared,
+        mailbox: &'s Mailbox<'d>,
+        options: &'s LiveOptions,
+    ) -> Self {
+        let (following, pictures) = shared.wanted();
+        let is_fast = matches!(device, Device::Gpu(_)) && device.info().kind != "software";
+        let news = shared.news();
+        Self {
+            device,
+            shared,
+            mailbox,
+            options,
+            following,
+            pictures,
+            open: None,
+            last: None,
+            on_last: false,
+            open_is_final: false,
+            jobs: 0,
+            asked_at: Instant::now(),
+            open_job: 0,
+            course: None,
+            handed: 0,
+            speed: Speed::assumed(is_fast),
+            is_fast,
+            of_files: Vec::new(),
+            of_values: Vec::new(),
+            failed: None,
+            number: news.picture.as_ref().map_or(0, |picture| picture.number),
+            shown: news.picture,
+            told_kernels: None,
+        }
+    }
+
+    fn render(&mut self) -> End {
+        self.make(Code::Open);
+        loop {
+            match self.turn() {
+                Ok(true) => {}
+                Ok(false) => return End::Quit,
+                Err(error) if is_loss(&error) => return End::Lost(error),
+                Err(error) => {
+                    self.change();
+                    self.failed = Some(error.to_string());
+                    self.tell_state();
+                }
+            }
+        }
+    }
+
+    /// Follows orders, takes what was made, and renders a portion or waits. `false` at the end.
+    fn turn(&mut self) -> Result<bool, RuntimeError> {
+        if self.shared.quits() {
+            return Ok(false);
+        }
+        if let Some(made) = self.mailbox.take() {
+            self.adopt(made.job, made.outcome)?;
+        }
+        let (wanted, pictures) = self.shared.wanted();
+        if wanted != self.following {
+            self.follow(wanted)?;
+        }
+        self.pictures = pictures;
+        self.finish();
+        if !self.portion()? {
+            self.shared.wait(IDLE);
+        }
+        Ok(true)
+    }
+
+    /// The kernels that render.
+    fn active(&mut self) -> Option<&mut Built<'d>> {
+        if self.on_last {
+            self.last.as_mut()
+        } else {
+            self.open.as_mut()
+        }
+    }
+
+    /// Has kernels made for what is followed now.
+    fn make(&mut self, code: Code) {
+        self.jobs += 1;
+        self.asked_at = Instant::now();
+        self.mailbox.ask(Job {
+            wanted: self.following.clone(),
+            code,
+            of: self.open_job,
+            number: self.jobs,
+        });
+        self.tell_state();
+    }
+
+    /// Follows what is wanted from now on.
+    fn follow(&mut self, wanted: Wanted) -> Result<(), RuntimeError> {
+        let old = std::mem::replace(&mut self.following, wanted);
+        if !self.is_fast && old.moved != self.following.moved {
+            // The hand needs the processor.
+            self.mailbox.drop_final();
+        }
+        let new = &self.following;
+        let is_other = (&old.size, &old.outputs, &old.strategy, old.frame, old.reads)
+            != (&new.size, &new.outputs, &new.strategy, new.frame, new.reads);
+        let begins = (old.restarts, old.crop, old.goals.is_some())
+            != (new.restarts, new.crop, new.goals.is_some());
+        if begins {
+            self.change();
+        }
+        if is_other {
+            self.make(Code::Open);
+        }
+        self.apply()?;
+        self.tell_state();
+        Ok(())
+    }
+
+    /// Gives the kernels that render the camera and the values that are wanted.
+    fn apply(&mut self) -> Result<(), RuntimeError> {
+        let values = self.following.values.clone();
+        let camera = self.following.camera;
+        if let (true, Some(last)) = (self.on_last, &self.last)
+            && settable(&values, &last.described) != last.values
+        {
+            self.on_last = false;
+            self.change();
+        }
+        let Some(built) = self.active() else {
+            return Ok(());
+        };
+        let applied = [built.set(&values)?, built.look(camera)];
+        let is_changed = applied.iter().any(|a| matches!(a, Applied::Changed));
+        let other = applied.iter().any(|a| matches!(a, Applied::OtherKernels));
+        let [of_values, _] = applied;
+        let was_wrong = !self.of_values.is_empty();
+        self.of_values = match of_values {
+            Applied::Wrong(problems) => problems,
+            _ => Vec::new(),
+        };
+        if is_changed {
+            self.change();
+            self.open_is_final &= self.on_last;
+        }
+        if is_changed || was_wrong || !self.of_values.is_empty() {
+            self.tell_project();
+        }
+        // One that is under way is waited for: whoever drags goes on dragging.
+        if other && self.mailbox.at_work() != Some(Code::Open) {
+            self.make(Code::Open);
+        }
+        Ok(())
+    }
+
+    /// Takes over what was made.
+    fn adopt(&mut self, job: Job, outcome: Outcome<'d>) -> Result<(), RuntimeError> {
+        match (job.code, outcome) {
+            (_, Outcome::Failed(error)) if is_loss(&error) => return Err(error),
+            (Code::Open, Outcome::Failed(error)) => {
+                self.of_files = vec![problems::of_render(&error)];
+            }
+            (Code::Open, Outcome::Wrong(problems)) => self.of_files = problems,
+            (Code::Open, Outcome::Built(built, problems)) => {
+                self.of_files = problems;
+                self.failed = None;
+                self.open_job = job.number;
+                self.forget_written(&built);
+                self.take_open(*built)?;
+            }
+            (Code::Open, Outcome::Same) => {}
+            // It was made for what is no longer there.
+            (Code::Final, _) if job.of != self.open_job => {}
+            (Code::Final, Outcome::Built(built, problems)) => self.take_last(*built, problems)?,
+            (Code::Final, Outcome::Same) => self.open_is_final = true,
+            // What open kernels can do, final ones may not; the picture stays.
+            (Code::Final, Outcome::Wrong(problems)) => {
+                self.of_files = problems;
+                self.open_is_final = true;
+            }
+            (Code::Final, Outcome::Failed(error)) => {
+                self.of_files.push(problems::of_render(&error));
+                self.open_is_final = true;
+            }
+        }
+        self.tell_project();
+        self.tell_state();
+        Ok(())
+    }
+
+    /// Values that were written into the scene need not be set any more.
+    fn forget_written(&mut self, built: &Built<'d>) {
+        let written = |id: &impasto_viewer::engine::ParamId| {
+            let binding = built.described.project.bindings.iter();
+            let binding = binding.into_iter().find(|b| b.name == id.binding)?;
+            let param = binding
+                .params
+                .iter()
+                .find(|p| p.interface.name == id.param)?;
+            param.written.clone()
+        };
+        let is_same = |id: &_, value: &_| written(id).as_ref() == Some(value);
+        let values = &mut self.following.values;
+        values.retain(|id, value| !is_same(id, value));
+        self.shared
+            .amend(|wanted| wanted.values.retain(|id, value| !is_same(id, value)));
+    }
+
+    /// Takes open kernels over, unless they show what is shown anyway.
+    fn take_open(&mut self, mut built: Built<'d>) -> Result<(), RuntimeError> {
+        let wanted = (self.following.values.clone(), self.following.camera);
+        let applied = [built.set(&wanted.0)?, built.look(wanted.1)];
+        let other = applied.iter().any(|a| matches!(a, Applied::OtherKernels));
+        let is_same = self.open.as_ref().is_some_and(|old| {
+            let same_camera = old.camera == built.camera || self.on_last;
+            same_camera
+                && old.size() == built.size()
+                && old.renderer.fingerprint_but_camera() == built.renderer.fingerprint_but_camera()
+        });
+        if is_same && let Some(old) = &mut self.open {
+            // The samples stay; what is said of them may be new.
+            old.described = built.described;
+            old.scene = built.scene;
+            if let Some(last) = &mut self.last {
+                last.described = old.described.clone();
+            }
+        } else {
+            self.open = Some(built);
+            self.last = None;
+            self.on_last = false;
+            self.open_is_final = false;
+            self.change();
+        }
+        if other {
+            self.make(Code::Open);
+            return Ok(());
+        }
+        // The file may have another camera than before.
+        self.apply()
+    }
+
+    /// Goes on by final kernels, if they are for what is wanted.
+    fn take_last(
+        &mut self,
+        mut built: Built<'d>,
+        problems: Vec<Problem>,
+    ) -> Result<(), RuntimeError> {
+        let values = settable(&self.following.values, &built.described);
+        let is_here = matches!(
+            built.look(self.following.camera),
+            Applied::Same | Applied::Changed
+        );
+        if values != built.values || !is_here {
+            return Ok(());
+        }
+        self.of_files = problems;
+        self.last = Some(built);
+        self.on_last = true;
+        self.begin();
+        Ok(())
+    }
+
+    /// Has final kernels made once the hand rests.
+    fn finish(&mut self) {
+        let has_open = self.open.is_some() && self.failed.is_none();
+        let is_due = has_open && !self.on_last && !self.open_is_final && !self.following.paused;
+        let rested = if self.is_fast { RESTED } else { RESTED_LONG };
+        let rests = !self.following.dragged && self.following.moved.elapsed() >= rested;
+        let has_picture = self
+            .course
+            .as_ref()
+            .is_some_and(|course| course.pictures > 0);
+        if is_due && rests && has_picture && self.mailbox.at_work().is_none() {
+            // Perhaps those of before are.
+            let values = self.following.values.clone();
+            if let Some(last) = &mut self.last
+                && settable(&values, &last.described) == last.values
+                && matches!(
+                    last.look(self.following.camera),
+                    Applied::Same | Applied::Changed
+                )
+            {
+                self.on_last = true;
+                self.begin();
+                return;
+            }
+            self.make(Code::Final);
+        }
+    }
+
+    /// What is shown becomes another picture.
+    fn change(&mut self) {
+        self.course = None;
+        self.handed = 0;
+    }
+
+    /// Begins the picture anew. Nothing is handed out until it is as good as the one that is there, if that is the same
+    /// but for its last bits.
+    fn begin(&mut self) {
+        let silent_below = self.handed.min(self.following.most_samples());
+        if let Some(built) = self.active() {
+            let sitting = built.renderer.sit();
+            self.course = Some(Course::new(sitting, silent_below));
+        }
+    }
+
+    fn asked(&self, built: &Built<'_>) -> Asked {
+        Asked {
+            seed: self.options.seed,
+            samples: self.following.most_samples(),
+            goals: self.following.goals,
+            pixels: Pixels::new(built.size(), self.following.crop),
+        }
+    }
+
+    /// Whether a picture rests that is about to be replaced: it would take the time of what is to replace it.
+    fn holds(&self) -> bool {
+        let is_soon = self.asked_at.elapsed() < HELD;
+        is_soon && self.handed > 0 && self.mailbox.at_work() == Some(Code::Open)
+    }
+
+    /// Takes a portion of samples, and hands out a picture of them. `false` if there is nothing to do.
+    fn portion(&mut self) -> Result<bool, RuntimeError> {
+        let has_kernels = if self.on_last { &self.last } else { &self.open };
+        let waits = self.following.paused || self.failed.is_some() || self.holds();
+        if has_kernels.is_none() || waits {
+            return Ok(false);
+        }
+        if self.course.is_none() {
+            self.begin();
+        }
+        let built = if self.on_last { &self.last } else { &self.open };
+        let (Some(built), Some(course)) = (built, &self.course) else {
+            return Ok(false);
+        };
+        let asked = self.asked(built);
+        let Some(step) = course.next(&asked, &self.speed) else {
+            return Ok(false);
+        };
+        if !self.take(&step, &asked)? {
+            self.course = None;
+            return Ok(true);
+        }
+        let Some(course) = &mut self.course else {
+            return Ok(true);
+        };
+        let has_picture = course.took(&step, &asked);
+        if has_picture || course.needs_look(&asked) {
+            let begun = Instant::now();
+            self.look(&step, &asked, has_picture)?;
+            self.speed.handed_out(begun.elapsed());
+        }
+        let is_done = self
+            .course
+            .as_ref()
+            .is_some_and(|course| is_done(course, &asked));
+        if is_done || has_picture {
+            self.tell_state();
+        }
+        Ok(true)
+    }
+
+    /// Takes the samples of a step; `false` if it was given up for another picture. The first picture after an order is
+    /// not given up for the next order: a hand that moves all the time would see none.
+    fn take(&mut self, step: &Step, asked: &Asked) -> Result<bool, RuntimeError> {
+        let (shared, mailbox, pictures) = (self.shared, self.mailbox, self.pictures);
+        let (built, course) = match (self.on_last, &mut self.last, &mut self.open) {
+            (true, Some(built), _) | (false, _, Some(built)) => (built, &mut self.course),
+            _ => return Ok(false),
+        };
+        let Some(course) = course else {
+            return Ok(false);
+        };
+        let is_first = course.pictures == 0 && course.silent_below == 0;
+        built.select(asked.pixels, step.some)?;
+        built.renderer.select(&impasto_runtime::render::Samples {
+            seed: asked.seed,
+            first: 0,
+            count: asked.samples,
+        })?;
+        let ends = || {
+            let is_other = shared.pictures() != pictures && !is_first;
+            is_other || mailbox.has_other() || shared.quits()
+        };
+        let (has_shown, asked_at) = (self.handed > 0, self.asked_at);
+        let holds = || {
+            let is_soon = asked_at.elapsed() < HELD;
+            is_soon && has_shown && mailbox.at_work() == Some(Code::Open)
+        };
+        let mut look = |_: &_| {
+            while holds() && !ends() {
+                shared.wait(IDLE);
+            }
+            if ends() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let begun = Instant::now();
+        let taken = built
+            .renderer
+            .take_portion(&mut course.sitting, &step.portion, &mut look)?;
+        if taken {
+            let pixels = asked.pixels.list(step.some).len() as u64;
+            let paths = pixels * u64::from(step.portion.count);
+            self.speed.took(step, paths, begun.elapsed());
+        }
+        Ok(taken)
+    }
+
+    /// Looks at the film, and hands it out as a picture.
+    fn look(&mut self, step: &Step, asked: &Asked, has_picture: bool) -> Result<(), RuntimeError> {
+        let built = if self.on_last { &self.last } else { &self.open };
+        let (Some(built), Some(course)) = (built, &mut self.course) else {
+            return Ok(());
+        };
+        let sums = built.renderer.sums_of(&course.sitting)?;
+        course.look(step, asked, &sums);
+        if !has_picture {
+            return Ok(());
+        }
+        self.number += 1;
+        let before = self.shown.as_deref();
+        let picture = Arc::new(picture(self.number, built, course, asked, &sums, before));
+        let is_coarse = course.stride() > 1;
+        let film = (!is_coarse).then(|| {
+            let film = built.renderer.film_of(&course.sitting, sums);
+            (Arc::new(film), asked.goals.is_none())
+        });
+        course.pictures += 1;
+        self.handed = course.samples();
+        self.shared.show(Shown {
+            scene: built.scene.clone(),
+            program: built.program.clone(),
+            camera: built.camera,
+            picture: picture.clone(),
+            film,
+            seed: asked.seed,
+        });
+        let due = self
+            .told_kernels
+            .is_none_or(|told| told.elapsed() >= KERNELS_EVERY);
+        let kernels = due.then(|| Arc::new(kernels::of(self.device, built, &course.sitting)));
+        if due {
+            self.told_kernels = Some(Instant::now());
+        }
+        let errors: Vec<ErrorPoint> = course
+            .checks
+            .iter()
+            .map(|check| ErrorPoint {
+                seconds: check.seconds,
+                samples: check.samples,
+                relmse: check.relmse,
+            })
+            .collect();
+        self.shown = Some(picture.clone());
+        self.shared.tell(|news| {
+            news.picture = Some(picture);
+            if let Some(kernels) = kernels
+                && *news.kernels != *kernels
+            {
+                news.kernels = kernels;
+            }
+            if *news.errors != errors {
+                news.errors = Arc::new(errors);
+            }
+        });
+        Ok(())
+    }
+
+    /// Says what is shown, with its values, and what is wrong.
+    fn tell_project(&mut self) {
+        let built = if self.on_last { &self.last } else { &self.open };
+        let project = built.as_ref().map(|built| {
+            let values = &built.values;
+            Arc::new(project::with_values(
+                &built.described.project,
+                &built.program,
+                values,
+            ))
+        });
+        let complaints = self.following.complaints.values();
+        let all = self
+            .of_files
+            .iter()
+            .chain(&self.of_values)
+            .chain(complaints);
+        let all: Vec<Problem> = all.cloned().collect();
+        self.shared.tell(|news| {
+            if let Some(project) = project {
+                news.project = project;
+            }
+            if *news.problems != all {
+                news.problems = Arc::new(all);
+            }
+        });
+    }
+
+    /// Says what the engine is at.
+    fn tell_state(&mut self) {
+        if self.mailbox.at_work() == Some(Code::Open) {
+            // The maker says what it is at.
+            return;
+        }
+        let built = if self.on_last { &self.last } else { &self.open };
+        let is_done = match (built, &self.course) {
+            (Some(built), Some(course)) => is_done(course, &self.asked(built)),
+            _ => false,
+        };
+        let state = if let Some(why) = &self.failed {
+            State::Failed(why.clone())
+        } else if problems::has_errors(&self.of_files) {
+            State::Broken
+        } else if self.following.paused {
+            State::Paused
+        } else if is_done {
+            State::Done
+        } else {
+            State::Rendering
+        };
+        if self.shared.news().state != state {
+            self.shared.tell(|news| news.state = state);
+        }
+    }
+}
+
+/// The picture that a film holds.
+fn picture(
+    number: u64,
+    built: &Built<'_>,
+    course: &Course,
+    asked: &Asked,
+    sums: &Sums,
+    before: Option<&Picture>,
+) -> Picture {
+    let [width, height] = built.size();
+    let (pixels, counts) = super::picture::pixels(sums, &asked.pixels, course.stride(), before);
+    let (nonfinite, dropped) = built.renderer.dropped_of(&course.sitting);
+    let examples = dropped.iter().filter_map(|d| d.example.as_ref());
+    let mut places: Vec<u32> = examples.map(|e| e.pixel[1] * width + e.pixel[0]).collect();
+    places.sort_unstable();
+    places.dedup();
+    Picture {
+        number,
+        width,
+        height,
+        camera: Some(built.camera),
+        samples: course.samples().max(1),
+        samples_asked: asked.samples,
+        elapsed: course.begun.elapsed(),
+        pixels: Arc::new(pixels),
+        counts: Arc::new(counts),
+        layers: super::picture::layers(sums),
+        nonfinite,
+        nonfinite_pixels: Arc::new(places),
+    }
+}
+
+/// Is the device to be opened anew? Calls on one that is lost are refused, and not always for that reason.
+fn is_loss(error: &RuntimeError) -> bool {
+    matches!(
+        error,
+        RuntimeError::DeviceLost(_) | RuntimeError::Validation(_) | RuntimeError::OutOfMemory(_)
+    )
+}

@@ -1,0 +1,545 @@
+//! The engine behind the window, driven without one: what it shows after each order, and what it leaves as it is.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, Weak};
+use std::time::{Duration, Instant};
+
+use impasto::compiler::ParameterValue;
+use impasto::compiler::interface::Value;
+use impasto::live::engine::{Answer, Engine, News, Order, ParamId, Picture, State};
+use impasto::live::{Live, LiveOptions};
+use impasto::runtime::film::file::FilmFile;
+use impasto::runtime::scene::{Asked, FilmSettings};
+use impasto::set::{Sample, Set};
+use impasto::shot::Subject;
+use impasto::{Choice, Device, DeviceOptions, RenderOptions, Renderer, Strategy};
+use tempfile::TempDir;
+
+const PAINT: &str = "use std::bsdf::{clear_coat, diffuse};
+/// Paint.
+material paint {
+    /// How rough its coat is.
+    param roughness: float = 0.25 in 0.0 .. 1.0;
+    param tint: color = color(0.5, 0.2, 0.1);
+    surface = layer(clear_coat(roughness: roughness), diffuse(tint));
+}
+";
+
+const LAMP: &str = "use std::edf::uniform;
+use std::bsdf::diffuse;
+material lamp {
+    param power: float = 1.0 in 0.0 .. 100.0;
+    emission = power * uniform(color(1.0, 0.9, 0.8));
+    surface = diffuse(color(0.2));
+}
+";
+
+const SCENE: &str = "# A wall and a lamp.
+[camera]
+position = [0.0, 0.0, 3.0]   # in front
+look_at = [0.0, 0.0, 0.0]
+fov = 40
+
+[film]
+width = 16
+height = 12
+
+[[geometry]]
+file = \"wall.obj\"
+
+# As it was measured.
+[materials.wall]
+file = \"paint.impasto\"
+params = { roughness = 0.5 } # of the day
+
+[materials.bulb]
+file = \"lamp.impasto\"
+params = { power = 4.0 }
+";
+
+const WALL: &str = "o wall
+v -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0
+usemtl wall
+f 1 2 3 4
+o bulb
+v -0.3 0.6 0.5\nv 0.3 0.6 0.5\nv 0 1 0.5
+usemtl bulb
+f 5 7 6\n";
+
+/// How long anything may take where other work goes on.
+const LONG: Duration = Duration::from_secs(90);
+
+fn device(choice: Choice) -> DeviceOptions {
+    DeviceOptions {
+        choice,
+        ..DeviceOptions::default()
+    }
+}
+
+fn options(choice: Choice) -> LiveOptions {
+    LiveOptions {
+        device: device(choice),
+        size: Some([16, 12]),
+        samples: 8,
+        ..LiveOptions::default()
+    }
+}
+
+/// Files, and an engine that shows one of them.
+struct Room {
+    folder: TempDir,
+    live: Arc<Live>,
+    /// The states that were told.
+    states: Arc<Mutex<Vec<State>>>,
+}
+
+impl Room {
+    fn new(file: &str, options: LiveOptions) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in [
+            ("paint.impasto", PAINT),
+            ("lamp.impasto", LAMP),
+            ("scene.toml", SCENE),
+            ("wall.obj", WALL),
+        ] {
+            std::fs::write(folder.path().join(name), text).expect("written");
+        }
+        let live = Live::new(&folder.path().join(file), options).expect("threads");
+        let live = Arc::new(live);
+        let states: Arc<Mutex<Vec<State>>> = Arc::default();
+        let (seen, own): (_, Weak<Live>) = (states.clone(), Arc::downgrade(&live));
+        live.on_news(Box::new(move || {
+            if let Some(live) = own.upgrade() {
+                seen.lock().expect("states").push(live.news().state);
+            }
+        }));
+        Self {
+            folder,
+            live,
+            states,
+        }
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.at(name), text).expect("written");
+    }
+
+    /// News of which something holds.
+    #[track_caller]
+    fn wait(&self, what: &str, holds: impl Fn(&News) -> bool) -> News {
+        let begin = Instant::now();
+        loop {
+            let news = self.live.news();
+            if holds(&news) {
+                return news;
+            }
+            let texts: Vec<&str> = news.problems.iter().map(|p| p.text.as_str()).collect();
+            assert!(
+                begin.elapsed() < LONG,
+                "no {what}: {:?} {texts:?}",
+                news.state
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// A picture after the one of this number.
+    #[track_caller]
+    fn picture_after(&self, number: u64) -> Arc<Picture> {
+        let has_one = |news: &News| news.picture.as_ref().is_some_and(|p| p.number > number);
+        self.wait("picture", has_one).picture.expect("a picture")
+    }
+
+    #[track_caller]
+    fn answer(&self, order: Order) -> Answer {
+        self.live.order(order);
+        let begin = Instant::now();
+        loop {
+            if let Some(answer) = self.live.answers().pop() {
+                return answer;
+            }
+            assert!(begin.elapsed() < LONG, "no answer");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// The picture once it is done by kernels that stay.
+    #[track_caller]
+    fn rested(&self) -> News {
+        let mut since = Instant::now();
+        let mut number = 0;
+        loop {
+            let news = self.wait("end", |news| news.state == State::Done);
+            let now = news.picture.as_ref().map_or(0, |picture| picture.number);
+            if now != number {
+                (number, since) = (now, Instant::now());
+            }
+            if since.elapsed() > Duration::from_secs(3) {
+                return news;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+}
+
+fn set(binding: &str, param: &str, value: ParameterValue, dragged: bool) -> Order {
+    let (binding, param) = (binding.into(), param.into());
+    Order::Set {
+        param: ParamId { binding, param },
+        value,
+        dragged,
+    }
+}
+
+fn value(news: &News, param: &str) -> Value {
+    let mut params = news.project.bindings.iter().flat_map(|b| &b.params);
+    let found = params.find(|p| p.interface.name == param);
+    found.expect("a parameter").value.clone()
+}
+
+/// The film of `impasto render` of a material on the ball.
+fn rendered(path: &Path, choice: Choice, samples: u32) -> FilmFile {
+    let sample = Sample {
+        file: path.to_string_lossy().into_owned(),
+        material: None,
+        turntable: None,
+    };
+    let subject = Subject::on(Set::Ball, &sample).expect("a set");
+    let mut scene = subject.scene(&Asked::default()).expect("a scene");
+    scene.film = FilmSettings {
+        width: 16,
+        height: 12,
+    };
+    let program = impasto::compile(&scene).expect("it compiles");
+    let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
+    let device = Device::open(&device(choice)).expect("a device");
+    let options = RenderOptions {
+        samples,
+        ..RenderOptions::default()
+    };
+    let renderer = Renderer::new(&device, &scene, &program, &plan, &options);
+    let rendering = renderer
+        .expect("it is built")
+        .render(&mut |_| std::ops::ControlFlow::Continue(()));
+    rendering.expect("it renders").sums
+}
+
+#[test]
+fn what_is_left_alone_has_the_bits_of_a_render() {
+    for choice in [Choice::Cpu, Choice::Gpu] {
+        let room = Room::new("paint.impasto", options(choice));
+        let first = room.picture_after(0);
+        assert_eq!((first.width, first.height), (16, 12));
+        let news = room.rested();
+        let picture = news.picture.expect("a picture");
+        assert_eq!((picture.samples, picture.samples_asked), (8, 8));
+        assert!(news.problems.is_empty(), "{:?}", news.problems);
+        assert!(picture.counts.iter().all(|count| *count == 8));
+        let path = room.at("own.film");
+        let Answer::Saved(Ok(_)) = room.answer(Order::Save {
+            path: path.clone(),
+            exposure: 0.0,
+        }) else {
+            panic!("it is saved");
+        };
+        let saved = FilmFile::read(&path).expect("a film");
+        let expected = rendered(&room.at("paint.impasto"), choice, 8);
+        assert_eq!(saved.sums, expected.sums, "{choice:?}");
+        assert_eq!(saved.about.identity, expected.about.identity);
+        assert_eq!(saved.about.ranges, expected.about.ranges);
+        assert_eq!(*picture.pixels, expected.sums.picture().pixels);
+    }
+}
+
+#[test]
+fn a_camera_and_a_value_compile_nothing() {
+    let room = Room::new("scene.toml", options(Choice::Cpu));
+    let first = room.rested();
+    let camera = first.project.camera.expect("a camera");
+    room.states.lock().expect("states").clear();
+    let mut moved = camera;
+    moved.position.x += 0.4;
+    room.live.order(Order::Look(moved));
+    let is_moved = |news: &News| {
+        news.picture
+            .as_ref()
+            .is_some_and(|p| p.camera == Some(moved))
+    };
+    let seen = room
+        .wait("other view", is_moved)
+        .picture
+        .expect("a picture");
+    let first_picture = first.picture.expect("a picture");
+    assert_ne!(seen.pixels, first_picture.pixels);
+    let sum = |picture: &Picture| picture.pixels.iter().map(|p| p[0]).sum::<f32>();
+    let mut last = seen.clone();
+    for (step, roughness) in [0.1, 0.9, 0.3].into_iter().enumerate() {
+        let value = ParameterValue::Float(roughness);
+        room.live.order(set("wall", "roughness", value, step < 2));
+        let other = room.wait("other picture", |news| {
+            news.picture
+                .as_ref()
+                .is_some_and(|p| p.pixels != last.pixels)
+                && self::value(news, "roughness") == Value::Number(roughness as f32)
+        });
+        last = other.picture.expect("a picture");
+    }
+    // Light follows from a value as well.
+    let power = ParameterValue::Float(40.0);
+    room.live.order(set("bulb", "power", power, true));
+    let is_bright = |news: &News| {
+        news.picture
+            .as_ref()
+            .is_some_and(|p| sum(p) > 4.0 * sum(&last))
+    };
+    let news = room.wait("bright picture", is_bright);
+    assert_eq!(value(&news, "power"), Value::Number(40.0));
+    let states = room.states.lock().expect("states").clone();
+    let builds = [State::Compiling, State::Building];
+    assert!(!states.iter().any(|s| builds.contains(s)), "{states:?}");
+    // A reset gives back what is written, and the camera of the scene is there again.
+    room.live.order(Order::ResetAll);
+    room.live.order(Order::LookAsWritten);
+    let news = room.wait("values as written", |news| {
+        value(news, "roughness") == Value::Number(0.5) && value(news, "power") == Value::Number(4.0)
+    });
+    assert!(
+        news.project
+            .bindings
+            .iter()
+            .flat_map(|b| &b.params)
+            .all(|p| !p.is_set)
+    );
+    let news = room.rested();
+    let picture = news.picture.expect("a picture");
+    assert_eq!(picture.pixels, first_picture.pixels);
+}
+
+#[test]
+fn wrong_values_and_broken_files_leave_the_last_picture() {
+    let room = Room::new("paint.impasto", options(Choice::Cpu));
+    let first = room.picture_after(0);
+    room.live
+        .order(set("sample", "roughness", ParameterValue::Float(7.0), true));
+    let news = room.wait("problem", |news| !news.problems.is_empty());
+    assert!(
+        news.problems[0].text.contains("sample.roughness"),
+        "{:?}",
+        news.problems
+    );
+    assert!(news.picture.is_some());
+    room.live.order(Order::ResetAll);
+    room.wait("peace", |news| news.problems.is_empty());
+
+    room.write(
+        "paint.impasto",
+        &PAINT.replace("diffuse(tint)", "diffuse(taint)"),
+    );
+    let news = room.wait("problem", |news| news.state == State::Broken);
+    let problem = &news.problems[0];
+    assert!(
+        !problem.is_warning && problem.message.contains("taint"),
+        "{problem:?}"
+    );
+    assert_eq!(problem.code.as_deref(), Some("E0201"));
+    let place = problem.place.clone().expect("a place");
+    assert!(
+        place.0.ends_with("paint.impasto") && place.1 == 7,
+        "{place:?}"
+    );
+    let kept = news.picture.expect("the last picture");
+    assert!(kept.number >= first.number && kept.pixels.len() == 16 * 12);
+
+    // Mended, with a new default and a new parameter.
+    let mended = PAINT
+        .replace("= 0.25 in", "= 0.75 in")
+        .replace("    surface", "    param other: float = 2.0;\n    surface");
+    room.write("paint.impasto", &mended);
+    let news = room.wait("new parameter", |news| {
+        let mut bindings = news.project.bindings.iter();
+        news.state != State::Broken && bindings.any(|b| b.params.len() == 3)
+    });
+    assert_eq!(value(&news, "roughness"), Value::Number(0.75));
+    room.picture_after(kept.number);
+
+    // A file that is gone, and comes back.
+    std::fs::remove_file(room.at("paint.impasto")).expect("removed");
+    room.wait("problem", |news| news.state == State::Broken);
+    room.write("paint.impasto", PAINT);
+    room.wait("file", |news| {
+        value(news, "roughness") == Value::Number(0.25)
+    });
+}
+
+#[test]
+fn a_save_without_effect_keeps_the_samples_and_a_reload_keeps_the_camera() {
+    let room = Room::new("scene.toml", options(Choice::Cpu));
+    let mut camera = room.picture_after(0).camera.expect("a camera");
+    camera.position.y += 0.3;
+    room.live.order(Order::Look(camera));
+    let done = room.rested().picture.expect("a picture");
+    assert_eq!(done.camera, Some(camera));
+    let project = room.live.news().project;
+    room.write("paint.impasto", &format!("{PAINT}// A comment.\n"));
+    room.wait("new project", |news| !Arc::ptr_eq(&news.project, &project));
+    std::thread::sleep(Duration::from_millis(700));
+    let still = room.rested().picture.expect("a picture");
+    assert_eq!((still.number, still.samples), (done.number, done.samples));
+    room.write("paint.impasto", &PAINT.replace("0.2, 0.1", "0.9, 0.1"));
+    let other = room.picture_after(done.number);
+    assert_eq!(other.camera, Some(camera));
+    assert!(other.samples <= 8);
+}
+
+#[test]
+fn values_are_written_back_between_comments() {
+    let room = Room::new("scene.toml", options(Choice::Cpu));
+    room.picture_after(0);
+    room.live.order(set(
+        "wall",
+        "roughness",
+        ParameterValue::Float(0.125),
+        false,
+    ));
+    room.live.order(set(
+        "wall",
+        "tint",
+        ParameterValue::Floats(vec![0.25, 0.5, 0.75]),
+        false,
+    ));
+    room.wait("value", |news| {
+        value(news, "tint") == Value::Components(vec![0.25, 0.5, 0.75])
+    });
+    let Answer::Saved(Ok(path)) = room.answer(Order::WriteBack) else {
+        panic!("it is written");
+    };
+    let written = std::fs::read_to_string(path).expect("the scene");
+    let expected = SCENE.replace(
+        "{ roughness = 0.5 } # of the day",
+        "{ roughness = 0.125, tint = [0.25, 0.5, 0.75] } # of the day",
+    );
+    assert_eq!(written, expected);
+    let news = room.wait("scene as it is now", |news| {
+        let params = &news.project.bindings[0].params;
+        params.iter().all(|p| !p.is_set) && params[0].written == Some(ParameterValue::Float(0.125))
+    });
+    assert_eq!(value(&news, "roughness"), Value::Number(0.125));
+    // A set has no file to write to.
+    let room = Room::new("paint.impasto", options(Choice::Cpu));
+    room.picture_after(0);
+    let refused = room.answer(Order::WriteBack);
+    assert!(matches!(refused, Answer::Saved(Err(why)) if why.contains("hint")));
+}
+
+#[test]
+fn pixels_are_picked_traced_saved_and_read() {
+    let room = Room::new("scene.toml", options(Choice::Cpu));
+    let done = room.rested();
+    let Answer::Picked(Some(picked)) = room.answer(Order::Pick([8, 6])) else {
+        panic!("the wall is there");
+    };
+    let binding = picked.binding.expect("a binding");
+    assert_eq!(done.project.bindings[binding].name, "wall");
+    assert_eq!(picked.object.as_deref(), Some("wall/wall"));
+    assert!(
+        (picked.depth - 3.0).abs() < 1e-4 && picked.position[2].abs() < 1e-4,
+        "{picked:?}"
+    );
+    let (file, line) = picked.source.expect("a source");
+    assert!(
+        file.ends_with("paint.impasto") && line == 3,
+        "{file} {line}"
+    );
+    assert!(matches!(
+        room.answer(Order::Pick([99, 0])),
+        Answer::Picked(None)
+    ));
+
+    let Answer::Traced(traced) = room.answer(Order::Trace {
+        pixel: [8, 6],
+        sample: 1,
+    }) else {
+        panic!("a path");
+    };
+    assert!(traced.vertices.len() >= 2, "{}", traced.text);
+    assert!((traced.vertices[0][2] - 3.0).abs() < 1e-6);
+    assert!(traced.text.contains("pixel 8,6, sample 1") && traced.text.contains("vertex 1"));
+
+    for name in ["a.exr", "a.png", "a.film"] {
+        let path = room.at(name);
+        let order = Order::Save {
+            path: path.clone(),
+            exposure: 0.0,
+        };
+        let Answer::Saved(saved) = room.answer(order) else {
+            panic!("{name}");
+        };
+        assert_eq!(saved.as_ref(), Ok(&path));
+    }
+    let Answer::Read(Ok(read)) = room.answer(Order::Read(room.at("a.exr"))) else {
+        panic!("it is read");
+    };
+    assert_eq!(read.pixels, done.picture.expect("a picture").pixels);
+    let refused = room.answer(Order::Save {
+        path: room.at("none/a.png"),
+        exposure: 0.0,
+    });
+    assert!(matches!(refused, Answer::Saved(Err(_))));
+    assert!(matches!(
+        room.answer(Order::Read(room.at("b.exr"))),
+        Answer::Read(Err(_))
+    ));
+}
+
+#[test]
+fn sizes_crops_outputs_strategies_and_ends_are_followed() {
+    let room = Room::new("scene.toml", options(Choice::Cpu));
+    room.picture_after(0);
+    room.live
+        .order(Order::Outputs(vec!["depth".into(), "material".into()]));
+    let with_layers = |news: &News| news.picture.as_ref().is_some_and(|p| p.layers.len() == 2);
+    let picture = room.wait("layers", with_layers).picture.expect("a picture");
+    let depth = picture
+        .layers
+        .iter()
+        .find(|l| l.name == "depth")
+        .expect("depth");
+    assert_eq!((depth.channels, depth.values.len()), (1, 16 * 12));
+    assert!((depth.values[6 * 16 + 8] - 3.0).abs() < 0.1);
+    room.live.order(Order::Size([24, 10]));
+    room.wait("size", |news| {
+        news.picture
+            .as_ref()
+            .is_some_and(|p| (p.width, p.height) == (24, 10))
+    });
+    room.live.order(Order::Samples(16));
+    room.live.order(Order::Crop(Some([[4, 2], [9, 7]])));
+    let news = room.wait("end", |news| {
+        news.state == State::Done && news.picture.as_ref().is_some_and(|p| p.samples == 16)
+    });
+    let picture = news.picture.expect("a picture");
+    let full = picture.counts.iter().filter(|count| **count == 16).count();
+    assert!(full >= 25, "{full}");
+    room.live.order(Order::Crop(None));
+    room.live.order(Order::Strategy("none".into()));
+    let news = room.wait("complaint", |news| !news.problems.is_empty());
+    assert!(news.problems[0].is_warning);
+    room.live.order(Order::Strategy("mega".into()));
+    let news = room.wait("megakernel", |news| news.kernels.strategy == "mega");
+    assert!(!news.kernels.reasons.is_empty());
+    room.live.order(Order::Until(Some("relmse=1e6".into())));
+    let news = room.wait("error", |news| {
+        !news.errors.is_empty() && news.state == State::Done
+    });
+    assert!(
+        news.errors
+            .last()
+            .is_some_and(|e| e.relmse.is_finite() && e.samples >= 16)
+    );
+    room.live.order(Order::Pause(true));
+    room.wait("pause", |news| news.state == State::Paused);
+}
