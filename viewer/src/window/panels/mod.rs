@@ -1,0 +1,31 @@
+//! What stands around the picture. Each panel reads the desk and tells it what hands do; none keeps a state of its own.
+
+use eframe::egui::{CollapsingHeader, RichText, Ui};
+
+use super::theme;
+
+pub mod bar;
+pub mod drawer;
+mod errors;
+pub mod help;
+mod kernels;
+mod params;
+pub mod save;
+pub mod scene;
+pub mod side;
+pub mod status;
+
+/// A part of a panel that folds.
+fn section<R>(ui: &mut Ui, title: &str, is_open: bool, content: impl FnOnce(&mut Ui) -> R) {
+    let header = CollapsingHeader::new(RichText::new(title).strong()).default_open(is_open);
+    header.show_unindented(ui, |ui| {
+        ui.add_space(2.0);
+        content(ui);
+        ui.add_space(6.0);
+    });
+}
+
+/// A quiet text.
+fn quiet(text: impl Into<String>) -> RichText {
+    RichText::new(text).color(theme::QUIET).size(12.0)
+}
