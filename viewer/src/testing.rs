@@ -99,15 +99,33 @@ pub fn project() -> Project {
     let group = |name: &str| Some(name.to_owned());
     let color = |r, g, b| Value::Components(vec![r, g, b]);
     let glaze = vec![
-        param("base_color", "color", color(0.42, 0.11, 0.06), "Color of the clay.").with(|i| {
+        param(
+            "base_color",
+            "color",
+            color(0.42, 0.11, 0.06),
+            "Color of the clay.",
+        )
+        .with(|i| {
             i.hard = Some([0.0, 1.0]);
             i.group = group("Base");
         }),
-        param("roughness", "float", Value::Number(0.3), "How rough the glaze is: 0 is a mirror.").with(|i| {
+        param(
+            "roughness",
+            "float",
+            Value::Number(0.3),
+            "How rough the glaze is: 0 is a mirror.",
+        )
+        .with(|i| {
             i.hard = Some([0.0, 1.0]);
             i.group = group("Base");
         }),
-        param("speckle", "length", Value::Number(0.008), "Size of the speckles.").with(|i| {
+        param(
+            "speckle",
+            "length",
+            Value::Number(0.008),
+            "Size of the speckles.",
+        )
+        .with(|i| {
             i.hard = Some([1e-4, 1.0]);
             i.soft = Some([1e-3, 0.03]);
             i.group = group("Pattern");
@@ -126,20 +144,44 @@ pub fn project() -> Project {
             });
             i.default_text = "28.6 deg".to_owned();
         }),
-        param("octaves", "int", Value::Int(3), "How fine the speckles get.").with(|i| {
+        param(
+            "octaves",
+            "int",
+            Value::Int(3),
+            "How fine the speckles get.",
+        )
+        .with(|i| {
             i.hard = Some([1.0, 8.0]);
             i.group = group("Pattern");
         }),
-        param("coated", "bool", Value::Bool(true), "Is there a clear coat?").with(|i| {
+        param(
+            "coated",
+            "bool",
+            Value::Bool(true),
+            "Is there a clear coat?",
+        )
+        .with(|i| {
             i.group = group("Coat");
         }),
-        param("bent", "normal", Value::Text("normal".to_owned()), "Bends the coat.").with(|i| {
+        param(
+            "bent",
+            "normal",
+            Value::Text("normal".to_owned()),
+            "Bends the coat.",
+        )
+        .with(|i| {
             i.settable = false;
             i.group = group("Coat");
         }),
     ];
     let floor = vec![
-        param("tint", "color", color(0.5, 0.5, 0.5), "Color of the brighter squares.").with(|i| {
+        param(
+            "tint",
+            "color",
+            color(0.5, 0.5, 0.5),
+            "Color of the brighter squares.",
+        )
+        .with(|i| {
             i.hard = Some([0.0, 1.0]);
         }),
         param("square", "length", Value::Number(0.05), "Side of a square.").with(|i| {
@@ -150,8 +192,18 @@ pub fn project() -> Project {
                 size: 1e-2,
             });
         }),
-        param("offset", "vec3", color(0.0, 0.0, 0.0), "Moves the squares, in metres."),
-        param("wood", "texture", Value::Text("wood.png".to_owned()), "A picture over the squares."),
+        param(
+            "offset",
+            "vec3",
+            color(0.0, 0.0, 0.0),
+            "Moves the squares, in metres.",
+        ),
+        param(
+            "wood",
+            "texture",
+            Value::Text("wood.png".to_owned()),
+            "A picture over the squares.",
+        ),
         param("glow", "float", Value::Number(0.0), "Light of the squares.").with(|i| {
             i.hard = Some([0.0, f32::INFINITY]);
         }),
@@ -365,7 +417,9 @@ fn meet(from: Vec3, toward: Vec3) -> Option<Hit> {
     let away = from - CENTRE;
     let half = away.dot(toward);
     let inside = half * half - away.length_squared() + RADIUS * RADIUS;
-    let ball = (inside > 0.0).then(|| -half - inside.sqrt()).filter(|t| *t > 1e-5);
+    let ball = (inside > 0.0)
+        .then(|| -half - inside.sqrt())
+        .filter(|t| *t > 1e-5);
     let floor = (toward.y < -1e-6).then(|| -from.y / toward.y);
     let floor = floor.filter(|t| *t > 1e-5 && (from + *t * toward).length() < 3.0);
     match (ball, floor) {
@@ -390,7 +444,8 @@ fn meet(from: Vec3, toward: Vec3) -> Option<Hit> {
 
 /// A number from 0 to 1 for each place.
 fn hash(x: u32, y: u32, z: u32) -> f32 {
-    let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B) ^ z.wrapping_mul(0xC2B2_AE35);
+    let mut h =
+        x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B) ^ z.wrapping_mul(0xC2B2_AE35);
     h ^= h >> 15;
     h = h.wrapping_mul(0x2C1B_3C6D);
     h ^= h >> 12;
@@ -440,13 +495,18 @@ impl Inner {
                 let p = hit.position;
                 let p = Vec3::new(cos * p.x + sin * p.z, p.y, cos * p.z - sin * p.x) / size;
                 let cell = p.floor();
-                let spot = hash(cell.x as i32 as u32, cell.y as i32 as u32, cell.z as i32 as u32);
+                let spot = hash(
+                    cell.x as i32 as u32,
+                    cell.y as i32 as u32,
+                    cell.z as i32 as u32,
+                );
                 let round = 1.0 - (p - cell - 0.5).length() * 2.0;
                 let speckle = if spot > 0.7 && round > 0.2 { 0.4 } else { 1.0 };
                 self.color(0, "base_color") * speckle
             }
             _ => {
-                let p = (hit.position - self.color(1, "offset")) / self.number(1, "square").max(1e-5);
+                let p =
+                    (hit.position - self.color(1, "offset")) / self.number(1, "square").max(1e-5);
                 let is_odd = (p.x.floor() + p.z.floor()).rem_euclid(2.0) > 0.5;
                 let tint = self.color(1, "tint");
                 if is_odd { 0.35 * tint } else { tint }
@@ -489,9 +549,14 @@ impl Inner {
         let [width, height] = self.size;
         let count = (width * height) as usize;
         let mut pixels = Vec::with_capacity(count);
-        let (mut error, mut cost, mut kernel) = (vec![0.0; count], vec![0.0; count], vec![-1.0; count]);
+        let (mut error, mut cost, mut kernel) =
+            (vec![0.0; count], vec![0.0; count], vec![-1.0; count]);
         let (mut albedo, mut normal, mut depth) = (Vec::new(), Vec::new(), Vec::new());
-        let old = self.news.picture.clone().filter(|p| [p.width, p.height] == self.size);
+        let old = self
+            .news
+            .picture
+            .clone()
+            .filter(|p| [p.width, p.height] == self.size);
         let mut counts = vec![self.taken; count];
         let forward = self.camera.basis()[2];
         for row in 0..height {
@@ -516,7 +581,8 @@ impl Inner {
                     continue;
                 }
                 let mean = self.radiance(self.camera.position, toward, 0);
-                let noise = (hash(column, row, self.taken) - 0.5) * 1.4 / (self.taken.max(1) as f32).sqrt();
+                let noise =
+                    (hash(column, row, self.taken) - 0.5) * 1.4 / (self.taken.max(1) as f32).sqrt();
                 error[index] = mean.length() * 0.4 / (self.taken.max(1) as f32).sqrt();
                 pixels.push((mean * (1.0 + noise)).to_array());
             }
@@ -530,15 +596,51 @@ impl Inner {
         };
         let names = vec!["glaze".to_owned(), "squares".to_owned()];
         let mut layers = vec![
-            layer("error", "The estimated error of the pixel.", LayerKind::Number, 1, error),
-            layer("cost", "Operations of the materials.", LayerKind::Number, 1, cost),
-            layer("kernel", "The kernel of the first hit.", LayerKind::Index(names), 1, kernel),
+            layer(
+                "error",
+                "The estimated error of the pixel.",
+                LayerKind::Number,
+                1,
+                error,
+            ),
+            layer(
+                "cost",
+                "Operations of the materials.",
+                LayerKind::Number,
+                1,
+                cost,
+            ),
+            layer(
+                "kernel",
+                "The kernel of the first hit.",
+                LayerKind::Index(names),
+                1,
+                kernel,
+            ),
         ];
         for name in &self.outputs {
             layers.push(match name.as_str() {
-                "albedo" => layer("albedo", "What is scattered.", LayerKind::Color, 3, albedo.clone()),
-                "normal" => layer("normal", "The normal.", LayerKind::Direction, 3, normal.clone()),
-                _ => layer("depth", "The distance.", LayerKind::Number, 1, depth.clone()),
+                "albedo" => layer(
+                    "albedo",
+                    "What is scattered.",
+                    LayerKind::Color,
+                    3,
+                    albedo.clone(),
+                ),
+                "normal" => layer(
+                    "normal",
+                    "The normal.",
+                    LayerKind::Direction,
+                    3,
+                    normal.clone(),
+                ),
+                _ => layer(
+                    "depth",
+                    "The distance.",
+                    LayerKind::Number,
+                    1,
+                    depth.clone(),
+                ),
             });
         }
         self.number += 1;
@@ -567,7 +669,11 @@ impl Inner {
 
     fn restart(&mut self) {
         // Without a thread all samples are there at once.
-        self.taken = if self.size == [64, 40] { self.samples } else { 1 };
+        self.taken = if self.size == [64, 40] {
+            self.samples
+        } else {
+            1
+        };
         self.began = Instant::now();
         self.news.errors = Arc::new(Vec::new());
         self.paint();
@@ -614,9 +720,10 @@ impl Inner {
                 .to_owned(),
         };
         self.news.problems = Arc::new(if is_broken { vec![problem] } else { Vec::new() });
-        match is_broken {
-            true => self.news.state = State::Broken,
-            false => self.restart(),
+        if is_broken {
+            self.news.state = State::Broken
+        } else {
+            self.restart()
         }
     }
 
@@ -712,11 +819,16 @@ impl Inner {
                         }
                     }
                 });
-                self.answers.push(Answer::Saved(Ok(PathBuf::from("ball.toml"))));
+                self.answers
+                    .push(Answer::Saved(Ok(PathBuf::from("ball.toml"))));
             }
             Order::Save { path, .. } => self.answers.push(Answer::Saved(Ok(path.clone()))),
             Order::Read(path) => {
-                let picture = self.news.picture.clone().filter(|_| path.ends_with("good.exr"));
+                let picture = self
+                    .news
+                    .picture
+                    .clone()
+                    .filter(|_| path.ends_with("good.exr"));
                 let read = picture.ok_or_else(|| format!("{} is not there", path.display()));
                 self.answers.push(Answer::Read(read));
             }
@@ -736,7 +848,10 @@ impl Inner {
             position: hit.position.to_array(),
             bounds: (hit.binding == 0).then(|| [low.to_array(), high.to_array()]),
             depth: hit.distance * toward.dot(self.camera.basis()[2]),
-            source: Some((["glaze.impasto", "squares.impasto"][hit.binding].to_owned(), 12)),
+            source: Some((
+                ["glaze.impasto", "squares.impasto"][hit.binding].to_owned(),
+                12,
+            )),
         })
     }
 

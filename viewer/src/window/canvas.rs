@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use eframe::egui::{
     Align2, Color32, ColorImage, Context, CornerRadius, CursorIcon, FontId, Modifiers, Painter,
-    PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, TextureFilter, TextureHandle,
-    TextureOptions, Ui, WidgetInfo, Role, pos2, vec2,
+    PointerButton, Pos2, Rect, Response, Role, Sense, Stroke, StrokeKind, TextureFilter,
+    TextureHandle, TextureOptions, Ui, WidgetInfo, pos2, vec2,
 };
 use glam::Vec3;
 
@@ -115,13 +115,13 @@ impl Canvas {
             scale: ui.ctx().pixels_per_point(),
         };
         self.area = Some(area);
-        self.handle(ui, &response, desk, &picture);
+        self.handle(ui, &response, desk);
         let placed = self.view.placed(&area);
         self.refresh(ui.ctx(), desk, &picture, &area);
         self.draw(ui, &painter, desk, &picture, placed);
     }
 
-    fn handle(&mut self, ui: &Ui, response: &Response, desk: &mut Desk, picture: &Picture) {
+    fn handle(&mut self, ui: &Ui, response: &Response, desk: &mut Desk) {
         let Some(area) = self.area else {
             return;
         };
@@ -139,7 +139,8 @@ impl Canvas {
         self.hover = pointer.and_then(|at| view::pixel_at(placed, size, at));
         if let Some(at) = pointer {
             if magnified != 1.0 {
-                self.view.zoom_to(self.view.zoom(&area) * magnified, at, &area);
+                self.view
+                    .zoom_to(self.view.zoom(&area) * magnified, at, &area);
             } else if wheel != 0.0 && !modifiers.command {
                 desk.dolly(wheel / 40.0);
             }
@@ -174,13 +175,14 @@ impl Canvas {
         }
         if response.hovered() {
             let icon = match (self.drag, desk.tool) {
-                (Some(Drag::Orbit | Drag::Pan | Drag::Dolly | Drag::Shift), _) => CursorIcon::Grabbing,
+                (Some(Drag::Orbit | Drag::Pan | Drag::Dolly | Drag::Shift), _) => {
+                    CursorIcon::Grabbing
+                }
                 (_, Tool::Orbit) => CursorIcon::Default,
                 _ => CursorIcon::Crosshair,
             };
             ui.ctx().set_cursor_icon(icon);
         }
-        let _ = picture;
     }
 
     fn follow(&mut self, response: &Response, desk: &mut Desk, drag: Drag, area: &Area) {
@@ -219,7 +221,11 @@ impl Canvas {
             look: desk.look,
             layer: desk.layer.clone(),
             overlay: desk.overlay.clone().map(|name| (name, desk.overlay_share)),
-            mode: if reference.is_some() { desk.compare } else { Mode::Off },
+            mode: if reference.is_some() {
+                desk.compare
+            } else {
+                Mode::Off
+            },
             factor,
         };
         if self.made.as_ref() == Some(&made) {
@@ -266,7 +272,13 @@ impl Canvas {
             (Some(reference), Mode::Wipe) => {
                 let other = image_of(reference, desk, &encoder).or_else(|| {
                     let values = picture::values(reference, None)?;
-                    Some(picture::image(&values, sizes(reference), look, &encoder, &[]))
+                    Some(picture::image(
+                        &values,
+                        sizes(reference),
+                        look,
+                        &encoder,
+                        &[],
+                    ))
                 });
                 if let Some(other) = other {
                     upload(ctx, &mut self.other, "snapshot", other.image, factor);
@@ -301,9 +313,9 @@ impl Canvas {
         self.pixel_texts(painter, desk, picture, placed);
         self.draw_crop(painter, desk, size, placed);
         draw_path(painter, desk, picture, placed);
-        if let Some(picked) = &desk.picked {
-            let low = view::corner(placed, size, picked.pixel);
-            let high = view::corner(placed, size, [picked.pixel[0] + 1, picked.pixel[1] + 1]);
+        if let Some(pixel) = desk.picked_pixel() {
+            let low = view::corner(placed, size, pixel);
+            let high = view::corner(placed, size, [pixel[0] + 1, pixel[1] + 1]);
             cross(painter, low + (high - low) * 0.5);
         }
         if let Some(legend) = &self.legend {
@@ -372,8 +384,14 @@ impl Canvas {
         for part in [
             Rect::from_min_max(seen.min, pos2(seen.max.x, inner.min.y)),
             Rect::from_min_max(pos2(seen.min.x, inner.max.y), seen.max),
-            Rect::from_min_max(pos2(seen.min.x, inner.min.y), pos2(inner.min.x, inner.max.y)),
-            Rect::from_min_max(pos2(inner.max.x, inner.min.y), pos2(seen.max.x, inner.max.y)),
+            Rect::from_min_max(
+                pos2(seen.min.x, inner.min.y),
+                pos2(inner.min.x, inner.max.y),
+            ),
+            Rect::from_min_max(
+                pos2(inner.max.x, inner.min.y),
+                pos2(seen.max.x, inner.max.y),
+            ),
         ] {
             painter.rect_filled(part, 0.0, shade);
         }
@@ -490,7 +508,10 @@ fn wipe_line(ui: &mut Ui, painter: &Painter, desk: &mut Desk, placed: Rect, line
     if response.hovered() || response.dragged() {
         ui.ctx().set_cursor_icon(CursorIcon::ResizeHorizontal);
     }
-    if let Some(at) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+    if let Some(at) = response
+        .interact_pointer_pos()
+        .filter(|_| response.dragged())
+    {
         desk.wipe = ((at.x - placed.left()) / placed.width().max(1.0)).clamp(0.0, 1.0);
     }
     for (width, color) in [(3.0, Color32::from_black_alpha(140)), (1.0, Color32::WHITE)] {
@@ -501,8 +522,20 @@ fn wipe_line(ui: &mut Ui, painter: &Painter, desk: &mut Desk, placed: Rect, line
     }
     let name = desk.reference().map_or(String::new(), |s| s.name.clone());
     let top = shown.top() + 6.0;
-    label(painter, pos2(line - 6.0, top), Align2::RIGHT_TOP, "now", theme::TEXT);
-    label(painter, pos2(line + 6.0, top), Align2::LEFT_TOP, &name, theme::TEXT);
+    label(
+        painter,
+        pos2(line - 6.0, top),
+        Align2::RIGHT_TOP,
+        "now",
+        theme::TEXT,
+    );
+    label(
+        painter,
+        pos2(line + 6.0, top),
+        Align2::LEFT_TOP,
+        &name,
+        theme::TEXT,
+    );
 }
 
 fn cross(painter: &Painter, at: Pos2) {
@@ -577,7 +610,11 @@ fn draw_legend(painter: &Painter, legend: &Legend, desk: &Desk) {
     }
     let font = FontId::proportional(11.0);
     let corner = clip.left_bottom() + vec2(10.0, -10.0);
-    let name = desk.layer.as_deref().or(desk.overlay.as_deref()).unwrap_or("luminance");
+    let name = match &desk.layer {
+        _ if desk.reference().is_some() && desk.compare.is_difference() => "difference",
+        Some(name) => name,
+        None => desk.overlay.as_deref().unwrap_or("luminance"),
+    };
     match legend {
         Legend::Scale(map, span) => {
             let plate = Rect::from_min_size(corner - vec2(0.0, 46.0), vec2(240.0, 46.0));

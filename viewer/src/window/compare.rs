@@ -49,7 +49,9 @@ impl Mode {
     pub fn about(self) -> &'static str {
         match self {
             Self::Off => "The picture alone.",
-            Self::Wipe => "The picture to the left of a line, the snapshot to the right. Drag the line.",
+            Self::Wipe => {
+                "The picture to the left of a line, the snapshot to the right. Drag the line."
+            }
             Self::Flip => "The snapshot in the picture's place.",
             Self::Absolute => "|a - b|, of the picture a and the snapshot b.",
             Self::Relative => "|a - b| / (|b| + 0.01), of the picture a and the snapshot b.",
@@ -146,7 +148,9 @@ mod tests {
         assert_eq!(of(Mode::Absolute), [0.25, 0.0, 2.0]);
         assert_eq!(of(Mode::Squared), [0.0625, 0.0, 4.0]);
         let relative = of(Mode::Relative);
-        assert!((relative[0] - 0.25 / 0.26).abs() < 1e-6 && (relative[2] - 2.0 / 3.01).abs() < 1e-6);
+        assert!(
+            (relative[0] - 0.25 / 0.26).abs() < 1e-6 && (relative[2] - 2.0 / 3.01).abs() < 1e-6
+        );
         let all = difference(&a, &b, Mode::Absolute).expect("of one size");
         assert!((all.absolute - 2.25 / 3.0).abs() < 1e-9);
         assert!((all.root_square - (4.0625f64 / 3.0).sqrt()).abs() < 1e-9);
@@ -157,7 +161,10 @@ mod tests {
     #[test]
     fn other_sizes_have_none_and_what_is_no_number_counts_for_nothing() {
         let a = picture(2, &[[0.5; 3]; 4]);
-        assert_eq!(difference(&a, &picture(4, &[[0.5; 3]; 4]), Mode::Absolute), None);
+        assert_eq!(
+            difference(&a, &picture(4, &[[0.5; 3]; 4]), Mode::Absolute),
+            None
+        );
         let mut bad = picture(2, &[[0.5; 3]; 4]);
         bad.pixels = Arc::new(vec![[f32::NAN; 3], [0.5; 3], [0.5; 3], [0.5; 3]]);
         let apart = difference(&a, &bad, Mode::Absolute).expect("of one size");

@@ -175,6 +175,8 @@ pub struct Desk {
     orders: Vec<Order>,
     taken: u32,
     has_sized: bool,
+    /// The picture that a point was picked in: its camera and size.
+    picked_in: Option<(Option<Camera>, [u32; 2])>,
 }
 
 /// Goals at which a render ends.
@@ -272,6 +274,7 @@ impl Default for Desk {
             orders: Vec::new(),
             taken: 0,
             has_sized: false,
+            picked_in: None,
         }
     }
 }
@@ -280,6 +283,9 @@ impl Desk {
     /// Takes what the engine says, at a time in seconds.
     pub fn take(&mut self, news: News, answers: Vec<Answer>, now: f64) {
         let is_other = !Arc::ptr_eq(&news.project, &self.news.project);
+        if self.news.problems.is_empty() && !news.problems.is_empty() {
+            self.drawer = Drawer::Problems;
+        }
         self.news = news;
         if is_other {
             self.take_over(now);
@@ -345,6 +351,7 @@ impl Desk {
         match (purpose, &picked) {
             (Purpose::Inspect, Some(found)) => {
                 self.reveal = found.binding;
+                self.picked_in = self.picture_seen();
                 self.picked = picked;
             }
             (Purpose::Inspect, None) => {
@@ -355,9 +362,10 @@ impl Desk {
             (Purpose::Focus, Some(found)) => {
                 if let Some(camera) = self.camera() {
                     self.look_from(navigate::focus(&camera, found.depth));
-                    self.say(match camera.aperture > 0.0 {
-                        true => format!("In focus: {} m", super::picture::number(found.depth)),
-                        false => "Focused; the aperture is 0, so that all is sharp".to_owned(),
+                    self.say(if camera.aperture > 0.0 {
+                        format!("In focus: {} m", super::picture::number(found.depth))
+                    } else {
+                        "Focused; the aperture is 0, so that all is sharp".to_owned()
                     });
                 }
             }
@@ -367,6 +375,25 @@ impl Desk {
                 }
             }
         }
+    }
+
+    fn picture_seen(&self) -> Option<(Option<Camera>, [u32; 2])> {
+        let picture = self.picture()?;
+        Some((picture.camera, [picture.width, picture.height]))
+    }
+
+    /// The pixel at which what was picked is now; none if it is outside of the picture.
+    pub fn picked_pixel(&self) -> Option<[u32; 2]> {
+        let picked = self.picked.as_ref()?;
+        let seen = self.picture_seen()?;
+        if Some(seen) == self.picked_in {
+            return Some(picked.pixel);
+        }
+        let (camera, size) = seen;
+        let at = Vec3::from(picked.position);
+        let [x, y] = super::project::point(&camera?, self.aspect(), at)?;
+        let is_inside = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
+        is_inside.then(|| [(x * size[0] as f32) as u32, (y * size[1] as f32) as u32])
     }
 
     /// Says what came of something.
@@ -551,7 +578,8 @@ impl Desk {
 
     fn least_distance(&self) -> f64 {
         let bounds = self.news.project.bounds;
-        let size = bounds.map(|[low, high]| f64::from((Vec3::from(high) - Vec3::from(low)).length()));
+        let size =
+            bounds.map(|[low, high]| f64::from((Vec3::from(high) - Vec3::from(low)).length()));
         size.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0) * 1e-4
     }
 
@@ -560,14 +588,24 @@ impl Desk {
         if let Some(camera) = self.camera() {
             let (yaw, pitch) = (f64::from(right), -f64::from(down));
             let half = std::f64::consts::PI;
-            self.look_from(navigate::orbit(&camera, self.pivot(), half * yaw, half * pitch));
+            self.look_from(navigate::orbit(
+                &camera,
+                self.pivot(),
+                half * yaw,
+                half * pitch,
+            ));
         }
     }
 
     /// A hand moves the camera sideways.
     pub fn drag_pan(&mut self, right: f32, down: f32) {
         if let Some(camera) = self.camera() {
-            self.look_from(navigate::pan(&camera, self.pivot(), right.into(), down.into()));
+            self.look_from(navigate::pan(
+                &camera,
+                self.pivot(),
+                right.into(),
+                down.into(),
+            ));
         }
     }
 
@@ -671,9 +709,10 @@ impl Desk {
         if mode != Mode::Off && self.snapshots.is_empty() {
             self.take_snapshot();
         }
-        self.compare = match self.snapshots.is_empty() {
-            true => Mode::Off,
-            false => mode,
+        self.compare = if self.snapshots.is_empty() {
+            Mode::Off
+        } else {
+            mode
         };
     }
 
@@ -685,7 +724,10 @@ impl Desk {
                 layers.push((layer.name.clone(), layer.about.clone()));
             }
             if !layers.iter().any(|(name, _)| name == SAMPLES) {
-                layers.push((SAMPLES.to_owned(), "How many samples the pixel has.".to_owned()));
+                layers.push((
+                    SAMPLES.to_owned(),
+                    "How many samples the pixel has.".to_owned(),
+                ));
             }
         }
         for (name, about) in &self.news.project.outputs {
@@ -719,7 +761,12 @@ impl Desk {
     }
 
     fn record_if_needed(&mut self, name: &str) {
-        let can_be = self.news.project.outputs.iter().any(|(known, _)| known == name);
+        let can_be = self
+            .news
+            .project
+            .outputs
+            .iter()
+            .any(|(known, _)| known == name);
         if can_be && !self.has_layer(name) {
             self.record(name, true);
         }
@@ -731,9 +778,10 @@ impl Desk {
         if is_there == is_on {
             return;
         }
-        match is_on {
-            true => self.outputs.push(name.to_owned()),
-            false => self.outputs.retain(|known| known != name),
+        if is_on {
+            self.outputs.push(name.to_owned())
+        } else {
+            self.outputs.retain(|known| known != name)
         }
         self.order(Order::Outputs(self.outputs.clone()));
     }
@@ -770,7 +818,9 @@ impl Desk {
 
     /// The strategy that was asked for, or else that of the plan.
     pub fn strategy(&self) -> &str {
-        self.strategy.as_deref().unwrap_or(&self.news.kernels.strategy)
+        self.strategy
+            .as_deref()
+            .unwrap_or(&self.news.kernels.strategy)
     }
 
     /// Another frame of what moves.
@@ -820,9 +870,10 @@ impl Desk {
 
     /// Writes values into the scene file.
     pub fn write_back(&mut self) {
-        match self.news.project.is_scene {
-            true => self.order(Order::WriteBack),
-            false => self.complain("This is no scene file: there is nothing to write into".to_owned()),
+        if self.news.project.is_scene {
+            self.order(Order::WriteBack)
+        } else {
+            self.complain("This is no scene file: there is nothing to write into".to_owned())
         }
     }
 
@@ -903,7 +954,11 @@ impl Desk {
     }
 
     fn toggle(&mut self, mode: Mode) {
-        self.compare_by(if self.compare == mode { Mode::Off } else { mode });
+        self.compare_by(if self.compare == mode {
+            Mode::Off
+        } else {
+            mode
+        });
     }
 
     fn leave(&mut self) {
@@ -930,7 +985,11 @@ impl Desk {
         };
         let aspect = f64::from(self.aspect());
         let picked = self.picked.as_ref();
-        let framed = match (picked, picked.and_then(|p| p.bounds), self.news.project.bounds) {
+        let framed = match (
+            picked,
+            picked.and_then(|p| p.bounds),
+            self.news.project.bounds,
+        ) {
             (Some(_), Some(bounds), _) | (None, _, Some(bounds)) => {
                 self.pivot = Some((Vec3::from(bounds[0]) + Vec3::from(bounds[1])) * 0.5);
                 navigate::frame(&camera, bounds, aspect)
@@ -943,7 +1002,10 @@ impl Desk {
 
     fn next_layer(&mut self) {
         let there: Vec<String> = self.layers().into_iter().map(|(name, _)| name).collect();
-        let there: Vec<String> = there.into_iter().filter(|name| self.has_layer(name)).collect();
+        let there: Vec<String> = there
+            .into_iter()
+            .filter(|name| self.has_layer(name))
+            .collect();
         let next = match &self.layer {
             None => there.first().cloned(),
             Some(now) => {

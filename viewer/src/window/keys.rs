@@ -152,10 +152,30 @@ const FILES: &str = "Values and files";
 /// All keys.
 pub const TABLE: &[Row] = &[
     row(CAMERA, Key::Home, Command::Home, "camera as written"),
-    row(CAMERA, Key::F, Command::Frame, "frame what was picked, or everything"),
-    row(CAMERA, Key::Num1, Command::ToolOrbit, "tool: turn, and pick by a click"),
-    row(CAMERA, Key::Num2, Command::ToolFocus, "tool: focus by a click"),
-    row(CAMERA, Key::Num3, Command::ToolTrace, "tool: trace a path by a click"),
+    row(
+        CAMERA,
+        Key::F,
+        Command::Frame,
+        "frame what was picked, or everything",
+    ),
+    row(
+        CAMERA,
+        Key::Num1,
+        Command::ToolOrbit,
+        "tool: turn, and pick by a click",
+    ),
+    row(
+        CAMERA,
+        Key::Num2,
+        Command::ToolFocus,
+        "tool: focus by a click",
+    ),
+    row(
+        CAMERA,
+        Key::Num3,
+        Command::ToolTrace,
+        "tool: trace a path by a click",
+    ),
     row(CAMERA, Key::Num4, Command::ToolCrop, "tool: crop by a drag"),
     row(RENDER, Key::Space, Command::Pause, "pause, and go on"),
     row(RENDER, Key::R, Command::Restart, "begin the picture again"),
@@ -170,11 +190,21 @@ pub const TABLE: &[Row] = &[
     row(DISPLAY, Key::L, Command::NextLayer, "next layer"),
     row(DISPLAY, Key::X, Command::FalseColor, "false color"),
     row(DISPLAY, Key::Z, Command::MarkClipped, "mark clipped pixels"),
-    row(DISPLAY, Key::N, Command::MarkNonfinite, "mark pixels that are not finite"),
+    row(
+        DISPLAY,
+        Key::N,
+        Command::MarkNonfinite,
+        "mark pixels that are not finite",
+    ),
     row(COMPARE, Key::S, Command::Snapshot, "take a snapshot"),
     row(COMPARE, Key::W, Command::Wipe, "wipe, and back"),
     row(COMPARE, Key::B, Command::Flip, "snapshot alone, and back"),
-    row(COMPARE, Key::D, Command::Difference, "next difference, and back"),
+    row(
+        COMPARE,
+        Key::D,
+        Command::Difference,
+        "next difference, and back",
+    ),
     row(VIEW, Key::Num0, Command::Fit, "whole picture").command(),
     row(VIEW, Key::Num1, Command::ActualPixels, "actual pixels").command(),
     row(VIEW, Key::Plus, Command::Larger, "larger"),
@@ -182,12 +212,24 @@ pub const TABLE: &[Row] = &[
     row(VIEW, Key::Minus, Command::Smaller, "smaller"),
     row(VIEW, Key::H, Command::Panels, "hide and show the panels"),
     row(VIEW, Key::Questionmark, Command::Help, "this list"),
-    row(VIEW, Key::Escape, Command::Leave, "leave this list, a dialog, a tool, the crop"),
+    row(
+        VIEW,
+        Key::Escape,
+        Command::Leave,
+        "leave this list, a dialog, a tool, the crop",
+    ),
     row(FILES, Key::Z, Command::Undo, "take the last value back").command(),
-    row(FILES, Key::Z, Command::Redo, "give it again").command().shift(),
-    row(FILES, Key::W, Command::WriteBack, "write values into the scene file")
+    row(FILES, Key::Z, Command::Redo, "give it again")
         .command()
         .shift(),
+    row(
+        FILES,
+        Key::W,
+        Command::WriteBack,
+        "write values into the scene file",
+    )
+    .command()
+    .shift(),
     row(FILES, Key::S, Command::Save, "save the picture").command(),
 ];
 
@@ -266,7 +308,11 @@ mod tests {
         let mut seen = HashSet::new();
         for pair in groups.windows(2) {
             seen.insert(pair[0]);
-            assert!(pair[0] == pair[1] || !seen.contains(pair[1]), "{} is torn", pair[1]);
+            assert!(
+                pair[0] == pair[1] || !seen.contains(pair[1]),
+                "{} is torn",
+                pair[1]
+            );
         }
     }
 
@@ -275,8 +321,14 @@ mod tests {
         let command = |key, modifiers| find(key, modifiers).map(|row| row.command);
         assert_eq!(command(Key::E, Modifiers::NONE), Some(Command::Brighter));
         assert_eq!(command(Key::E, Modifiers::SHIFT), Some(Command::Darker));
-        assert_eq!(command(Key::Questionmark, Modifiers::SHIFT), Some(Command::Help));
-        assert_eq!(command(Key::Questionmark, Modifiers::NONE), Some(Command::Help));
+        assert_eq!(
+            command(Key::Questionmark, Modifiers::SHIFT),
+            Some(Command::Help)
+        );
+        assert_eq!(
+            command(Key::Questionmark, Modifiers::NONE),
+            Some(Command::Help)
+        );
         assert_eq!(command(Key::F, Modifiers::ALT), None);
         assert_eq!(command(Key::Q, Modifiers::NONE), None);
     }
@@ -286,7 +338,8 @@ mod tests {
     fn the_manual_has_every_key() {
         let manual = include_str!("../../../docs/view.md");
         for row in TABLE {
-            let line = format!("| `{}` | {} |", row.keys(), row.about);
+            let keys = row.keys().replace("Cmd+", "Ctrl+");
+            let line = format!("| `{keys}` | {} |", row.about);
             assert!(manual.contains(&line), "docs/view.md lacks\n{line}");
         }
         for (hand, about) in MOUSE {

@@ -49,9 +49,10 @@ pub struct WindowOptions {
 /// If there is no display or no GPU for a window, in words that say what to do instead.
 pub fn run(engine: Box<dyn Engine>, options: WindowOptions) -> Result<(), String> {
     let [width, height] = options.size.unwrap_or([1280.0, 800.0]);
-    let title = match options.title.is_empty() {
-        true => "Impasto".to_owned(),
-        false => options.title.clone(),
+    let title = if options.title.is_empty() {
+        "Impasto".to_owned()
+    } else {
+        options.title.clone()
     };
     let viewport = ViewportBuilder::default()
         .with_title(&title)
@@ -142,10 +143,12 @@ impl Window {
     pub fn ui(&mut self, ui: &mut Ui) {
         let now = ui.input(|i| i.time);
         let name = self.desk.news.project.name.clone();
-        self.desk.take(self.engine.news(), self.engine.answers(), now);
+        self.desk
+            .take(self.engine.news(), self.engine.answers(), now);
         if self.title.is_empty() && name != self.desk.news.project.name {
             let title = format!("{} - Impasto", self.desk.news.project.name);
-            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
+            ui.ctx()
+                .send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
         for command in keys::pressed(ui.ctx()) {
             self.command(command);
@@ -174,19 +177,25 @@ impl Window {
 
     fn panels(&mut self, ui: &mut Ui, commands: &mut Vec<Command>) {
         let desk = &mut self.desk;
-        let bar = Frame::new().fill(theme::PANEL).inner_margin(egui::Margin::symmetric(8, 5));
+        let bar = Frame::new()
+            .fill(theme::PANEL)
+            .inner_margin(egui::Margin::symmetric(8, 5));
         Panel::top("bar")
             .frame(bar)
             .resizable(false)
             .show(ui, |ui| panels::bar::show(ui, desk, &self.canvas, commands));
-        let status = Frame::new().fill(theme::PANEL).inner_margin(egui::Margin::symmetric(8, 3));
+        let status = Frame::new()
+            .fill(theme::PANEL)
+            .inner_margin(egui::Margin::symmetric(8, 3));
         Panel::bottom("status")
             .frame(status)
             .resizable(false)
             .show(ui, |ui| panels::status::show(ui, desk, &self.canvas));
         let width = ui.available_width();
         if desk.shows_panels && width > 500.0 {
-            let side = Frame::new().fill(theme::PANEL).inner_margin(egui::Margin::same(8));
+            let side = Frame::new()
+                .fill(theme::PANEL)
+                .inner_margin(egui::Margin::same(8));
             Panel::left("scene")
                 .frame(side)
                 .resizable(true)
@@ -202,7 +211,9 @@ impl Window {
         }
         if panels::drawer::is_open(desk) {
             let height = ui.available_height();
-            let drawer = Frame::new().fill(theme::PANEL).inner_margin(egui::Margin::same(8));
+            let drawer = Frame::new()
+                .fill(theme::PANEL)
+                .inner_margin(egui::Margin::same(8));
             Panel::bottom("drawer")
                 .frame(drawer)
                 .resizable(true)

@@ -110,12 +110,13 @@ pub fn aim(camera: &Camera, at: Vec3) -> Camera {
 
 /// The camera with what is this far along the view in focus.
 pub fn focus(camera: &Camera, depth: f32) -> Camera {
-    match depth.is_finite() && depth > 0.0 {
-        true => Camera {
+    if depth.is_finite() && depth > 0.0 {
+        Camera {
             focus: depth,
             ..*camera
-        },
-        false => *camera,
+        }
+    } else {
+        *camera
     }
 }
 
@@ -154,7 +155,10 @@ mod tests {
     #[test]
     fn a_turn_to_the_right_goes_counterclockwise_from_above() {
         let turned = orbit(&camera(), Vec3::Y, std::f64::consts::FRAC_PI_2, 0.0);
-        assert!((turned.position - Vec3::new(-5.0, 1.0, 0.0)).length() < 1e-5, "{turned:?}");
+        assert!(
+            (turned.position - Vec3::new(-5.0, 1.0, 0.0)).length() < 1e-5,
+            "{turned:?}"
+        );
         assert!((turned.look_at - Vec3::Y).length() < 1e-6);
         let raised = orbit(&camera(), Vec3::Y, 0.0, -0.5);
         assert!(raised.position.y > 3.0, "{raised:?}");
@@ -224,7 +228,10 @@ mod tests {
         let height = 2.0 * 5.0 * 20f32.to_radians().tan();
         let expected = Vec3::new(-0.5 * height, 0.25 * height, 0.0);
         assert!((moved.position - camera().position - expected).length() < 1e-5);
-        assert_eq!(moved.position - camera().position, moved.look_at - camera().look_at);
+        assert_eq!(
+            moved.position - camera().position,
+            moved.look_at - camera().look_at
+        );
     }
 
     #[test]
@@ -251,7 +258,10 @@ mod tests {
                 let corner = Vec3::new(pick(0), pick(1), pick(2));
                 let at = crate::window::project::point(&framed, aspect as f32, corner);
                 let at = at.expect("in front");
-                assert!((0.0..=1.0).contains(&at[0]) && (0.0..=1.0).contains(&at[1]), "{aspect} {at:?}");
+                assert!(
+                    (0.0..=1.0).contains(&at[0]) && (0.0..=1.0).contains(&at[1]),
+                    "{aspect} {at:?}"
+                );
             }
         }
         let point = frame(&camera(), [[1.0; 3]; 2], 1.0);

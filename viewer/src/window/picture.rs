@@ -45,7 +45,11 @@ pub fn values<'a>(picture: &'a Picture, name: Option<&str>) -> Option<Values<'a>
     // What has too few channels repeats its last one.
     let three = || -> Cow<'a, [[f32; 3]]> {
         let pixels = layer.values.chunks_exact(channels);
-        Cow::Owned(pixels.map(|p| [0, 1, 2].map(|i| p[i.min(channels - 1)])).collect())
+        Cow::Owned(
+            pixels
+                .map(|p| [0, 1, 2].map(|i| p[i.min(channels - 1)]))
+                .collect(),
+        )
     };
     let one = || -> Cow<'a, [f32]> {
         match channels {
@@ -251,7 +255,9 @@ fn plain(values: &[[f32; 3]], channel: Channel, byte: impl Fn(f32) -> u8) -> Vec
     let pixels = values.iter();
     match channel {
         Channel::Color => pixels.map(|p| color(p.map(&byte))).collect(),
-        one => pixels.map(|&p| Color32::from_gray(byte(one.of(p)))).collect(),
+        one => pixels
+            .map(|&p| Color32::from_gray(byte(one.of(p))))
+            .collect(),
     }
 }
 
@@ -263,9 +269,12 @@ fn in_colors(numbers: &[f32], look: &Look, legend: &mut Option<Legend>) -> Vec<C
     };
     let table = map.table().map(color);
     *legend = Some(Legend::Scale(map, span));
-    let place = |&x: &f32| match x.is_nan() {
-        true => color(NONFINITE),
-        false => table[(span.place(x) * 255.0 + 0.5) as usize],
+    let place = |&x: &f32| {
+        if x.is_nan() {
+            color(NONFINITE)
+        } else {
+            table[(span.place(x) * 255.0 + 0.5) as usize]
+        }
     };
     numbers.iter().map(place).collect()
 }
@@ -276,7 +285,11 @@ fn mark(pixels: &mut [Color32], light: &[[f32; 3]], width: usize, look: &Look, s
     if !is_cut && !look.mark_nonfinite {
         return;
     }
-    for (row, (pixels, light)) in pixels.chunks_mut(width).zip(light.chunks(width)).enumerate() {
+    for (row, (pixels, light)) in pixels
+        .chunks_mut(width)
+        .zip(light.chunks(width))
+        .enumerate()
+    {
         for (column, (pixel, value)) in pixels.iter_mut().zip(light).enumerate() {
             if !value.iter().all(|x| x.is_finite()) {
                 if look.mark_nonfinite {
@@ -305,7 +318,7 @@ pub fn number(x: f32) -> String {
     }
     match magnitude {
         0.0 => "0".to_owned(),
-        m if m >= 1e5 || m < 1e-3 => format!("{x:.2e}"),
+        m if !(1e-3..1e5).contains(&m) => format!("{x:.2e}"),
         m if m >= 100.0 => format!("{x:.0}"),
         m if m >= 10.0 => format!("{x:.1}"),
         m if m >= 1.0 => format!("{x:.2}"),
@@ -328,9 +341,12 @@ pub fn texts(picture: &Picture, name: Option<&str>, index: usize) -> Vec<String>
     let values = values.unwrap_or_default();
     match &layer.kind {
         LayerKind::Index(names) => {
-            let name = values.first().map(|&i| match i >= 0.0 {
-                true => names.get(i as usize).cloned().unwrap_or_default(),
-                false => "none".to_owned(),
+            let name = values.first().map(|&i| {
+                if i >= 0.0 {
+                    names.get(i as usize).cloned().unwrap_or_default()
+                } else {
+                    "none".to_owned()
+                }
             });
             name.into_iter().collect()
         }
@@ -342,7 +358,10 @@ pub fn texts(picture: &Picture, name: Option<&str>, index: usize) -> Vec<String>
 /// picture with more pixels than it has.
 pub fn reduced(image: &ColorImage, factor: usize) -> ColorImage {
     let [width, height] = image.size;
-    let size = [width.div_ceil(factor).max(1), height.div_ceil(factor).max(1)];
+    let size = [
+        width.div_ceil(factor).max(1),
+        height.div_ceil(factor).max(1),
+    ];
     let mut pixels = Vec::with_capacity(size[0] * size[1]);
     for row in 0..size[1] {
         for column in 0..size[0] {
@@ -384,7 +403,13 @@ mod tests {
     }
 
     fn shown(values: &Values, size: [usize; 2], look: &Look, lost: &[u32]) -> Shown {
-        image(values, size, look, &Encoder::new(look.curve, look.exposure), lost)
+        image(
+            values,
+            size,
+            look,
+            &Encoder::new(look.curve, look.exposure),
+            lost,
+        )
     }
 
     fn light(pixels: &[[f32; 3]]) -> Values<'_> {
@@ -407,7 +432,11 @@ mod tests {
     #[test]
     fn channels_are_grey() {
         let pixels = [[0.0, 0.5, 1.0]];
-        for (channel, byte) in [(Channel::Red, 0), (Channel::Green, 188), (Channel::Blue, 255)] {
+        for (channel, byte) in [
+            (Channel::Red, 0),
+            (Channel::Green, 188),
+            (Channel::Blue, 255),
+        ] {
             let look = Look { channel, ..look() };
             let shown = shown(&light(&pixels), [1, 1], &look, &[]);
             assert_eq!(shown.image.pixels[0], Color32::from_gray(byte));
@@ -435,7 +464,10 @@ mod tests {
             .collect();
         assert_eq!(changed, [3, 9, 10, 20]);
         assert_eq!(marked.pixels[20], color(NONFINITE));
-        assert_eq!((marked.pixels[9], marked.pixels[10]), (color(ABOVE), color(BELOW)));
+        assert_eq!(
+            (marked.pixels[9], marked.pixels[10]),
+            (color(ABOVE), color(BELOW))
+        );
         // Fewer stops, and nothing is cut above.
         let darker = Look {
             exposure: -2.0,
@@ -492,12 +524,20 @@ mod tests {
                 layer("uv", LayerKind::Color, 2, &[0.1, 0.2, 0.3, 0.4]),
                 layer("bad", LayerKind::Number, 1, &[1.0]),
                 layer("none", LayerKind::Number, 0, &[]),
-                layer("kernel", LayerKind::Index(vec!["k".to_owned()]), 1, &[0.0, -1.0]),
+                layer(
+                    "kernel",
+                    LayerKind::Index(vec!["k".to_owned()]),
+                    1,
+                    &[0.0, -1.0],
+                ),
             ],
             ..Picture::default()
         };
         assert!(matches!(values(&picture, None), Some(Values::Light(_))));
-        assert!(matches!(values(&picture, Some("depth")), Some(Values::Numbers(_))));
+        assert!(matches!(
+            values(&picture, Some("depth")),
+            Some(Values::Numbers(_))
+        ));
         let Some(Values::Colors(uv)) = values(&picture, Some("uv")) else {
             panic!("uv is missing");
         };
@@ -509,7 +549,10 @@ mod tests {
         for missing in ["bad", "none", "albedo"] {
             assert!(values(&picture, Some(missing)).is_none(), "{missing}");
         }
-        assert!(values(&Picture::default(), None).is_some(), "an empty picture is whole");
+        assert!(
+            values(&Picture::default(), None).is_some(),
+            "an empty picture is whole"
+        );
         assert_eq!(texts(&picture, None, 1), ["0", "0", "0"]);
         assert_eq!(texts(&picture, Some("uv"), 1), ["0.300", "0.400"]);
         assert_eq!(texts(&picture, Some(SAMPLES), 1), ["8"]);
@@ -526,7 +569,10 @@ mod tests {
         let pixels = bytes.map(Color32::from_gray).to_vec();
         let small = reduced(&ColorImage::new([3, 2], pixels), 2);
         assert_eq!(small.size, [2, 1]);
-        assert_eq!(small.pixels, [Color32::from_gray(20), Color32::from_gray(35)]);
+        assert_eq!(
+            small.pixels,
+            [Color32::from_gray(20), Color32::from_gray(35)]
+        );
         let mut under = ColorImage::new([1, 1], vec![Color32::from_gray(0)]);
         let over = ColorImage::new([1, 1], vec![Color32::from_gray(200)]);
         blended(&mut under, &over, 0.5);
@@ -554,6 +600,9 @@ mod tests {
         let elapsed = start.elapsed();
         assert_eq!(shown.image.pixels.len(), pixels.len());
         eprintln!("1280 x 720 pixels in {:.1} ms", elapsed.as_secs_f64() * 1e3);
-        assert!(cfg!(debug_assertions) || elapsed.as_millis() < 100, "{elapsed:?}");
+        assert!(
+            cfg!(debug_assertions) || elapsed.as_millis() < 100,
+            "{elapsed:?}"
+        );
     }
 }

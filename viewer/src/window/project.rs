@@ -70,7 +70,10 @@ mod tests {
     fn the_middle_the_corners_and_behind() {
         assert_eq!(point(&camera(), 2.0, Vec3::ZERO), Some([0.5, 0.5]));
         let corner = point(&camera(), 2.0, Vec3::new(10.0, 5.0, 0.0)).expect("in front");
-        assert!((corner[0] - 1.0).abs() < 1e-5 && corner[1].abs() < 1e-5, "{corner:?}");
+        assert!(
+            (corner[0] - 1.0).abs() < 1e-5 && corner[1].abs() < 1e-5,
+            "{corner:?}"
+        );
         assert_eq!(point(&camera(), 2.0, Vec3::new(0.0, 0.0, 6.0)), None);
         assert_eq!(point(&camera(), 2.0, camera().position), None);
     }

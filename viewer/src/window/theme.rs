@@ -36,7 +36,10 @@ pub fn apply(ctx: &Context) {
             (TextStyle::Body, font(13.0)),
             (TextStyle::Button, font(13.0)),
             (TextStyle::Heading, font(15.0)),
-            (TextStyle::Monospace, FontId::new(12.0, FontFamily::Monospace)),
+            (
+                TextStyle::Monospace,
+                FontId::new(12.0, FontFamily::Monospace),
+            ),
         ]
         .into();
         style.spacing.item_spacing = vec2(6.0, 4.0);

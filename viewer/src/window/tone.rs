@@ -35,7 +35,9 @@ impl Curve {
     pub fn about(self) -> &'static str {
         match self {
             Self::Srgb => "What PNG files have: cut at 1, encoded as sRGB.",
-            Self::Filmic => "A fit of the ACES curve: highlights roll off. PNG files do not have it.",
+            Self::Filmic => {
+                "A fit of the ACES curve: highlights roll off. PNG files do not have it."
+            }
             Self::Soft => "x / (1 + x): nothing is cut. PNG files do not have it.",
             Self::Plain => "Numbers without sRGB's encoding, cut at 1. PNG files do not have it.",
         }
@@ -265,13 +267,14 @@ impl Span {
     /// Where a number is: 0 at the low end, 1 at the high one.
     #[inline]
     pub fn place(&self, x: f32) -> f32 {
-        let (low, high, x) = match self.is_log {
-            true => (
+        let (low, high, x) = if self.is_log {
+            (
                 self.low.max(1e-38).log2(),
                 self.high.max(1e-38).log2(),
                 x.max(1e-38).log2(),
-            ),
-            false => (self.low, self.high, x),
+            )
+        } else {
+            (self.low, self.high, x)
         };
         if high <= low {
             return 0.0;
@@ -281,12 +284,11 @@ impl Span {
 
     /// The number at a place from 0 to 1.
     pub fn at(&self, place: f32) -> f32 {
-        match self.is_log {
-            true => {
-                let (low, high) = (self.low.max(1e-38).log2(), self.high.max(1e-38).log2());
-                (low + (high - low) * place).exp2()
-            }
-            false => self.low + (self.high - self.low) * place,
+        if self.is_log {
+            let (low, high) = (self.low.max(1e-38).log2(), self.high.max(1e-38).log2());
+            (low + (high - low) * place).exp2()
+        } else {
+            self.low + (self.high - self.low) * place
         }
     }
 }
@@ -294,7 +296,7 @@ impl Span {
 /// Colors of indices, neighbours far apart in hue.
 pub fn index_color(index: usize) -> [u8; 3] {
     let hue = (index as f32 * 0.618_034 + 0.08).fract() * 6.0;
-    let (strength, least) = [(0.62, 0.30), (0.45, 0.18), (0.72, 0.20)][index % 3];
+    let (strength, least) = [(0.42, 0.36), (0.36, 0.22), (0.34, 0.48)][index % 3];
     [0.0, 4.0, 2.0].map(|shift| {
         let distance = ((hue + shift) % 6.0 - 3.0).abs() - 1.0;
         let value = least + strength * distance.clamp(0.0, 1.0);
@@ -309,8 +311,19 @@ mod tests {
     fn numbers() -> impl Iterator<Item = f32> {
         // Every magnitude, from many places of the line of floats.
         let spread = (0..200_000u32).map(|i| f32::from_bits(i.wrapping_mul(0x9E37_79B1)));
-        let odd = [0.0, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45];
-        spread.chain(odd).chain((0..=2048).map(|i| i as f32 / 1024.0))
+        let odd = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::NAN,
+            1e-45,
+        ];
+        spread
+            .chain(odd)
+            .chain((0..=2048).map(|i| i as f32 / 1024.0))
     }
 
     #[test]
@@ -370,10 +383,26 @@ mod tests {
     #[test]
     fn maps_go_from_dark_to_bright() {
         let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 4);
-        assert!(near(Map::Viridis.color(0.0), [68, 1, 84]), "{:?}", Map::Viridis.color(0.0));
-        assert!(near(Map::Viridis.color(1.0), [253, 231, 37]), "{:?}", Map::Viridis.color(1.0));
-        assert!(near(Map::Inferno.color(0.0), [0, 0, 4]), "{:?}", Map::Inferno.color(0.0));
-        assert!(near(Map::Inferno.color(1.0), [252, 255, 164]), "{:?}", Map::Inferno.color(1.0));
+        assert!(
+            near(Map::Viridis.color(0.0), [68, 1, 84]),
+            "{:?}",
+            Map::Viridis.color(0.0)
+        );
+        assert!(
+            near(Map::Viridis.color(1.0), [253, 231, 37]),
+            "{:?}",
+            Map::Viridis.color(1.0)
+        );
+        assert!(
+            near(Map::Inferno.color(0.0), [0, 0, 4]),
+            "{:?}",
+            Map::Inferno.color(0.0)
+        );
+        assert!(
+            near(Map::Inferno.color(1.0), [252, 255, 164]),
+            "{:?}",
+            Map::Inferno.color(1.0)
+        );
         for map in Map::ALL {
             let luminance = |c: [u8; 3]| {
                 let [r, g, b] = c.map(|v| linear(f32::from(v) / 255.0));
@@ -391,7 +420,10 @@ mod tests {
         let numbers = [3.0, f32::NAN, 0.0, 8.0, f32::INFINITY];
         let span = Span::around(numbers.into_iter(), false);
         assert_eq!((span.low, span.high), (0.0, 8.0));
-        assert_eq!([span.place(0.0), span.place(4.0), span.place(9.0)], [0.0, 0.5, 1.0]);
+        assert_eq!(
+            [span.place(0.0), span.place(4.0), span.place(9.0)],
+            [0.0, 0.5, 1.0]
+        );
         let log = Span::around(numbers.into_iter(), true);
         assert_eq!((log.low, log.high), (3.0, 8.0));
         assert!((log.at(log.place(5.0)) - 5.0).abs() < 1e-4);

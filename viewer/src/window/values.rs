@@ -77,8 +77,12 @@ pub struct Ends {
 
 /// The ends of a parameter's slider: the soft range, or else the hard one, or else one around the default.
 pub fn ends(interface: &ParamInterface) -> Ends {
-    let finite = |range: &[f32; 2]| range[0].is_finite() && range[1].is_finite() && range[0] < range[1];
-    let range = interface.soft.filter(finite).or(interface.hard.filter(finite));
+    let finite =
+        |range: &[f32; 2]| range[0].is_finite() && range[1].is_finite() && range[0] < range[1];
+    let range = interface
+        .soft
+        .filter(finite)
+        .or(interface.hard.filter(finite));
     let [low, high] = range.unwrap_or_else(|| {
         let default = match &interface.default {
             Value::Number(x) => *x,
@@ -86,14 +90,22 @@ pub fn ends(interface: &ParamInterface) -> Ends {
             Value::Components(c) => c.iter().fold(0.0, |most: f32, x| most.max(x.abs())),
             Value::Bool(_) | Value::Text(_) => 0.0,
         };
-        let high = match default == 0.0 || !default.is_finite() {
-            true => given(interface, 1.0),
-            false => 2.0 * default.abs(),
+        let high = if default == 0.0 || !default.is_finite() {
+            given(interface, 1.0)
+        } else {
+            2.0 * default.abs()
         };
         let low = if default < 0.0 { -high } else { 0.0 };
         let [hard_low, hard_high] = interface.hard.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
-        let (low, high) = (low.clamp(hard_low, hard_high), high.clamp(hard_low, hard_high));
-        if low < high { [low, high] } else { [low, low + 1.0] }
+        let (low, high) = (
+            low.clamp(hard_low, hard_high),
+            high.clamp(hard_low, hard_high),
+        );
+        if low < high {
+            [low, high]
+        } else {
+            [low, low + 1.0]
+        }
     });
     let is_log = low > 0.0 && high / low >= 100.0;
     Ends {
@@ -116,9 +128,12 @@ pub fn limits(interface: &ParamInterface) -> [f64; 2] {
 /// The nearest value that the limits allow, by component. What is no number is the low end, or 0.
 pub fn held(interface: &ParamInterface, value: Value) -> Value {
     let [low, high] = interface.hard.unwrap_or([f32::MIN, f32::MAX]);
-    let hold = |x: f32| match x.is_nan() {
-        true => low.max(0.0).min(high),
-        false => x.max(low).min(high),
+    let hold = |x: f32| {
+        if x.is_nan() {
+            low.max(0.0).min(high)
+        } else {
+            x.max(low).min(high)
+        }
     };
     match value {
         Value::Number(x) => Value::Number(hold(x)),
@@ -166,7 +181,9 @@ pub fn text(interface: &ParamInterface, value: &Value) -> String {
         Value::Int(i) => i.to_string(),
         Value::Number(x) => {
             let (name, _) = unit(interface);
-            format!("{} {name}", shown(interface, *x)).trim_end().to_owned()
+            format!("{} {name}", shown(interface, *x))
+                .trim_end()
+                .to_owned()
         }
         Value::Components(c) => {
             let all: Vec<String> = c.iter().map(f32::to_string).collect();
@@ -185,14 +202,43 @@ pub fn hex(linear: [f32; 3]) -> String {
 /// The linear color of six digits, with what people write before them: `#8c1010`, `0x8c1010`, `srgb(0x8c1010)`.
 pub fn from_hex(text: &str) -> Option<[f32; 3]> {
     let text = text.trim();
-    let text = text.strip_prefix("srgb(").and_then(|t| t.strip_suffix(')')).unwrap_or(text);
-    let digits = text.strip_prefix("0x").or(text.strip_prefix('#')).unwrap_or(text);
+    let text = text
+        .strip_prefix("srgb(")
+        .and_then(|t| t.strip_suffix(')'))
+        .unwrap_or(text);
+    let digits = text
+        .strip_prefix("0x")
+        .or(text.strip_prefix('#'))
+        .unwrap_or(text);
     if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
     }
     let number = u32::from_str_radix(digits, 16).ok()?;
     let [_, r, g, b] = number.to_be_bytes();
     Some([r, g, b].map(|byte| super::tone::linear(f32::from(byte) / 255.0)))
+}
+
+/// Hue, saturation and value, from 0 to 1, of a color of the same kind of numbers, such as sRGB.
+pub fn hsv([r, g, b]: [f32; 3]) -> [f32; 3] {
+    let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+    let width = most - least;
+    if width <= 0.0 {
+        return [0.0, 0.0, most];
+    }
+    let sector = match most {
+        m if m == r => ((g - b) / width).rem_euclid(6.0),
+        m if m == g => (b - r) / width + 2.0,
+        _ => (r - g) / width + 4.0,
+    };
+    [sector / 6.0, width / most, most]
+}
+
+/// The color of a hue, a saturation and a value.
+pub fn from_hsv([hue, saturation, value]: [f32; 3]) -> [f32; 3] {
+    [0.0, 4.0, 2.0].map(|shift| {
+        let distance = ((hue * 6.0 + shift).rem_euclid(6.0) - 3.0).abs() - 1.0;
+        value * (1.0 - saturation + saturation * distance.clamp(0.0, 1.0))
+    })
 }
 
 #[cfg(test)]
@@ -245,7 +291,10 @@ mod tests {
     #[test]
     fn plain_values_are_those_of_the_language() {
         let float = interface("float", Value::Number(0.1));
-        assert_eq!(ordered(&float, &Value::Number(0.1)), ParameterValue::Float(0.1));
+        assert_eq!(
+            ordered(&float, &Value::Number(0.1)),
+            ParameterValue::Float(0.1)
+        );
         let color = interface("color", Value::Components(vec![0.2; 3]));
         let floats = ordered(&color, &Value::Components(vec![0.2, 0.4, 0.1]));
         assert_eq!(floats, ParameterValue::Floats(vec![0.2, 0.4, 0.1]));
@@ -253,7 +302,10 @@ mod tests {
         let texture = interface("texture", path.clone());
         let ordered_path = ordered(&texture, &path);
         assert_eq!(ordered_path, ParameterValue::Texture("wood.png".to_owned()));
-        assert_eq!(ordered(&float, &Value::Bool(true)), ParameterValue::Bool(true));
+        assert_eq!(
+            ordered(&float, &Value::Bool(true)),
+            ParameterValue::Bool(true)
+        );
         assert_eq!(ordered(&float, &Value::Int(-3)), ParameterValue::Int(-3));
     }
 
@@ -304,12 +356,21 @@ mod tests {
     #[test]
     fn controls_fit_the_values() {
         let color = interface("color", Value::Components(vec![0.2; 3]));
-        assert_eq!(control(&color, &Value::Components(vec![0.2; 3])), Control::Color);
+        assert_eq!(
+            control(&color, &Value::Components(vec![0.2; 3])),
+            Control::Color
+        );
         let point = interface("point", Value::Components(vec![0.2; 3]));
-        assert_eq!(control(&point, &Value::Components(vec![0.2; 3])), Control::Vector);
+        assert_eq!(
+            control(&point, &Value::Components(vec![0.2; 3])),
+            Control::Vector
+        );
         assert_eq!(control(&point, &Value::Text("x".to_owned())), Control::Text);
         let texture = interface("texture", Value::Text(String::new()));
-        assert_eq!(control(&texture, &Value::Text(String::new())), Control::Path);
+        assert_eq!(
+            control(&texture, &Value::Text(String::new())),
+            Control::Path
+        );
     }
 
     #[test]
@@ -326,10 +387,30 @@ mod tests {
     }
 
     #[test]
+    fn hues_and_back() {
+        assert_eq!(hsv([1.0, 0.0, 0.0]), [0.0, 1.0, 1.0]);
+        assert_eq!(hsv([0.5; 3]), [0.0, 0.0, 0.5]);
+        assert_eq!(hsv([0.0; 3]), [0.0; 3]);
+        for color in [
+            [0.9, 0.1, 0.3],
+            [0.2, 0.7, 0.1],
+            [0.1, 0.2, 0.8],
+            [0.3, 0.3, 0.1],
+        ] {
+            let back = from_hsv(hsv(color));
+            let is_near = back.iter().zip(color).all(|(a, b)| (a - b).abs() < 1e-5);
+            assert!(is_near, "{color:?} {back:?}");
+        }
+    }
+
+    #[test]
     fn nearly_equal_is_equal() {
         assert!(alike(&Value::Number(0.1), &Value::Number(0.100_000_01)));
         assert!(!alike(&Value::Number(0.1), &Value::Number(0.1001)));
         assert!(!alike(&Value::Number(0.0), &Value::Int(0)));
-        assert!(alike(&Value::Components(vec![1.0]), &Value::Components(vec![1.0])));
+        assert!(alike(
+            &Value::Components(vec![1.0]),
+            &Value::Components(vec![1.0])
+        ));
     }
 }

@@ -64,7 +64,11 @@ impl View {
     pub fn placed(&self, area: &Area) -> Rect {
         let scale = area.scale.max(1e-3);
         let extent = area.size() * self.zoom(area) / scale;
-        let centre = if self.is_fit() { vec2(0.5, 0.5) } else { self.centre };
+        let centre = if self.is_fit() {
+            vec2(0.5, 0.5)
+        } else {
+            self.centre
+        };
         let corner = area.rect.center() - extent * centre;
         // On whole pixels of the screen.
         let corner = (corner.to_vec2() * scale).round() / scale;
@@ -94,9 +98,10 @@ impl View {
     /// Twice as large, or half, in powers of two.
     pub fn step(&mut self, is_larger: bool, area: &Area) {
         let power = self.zoom(area).log2();
-        let power = match is_larger {
-            true => (power + 0.01).floor() + 1.0,
-            false => (power - 0.01).ceil() - 1.0,
+        let power = if is_larger {
+            (power + 0.01).floor() + 1.0
+        } else {
+            (power - 0.01).ceil() - 1.0
         };
         self.zoom_to(power.exp2(), area.rect.center(), area);
     }
@@ -114,7 +119,13 @@ impl View {
 
     /// Some of the picture stays in the middle, so that it is never lost.
     fn hold(&mut self) {
-        let hold = |x: f32| if x.is_finite() { x.clamp(0.0, 1.0) } else { 0.5 };
+        let hold = |x: f32| {
+            if x.is_finite() {
+                x.clamp(0.0, 1.0)
+            } else {
+                0.5
+            }
+        };
         self.centre = vec2(hold(self.centre.x), hold(self.centre.y));
     }
 }
@@ -228,7 +239,10 @@ mod tests {
             let placed = view.placed(&area);
             let _ = pixel_at(placed, size, pos2(1.0, 1.0));
             let _ = pixel_near(placed, size, pos2(1.0, 1.0));
-            assert!(placed.min.x.is_finite() && placed.max.y.is_finite(), "{area:?} {placed:?}");
+            assert!(
+                placed.min.x.is_finite() && placed.max.y.is_finite(),
+                "{area:?} {placed:?}"
+            );
         }
     }
 

@@ -25,7 +25,10 @@ pub fn show(ui: &mut Ui, desk: &mut Desk) {
     ui.horizontal(|ui| {
         if !problems.is_empty() {
             let text = title(&problems);
-            if ui.selectable_label(shown == Drawer::Problems, text).clicked() {
+            if ui
+                .selectable_label(shown == Drawer::Problems, text)
+                .clicked()
+            {
                 desk.drawer = Drawer::Problems;
             }
         }
@@ -37,7 +40,9 @@ pub fn show(ui: &mut Ui, desk: &mut Desk) {
             }
         }
         if shown == Drawer::Trace {
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| trace_buttons(ui, desk));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                trace_buttons(ui, desk)
+            });
         }
     });
     ui.add_space(2.0);
@@ -95,9 +100,17 @@ fn title(problems: &[Problem]) -> String {
 }
 
 fn problem(ui: &mut Ui, desk: &mut Desk, problem: &Problem) {
-    let color = if problem.is_warning { theme::WARNING } else { theme::BAD };
+    let color = if problem.is_warning {
+        theme::WARNING
+    } else {
+        theme::BAD
+    };
     ui.horizontal(|ui| {
-        let code = problem.code.as_deref().map(|c| format!("{c}  ")).unwrap_or_default();
+        let code = problem
+            .code
+            .as_deref()
+            .map(|c| format!("{c}  "))
+            .unwrap_or_default();
         let text = format!("{code}{}", problem.message);
         ui.label(RichText::new(text).color(color).strong());
         if let Some((file, line, column)) = &problem.place {
@@ -110,7 +123,9 @@ fn problem(ui: &mut Ui, desk: &mut Desk, problem: &Problem) {
         }
     });
     if !problem.text.is_empty() {
-        let text = RichText::new(problem.text.trim_end()).monospace().color(theme::TEXT);
+        let text = RichText::new(problem.text.trim_end())
+            .monospace()
+            .color(theme::TEXT);
         ui.add(Label::new(text).extend().selectable(true));
     }
     ui.add_space(6.0);
@@ -131,6 +146,9 @@ mod tests {
         };
         assert_eq!(title(&[problem(false)]), "1 error");
         assert_eq!(title(&[problem(true), problem(true)]), "2 warnings");
-        assert_eq!(title(&[problem(true), problem(false)]), "1 error, 1 warning");
+        assert_eq!(
+            title(&[problem(true), problem(false)]),
+            "1 error, 1 warning"
+        );
     }
 }

@@ -30,13 +30,25 @@ pub fn show(ui: &mut Ui, desk: &Desk) {
         let x = axes.place(inner, 10f64.powi(power), 1.0).x;
         painter.line_segment([pos2(x, inner.top()), pos2(x, inner.bottom())], grid);
         let at = pos2(x, inner.bottom() + 3.0);
-        painter.text(at, Align2::CENTER_TOP, seconds(power), font.clone(), theme::QUIET);
+        painter.text(
+            at,
+            Align2::CENTER_TOP,
+            seconds(power),
+            font.clone(),
+            theme::QUIET,
+        );
     }
     for power in axes.powers(1) {
         let y = axes.place(inner, 1.0, 10f64.powi(power)).y;
         painter.line_segment([pos2(inner.left(), y), pos2(inner.right(), y)], grid);
         let at = pos2(inner.left() - 4.0, y);
-        painter.text(at, Align2::RIGHT_CENTER, format!("1e{power}"), font.clone(), theme::QUIET);
+        painter.text(
+            at,
+            Align2::RIGHT_CENTER,
+            format!("1e{power}"),
+            font.clone(),
+            theme::QUIET,
+        );
     }
     if let Some(goal) = goal(desk) {
         let y = axes.place(inner, 1.0, goal).y;
@@ -166,6 +178,9 @@ mod tests {
         let one = Axes::around(&[point(1.0, 1.0)], None).expect("a point");
         assert!(one.high[0] > one.low[0] && one.high[1] > one.low[1]);
         assert!(!is_drawn(&point(0.0, 1.0)) && !is_drawn(&point(1.0, f64::NAN)));
-        assert_eq!([seconds(-3), seconds(0), seconds(2)], ["1 ms", "1 s", "100 s"]);
+        assert_eq!(
+            [seconds(-3), seconds(0), seconds(2)],
+            ["1 ms", "1 s", "100 s"]
+        );
     }
 }

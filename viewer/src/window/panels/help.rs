@@ -13,15 +13,18 @@ pub fn show(ctx: &Context, desk: &mut Desk) {
     }
     let mut is_open = true;
     let room = ctx.content_rect().size();
+    let size = vec2(
+        (room.x - 40.0).clamp(60.0, 920.0),
+        (room.y - 90.0).clamp(60.0, 500.0),
+    );
     Window::new("Keys")
         .open(&mut is_open)
         .collapsible(false)
-        .resizable(false)
+        .fixed_size(size)
         .anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0))
         .show(ctx, |ui| {
             ScrollArea::both()
-                .max_width((room.x - 60.0).max(60.0))
-                .max_height((room.y - 90.0).max(60.0))
+                .auto_shrink([false, true])
                 .show(ui, columns);
         });
     desk.shows_help &= is_open;
@@ -33,19 +36,23 @@ fn columns(ui: &mut Ui) {
         groups.dedup();
         for column in groups.chunks(groups.len().div_ceil(2)) {
             ui.vertical(|ui| {
+                ui.set_min_width(280.0);
                 for group in column {
                     keys(ui, group);
                 }
             });
-            ui.add_space(16.0);
         }
         ui.vertical(|ui| {
+            ui.set_min_width(280.0);
             heading(ui, "On the picture");
-            Grid::new("mouse").num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-                for (hand, about) in MOUSE {
-                    row(ui, hand, about);
-                }
-            });
+            Grid::new("mouse")
+                .num_columns(2)
+                .spacing([14.0, 3.0])
+                .show(ui, |ui| {
+                    for (hand, about) in MOUSE {
+                        row(ui, hand, about);
+                    }
+                });
         });
     });
 }
@@ -57,11 +64,14 @@ fn heading(ui: &mut Ui, text: &str) {
 
 fn keys(ui: &mut Ui, group: &str) {
     heading(ui, group);
-    Grid::new(group).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
-        for of_group in TABLE.iter().filter(|row| row.group == group) {
-            row(ui, &of_group.keys(), of_group.about);
-        }
-    });
+    Grid::new(group)
+        .num_columns(2)
+        .spacing([14.0, 3.0])
+        .show(ui, |ui| {
+            for of_group in TABLE.iter().filter(|row| row.group == group) {
+                row(ui, &of_group.keys(), of_group.about);
+            }
+        });
     ui.add_space(10.0);
 }
 

@@ -36,7 +36,12 @@ pub fn show(ui: &mut Ui, desk: &mut Desk) {
                 Some(share) => format!("{:4.1} %", 100.0 * share),
                 None => "      ".to_owned(),
             };
-            ui.label(RichText::new(share).monospace().size(11.0).color(theme::QUIET));
+            ui.label(
+                RichText::new(share)
+                    .monospace()
+                    .size(11.0)
+                    .color(theme::QUIET),
+            );
             let name = eframe::egui::Label::new(RichText::new(&kernel.name).size(12.0)).truncate();
             let label = ui.add(name);
             if !kernel.materials.is_empty() {
@@ -62,16 +67,19 @@ fn strategy(ui: &mut Ui, desk: &mut Desk) {
         return;
     }
     ui.horizontal(|ui| {
-        ui.label("Strategy");
+        let label = ui.label("Strategy");
         let mut next = desk.strategy().to_owned();
         ComboBox::from_id_salt("strategy")
             .selected_text(next.clone())
             .width(ui.available_width() - 8.0)
             .show_ui(ui, |ui| {
                 for (name, about) in &project.strategies {
-                    ui.selectable_value(&mut next, name.clone(), name).on_hover_text(about);
+                    ui.selectable_value(&mut next, name.clone(), name)
+                        .on_hover_text(about);
                 }
-            });
+            })
+            .response
+            .labelled_by(label.id);
         desk.plan_by(&next);
     });
 }

@@ -1,6 +1,6 @@
 //! What stands around the picture. Each panel reads the desk and tells it what hands do; none keeps a state of its own.
 
-use eframe::egui::{CollapsingHeader, RichText, Ui};
+use eframe::egui::{CollapsingHeader, Response, RichText, Ui};
 
 use super::theme;
 
@@ -10,6 +10,7 @@ mod errors;
 pub mod help;
 mod kernels;
 mod params;
+mod picker;
 pub mod save;
 pub mod scene;
 pub mod side;
@@ -28,4 +29,12 @@ fn section<R>(ui: &mut Ui, title: &str, is_open: bool, content: impl FnOnce(&mut
 /// A quiet text.
 fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(theme::QUIET).size(12.0)
+}
+
+/// Gives a control that has no label beside it a name for screen readers.
+fn named(response: &Response, name: &str) {
+    let name = name.to_owned();
+    response
+        .ctx
+        .accesskit_node_builder(response.id, |node| node.set_label(name));
 }

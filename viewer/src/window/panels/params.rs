@@ -2,19 +2,19 @@
 
 use eframe::egui::{
     self, Align, Button, Color32, DragValue, Key, Label, Layout, Popup, PopupCloseBehavior, Rect,
-    Response, RichText, Sense, Slider, SliderClamping, TextEdit, Ui, WidgetInfo, Role,
-    color_picker, pos2, vec2,
+    Response, RichText, Role, Sense, Slider, SliderClamping, TextEdit, Ui, WidgetInfo, pos2, vec2,
 };
 use impasto_compiler::interface::Value;
 
 use super::super::desk::Desk;
 use super::super::theme;
 use super::super::values::{self, Control};
+use super::{named, picker};
 use crate::engine::{Param, ParamId};
 
 /// Points that a name has, and a field of a number.
 const NAME: f32 = 96.0;
-const FIELD: f32 = 62.0;
+const FIELD: f32 = 68.0;
 
 /// Draws a parameter.
 pub fn show(ui: &mut Ui, desk: &mut Desk, id: &ParamId, param: &Param) {
@@ -51,9 +51,10 @@ pub fn show(ui: &mut Ui, desk: &mut Desk, id: &ParamId, param: &Param) {
 }
 
 fn why_closed(param: &Param) -> &'static str {
-    match param.is_animated {
-        true => "Keys of the scene move it: edit them in the file",
-        false => "It is an input of the surface, which a scene cannot set",
+    if param.is_animated {
+        "Keys of the scene move it: edit them in the file"
+    } else {
+        "It is an input of the surface, which a scene cannot set"
     }
 }
 
@@ -66,7 +67,8 @@ fn name(ui: &mut Ui, param: &Param, is_set: bool, is_open: bool) -> Response {
     };
     let text = RichText::new(&interface.label).color(color);
     let width = NAME.min(0.45 * ui.available_width());
-    let (rect, _) = ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
+    let (rect, _) =
+        ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
     let mut inside = ui.new_child(
         egui::UiBuilder::new()
             .max_rect(rect)
@@ -106,7 +108,8 @@ fn reset(ui: &mut Ui, desk: &mut Desk, id: &ParamId, param: &Param, is_set: bool
     let label = format!("Reset {}", param.interface.label);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
     let radius = if response.hovered() { 5.0 } else { 3.5 };
-    ui.painter().circle_filled(rect.center(), radius, theme::ACCENT);
+    ui.painter()
+        .circle_filled(rect.center(), radius, theme::ACCENT);
     let response = response.on_hover_text(match &param.written {
         Some(written) => format!("Reset to {written}, as the scene has it"),
         None => format!("Reset to the default, {}", param.interface.default_text),
@@ -154,13 +157,7 @@ fn edited(
 }
 
 /// A slider between the soft limits, and a field within the hard ones.
-fn number(
-    ui: &mut Ui,
-    param: &Param,
-    shown: f64,
-    is_whole: bool,
-    name: &Response,
-) -> Option<f64> {
+fn number(ui: &mut Ui, param: &Param, shown: f64, is_whole: bool, name: &Response) -> Option<f64> {
     let interface = &param.interface;
     let ends = values::ends(interface);
     let [low, high] = values::limits(interface);
@@ -179,19 +176,27 @@ fn number(
         }
         has_changed |= ui.add(slider).labelled_by(name.id).changed();
     }
-    let speed = match is_whole {
-        true => 0.1,
-        false => ((ends.high - ends.low) / 400.0).max(1e-9),
+    let speed = if is_whole {
+        0.1
+    } else {
+        ((ends.high - ends.low) / 400.0).max(1e-9)
     };
     let mut field = DragValue::new(&mut next)
         .range(low..=high)
         .speed(speed)
-        .max_decimals(if is_whole { 0 } else { decimals(ends.high - ends.low) })
+        .max_decimals(if is_whole {
+            0
+        } else {
+            decimals(ends.high - ends.low)
+        })
         .update_while_editing(false);
     if !unit.is_empty() {
         field = field.suffix(format!(" {unit}"));
     }
-    let size = vec2(FIELD.min(ui.available_width()), ui.spacing().interact_size.y);
+    let size = vec2(
+        FIELD.min(ui.available_width()),
+        ui.spacing().interact_size.y,
+    );
     has_changed |= ui.add_sized(size, field).labelled_by(name.id).changed();
     (has_changed && next != shown).then_some(next)
 }
@@ -224,12 +229,7 @@ fn fields(ui: &mut Ui, param: &Param, components: &[f32]) -> Option<Vec<f32>> {
                 .update_while_editing(false);
             let size = vec2(width.max(20.0), ui.spacing().interact_size.y);
             let response = ui.add_sized(size, field);
-            response.widget_info(|| {
-                WidgetInfo {
-                    value: Some(shown),
-                    ..WidgetInfo::labeled(Role::SpinButton, true, format!("{} {}", interface.label, axis.trim()))
-                }
-            });
+            named(&response, &format!("{} {}", interface.label, axis.trim()));
             if response.changed() {
                 *component = values::given(interface, shown);
                 has_changed = true;
@@ -257,9 +257,11 @@ fn color(ui: &mut Ui, id: &ParamId, param: &Param, linear: [f32; 3]) -> Option<[
         digits = draft;
     }
     let field = TextEdit::singleline(&mut digits)
-        .font(egui::TextStyle::Monospace)
-        .desired_width(FIELD - 8.0);
+        .font(egui::FontId::monospace(11.5))
+        .margin(egui::Margin::symmetric(5, 3))
+        .desired_width(FIELD - 10.0);
     let field = ui.add(field).on_hover_text("sRGB, six digits");
+    named(&field, &format!("{} digits", param.interface.label));
     if field.has_focus() {
         ui.data_mut(|d| d.insert_temp(at, digits.clone()));
     }
@@ -271,7 +273,7 @@ fn color(ui: &mut Ui, id: &ParamId, param: &Param, linear: [f32; 3]) -> Option<[
     Popup::from_toggle_button_response(&button)
         .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
         .show(|ui| {
-            if let Some(picked) = picker(ui, id, linear, strength) {
+            if let Some(picked) = picker::show(ui, &param.interface.label, linear, strength) {
                 next = Some(picked);
             }
         });
@@ -280,59 +282,15 @@ fn color(ui: &mut Ui, id: &ParamId, param: &Param, linear: [f32; 3]) -> Option<[
 
 fn plate(ui: &Ui, rect: Rect, color: Color32, response: &Response) {
     let painter = ui.painter();
-    let shade = if ui.is_enabled() { color } else { color.gamma_multiply(0.4) };
+    let shade = if ui.is_enabled() {
+        color
+    } else {
+        color.gamma_multiply(0.4)
+    };
     painter.rect_filled(rect, 3.0, shade);
     let edge = if response.hovered() { 0xb0 } else { 0x50 };
     let stroke = egui::Stroke::new(1.0, Color32::from_gray(edge));
     painter.rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Inside);
-}
-
-/// A picker in sRGB, and the linear numbers that it gives.
-fn picker(ui: &mut Ui, id: &ParamId, linear: [f32; 3], strength: f32) -> Option<[f32; 3]> {
-    use super::super::tone;
-    ui.spacing_mut().slider_width = 200.0;
-    // The picker forgets the hue of greys, unless it is kept while the color is what it made last.
-    let at = ui.scope_id().with((id, "hue"));
-    let kept: Option<([f32; 3], egui::ecolor::Hsva)> = ui.data(|d| d.get_temp(at));
-    let mut hsva = match kept {
-        Some((made, hsva)) if made == linear => hsva,
-        _ => {
-            let [r, g, b] = linear.map(|x| (x / strength).clamp(0.0, 1.0));
-            egui::ecolor::Hsva::from_rgb([r, g, b])
-        }
-    };
-    let mut next = None;
-    if color_picker::color_picker_hsva_2d(ui, &mut hsva, color_picker::Alpha::Opaque) {
-        let made = hsva.to_rgb().map(|x| x * strength);
-        ui.data_mut(|d| d.insert_temp(at, (made, hsva)));
-        next = Some(made);
-    }
-    ui.horizontal(|ui| {
-        ui.label(super::quiet("linear"));
-        let mut components = linear;
-        for (i, component) in components.iter_mut().enumerate() {
-            let mut shown = values::exact(*component);
-            let field = DragValue::new(&mut shown)
-                .range(0.0..=f64::INFINITY)
-                .speed(0.004)
-                .max_decimals(4)
-                .prefix(["r ", "g ", "b "][i])
-                .update_while_editing(false);
-            if ui.add(field).changed() {
-                *component = shown as f32;
-            }
-        }
-        if components != linear {
-            next = Some(components);
-        }
-    });
-    let srgb = linear.map(|x| (255.0 * tone::srgb((x / strength).clamp(0.0, 1.0)) + 0.5) as u8);
-    let [r, g, b] = srgb;
-    ui.label(super::quiet(match strength > 1.0 {
-        true => format!("{strength:.3} * srgb(0x{r:02x}{g:02x}{b:02x})"),
-        false => format!("srgb(0x{r:02x}{g:02x}{b:02x})"),
-    }));
-    next
 }
 
 /// A text that counts when it is entered, and not letter by letter.
@@ -368,6 +326,7 @@ pub fn group(ui: &mut Ui, name: &str) {
             pos2(label.rect.right() + 6.0, y),
             pos2(ui.max_rect().right() - 4.0, y),
         ];
-        ui.painter().line_segment(line, egui::Stroke::new(1.0, Color32::from_gray(0x36)));
+        ui.painter()
+            .line_segment(line, egui::Stroke::new(1.0, Color32::from_gray(0x36)));
     });
 }

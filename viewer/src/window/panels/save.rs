@@ -4,12 +4,17 @@ use eframe::egui::{Align2, Context, Key, RichText, TextEdit, Window, vec2};
 
 use super::super::desk::Desk;
 use super::super::theme;
+use super::named;
 
 /// Formats, and what they hold.
 const FORMATS: [(&str, &str, &str); 3] = [
     ("EXR", "exr", "Linear radiance and all layers"),
     ("PNG", "png", "sRGB at this exposure, for looking"),
-    ("Film", "film", "Exact sums, for `impasto merge` and to go on from"),
+    (
+        "Film",
+        "film",
+        "Exact sums, for `impasto merge` and to go on from",
+    ),
 ];
 
 /// Draws it if it is open.
@@ -25,6 +30,7 @@ pub fn show(ctx: &Context, desk: &mut Desk) {
         .anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0))
         .show(ctx, |ui| {
             let response = ui.add(TextEdit::singleline(&mut desk.save_as).desired_width(320.0));
+            named(&response, "File");
             if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
                 desk.save(None);
             }
@@ -35,7 +41,11 @@ pub fn show(ctx: &Context, desk: &mut Desk) {
                         desk.save(Some(extension));
                     }
                 }
-                ui.label(RichText::new("Enter: by its extension").color(theme::QUIET).size(12.0));
+                ui.label(
+                    RichText::new("Enter: by its extension")
+                        .color(theme::QUIET)
+                        .size(12.0),
+                );
             });
         });
     desk.shows_save &= is_open;

@@ -2,28 +2,32 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Align, CollapsingHeader, DragValue, Layout, RichText, ScrollArea, TextEdit, Ui};
+use eframe::egui::{
+    Align, CollapsingHeader, DragValue, Layout, RichText, ScrollArea, TextEdit, Ui,
+};
 use glam::Vec3;
 use impasto_runtime::scene::Camera;
 
 use super::super::desk::Desk;
 use super::super::{navigate, theme};
-use super::{params, quiet, section};
+use super::{named, params, quiet, section};
 use crate::engine::{Binding, ParamId};
 
 /// Draws it.
 pub fn show(ui: &mut Ui, desk: &mut Desk) {
     head(ui, desk);
     ui.separator();
-    ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        let project = Arc::clone(&desk.news.project);
-        let is_short = project.bindings.len() <= 4;
-        for (index, binding) in project.bindings.iter().enumerate() {
-            show_binding(ui, desk, index, binding, is_short || index == 0);
-        }
-        ui.separator();
-        section(ui, "Camera", false, |ui| camera(ui, desk));
-    });
+    ScrollArea::vertical()
+        .auto_shrink([false; 2])
+        .show(ui, |ui| {
+            let project = Arc::clone(&desk.news.project);
+            let is_short = project.bindings.len() <= 4;
+            for (index, binding) in project.bindings.iter().enumerate() {
+                show_binding(ui, desk, index, binding, is_short || index == 0);
+            }
+            ui.separator();
+            section(ui, "Camera", false, |ui| camera(ui, desk));
+        });
     desk.reveal = None;
 }
 
@@ -33,17 +37,22 @@ fn head(ui: &mut Ui, desk: &mut Desk) {
         let filter = TextEdit::singleline(&mut desk.filter)
             .hint_text("Filter")
             .desired_width(width);
-        ui.add(filter);
+        let filter = ui.add(filter);
+        named(&filter, "Filter parameters");
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let count = desk.count_set();
             if desk.news.project.is_scene {
-                let write = ui.add_enabled_ui(count > 0, |ui| params::small(ui, "Write back")).inner;
+                let write = ui
+                    .add_enabled_ui(count > 0, |ui| params::small(ui, "Write back"))
+                    .inner;
                 let write = write.on_hover_text("Writes what was set into the scene file");
                 if write.clicked() {
                     desk.write_back();
                 }
             }
-            let reset = ui.add_enabled_ui(count > 0, |ui| params::small(ui, "Reset all")).inner;
+            let reset = ui
+                .add_enabled_ui(count > 0, |ui| params::small(ui, "Reset all"))
+                .inner;
             if reset.on_hover_text(format!("{count} set")).clicked() {
                 desk.reset_all();
             }
@@ -65,8 +74,15 @@ fn show_binding(ui: &mut Ui, desk: &mut Desk, index: usize, binding: &Binding, i
     if !filter.is_empty() && shown.is_empty() {
         return;
     }
-    let is_picked = desk.picked.as_ref().is_some_and(|p| p.binding == Some(index));
-    let color = if is_picked { theme::ACCENT } else { theme::TEXT };
+    let is_picked = desk
+        .picked
+        .as_ref()
+        .is_some_and(|p| p.binding == Some(index));
+    let color = if is_picked {
+        theme::ACCENT
+    } else {
+        theme::TEXT
+    };
     let title = RichText::new(&binding.name).strong().color(color);
     let is_revealed = desk.reveal == Some(index);
     let open = (is_revealed || !filter.is_empty()).then_some(true);
@@ -114,7 +130,14 @@ fn camera(ui: &mut Ui, desk: &mut Desk) {
     vector(ui, "Position", &mut camera.position);
     vector(ui, "Look at", &mut camera.look_at);
     scalar(ui, "View", &mut camera.fov, 0.2, 0.5..=175.0, " deg");
-    scalar(ui, "Aperture", &mut camera.aperture, 0.0005, 0.0..=10.0, " m");
+    scalar(
+        ui,
+        "Aperture",
+        &mut camera.aperture,
+        0.0005,
+        0.0..=10.0,
+        " m",
+    );
     scalar(ui, "Focus", &mut camera.focus, 0.01, 1e-4..=1e6, " m");
     let is_seeing = camera.basis()[1] != Vec3::ZERO && camera.basis()[2] != Vec3::ZERO;
     if camera != before && is_seeing {
@@ -135,12 +158,18 @@ fn vector(ui: &mut Ui, name: &str, vector: &mut Vec3) {
     ui.horizontal(|ui| {
         ui.add_sized([58.0, 18.0], eframe::egui::Label::new(name));
         let width = (ui.available_width() - 18.0) / 3.0;
-        for component in [&mut vector.x, &mut vector.y, &mut vector.z] {
+        let axes = [
+            (&mut vector.x, "x"),
+            (&mut vector.y, "y"),
+            (&mut vector.z, "z"),
+        ];
+        for (component, axis) in axes {
             let field = DragValue::new(component)
                 .speed(0.01)
                 .max_decimals(4)
                 .update_while_editing(false);
-            ui.add_sized([width.max(20.0), 20.0], field);
+            let response = ui.add_sized([width.max(20.0), 20.0], field);
+            named(&response, &format!("{name} {axis}"));
         }
     });
 }

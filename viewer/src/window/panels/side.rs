@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    Button, Checkbox, ComboBox, DragValue, RichText, ScrollArea, Slider, TextEdit, Ui,
+    Button, Checkbox, ComboBox, DragValue, Id, RichText, ScrollArea, Slider, TextEdit, Ui,
 };
 
 use super::super::canvas::Canvas;
@@ -13,31 +13,33 @@ use super::super::keys::{self, Command};
 use super::super::picture::{self, Channel};
 use super::super::theme;
 use super::super::tone::{Curve, Map};
-use super::{errors, kernels, params, quiet, section};
+use super::{errors, kernels, named, params, quiet, section};
 
 /// Draws it.
 pub fn show(ui: &mut Ui, desk: &mut Desk, canvas: &Canvas) {
-    ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        section(ui, "Display", true, |ui| display(ui, desk));
-        section(ui, "Compare", true, |ui| compare(ui, desk, canvas));
-        section(ui, "Pixel", true, |ui| pixel(ui, desk));
-        section(ui, "Render", true, |ui| render(ui, desk));
-        section(ui, "Kernels", true, |ui| kernels::show(ui, desk));
-        section(ui, "Error", true, |ui| errors::show(ui, desk));
-    });
+    ScrollArea::vertical()
+        .auto_shrink([false; 2])
+        .show(ui, |ui| {
+            section(ui, "Display", true, |ui| display(ui, desk));
+            section(ui, "Compare", true, |ui| compare(ui, desk, canvas));
+            section(ui, "Pixel", true, |ui| pixel(ui, desk));
+            section(ui, "Render", true, |ui| render(ui, desk));
+            section(ui, "Kernels", true, |ui| kernels::show(ui, desk));
+            section(ui, "Error", true, |ui| errors::show(ui, desk));
+        });
 }
 
-/// A name at the left, and room for a control of the same place in every line.
-fn line<R>(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui) -> R) -> R {
+/// A name at the left, and a control at the same place in every line, which the name is the label of.
+fn line<R>(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui, Id) -> R) -> R {
     ui.horizontal(|ui| {
         let width = 66f32.min(0.4 * ui.available_width());
         let size = eframe::egui::vec2(width, ui.spacing().interact_size.y);
         let layout = eframe::egui::Layout::left_to_right(eframe::egui::Align::Center);
-        ui.allocate_ui_with_layout(size, layout, |ui| {
+        let label = ui.allocate_ui_with_layout(size, layout, |ui| {
             ui.set_min_width(width);
-            ui.label(name);
+            ui.label(name).id
         });
-        content(ui)
+        content(ui, label.inner)
     })
     .inner
 }
@@ -47,23 +49,24 @@ fn key(command: Command) -> String {
 }
 
 fn display(ui: &mut Ui, desk: &mut Desk) {
-    line(ui, "Exposure", |ui| {
+    line(ui, "Exposure", |ui, name| {
         ui.spacing_mut().slider_width = (ui.available_width() - 70.0).max(30.0);
         let mut stops = desk.look.exposure;
         let slider = Slider::new(&mut stops, -8.0..=8.0)
             .clamping(eframe::egui::SliderClamping::Never)
             .show_value(false);
-        ui.add(slider).on_hover_text(format!("Stops ({})", key(Command::Brighter)));
+        let slider = ui.add(slider).labelled_by(name);
+        slider.on_hover_text(format!("Stops ({})", key(Command::Brighter)));
         let field = DragValue::new(&mut stops)
             .range(-20.0..=20.0)
             .speed(0.05)
             .fixed_decimals(1);
-        ui.add_sized([44.0, 20.0], field);
+        ui.add_sized([44.0, 20.0], field).labelled_by(name);
         if stops != desk.look.exposure {
             desk.expose(stops);
         }
     });
-    line(ui, "Curve", |ui| {
+    line(ui, "Curve", |ui, name| {
         ComboBox::from_id_salt("curve")
             .selected_text(desk.look.curve.name())
             .width(ui.available_width() - 8.0)
@@ -72,16 +75,19 @@ fn display(ui: &mut Ui, desk: &mut Desk) {
                     ui.selectable_value(&mut desk.look.curve, curve, curve.name())
                         .on_hover_text(curve.about());
                 }
-            });
+            })
+            .response
+            .labelled_by(name);
     });
-    line(ui, "Layer", |ui| layers(ui, desk));
+    line(ui, "Layer", |ui, name| layers(ui, desk, name));
     ui.horizontal(|ui| {
         for channel in Channel::ALL {
             ui.selectable_value(&mut desk.look.channel, channel, channel.name());
         }
     });
     let tip = format!("Light in false color ({})", key(Command::FalseColor));
-    ui.checkbox(&mut desk.look.is_false, "False color").on_hover_text(tip);
+    ui.checkbox(&mut desk.look.is_false, "False color")
+        .on_hover_text(tip);
     if desk.shows_numbers() || desk.overlay.is_some() {
         colors(ui, desk);
     }
@@ -89,68 +95,86 @@ fn display(ui: &mut Ui, desk: &mut Desk) {
         "Red stripes above 1, blue ones below 0, after exposure ({})",
         key(Command::MarkClipped)
     );
-    ui.checkbox(&mut desk.look.mark_clipped, "Mark clipped").on_hover_text(tip);
+    ui.checkbox(&mut desk.look.mark_clipped, "Mark clipped")
+        .on_hover_text(tip);
     let tip = format!(
         "Pixels that are not finite, or lost samples that were not ({})",
         key(Command::MarkNonfinite)
     );
-    ui.checkbox(&mut desk.look.mark_nonfinite, "Mark not finite").on_hover_text(tip);
+    ui.checkbox(&mut desk.look.mark_nonfinite, "Mark not finite")
+        .on_hover_text(tip);
     overlay(ui, desk);
 }
 
-fn layers(ui: &mut Ui, desk: &mut Desk) {
+fn layers(ui: &mut Ui, desk: &mut Desk, name: Id) {
     let shown = desk.layer.clone().unwrap_or_else(|| "picture".to_owned());
     ComboBox::from_id_salt("layer")
         .selected_text(shown)
         .width(ui.available_width() - 8.0)
         .show_ui(ui, |ui| {
-            if ui.selectable_label(desk.layer.is_none(), "picture").clicked() {
+            if ui
+                .selectable_label(desk.layer.is_none(), "picture")
+                .clicked()
+            {
                 desk.show(None);
             }
-            for (name, about) in desk.layers() {
-                let is_there = desk.has_layer(&name);
-                let text = RichText::new(&name);
-                let text = if is_there { text } else { text.color(theme::QUIET) };
-                let is_shown = desk.layer.as_deref() == Some(&name);
+            for (layer, about) in desk.layers() {
+                let is_there = desk.has_layer(&layer);
+                let text = RichText::new(&layer);
+                let text = if is_there {
+                    text
+                } else {
+                    text.color(theme::QUIET)
+                };
+                let is_shown = desk.layer.as_deref() == Some(&layer);
                 let row = ui.selectable_label(is_shown, text);
-                let tip = match is_there {
-                    true => about,
-                    false => format!("{about}\nIt is recorded once it is chosen."),
+                let tip = if is_there {
+                    about
+                } else {
+                    format!("{about}\nIt is recorded once it is chosen.")
                 };
                 if row.on_hover_text(tip).clicked() {
-                    desk.show(Some(name));
+                    desk.show(Some(layer));
                 }
             }
-        });
+        })
+        .response
+        .labelled_by(name);
 }
 
 fn overlay(ui: &mut Ui, desk: &mut Desk) {
-    line(ui, "Overlay", |ui| {
+    line(ui, "Overlay", |ui, name| {
         let shown = desk.overlay.clone().unwrap_or_else(|| "none".to_owned());
         ComboBox::from_id_salt("overlay")
             .selected_text(shown)
             .width(ui.available_width() - 8.0)
             .show_ui(ui, |ui| {
-                if ui.selectable_label(desk.overlay.is_none(), "none").clicked() {
+                if ui
+                    .selectable_label(desk.overlay.is_none(), "none")
+                    .clicked()
+                {
                     desk.lay_over(None);
                 }
-                for name in OVERLAYS {
-                    let known = desk.layers().into_iter().find(|(known, _)| known == name);
-                    let is_over = desk.overlay.as_deref() == Some(name);
-                    let button = Button::selectable(is_over, name);
+                for layer in OVERLAYS {
+                    let known = desk.layers().into_iter().find(|(known, _)| known == layer);
+                    let is_over = desk.overlay.as_deref() == Some(layer);
+                    let button = Button::selectable(is_over, layer);
                     let row = ui.add_enabled(known.is_some(), button);
                     let row = row.on_disabled_hover_text("This render has no such layer");
                     let tip = known.map_or(String::new(), |(_, about)| about);
                     if row.on_hover_text(tip).clicked() {
-                        desk.lay_over(Some(name.to_owned()));
+                        desk.lay_over(Some(layer.to_owned()));
                     }
                 }
-            });
+            })
+            .response
+            .labelled_by(name);
     });
     if desk.overlay.is_some() {
-        line(ui, "Opacity", |ui| {
+        line(ui, "Opacity", |ui, name| {
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(30.0);
-            ui.add(Slider::new(&mut desk.overlay_share, 0.0..=1.0).show_value(false));
+            let slider = Slider::new(&mut desk.overlay_share, 0.0..=1.0).show_value(false);
+            ui.add(slider).labelled_by(name);
         });
     }
 }
@@ -158,7 +182,7 @@ fn overlay(ui: &mut Ui, desk: &mut Desk) {
 fn colors(ui: &mut Ui, desk: &mut Desk) {
     let colors = &mut desk.look.colors;
     ui.horizontal(|ui| {
-        ComboBox::from_id_salt("map")
+        let menu = ComboBox::from_id_salt("map")
             .selected_text(colors.map.name())
             .width(84.0)
             .show_ui(ui, |ui| {
@@ -166,17 +190,23 @@ fn colors(ui: &mut Ui, desk: &mut Desk) {
                     ui.selectable_value(&mut colors.map, map, map.name());
                 }
             });
+        named(&menu.response, "Colors");
         ui.checkbox(&mut colors.is_log, "log");
         let mut has_ends = colors.ends.is_some();
-        if ui.checkbox(&mut has_ends, "ends").on_hover_text("Ends of the scale").changed() {
+        if ui
+            .checkbox(&mut has_ends, "ends")
+            .on_hover_text("Ends of the scale")
+            .changed()
+        {
             colors.ends = has_ends.then_some([1e-3, 1.0]);
         }
     });
     if let Some([low, high]) = &mut colors.ends {
         ui.horizontal(|ui| {
-            for end in [low, high] {
+            for (end, name) in [(low, "Low end"), (high, "High end")] {
                 let speed = (f64::from(end.abs()) * 0.02).max(1e-6);
-                ui.add(DragValue::new(end).speed(speed).max_decimals(6));
+                let field = ui.add(DragValue::new(end).speed(speed).max_decimals(6));
+                named(&field, name);
             }
         });
     }
@@ -184,21 +214,26 @@ fn colors(ui: &mut Ui, desk: &mut Desk) {
 
 fn compare(ui: &mut Ui, desk: &mut Desk, canvas: &Canvas) {
     ui.horizontal(|ui| {
-        let tip = format!("Keeps the picture as it is now ({})", key(Command::Snapshot));
+        let tip = format!(
+            "Keeps the picture as it is now ({})",
+            key(Command::Snapshot)
+        );
         let has_picture = desk.picture().is_some();
         let take = ui.add_enabled(has_picture, Button::new("Snapshot"));
         if take.on_hover_text(tip).clicked() {
             desk.take_snapshot();
         }
         let mut mode = desk.compare;
-        ComboBox::from_id_salt("compare")
+        let menu = ComboBox::from_id_salt("compare")
             .selected_text(mode.name())
             .width(ui.available_width() - 8.0)
             .show_ui(ui, |ui| {
                 for one in Mode::ALL {
-                    ui.selectable_value(&mut mode, one, one.name()).on_hover_text(one.about());
+                    ui.selectable_value(&mut mode, one, one.name())
+                        .on_hover_text(one.about());
                 }
             });
+        named(&menu.response, "Compare by");
         if mode != desk.compare {
             desk.compare_by(mode);
         }
@@ -224,8 +259,9 @@ fn compare(ui: &mut Ui, desk: &mut Desk, canvas: &Canvas) {
             .hint_text("reference.exr")
             .desired_width(width);
         let response = ui.add(field);
-        let is_entered = response.lost_focus()
-            && ui.input(|i| i.key_pressed(eframe::egui::Key::Enter));
+        named(&response, "File to compare with");
+        let is_entered =
+            response.lost_focus() && ui.input(|i| i.key_pressed(eframe::egui::Key::Enter));
         if params::small(ui, "Read").clicked() || is_entered {
             desk.read();
         }
@@ -244,12 +280,17 @@ fn pixel(ui: &mut Ui, desk: &mut Desk) {
         ui.label(quiet("Click on the picture."));
         return;
     };
-    let [column, row] = picked.pixel;
     let bindings = Arc::clone(&desk.news.project);
     let binding = picked.binding.and_then(|i| bindings.bindings.get(i));
-    line(ui, "Pixel", |ui| ui.label(format!("{column}, {row}")));
+    let pixel = desk.picked_pixel();
+    line(ui, "Pixel", |ui, _| {
+        ui.label(match pixel {
+            Some([column, row]) => format!("{column}, {row}"),
+            None => "outside".to_owned(),
+        })
+    });
     if let Some(binding) = binding {
-        line(ui, "Material", |ui| {
+        line(ui, "Material", |ui, _| {
             let label = ui.link(&binding.name).on_hover_text("Shows its parameters");
             if label.clicked() {
                 desk.reveal = picked.binding;
@@ -257,51 +298,70 @@ fn pixel(ui: &mut Ui, desk: &mut Desk) {
         });
     }
     if let Some((file, line_number)) = &picked.source {
-        line(ui, "Source", |ui| {
+        line(ui, "Source", |ui, _| {
             let place = format!("{file}:{line_number}");
             let shown = std::path::Path::new(file).file_name();
-            let shown = shown.map_or(place.clone(), |f| format!("{}:{line_number}", f.to_string_lossy()));
-            if ui.link(shown).on_hover_text(format!("Copies {place}")).clicked() {
+            let shown = shown.map_or(place.clone(), |f| {
+                format!("{}:{line_number}", f.to_string_lossy())
+            });
+            if ui
+                .link(shown)
+                .on_hover_text(format!("Copies {place}"))
+                .clicked()
+            {
                 ui.ctx().copy_text(place.clone());
                 desk.say(format!("Copied {place}"));
             }
         });
     }
     if let Some(object) = &picked.object {
-        line(ui, "Object", |ui| ui.add(eframe::egui::Label::new(object).truncate()));
+        line(ui, "Object", |ui, _| {
+            ui.add(eframe::egui::Label::new(object).truncate())
+        });
     }
     let [x, y, z] = picked.position.map(picture::number);
-    line(ui, "Position", |ui| ui.label(format!("{x}  {y}  {z} m")));
-    line(ui, "Depth", |ui| ui.label(format!("{} m", picture::number(picked.depth))));
-    if let Some(picture) = desk.picture() {
+    line(ui, "Position", |ui, _| ui.label(format!("{x}  {y}  {z} m")));
+    line(ui, "Depth", |ui, _| {
+        ui.label(format!("{} m", picture::number(picked.depth)))
+    });
+    if let (Some(picture), Some([column, row])) = (desk.picture(), pixel) {
         let index = row as usize * picture.width as usize + column as usize;
         let texts = picture::texts(picture, desk.layer.as_deref(), index);
-        line(ui, "Value", |ui| ui.label(texts.join("  ")));
+        line(ui, "Value", |ui, _| ui.label(texts.join("  ")));
     }
-    line(ui, "Path", |ui| {
+    line(ui, "Path", |ui, name| {
         let mut sample = desk.sample;
-        let field = DragValue::new(&mut sample).prefix("sample ").update_while_editing(false);
-        ui.add(field);
+        let field = DragValue::new(&mut sample)
+            .prefix("sample ")
+            .update_while_editing(false);
+        ui.add(field).labelled_by(name);
         desk.sample = sample;
-        if params::small(ui, "Trace").on_hover_text(key(Command::ToolTrace)).clicked() {
-            desk.trace(picked.pixel, sample);
+        if params::small(ui, "Trace")
+            .on_hover_text(key(Command::ToolTrace))
+            .clicked()
+        {
+            desk.trace(pixel.unwrap_or(picked.pixel), sample);
         }
     });
 }
 
 fn render(ui: &mut Ui, desk: &mut Desk) {
-    line(ui, "Samples", |ui| {
+    line(ui, "Samples", |ui, name| {
         let mut samples = desk.samples;
         let speed = (f64::from(samples) * 0.02).max(0.2);
         let field = DragValue::new(&mut samples)
             .range(1..=1_048_576)
             .speed(speed)
             .update_while_editing(false);
-        if ui.add(field).on_hover_text("Samples of a pixel after which to rest").changed() {
+        let field = ui.add(field).labelled_by(name);
+        if field
+            .on_hover_text("Samples of a pixel after which to rest")
+            .changed()
+        {
             desk.take_samples(samples);
         }
     });
-    line(ui, "Until", |ui| {
+    line(ui, "Until", |ui, name| {
         let (mut goal, mut size) = desk.goal.clone();
         ComboBox::from_id_salt("goal")
             .selected_text(goal.name())
@@ -310,10 +370,13 @@ fn render(ui: &mut Ui, desk: &mut Desk) {
                 for one in Goal::ALL {
                     ui.selectable_value(&mut goal, one, one.name());
                 }
-            });
+            })
+            .response
+            .labelled_by(name);
         desk.end_by(goal);
         if goal != Goal::Samples && goal == desk.goal.0 {
-            let response = ui.add(TextEdit::singleline(&mut size).desired_width(52.0));
+            let field = TextEdit::singleline(&mut size).desired_width(52.0);
+            let response = ui.add(field).labelled_by(name);
             if response.changed() {
                 desk.goal.1 = size;
             }
@@ -322,8 +385,8 @@ fn render(ui: &mut Ui, desk: &mut Desk) {
             }
         }
     });
-    line(ui, "Size", |ui| sizes(ui, desk));
-    line(ui, "Crop", |ui| match desk.crop {
+    line(ui, "Size", |ui, name| sizes(ui, desk, name));
+    line(ui, "Crop", |ui, _| match desk.crop {
         Some([from, to]) => {
             ui.label(format!("{} x {}", to[0] - from[0], to[1] - from[1]));
             if params::small(ui, "All").clicked() {
@@ -331,13 +394,16 @@ fn render(ui: &mut Ui, desk: &mut Desk) {
             }
         }
         None => {
-            ui.label(quiet(format!("none ({} and a drag)", key(Command::ToolCrop))));
+            ui.label(quiet(format!(
+                "none ({} and a drag)",
+                key(Command::ToolCrop)
+            )));
         }
     });
     outputs(ui, desk);
 }
 
-fn sizes(ui: &mut Ui, desk: &mut Desk) {
+fn sizes(ui: &mut Ui, desk: &mut Desk, name: Id) {
     let written = desk.news.project.size;
     let now = desk.picture().map_or(written, |p| [p.width, p.height]);
     let mut next = now;
@@ -345,12 +411,19 @@ fn sizes(ui: &mut Ui, desk: &mut Desk) {
         .selected_text(format!("{} x {}", now[0], now[1]))
         .width(ui.available_width() - 8.0)
         .show_ui(ui, |ui| {
-            for (share, name) in [(0.25, "25 %"), (0.5, "50 %"), (1.0, "as written"), (2.0, "200 %")] {
+            for (share, about) in [
+                (0.25, "25 %"),
+                (0.5, "50 %"),
+                (1.0, "as written"),
+                (2.0, "200 %"),
+            ] {
                 let size = written.map(|n| ((f64::from(n) * share).round() as u32).max(1));
-                let text = format!("{} x {}  ({name})", size[0], size[1]);
+                let text = format!("{} x {}  ({about})", size[0], size[1]);
                 ui.selectable_value(&mut next, size, text);
             }
-        });
+        })
+        .response
+        .labelled_by(name);
     if next != now {
         desk.resize(next);
     }

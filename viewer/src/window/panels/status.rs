@@ -42,7 +42,11 @@ pub fn show(ui: &mut Ui, desk: &Desk, canvas: &Canvas) {
             if let Some(text) = under_the_hand(desk, canvas) {
                 ui.label(RichText::new(text).monospace().color(theme::TEXT));
             } else if let Some(note) = &desk.note {
-                let color = if note.is_bad { theme::BAD } else { theme::QUIET };
+                let color = if note.is_bad {
+                    theme::BAD
+                } else {
+                    theme::QUIET
+                };
                 let line = note.text.lines().next().unwrap_or_default();
                 let label = eframe::egui::Label::new(RichText::new(line).color(color)).truncate();
                 ui.add(label).on_hover_text(&note.text);
@@ -91,8 +95,16 @@ pub fn time(seconds: f64) -> String {
     match seconds {
         s if s < 1.0 => format!("{:.0} ms", 1e3 * s),
         s if s < 60.0 => format!("{s:.1} s"),
-        s if s < 3600.0 => format!("{:.0} min {:02.0} s", (s / 60.0).floor(), (s % 60.0).floor()),
-        s => format!("{:.0} h {:02.0} min", (s / 3600.0).floor(), (s % 3600.0 / 60.0).floor()),
+        s if s < 3600.0 => format!(
+            "{:.0} min {:02.0} s",
+            (s / 60.0).floor(),
+            (s % 60.0).floor()
+        ),
+        s => format!(
+            "{:.0} h {:02.0} min",
+            (s / 3600.0).floor(),
+            (s % 3600.0 / 60.0).floor()
+        ),
     }
 }
 
