@@ -39,11 +39,18 @@ struct Inner {
     number: u64,
     frame: u32,
     is_paused: bool,
+    /// Are all samples there at once, without a thread that takes them?
+    is_still: bool,
     began: Instant,
     /// A file that stands for the scene: with the word `error` in it, it is broken.
     file: Option<PathBuf>,
     text: String,
 }
+
+/// Columns and rows of the picture of [`BallEngine::progressive`].
+pub const SIZE: [u32; 2] = [640, 400];
+/// Its samples.
+pub const SAMPLES: u32 = 256;
 
 /// The camera that the scene has.
 pub fn camera() -> Camera {
@@ -214,7 +221,7 @@ pub fn project() -> Project {
         is_scene: true,
         camera: Some(camera()),
         bounds: Some([[-0.1, 0.0, -0.1], [0.1, 0.2, 0.1]]),
-        size: [640, 400],
+        size: SIZE,
         bindings: vec![
             Binding {
                 name: "pot".to_owned(),
@@ -273,6 +280,7 @@ impl BallEngine {
             number: 0,
             frame: 1,
             is_paused: false,
+            is_still: true,
             began: Instant::now(),
             file: None,
             text: String::new(),
@@ -290,8 +298,9 @@ impl BallEngine {
         let engine = Self::still();
         {
             let mut inner = engine.inner();
-            inner.size = [640, 400];
-            inner.samples = 256;
+            inner.size = SIZE;
+            inner.samples = SAMPLES;
+            inner.is_still = false;
             inner.file = file.map(Path::to_owned);
             inner.restart();
         }
@@ -668,12 +677,7 @@ impl Inner {
     }
 
     fn restart(&mut self) {
-        // Without a thread all samples are there at once.
-        self.taken = if self.size == [64, 40] {
-            self.samples
-        } else {
-            1
-        };
+        self.taken = if self.is_still { self.samples } else { 1 };
         self.began = Instant::now();
         self.news.errors = Arc::new(Vec::new());
         self.paint();

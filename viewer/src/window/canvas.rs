@@ -31,7 +31,11 @@ enum Drag {
     Dolly,
     Shift,
     Crop([u32; 2]),
+    Wipe,
 }
+
+/// How near to the line of a wipe a hand takes hold of it, in points.
+const GRIP: f32 = 5.0;
 
 /// What an image was made of; another one is made when it is not this any more.
 #[derive(Clone, PartialEq)]
@@ -146,8 +150,17 @@ impl Canvas {
             }
         }
         if response.drag_started() {
+            // Where the hand pressed, and not where it is by now: frames may be slower than hands.
+            let line = wipe_at(desk, placed).filter(|_| self.other.is_some());
+            let is_line = origin
+                .zip(line)
+                .is_some_and(|(at, x)| (at.x - x).abs() <= GRIP);
             let start = origin.map(|at| view::pixel_near(placed, size, at));
-            self.drag = begun(response, modifiers, desk.tool, start);
+            self.drag = if is_line && response.dragged_by(PointerButton::Primary) {
+                Some(Drag::Wipe)
+            } else {
+                begun(response, modifiers, desk.tool, start)
+            };
         }
         if let Some(drag) = self.drag {
             self.follow(response, desk, drag, &area);
@@ -197,6 +210,12 @@ impl Canvas {
                     let low = [start[0].min(end[0]), start[1].min(end[1])];
                     let high = [start[0].max(end[0]) + 1, start[1].max(end[1]) + 1];
                     self.crop = Some([low, high]);
+                }
+            }
+            Drag::Wipe => {
+                if let Some(at) = response.interact_pointer_pos() {
+                    let share = (at.x - placed.left()) / placed.width().max(1.0);
+                    desk.wipe = share.clamp(0.0, 1.0);
                 }
             }
             _ if !moved => {}
@@ -294,7 +313,7 @@ impl Canvas {
         &mut self,
         ui: &mut Ui,
         painter: &Painter,
-        desk: &mut Desk,
+        desk: &Desk,
         picture: &Picture,
         placed: Rect,
     ) {
@@ -303,7 +322,7 @@ impl Canvas {
             painter.image(main.id(), placed, uv, Color32::WHITE);
         }
         if let Some(other) = self.other.as_ref().map(TextureHandle::id) {
-            let line = placed.left() + desk.wipe.clamp(0.0, 1.0) * placed.width();
+            let line = wipe_at(desk, placed).unwrap_or(placed.right());
             let right = Rect::from_min_max(pos2(line, placed.top()), placed.max);
             let clipped = painter.with_clip_rect(right.intersect(painter.clip_rect()));
             clipped.image(other, placed, uv, Color32::WHITE);
@@ -494,25 +513,26 @@ fn label(painter: &Painter, at: Pos2, align: Align2, text: &str, color: Color32)
     rect
 }
 
-fn wipe_line(ui: &mut Ui, painter: &Painter, desk: &mut Desk, placed: Rect, line: f32) {
+/// Where the line of the wipe is, if there is one.
+fn wipe_at(desk: &Desk, placed: Rect) -> Option<f32> {
+    let line = placed.left() + desk.wipe.clamp(0.0, 1.0) * placed.width();
+    (desk.compare == Mode::Wipe && desk.reference().is_some()).then_some(line)
+}
+
+fn wipe_line(ui: &mut Ui, painter: &Painter, desk: &Desk, placed: Rect, line: f32) {
     let shown = placed.intersect(painter.clip_rect());
     if !shown.is_positive() {
         return;
     }
     let grip = Rect::from_min_max(
-        pos2(line - 5.0, shown.top()),
-        pos2(line + 5.0, shown.bottom()),
+        pos2(line - GRIP, shown.top()),
+        pos2(line + GRIP, shown.bottom()),
     );
-    let response = ui.interact(grip, ui.scope_id().with("wipe"), Sense::drag());
+    // The picture itself follows a drag of the line; this only shows that there is one.
+    let response = ui.interact(grip, ui.scope_id().with("wipe"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Splitter, true, "Wipe line"));
-    if response.hovered() || response.dragged() {
+    if response.contains_pointer() {
         ui.ctx().set_cursor_icon(CursorIcon::ResizeHorizontal);
-    }
-    if let Some(at) = response
-        .interact_pointer_pos()
-        .filter(|_| response.dragged())
-    {
-        desk.wipe = ((at.x - placed.left()) / placed.width().max(1.0)).clamp(0.0, 1.0);
     }
     for (width, color) in [(3.0, Color32::from_black_alpha(140)), (1.0, Color32::WHITE)] {
         painter.line_segment(
