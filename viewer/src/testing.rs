@@ -50,7 +50,7 @@ struct Inner {
 /// Columns and rows of the picture of [`BallEngine::progressive`].
 pub const SIZE: [u32; 2] = [640, 400];
 /// Its samples.
-pub const SAMPLES: u32 = 256;
+pub const SAMPLES: u32 = 64;
 
 /// The camera that the scene has.
 pub fn camera() -> Camera {
@@ -687,7 +687,7 @@ impl Inner {
         if self.taken >= self.samples || self.is_paused || !self.news.problems.is_empty() {
             return false;
         }
-        self.taken = (self.taken + self.taken.div_ceil(6)).min(self.samples);
+        self.taken = (self.taken + self.taken.div_ceil(4)).min(self.samples);
         let mut errors = (*self.news.errors).clone();
         errors.push(ErrorPoint {
             seconds: self.began.elapsed().as_secs_f64(),

@@ -232,8 +232,10 @@ fn what_is_typed_is_held_by_the_hard_limits() {
     let mut test = Test::new();
     let field = test.rect(Role::SpinButton, "Speckle");
     test.click_at(field.center(), Modifiers::NONE);
+    test.harness.key_press(Key::Num2);
     test.harness.event(Event::Text("12345".to_owned()));
     test.frames(2);
+    assert_eq!(test.desk().tool, Tool::Orbit, "digits are digits");
     assert!(test.engine.orders().is_empty(), "nothing is entered yet");
     test.key(Key::Enter, Modifiers::NONE);
     let orders = test.engine.orders();
@@ -677,6 +679,16 @@ fn pictures_are_saved_from_a_dialog() {
     };
     assert_eq!(test.engine.orders(), [expected]);
     assert!(!test.desk().shows_save && test.shows("Wrote out/ball.png"));
+}
+
+#[test]
+fn frames_lie_on_a_line() {
+    let mut test = Test::new();
+    let slider = test.rect(Role::Slider, "Frame");
+    let orders = test.drag(slider.center(), &[(4.0, 0.0), (900.0, 0.0)]);
+    assert_eq!(orders.into_iter().flatten().last(), Some(Order::Frame(48)));
+    test.click("Previous frame");
+    assert_eq!(test.engine.orders(), [Order::Frame(47)]);
 }
 
 #[test]

@@ -22,6 +22,8 @@ use impasto_viewer::window::{Window, WindowOptions, run};
 
 /// Points of the window and the screen.
 const SCREEN: [u32; 2] = [1280, 800];
+/// Where the dot of the state is: of a warm color while something is done.
+const DOT: (usize, usize) = (12, 787);
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
@@ -255,21 +257,16 @@ impl Screen {
 
     fn click(&mut self, at: Pos2) {
         self.move_to(at);
-        std::thread::sleep(Duration::from_millis(150));
         self.hand(&["click", "1"]);
     }
 
     fn drag(&mut self, from: Pos2, step: eframe::egui::Vec2, steps: u32) {
         self.move_to(from);
-        std::thread::sleep(Duration::from_millis(150));
         self.hand(&["mousedown", "1"]);
-        // A slow screen takes a press and a move as one, at the place of the move.
-        std::thread::sleep(Duration::from_millis(250));
         for i in 1..=steps {
             self.move_to(from + step * i as f32);
         }
         self.hand(&["mouseup", "1"]);
-        std::thread::sleep(Duration::from_millis(250));
         // Away, so that nothing is lit because of the pointer.
         self.move_to(pos2(640.0, 795.0));
     }
@@ -290,14 +287,16 @@ impl Screen {
         }
     }
 
-    /// What is seen once nothing changes any more.
+    /// What is seen once the render is done, or the files are broken, and nothing changes any more.
     fn settled(&mut self, name: &str) -> Shot {
         let start = Instant::now();
         let mut before = self.look();
         loop {
             std::thread::sleep(Duration::from_millis(300));
             let now = self.look();
-            if now.pixels == before.pixels {
+            let [r, g, b] = now.at(DOT.0, DOT.1);
+            let is_working = r > g && g > 130 && g > b + 10;
+            if now.pixels == before.pixels && !is_working {
                 break;
             }
             before = now;
@@ -308,6 +307,16 @@ impl Screen {
         }
         self.keep(name);
         before
+    }
+
+    /// The same once something else than before is seen in a part of the screen.
+    fn changed(&mut self, name: &str, before: &Shot, part: Rect) -> Shot {
+        let start = Instant::now();
+        while self.look().differences(before, part) == 0 {
+            let waited = start.elapsed();
+            assert!(waited < Duration::from_secs(30), "{name}: nothing changes");
+        }
+        self.settled(name)
     }
 
     fn keep(&mut self, name: &str) {
@@ -385,12 +394,12 @@ fn drive(screen: &mut Screen) {
         vec2(8.0, 0.0),
         6,
     );
-    let rough = screen.settled("slider");
+    let rough = screen.changed("slider", &first, picture);
     let changed = rough.differences(&first, picture);
     assert!(changed > area / 50, "a slider changes {changed} pixels");
 
     screen.drag(picture.center(), vec2(15.0, 6.0), 6);
-    let turned = screen.settled("orbit");
+    let turned = screen.changed("orbit", &rough, picture);
     assert!(
         turned.differences(&rough, picture) > area / 4,
         "a drag turns the camera"
@@ -400,13 +409,13 @@ fn drive(screen: &mut Screen) {
         screen.hand(&["click", "4"]);
     }
     screen.move_to(pos2(640.0, 795.0));
-    let nearer = screen.settled("wheel");
+    let nearer = screen.changed("wheel", &turned, picture);
     assert!(
         nearer.differences(&turned, picture) > area / 4,
         "the wheel moves the camera"
     );
     screen.key("Home");
-    let home = screen.settled("home");
+    let home = screen.changed("home", &nearer, picture);
     assert_eq!(
         home.differences(&rough, picture),
         0,
@@ -414,13 +423,13 @@ fn drive(screen: &mut Screen) {
     );
 
     screen.key("question");
-    let help = screen.settled("help");
+    let help = screen.changed("help", &home, picture);
     assert!(
         help.differences(&home, picture) > area / 2,
         "the keys are shown"
     );
     screen.key("Escape");
-    let left = screen.settled("help-left");
+    let left = screen.changed("help-left", &help, picture);
     assert_eq!(left.differences(&home, picture), 0);
 
     screen.key("s");
@@ -430,9 +439,9 @@ fn drive(screen: &mut Screen) {
         vec2(-8.0, 0.0),
         6,
     );
-    let other = screen.settled("snapshot");
+    let other = screen.changed("snapshot", &home, picture);
     screen.key("w");
-    let wipe = screen.settled("wipe");
+    let wipe = screen.changed("wipe", &other, picture);
     let (mut now, mut kept) = (picture, picture);
     // Without what is written beside the line.
     now.max.x = picture.center().x - 4.0;
@@ -451,45 +460,44 @@ fn drive(screen: &mut Screen) {
     );
     assert!(wipe.differences(&home, now) > 100, "they differ");
     screen.drag(picture.center(), vec2(-20.0, 0.0), 5);
-    let moved = screen.settled("wipe-moved");
+    let moved = screen.changed("wipe-moved", &wipe, picture);
     assert!(moved.differences(&wipe, picture) > 100, "the line moves");
     screen.key("d");
     screen.key("x");
-    screen.settled("difference");
+    let apart = screen.changed("difference", &moved, picture);
     for key in ["x", "d", "d", "d"] {
         screen.key(key);
     }
-    let back = screen.settled("compare-left");
+    let back = screen.changed("compare-left", &apart, picture);
     assert_eq!(back.differences(&other, picture), 0);
 
     screen.click(picture.center());
     screen.move_to(pos2(640.0, 795.0));
-    let picked = screen.settled("pick");
+    let picked = screen.changed("pick", &back, picture);
     let marked = picked.differences(&back, picture);
     assert!((10..400).contains(&marked), "a mark of {marked} pixels");
     screen.key("3");
     screen.click(picture.center() + vec2(30.0, 20.0));
     screen.move_to(pos2(640.0, 795.0));
-    screen.settled("trace");
+    let traced = screen.changed("trace", &picked, picture);
     for key in ["Escape", "Escape", "Escape"] {
         screen.key(key);
     }
-    let left = screen.settled("trace-left");
+    let left = screen.changed("trace-left", &traced, picture);
     assert_eq!(left.differences(&back, picture), 0);
 
     screen.write("an error");
     let below = Rect::from_min_max(pos2(320.0, 600.0), pos2(1000.0, 760.0));
-    std::thread::sleep(Duration::from_millis(500));
-    let broken = screen.settled("broken");
+    let broken = screen.changed("broken", &left, below);
     assert!(
         broken.differences(&left, below) > 1000,
         "problems stand below"
     );
     // The picture has moved up and is whole.
-    let shift = (0..300).find(|up| {
+    let shift = (0..300usize).find(|up| {
         let at = |x: usize, y: usize| {
             let (x, y) = (picture.left() as usize + x, picture.top() as usize + y);
-            broken.at(x, y - up) == left.at(x, y)
+            y >= *up && broken.at(x, y - up) == left.at(x, y)
         };
         (0..SIZE[0] as usize)
             .step_by(7)
@@ -500,13 +508,12 @@ fn drive(screen: &mut Screen) {
         "the last good picture stays: {shift:?}"
     );
     screen.write("fine");
-    std::thread::sleep(Duration::from_millis(500));
-    let repaired = screen.settled("repaired");
+    let repaired = screen.changed("repaired", &broken, picture);
     assert_eq!(repaired.differences(&left, picture), 0);
 
     let plate = places.of(Role::ColorWell, "Base color color");
     screen.click(plate.center());
-    screen.settled("color");
+    screen.changed("color", &repaired, picture);
     screen.key("Escape");
     screen.click(pos2(640.0, 80.0));
     for (size, name) in [

@@ -15,7 +15,7 @@ use super::compare::{self, Difference, Mode};
 use super::desk::{Desk, Tool};
 use super::keys::Command;
 use super::picture::{self, Legend, Look, Values};
-use super::tone::Encoder;
+use super::tone::{Encoder, index_color};
 use super::view::{self, Area, View};
 use super::{project, theme};
 use crate::engine::Picture;
@@ -358,15 +358,15 @@ impl Canvas {
             view::pixel_near(placed, size, seen.min),
             view::pixel_near(placed, size, seen.max),
         );
-        let shown = match (desk.compare, desk.reference()) {
-            (Mode::Flip, Some(reference)) => &reference.picture,
-            _ => picture,
-        };
         let font = FontId::monospace((room / 5.0).clamp(9.0, 13.0));
         let step = font.size + 1.0;
         for row in from[1]..=to[1] {
             for column in from[0]..=to[0] {
-                let index = row as usize * picture.width as usize + column as usize;
+                let share = (column as f32 + 0.5) / size[0] as f32;
+                let Some(shown) = desk.seen_at(share) else {
+                    continue;
+                };
+                let index = row as usize * shown.width as usize + column as usize;
                 let texts = picture::texts(shown, desk.layer.as_deref(), index);
                 let corner = view::corner(placed, size, [column, row]);
                 let cell = Rect::from_min_size(corner, vec2(room, room));
@@ -443,9 +443,23 @@ fn sizes(picture: &Picture) -> [usize; 2] {
     [picture.width as usize, picture.height as usize]
 }
 
+/// What a layer has. Kernels have the colors that the list of kernels has.
+fn values_of<'a>(picture: &'a Picture, name: Option<&str>, desk: &Desk) -> Option<Values<'a>> {
+    let mut values = picture::values(picture, name)?;
+    if let (Some("kernel"), Values::Indices(_, names, colors)) = (name, &mut values) {
+        let kernels = &desk.news.kernels.kernels;
+        for (name, color) in names.iter().zip(colors) {
+            if let Some(index) = kernels.iter().position(|kernel| kernel.name == *name) {
+                *color = index_color(index);
+            }
+        }
+    }
+    Some(values)
+}
+
 /// The image of a picture as the desk has it shown; nothing if it lacks the layer.
 fn image_of(picture: &Picture, desk: &Desk, encoder: &Encoder) -> Option<picture::Shown> {
-    let values = picture::values(picture, desk.layer.as_deref())?;
+    let values = values_of(picture, desk.layer.as_deref(), desk)?;
     let lost: &[u32] = match desk.layer {
         None => &picture.nonfinite_pixels,
         Some(_) => &[],
@@ -453,7 +467,7 @@ fn image_of(picture: &Picture, desk: &Desk, encoder: &Encoder) -> Option<picture
     let mut shown = picture::image(&values, sizes(picture), &desk.look, encoder, lost);
     if desk.layer.is_none()
         && let Some(name) = &desk.overlay
-        && let Some(values) = picture::values(picture, Some(name))
+        && let Some(values) = values_of(picture, Some(name), desk)
     {
         let over = picture::image(&values, sizes(picture), &desk.look, encoder, &[]);
         picture::blended(&mut shown.image, &over.image, desk.overlay_share);

@@ -162,8 +162,8 @@ pub struct Desk {
     pub strategy: Option<String>,
     /// Is the engine asked to rest?
     pub is_paused: bool,
-    /// Outputs that are recorded.
-    pub outputs: Vec<String>,
+    /// Outputs that were asked for; those that the engine began with if none were.
+    outputs: Option<Vec<String>>,
     /// The camera that was asked for; that of the scene if none.
     camera: Option<Camera>,
     camera_is_new: bool,
@@ -263,7 +263,7 @@ impl Default for Desk {
             goal: (Goal::default(), String::new()),
             strategy: None,
             is_paused: false,
-            outputs: Vec::new(),
+            outputs: None,
             camera: None,
             camera_is_new: false,
             pivot: None,
@@ -698,6 +698,17 @@ impl Desk {
         }
     }
 
+    /// The picture that is seen at a share of its width: it, or the snapshot that stands in its place.
+    pub fn seen_at(&self, share: f32) -> Option<&Arc<Picture>> {
+        let is_snapshot = match self.compare {
+            Mode::Flip => true,
+            Mode::Wipe => share >= self.wipe,
+            _ => false,
+        };
+        let snapshot = self.reference().filter(|_| is_snapshot);
+        snapshot.map(|s| &s.picture).or(self.picture())
+    }
+
     /// The snapshot that the picture is compared with, if it is compared.
     pub fn reference(&self) -> Option<&Snapshot> {
         let snapshot = self.snapshots.get(self.chosen);
@@ -772,18 +783,33 @@ impl Desk {
         }
     }
 
+    /// Outputs that are recorded: those that were asked for, or else those that the picture came with.
+    pub fn recorded(&self) -> Vec<String> {
+        if let Some(outputs) = &self.outputs {
+            return outputs.clone();
+        }
+        let is_output = |name: &String| {
+            let outputs = &self.news.project.outputs;
+            outputs.iter().any(|(known, _)| known == name)
+        };
+        let layers = self.picture().map_or(&[][..], |p| &p.layers);
+        let names = layers.iter().map(|layer| layer.name.clone());
+        names.filter(is_output).collect()
+    }
+
     /// Records an output from now on, or no longer.
     pub fn record(&mut self, name: &str, is_on: bool) {
-        let is_there = self.outputs.iter().any(|known| known == name);
-        if is_there == is_on {
+        let mut outputs = self.recorded();
+        if outputs.iter().any(|known| known == name) == is_on {
             return;
         }
         if is_on {
-            self.outputs.push(name.to_owned())
+            outputs.push(name.to_owned());
         } else {
-            self.outputs.retain(|known| known != name)
+            outputs.retain(|known| known != name);
         }
-        self.order(Order::Outputs(self.outputs.clone()));
+        self.outputs = Some(outputs.clone());
+        self.order(Order::Outputs(outputs));
     }
 
     /// Ends at another number of samples.

@@ -364,6 +364,15 @@ fn layers_are_recorded_when_they_are_wanted() {
         frame(&mut desk, &engine, false, 0.0),
         [Order::Outputs(Vec::new())]
     );
+    // Those that the engine began with stay.
+    engine.order(Order::Outputs(vec!["depth".to_owned()]));
+    let mut later = Desk::default();
+    later.take(engine.news(), Vec::new(), 0.0);
+    later.record("albedo", true);
+    let expected = Order::Outputs(vec!["depth".to_owned(), "albedo".to_owned()]);
+    assert_eq!(later.settle(false, 0.0), [expected]);
+    engine.order(Order::Outputs(Vec::new()));
+    desk.take(engine.news(), Vec::new(), 0.0);
     desk.layer = None;
     let mut seen = Vec::new();
     for _ in 0..5 {

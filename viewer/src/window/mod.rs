@@ -12,6 +12,7 @@ use crate::engine::{Engine, Order};
 pub mod canvas;
 pub mod compare;
 pub mod desk;
+mod hands;
 pub mod keys;
 pub mod navigate;
 mod panels;
@@ -113,6 +114,8 @@ pub struct Window {
     pub canvas: Canvas,
     title: String,
     has_quit: bool,
+    /// What hands did behind the end of the last frame.
+    later: Vec<egui::Event>,
 }
 
 impl Window {
@@ -136,6 +139,7 @@ impl Window {
             canvas: Canvas::default(),
             title: options.title.clone(),
             has_quit: false,
+            later: Vec::new(),
         }
     }
 
@@ -221,6 +225,15 @@ impl Window {
                 .size_range(40.0..=(0.7 * height).max(41.0))
                 .show(ui, |ui| panels::drawer::show(ui, desk));
         }
+        if panels::frames::is_open(desk) {
+            let line = Frame::new()
+                .fill(theme::PANEL)
+                .inner_margin(egui::Margin::symmetric(8, 4));
+            Panel::bottom("frames")
+                .frame(line)
+                .resizable(false)
+                .show(ui, |ui| panels::frames::show(ui, desk));
+        }
         CentralPanel::default()
             .frame(Frame::new().fill(theme::SURROUND))
             .show(ui, |ui| self.canvas.show(ui, desk));
@@ -232,6 +245,14 @@ impl Window {
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         Self::ui(self, ui);
+    }
+
+    fn raw_input_hook(&mut self, ctx: &Context, input: &mut egui::RawInput) {
+        input.events.splice(0..0, self.later.drain(..));
+        self.later = hands::cut(&mut input.events);
+        if !self.later.is_empty() {
+            ctx.request_repaint();
+        }
     }
 
     fn on_exit(&mut self) {

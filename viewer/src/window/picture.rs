@@ -19,8 +19,8 @@ pub enum Values<'a> {
     Directions(Cow<'a, [[f32; 3]]>),
     /// Numbers.
     Numbers(Cow<'a, [f32]>),
-    /// Indices of names.
-    Indices(Cow<'a, [f32]>, &'a [String]),
+    /// Indices of names, with the color that each name has.
+    Indices(Cow<'a, [f32]>, &'a [String], Vec<[u8; 3]>),
 }
 
 /// The one layer that every picture has.
@@ -62,7 +62,10 @@ pub fn values<'a>(picture: &'a Picture, name: Option<&str>) -> Option<Values<'a>
         LayerKind::Color => Values::Colors(three()),
         LayerKind::Direction => Values::Directions(three()),
         LayerKind::Number => Values::Numbers(one()),
-        LayerKind::Index(names) => Values::Indices(one(), names),
+        LayerKind::Index(names) => {
+            let colors = (0..names.len()).map(index_color).collect();
+            Values::Indices(one(), names, colors)
+        }
     })
 }
 
@@ -212,20 +215,25 @@ pub fn image(
             ((0.5 + 0.5 * x).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         }),
         Values::Numbers(numbers) => in_colors(numbers, look, &mut legend),
-        Values::Indices(indices, names) => {
+        Values::Indices(indices, names, colors) => {
             let mut used = vec![false; names.len()];
             let pixels = indices.iter().map(|&index| {
-                match used.get_mut(index as usize).filter(|_| index >= 0.0) {
-                    Some(used) => {
+                let at = index as usize;
+                match (used.get_mut(at), colors.get(at)) {
+                    (Some(used), Some(own)) if index >= 0.0 => {
                         *used = true;
-                        color(index_color(index as usize))
+                        color(*own)
                     }
-                    None => Color32::from_gray(20),
+                    _ => Color32::from_gray(20),
                 }
             });
             let pixels = pixels.collect();
-            let named = names.iter().enumerate().filter(|(i, _)| used[*i]);
-            let named = named.map(|(i, name)| (index_color(i), name.clone()));
+            let named = colors
+                .iter()
+                .zip(names.iter())
+                .zip(&used)
+                .filter(|(_, used)| **used);
+            let named = named.map(|((color, name), _)| (*color, name.clone()));
             legend = Some(Legend::Names(named.collect()));
             pixels
         }
@@ -495,7 +503,8 @@ mod tests {
         assert_eq!((span.low, span.high), (0.0, 2.0));
         assert_eq!(shown_numbers.image.pixels[2], color(NONFINITE));
         let names = ["a", "b", "c"].map(str::to_owned);
-        let indices = Values::Indices(Cow::Borrowed(&[2.0, -1.0, 0.0]), &names);
+        let colors = (0..3).map(index_color).collect();
+        let indices = Values::Indices(Cow::Borrowed(&[2.0, -1.0, 0.0]), &names, colors);
         let shown_indices = shown(&indices, [3, 1], &look, &[]);
         let Some(Legend::Names(named)) = shown_indices.legend else {
             panic!("{:?}", shown_indices.legend);

@@ -1,6 +1,6 @@
 //! The bar above the picture: what is shown, tools, and what concerns the whole.
 
-use eframe::egui::{Align, Button, Layout, RichText, Slider, Ui};
+use eframe::egui::{Align, Button, Layout, RichText, Ui};
 
 use super::super::canvas::Canvas;
 use super::super::desk::{Desk, Tool};
@@ -38,17 +38,36 @@ pub fn show(ui: &mut Ui, desk: &mut Desk, canvas: &Canvas, commands: &mut Vec<Co
         }
         ui.separator();
         button(ui, "Save", Command::Save, commands);
-        frames(ui, desk);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            button(ui, "?", Command::Help, commands);
-            button(ui, "1:1", Command::ActualPixels, commands);
-            button(ui, "Fit", Command::Fit, commands);
-            if let Some(zoom) = canvas.zoom() {
-                let text = format!("{:.0} %", 100.0 * zoom);
-                ui.label(RichText::new(text).color(theme::QUIET));
+        if ui.available_width() > 190.0 {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                for (text, command) in PLACE.iter().rev() {
+                    button(ui, text, *command, commands);
+                }
+                magnification(ui, canvas);
+            });
+        } else {
+            // In a narrow window they take part in its lines.
+            ui.separator();
+            for (text, command) in PLACE {
+                button(ui, text, command, commands);
             }
-        });
+            magnification(ui, canvas);
+        }
     });
+}
+
+/// What is about the picture's place in the window.
+const PLACE: [(&str, Command); 3] = [
+    ("Fit", Command::Fit),
+    ("1:1", Command::ActualPixels),
+    ("?", Command::Help),
+];
+
+fn magnification(ui: &mut Ui, canvas: &Canvas) {
+    if let Some(zoom) = canvas.zoom() {
+        let text = format!("{:.0} %", 100.0 * zoom);
+        ui.label(RichText::new(text).color(theme::QUIET));
+    }
 }
 
 fn button(ui: &mut Ui, text: &str, command: Command, commands: &mut Vec<Command>) {
@@ -61,18 +80,4 @@ fn button(ui: &mut Ui, text: &str, command: Command, commands: &mut Vec<Command>
 fn tip(command: Command) -> String {
     let about = keys::TABLE.iter().find(|row| row.command == command);
     about.map_or_else(String::new, |row| format!("{} ({})", row.about, row.keys()))
-}
-
-fn frames(ui: &mut Ui, desk: &mut Desk) {
-    let Some([first, last]) = desk.news.project.frames else {
-        return;
-    };
-    ui.separator();
-    ui.spacing_mut().slider_width = 120.0;
-    let mut frame = desk.frame;
-    let slider = Slider::new(&mut frame, first..=last.max(first)).integer();
-    let label = ui.label("Frame");
-    if ui.add(slider).labelled_by(label.id).changed() {
-        desk.go_to(frame);
-    }
 }

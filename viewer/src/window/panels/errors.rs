@@ -20,7 +20,7 @@ pub fn show(ui: &mut Ui, desk: &Desk) {
     let (rect, response) = ui.allocate_exact_size(vec2(width, 0.58 * width), Sense::hover());
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, Color32::from_gray(0x1a));
-    let inner = Rect::from_min_max(rect.min + vec2(34.0, 6.0), rect.max - vec2(6.0, 18.0));
+    let inner = Rect::from_min_max(rect.min + vec2(34.0, 6.0), rect.max - vec2(14.0, 18.0));
     if !inner.is_positive() {
         return;
     }

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, ComboBox, Rect, RichText, Sense, Ui, pos2, vec2};
+use eframe::egui::{Color32, ComboBox, Label, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use super::super::desk::Desk;
 use super::super::theme;
 use super::super::tone::index_color;
 use super::quiet;
+use crate::engine::Kernel;
 
 /// Draws it.
 pub fn show(ui: &mut Ui, desk: &mut Desk) {
@@ -27,28 +28,13 @@ pub fn show(ui: &mut Ui, desk: &mut Desk) {
     if sum > 0.0 {
         bar(ui, &shares, sum, &kernels.kernels);
     }
-    for (i, kernel) in kernels.kernels.iter().enumerate() {
-        ui.horizontal(|ui| {
-            let (rect, _) = ui.allocate_exact_size(vec2(9.0, 14.0), Sense::hover());
-            let swatch = Rect::from_center_size(rect.center(), vec2(9.0, 9.0));
-            ui.painter().rect_filled(swatch, 2.0, color(i));
-            let share = match kernel.share {
-                Some(share) => format!("{:4.1} %", 100.0 * share),
-                None => "      ".to_owned(),
-            };
-            ui.label(
-                RichText::new(share)
-                    .monospace()
-                    .size(11.0)
-                    .color(theme::QUIET),
-            );
-            let name = eframe::egui::Label::new(RichText::new(&kernel.name).size(12.0)).truncate();
-            let label = ui.add(name);
-            if !kernel.materials.is_empty() {
-                label.on_hover_text(kernel.materials.join("\n"));
-            }
-        });
-    }
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing.y = 1.0;
+        ui.spacing_mut().interact_size.y = 15.0;
+        for (i, kernel) in kernels.kernels.iter().enumerate() {
+            row(ui, i, kernel);
+        }
+    });
     if sum == 0.0 {
         ui.label(quiet("This device times no kernels."));
     }
@@ -59,6 +45,28 @@ pub fn show(ui: &mut Ui, desk: &mut Desk) {
             }
         });
     }
+}
+
+fn row(ui: &mut Ui, index: usize, kernel: &Kernel) {
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(vec2(9.0, 14.0), Sense::hover());
+        let swatch = Rect::from_center_size(rect.center(), vec2(9.0, 9.0));
+        ui.painter().rect_filled(swatch, 2.0, color(index));
+        let share = match kernel.share {
+            Some(share) => format!("{:4.1} %", 100.0 * share),
+            None => "      ".to_owned(),
+        };
+        ui.label(
+            RichText::new(share)
+                .monospace()
+                .size(11.0)
+                .color(theme::QUIET),
+        );
+        let label = ui.add(Label::new(RichText::new(&kernel.name).size(12.0)).truncate());
+        if !kernel.materials.is_empty() {
+            label.on_hover_text(kernel.materials.join("\n"));
+        }
+    });
 }
 
 fn strategy(ui: &mut Ui, desk: &mut Desk) {
@@ -89,7 +97,7 @@ fn color(index: usize) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-fn bar(ui: &mut Ui, shares: &[f32], sum: f32, kernels: &[crate::engine::Kernel]) {
+fn bar(ui: &mut Ui, shares: &[f32], sum: f32, kernels: &[Kernel]) {
     let (rect, response) =
         ui.allocate_exact_size(vec2(ui.available_width() - 4.0, 16.0), Sense::hover());
     let painter = ui.painter();

@@ -7,6 +7,7 @@ use super::theme;
 pub mod bar;
 pub mod drawer;
 mod errors;
+pub mod frames;
 pub mod help;
 mod kernels;
 mod params;

@@ -66,7 +66,7 @@ fn name(ui: &mut Ui, param: &Param, is_set: bool, is_open: bool) -> Response {
         (false, false) => theme::QUIET,
     };
     let text = RichText::new(&interface.label).color(color);
-    let width = NAME.min(0.45 * ui.available_width());
+    let width = NAME.min(0.34 * ui.available_width());
     let (rect, _) =
         ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
     let mut inside = ui.new_child(

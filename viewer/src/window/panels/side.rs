@@ -91,18 +91,20 @@ fn display(ui: &mut Ui, desk: &mut Desk) {
     if desk.shows_numbers() || desk.overlay.is_some() {
         colors(ui, desk);
     }
-    let tip = format!(
-        "Red stripes above 1, blue ones below 0, after exposure ({})",
-        key(Command::MarkClipped)
-    );
-    ui.checkbox(&mut desk.look.mark_clipped, "Mark clipped")
-        .on_hover_text(tip);
-    let tip = format!(
-        "Pixels that are not finite, or lost samples that were not ({})",
-        key(Command::MarkNonfinite)
-    );
-    ui.checkbox(&mut desk.look.mark_nonfinite, "Mark not finite")
-        .on_hover_text(tip);
+    line(ui, "Mark", |ui, _| {
+        let tip = format!(
+            "Red stripes above 1, blue ones below 0, after exposure ({})",
+            key(Command::MarkClipped)
+        );
+        let tick = ui.checkbox(&mut desk.look.mark_clipped, "clipped");
+        tick.on_hover_text(tip);
+        let tip = format!(
+            "Pixels that are not finite, or lost samples that were not ({})",
+            key(Command::MarkNonfinite)
+        );
+        let tick = ui.checkbox(&mut desk.look.mark_nonfinite, "not finite");
+        tick.on_hover_text(tip);
+    });
     overlay(ui, desk);
 }
 
@@ -267,11 +269,13 @@ fn compare(ui: &mut Ui, desk: &mut Desk, canvas: &Canvas) {
         }
     });
     if let Some(difference) = &canvas.difference {
-        let text = format!(
-            "mean {:.3e}   RMSE {:.3e}   relMSE {:.3e}",
-            difference.absolute, difference.root_square, difference.relative_square
-        );
-        ui.label(quiet(text));
+        for (name, x) in [
+            ("mean", difference.absolute),
+            ("RMSE", difference.root_square),
+            ("relMSE", difference.relative_square),
+        ] {
+            line(ui, name, |ui, _| ui.label(quiet(format!("{x:.3e}"))));
+        }
     }
 }
 
@@ -434,10 +438,11 @@ fn outputs(ui: &mut Ui, desk: &mut Desk) {
     if project.outputs.is_empty() {
         return;
     }
-    ui.menu_button(format!("Record outputs ({})", desk.outputs.len()), |ui| {
+    let recorded = desk.recorded();
+    ui.menu_button(format!("Record outputs ({})", recorded.len()), |ui| {
         ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
             for (name, about) in &project.outputs {
-                let mut is_on = desk.outputs.contains(name);
+                let mut is_on = recorded.contains(name);
                 let tick = ui.add(Checkbox::new(&mut is_on, name)).on_hover_text(about);
                 if tick.changed() {
                     desk.record(name, is_on);

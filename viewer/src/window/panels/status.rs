@@ -81,10 +81,13 @@ fn under_the_hand(desk: &Desk, canvas: &Canvas) -> Option<String> {
         text += &format!("  difference {}", pixel.map(picture::number).join(" "));
         return Some(text);
     }
-    for value in picture::texts(picture, desk.layer.as_deref(), index) {
+    let share = (column as f32 + 0.5) / picture.width.max(1) as f32;
+    let seen = desk.seen_at(share)?;
+    let index = row as usize * seen.width as usize + column as usize;
+    for value in picture::texts(seen, desk.layer.as_deref(), index) {
         text += &format!("  {value}");
     }
-    if let Some(samples) = picture.counts.get(index).filter(|_| desk.layer.is_none()) {
+    if let Some(samples) = seen.counts.get(index).filter(|_| desk.layer.is_none()) {
         text += &format!("  {samples} spp");
     }
     Some(text)
