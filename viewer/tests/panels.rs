@@ -7,7 +7,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    Event, Key, Modifiers, MouseWheelUnit, OutputCommand, PointerButton, Pos2, Rect, Role, vec2,
+    Event, Key, Modifiers, MouseWheelUnit, OutputCommand, PointerButton, Pos2, Rect, Role, Ui,
+    UiBuilder, vec2,
 };
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -41,7 +42,7 @@ impl Test {
                     let make = || {
                         Window::new(ui.ctx(), Box::new(given.clone()), &WindowOptions::default())
                     };
-                    window.get_or_insert_with(make).ui(ui);
+                    window.get_or_insert_with(make).ui(&mut whole(ui));
                 },
                 None,
             );
@@ -774,4 +775,12 @@ fn a_window_that_closes_ends_its_engine() {
     assert!(!engine.has_quit());
     drop(test);
     assert!(engine.has_quit());
+}
+
+/// All of the window, without the margin that the harness leaves.
+fn whole(ui: &mut Ui) -> Ui {
+    let rect = ui.ctx().content_rect();
+    let mut whole = ui.new_child(UiBuilder::new().max_rect(rect));
+    whole.set_clip_rect(rect);
+    whole
 }

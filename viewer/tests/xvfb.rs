@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
-use eframe::egui::{Pos2, Rect, Role, pos2, vec2};
+use eframe::egui::{Pos2, Rect, Role, Ui, UiBuilder, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use impasto_viewer::engine::{Engine, Order};
@@ -327,8 +327,11 @@ impl Screen {
         self.count += 1;
     }
 
+    /// Saves the scene, whole at once.
     fn write(&self, text: &str) {
-        std::fs::write(self.folder.path().join("scene"), text).unwrap();
+        let new = self.folder.path().join("new");
+        std::fs::write(&new, text).unwrap();
+        std::fs::rename(new, self.folder.path().join("scene")).unwrap();
     }
 }
 
@@ -346,7 +349,7 @@ impl Places {
                 move |ui, window: &mut Option<Window>| {
                     let options = WindowOptions::default();
                     let make = || Window::new(ui.ctx(), Box::new(engine.clone()), &options);
-                    window.get_or_insert_with(make).ui(ui);
+                    window.get_or_insert_with(make).ui(&mut whole(ui));
                 },
                 None,
             );
@@ -553,4 +556,12 @@ fn same_bytes(shot: &Shot, engine: &BallEngine, place: Rect) {
         "pixels that have other bytes than the PNG, of {}",
         picture.pixels.len()
     );
+}
+
+/// All of the window, without the margin that the harness leaves.
+fn whole(ui: &mut Ui) -> Ui {
+    let rect = ui.ctx().content_rect();
+    let mut whole = ui.new_child(UiBuilder::new().max_rect(rect));
+    whole.set_clip_rect(rect);
+    whole
 }
