@@ -249,6 +249,10 @@ pub fn project() -> Project {
             ("auto", "What the time model finds best."),
             ("own", "Each material has a kernel."),
             ("mega", "One kernel for everything."),
+            (
+                "threshold=",
+                "A kernel for each material of so many operations.",
+            ),
         ]
         .map(|(name, about)| (name.to_owned(), about.to_owned()))
         .to_vec(),

@@ -647,6 +647,18 @@ fn menus_ask_for_layers_goals_sizes_and_strategies() {
         test.engine.orders(),
         [Order::Until(Some("relmse=1e-3".to_owned()))]
     );
+    choose(&mut test, "Strategy", "threshold=");
+    assert_eq!(
+        test.engine.orders(),
+        [Order::Strategy("threshold=1000".to_owned())]
+    );
+    let number = test.rect(Role::SpinButton, "threshold");
+    let orders = test.drag(number.center(), &[(10.0, 0.0), (10.0, 0.0)]);
+    let orders: Vec<Order> = orders.into_iter().flatten().collect();
+    assert!(
+        matches!(&orders[..], [Order::Strategy(s)] if s != "threshold=1000"),
+        "{orders:?}"
+    );
     choose(&mut test, "Curve", "Filmic");
     assert_eq!(test.desk().look.curve, Curve::Filmic);
     choose(&mut test, "Size", "320 x 200  (50 %)");

@@ -27,6 +27,8 @@ const PATIENCE: f64 = 2.0;
 const UNDO: usize = 200;
 /// Snapshots that are kept.
 pub const SNAPSHOTS: usize = 16;
+/// What a strategy that takes a number begins with.
+const FIRST_NUMBER: &str = "1000";
 /// Layers that lie over the picture.
 pub const OVERLAYS: [&str; 4] = [SAMPLES, "error", "cost", "kernel"];
 
@@ -834,11 +836,15 @@ impl Desk {
         self.order(Order::Until(goal.order(size)));
     }
 
-    /// Which materials share kernels.
+    /// Which materials share kernels. A strategy that takes a number, such as `threshold=`, begins with one.
     pub fn plan_by(&mut self, strategy: &str) {
+        let mut strategy = strategy.to_owned();
+        if strategy.ends_with('=') {
+            strategy += FIRST_NUMBER;
+        }
         if self.strategy() != strategy {
-            self.strategy = Some(strategy.to_owned());
-            self.order(Order::Strategy(strategy.to_owned()));
+            self.strategy = Some(strategy.clone());
+            self.order(Order::Strategy(strategy));
         }
     }
 

@@ -404,11 +404,13 @@ fn renders_end_as_they_are_asked_to() {
     assert_eq!(frame(&mut desk, &engine, false, 0.0), expected);
     desk.plan_by("auto");
     desk.plan_by("mega");
+    desk.plan_by("threshold=");
     desk.go_to(900);
     desk.command(Command::NextFrame);
     desk.resize([0, 99_999]);
     let expected = [
         Order::Strategy("mega".to_owned()),
+        Order::Strategy("threshold=1000".to_owned()),
         Order::Frame(48),
         Order::Size([1, 16_384]),
     ];

@@ -19,6 +19,8 @@ pub enum Values<'a> {
     Directions(Cow<'a, [[f32; 3]]>),
     /// Numbers.
     Numbers(Cow<'a, [f32]>),
+    /// Several numbers a pixel, such as a position: the first is shown unless a channel is chosen.
+    Several(Cow<'a, [[f32; 3]]>),
     /// Indices of names, with the color that each name has.
     Indices(Cow<'a, [f32]>, &'a [String], Vec<[u8; 3]>),
 }
@@ -42,14 +44,14 @@ pub fn values<'a>(picture: &'a Picture, name: Option<&str>) -> Option<Values<'a>
     if channels == 0 || layer.values.len() != count * channels {
         return None;
     }
-    // What has too few channels repeats its last one.
+    // One channel is grey; a second one has a third of 0 beside it.
     let three = || -> Cow<'a, [[f32; 3]]> {
         let pixels = layer.values.chunks_exact(channels);
-        Cow::Owned(
-            pixels
-                .map(|p| [0, 1, 2].map(|i| p[i.min(channels - 1)]))
-                .collect(),
-        )
+        let component = |p: &[f32], i: usize| match p {
+            [grey] => *grey,
+            p => p.get(i).copied().unwrap_or(0.0),
+        };
+        Cow::Owned(pixels.map(|p| [0, 1, 2].map(|i| component(p, i))).collect())
     };
     let one = || -> Cow<'a, [f32]> {
         match channels {
@@ -61,7 +63,8 @@ pub fn values<'a>(picture: &'a Picture, name: Option<&str>) -> Option<Values<'a>
         LayerKind::Radiance => Values::Light(three()),
         LayerKind::Color => Values::Colors(three()),
         LayerKind::Direction => Values::Directions(three()),
-        LayerKind::Number => Values::Numbers(one()),
+        LayerKind::Number if channels == 1 => Values::Numbers(one()),
+        LayerKind::Number => Values::Several(three()),
         LayerKind::Index(names) => {
             let colors = (0..names.len()).map(index_color).collect();
             Values::Indices(one(), names, colors)
@@ -215,6 +218,14 @@ pub fn image(
             ((0.5 + 0.5 * x).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
         }),
         Values::Numbers(numbers) => in_colors(numbers, look, &mut legend),
+        Values::Several(all) => {
+            let number = |p: &[f32; 3]| match look.channel {
+                Channel::Color => p[0],
+                one => one.of(*p),
+            };
+            let numbers: Vec<f32> = all.iter().map(number).collect();
+            in_colors(&numbers, look, &mut legend)
+        }
         Values::Indices(indices, names, colors) => {
             let mut used = vec![false; names.len()];
             let pixels = indices.iter().map(|&index| {
@@ -531,6 +542,12 @@ mod tests {
             layers: vec![
                 layer("depth", LayerKind::Number, 1, &[1.0, 2.0]),
                 layer("uv", LayerKind::Color, 2, &[0.1, 0.2, 0.3, 0.4]),
+                layer(
+                    "position",
+                    LayerKind::Number,
+                    3,
+                    &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+                ),
                 layer("bad", LayerKind::Number, 1, &[1.0]),
                 layer("none", LayerKind::Number, 0, &[]),
                 layer(
@@ -550,7 +567,20 @@ mod tests {
         let Some(Values::Colors(uv)) = values(&picture, Some("uv")) else {
             panic!("uv is missing");
         };
-        assert_eq!(uv[1], [0.3, 0.4, 0.4]);
+        assert_eq!(uv[1], [0.3, 0.4, 0.0]);
+        let Some(Values::Several(place)) = values(&picture, Some("position")) else {
+            panic!("position is missing");
+        };
+        let values_of = Values::Several(place);
+        let spans = [(Channel::Color, [1.0, 4.0]), (Channel::Blue, [3.0, 6.0])];
+        for (channel, ends) in spans {
+            let look = Look { channel, ..look() };
+            let legend = shown(&values_of, [2, 1], &look, &[]).legend;
+            let Some(Legend::Scale(_, span)) = legend else {
+                panic!("{legend:?}");
+            };
+            assert_eq!([span.low, span.high], ends);
+        }
         let Some(Values::Numbers(samples)) = values(&picture, Some(SAMPLES)) else {
             panic!("samples are missing");
         };

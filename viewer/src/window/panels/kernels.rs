@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, ComboBox, Label, Rect, RichText, Sense, Ui, pos2, vec2};
+use eframe::egui::{Color32, ComboBox, DragValue, Label, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use super::super::desk::Desk;
 use super::super::theme;
@@ -88,7 +88,42 @@ fn strategy(ui: &mut Ui, desk: &mut Desk) {
             })
             .response
             .labelled_by(label.id);
-        desk.plan_by(&next);
+        if next != desk.strategy() {
+            desk.plan_by(&next);
+        }
+    });
+    number(ui, desk);
+}
+
+/// The number of a strategy that takes one.
+fn number(ui: &mut Ui, desk: &mut Desk) {
+    let strategy = desk.strategy().to_owned();
+    let Some((name, number)) = strategy.split_once('=') else {
+        return;
+    };
+    let Ok(now) = number.parse::<f64>() else {
+        return;
+    };
+    // A plan is made anew for each number: only when the hand lets go.
+    let at = ui.scope_id().with("number");
+    let mut number = ui.data(|d| d.get_temp(at)).unwrap_or(now);
+    ui.horizontal(|ui| {
+        let label = ui.label(quiet(name));
+        let speed = (number.abs() * 0.02).max(0.1);
+        let field = DragValue::new(&mut number)
+            .range(0.0..=1e9)
+            .speed(speed)
+            .max_decimals(1)
+            .update_while_editing(false);
+        let response = ui.add(field).labelled_by(label.id);
+        if response.changed() {
+            ui.data_mut(|d| d.insert_temp(at, number));
+        }
+        if !response.dragged()
+            && let Some(number) = ui.data_mut(|d| d.remove_temp::<f64>(at))
+        {
+            desk.plan_by(&format!("{name}={number}"));
+        }
     });
 }
 
