@@ -3,7 +3,9 @@
 //! [`desk::Desk`] is what the window knows; [`Canvas`] is the picture; `panels/` is everything around it. They are drawn
 //! anew when the engine has news or a hand moves, and not in between.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use eframe::egui::{self, CentralPanel, Context, Frame, Panel, Ui, ViewportBuilder, vec2};
 
@@ -67,38 +69,60 @@ pub fn run(engine: Box<dyn Engine>, options: WindowOptions) -> Result<(), String
         dithering: false,
         ..eframe::NativeOptions::default()
     };
-    let made = eframe::run_native(
-        &title,
-        native,
-        Box::new(|context| {
-            if let Some(scale) = options.scale {
-                context.egui_ctx.set_pixels_per_point(scale.clamp(0.5, 8.0));
-            }
-            Ok(Box::new(Window::new(&context.egui_ctx, engine, &options)))
-        }),
-    );
-    made.map_err(|error| unopened(&error))
+    let has_opened = AtomicBool::new(false);
+    let open = || {
+        eframe::run_native(
+            &title,
+            native,
+            Box::new(|context| {
+                has_opened.store(true, Ordering::Relaxed);
+                if let Some(scale) = options.scale {
+                    context.egui_ctx.set_pixels_per_point(scale.clamp(0.5, 8.0));
+                }
+                Ok(Box::new(Window::new(&context.egui_ctx, engine, &options)))
+            }),
+        )
+    };
+    // winit panics where a library of the display is missing, such as libxkbcommon-x11.
+    match catch_unwind(AssertUnwindSafe(open)) {
+        Ok(ended) => ended.map_err(|error| unopened(&error)),
+        Err(panic) if has_opened.load(Ordering::Relaxed) => resume_unwind(panic),
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().cloned();
+            let text = text.or(panic.downcast_ref::<&str>().map(|&text| text.to_owned()));
+            let why = text.unwrap_or_else(|| "no reason is known".to_owned());
+            Err(instead("no window could be opened", &why, NO_DISPLAY))
+        }
+    }
 }
+
+const NO_DISPLAY: &str =
+    "on a machine without a display, `ssh -X` or a virtual display (Xvfb) can lend one";
+const NO_GPU: &str =
+    "a window needs Vulkan, Metal or DirectX 12; Mesa's llvmpipe (mesa-vulkan-drivers) will do";
 
 /// Why no window opened, and what to do instead.
 fn unopened(error: &eframe::Error) -> String {
-    let why = match error {
+    let (why, help) = match error {
         eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => {
-            "no window could be opened: there is no display"
+            ("no window could be opened: there is no display", NO_DISPLAY)
         }
-        eframe::Error::Wgpu(_) => "no window could be opened: no GPU draws to this display",
-        _ => "no window could be opened",
+        eframe::Error::Wgpu(_) => (
+            "no window could be opened: no GPU draws to this display",
+            NO_GPU,
+        ),
+        _ => ("no window could be opened", NO_DISPLAY),
     };
-    let mut detail = error.to_string();
-    if let Some((first, _)) = detail.split_once('\n') {
-        detail = first.to_owned();
-    }
-    let help = match error {
-        eframe::Error::Wgpu(_) => {
-            "a window needs Vulkan, Metal or DirectX 12; Mesa's llvmpipe (mesa-vulkan-drivers) will do"
-        }
-        _ => "on a machine without a display, `ssh -X` or a virtual display (Xvfb) can lend one",
-    };
+    instead(why, &error.to_string(), help)
+}
+
+fn instead(why: &str, detail: &str, help: &str) -> String {
+    let detail = detail.lines().next().unwrap_or_default();
+    // Without the place in winit's sources where it was found.
+    let place = detail
+        .rsplit_once(".rs:")
+        .and_then(|(_, rest)| rest.split_once(": "));
+    let detail = place.map_or(detail, |(_, rest)| rest).trim_end_matches('.');
     format!(
         "{why} ({detail})\nhint: {help}\nhint: `impasto render --watch` renders at each save without a window, and \
          `impasto view --tev` shows the picture in tev"
@@ -267,5 +291,22 @@ impl Drop for Window {
         if !self.has_quit {
             self.engine.order(Order::Quit);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_say_what_to_do_instead() {
+        let detail =
+            "os error at some/where/winit/mod.rs:788: Failed to open connection to X server.\nmore";
+        let expected = "no window (Failed to open connection to X server)\nhint: some help\nhint: `impasto render";
+        let said = instead("no window", detail, "some help");
+        assert!(said.starts_with(expected), "{said}");
+        assert!(instead("no window", "plain", "help").starts_with("no window (plain)\n"));
+        let said = unopened(&eframe::Error::AppCreation("what".into()));
+        assert!(said.contains("what") && said.contains("--tev"), "{said}");
     }
 }
