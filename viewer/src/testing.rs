@@ -691,7 +691,7 @@ impl Inner {
         if self.taken >= self.samples || self.is_paused || !self.news.problems.is_empty() {
             return false;
         }
-        self.taken = (self.taken + self.taken.div_ceil(4)).min(self.samples);
+        self.taken = (self.taken + self.taken.div_ceil(2)).min(self.samples);
         let mut errors = (*self.news.errors).clone();
         errors.push(ErrorPoint {
             seconds: self.began.elapsed().as_secs_f64(),

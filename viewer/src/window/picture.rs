@@ -287,12 +287,13 @@ fn in_colors(numbers: &[f32], look: &Look, legend: &mut Option<Legend>) -> Vec<C
         None => Span::around(numbers.iter().copied(), is_log),
     };
     let table = map.table().map(color);
+    let placing = span.placing();
     *legend = Some(Legend::Scale(map, span));
     let place = |&x: &f32| {
         if x.is_nan() {
             color(NONFINITE)
         } else {
-            table[(span.place(x) * 255.0 + 0.5) as usize]
+            table[(placing(x) * 255.0 + 0.5) as usize]
         }
     };
     numbers.iter().map(place).collect()
@@ -634,14 +635,32 @@ mod tests {
             .map(|i| [0, 7, 31].map(|k| (i.wrapping_mul(2_654_435_761 + k) >> 8) as f32 / 1e7))
             .collect();
         let encoder = Encoder::new(Curve::Srgb, 0.3);
-        let start = std::time::Instant::now();
-        let shown = image(&light(&pixels), [1280, 720], &look(), &encoder, &[]);
-        let elapsed = start.elapsed();
-        assert_eq!(shown.image.pixels.len(), pixels.len());
-        eprintln!("1280 x 720 pixels in {:.1} ms", elapsed.as_secs_f64() * 1e3);
-        assert!(
-            cfg!(debug_assertions) || elapsed.as_millis() < 100,
-            "{elapsed:?}"
-        );
+        let false_color = Look {
+            is_false: true,
+            ..look()
+        };
+        let marked = Look {
+            mark_clipped: true,
+            mark_nonfinite: true,
+            ..look()
+        };
+        for (name, look) in [
+            ("plain", look()),
+            ("marked", marked),
+            ("false color", false_color),
+        ] {
+            let start = std::time::Instant::now();
+            let shown = image(&light(&pixels), [1280, 720], &look, &encoder, &[]);
+            let elapsed = start.elapsed();
+            assert_eq!(shown.image.pixels.len(), pixels.len());
+            eprintln!(
+                "1280 x 720 pixels, {name}: {:.1} ms",
+                elapsed.as_secs_f64() * 1e3
+            );
+            assert!(
+                cfg!(debug_assertions) || elapsed.as_millis() < 100,
+                "{elapsed:?}"
+            );
+        }
     }
 }

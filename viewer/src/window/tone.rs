@@ -260,22 +260,18 @@ impl Span {
         Self { low, high, is_log }
     }
 
-    /// Where a number is: 0 at the low end, 1 at the high one.
-    #[inline]
+    /// Where numbers are: 0 at the low end, 1 at the high one.
+    pub fn placing(&self) -> impl Fn(f32) -> f32 + use<> {
+        let is_log = self.is_log;
+        let scale = move |x: f32| if is_log { x.max(1e-38).log2() } else { x };
+        let (low, high) = (scale(self.low), scale(self.high));
+        let factor = if high > low { 1.0 / (high - low) } else { 0.0 };
+        move |x| ((scale(x) - low) * factor).clamp(0.0, 1.0)
+    }
+
+    /// Where a number is.
     pub fn place(&self, x: f32) -> f32 {
-        let (low, high, x) = if self.is_log {
-            (
-                self.low.max(1e-38).log2(),
-                self.high.max(1e-38).log2(),
-                x.max(1e-38).log2(),
-            )
-        } else {
-            (self.low, self.high, x)
-        };
-        if high <= low {
-            return 0.0;
-        }
-        ((x - low) / (high - low)).clamp(0.0, 1.0)
+        self.placing()(x)
     }
 
     /// The number at a place from 0 to 1.
