@@ -369,6 +369,20 @@ fn what_keys_of_the_scene_move_is_closed_and_says_why() {
 }
 
 #[test]
+fn names_tell_what_their_authors_said() {
+    let mut test = Test::new();
+    let slider = test.rect(Role::Slider, "Speckle");
+    assert!(!test.shows("Size of the speckles."));
+    // Beside the letters, but before the slider.
+    test.harness
+        .hover_at(slider.left_center() - vec2(20.0, 0.0));
+    test.frames(60);
+    for text in ["Size of the speckles.", "in 0.1 .. 1000 mm", "default 8 mm"] {
+        assert!(test.shows(text), "{text} is not shown");
+    }
+}
+
+#[test]
 fn the_filter_hides_what_does_not_fit() {
     let mut test = Test::new();
     test.desk().filter = "rough".to_owned();
@@ -692,6 +706,20 @@ fn pictures_are_saved_from_a_dialog() {
     };
     assert_eq!(test.engine.orders(), [expected]);
     assert!(!test.desk().shows_save && test.shows("Wrote out/ball.png"));
+    // By keys alone.
+    test.key(Key::S, Modifiers::COMMAND);
+    test.key(Key::A, Modifiers::COMMAND);
+    test.harness.event(Event::Text("other.film".to_owned()));
+    test.frames(2);
+    test.key(Key::Enter, Modifiers::NONE);
+    let expected = Order::Save {
+        path: "other.film".into(),
+        exposure: 0.0,
+    };
+    assert_eq!(test.engine.orders(), [expected]);
+    test.key(Key::S, Modifiers::COMMAND);
+    test.key(Key::Escape, Modifiers::NONE);
+    assert!(!test.desk().shows_save && test.engine.orders().is_empty());
 }
 
 #[test]

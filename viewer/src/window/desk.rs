@@ -142,6 +142,8 @@ pub struct Desk {
     pub shows_help: bool,
     /// Is the dialog open in which the picture is saved?
     pub shows_save: bool,
+    /// Has it just been opened, so that a hand can type at once?
+    pub has_opened_save: bool,
     /// Are the panels there?
     pub shows_panels: bool,
     /// The file to save to.
@@ -254,6 +256,7 @@ impl Default for Desk {
             shows_trace: false,
             shows_help: false,
             shows_save: false,
+            has_opened_save: false,
             shows_panels: true,
             save_as: String::new(),
             read_from: String::new(),
@@ -975,7 +978,10 @@ impl Desk {
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
             Command::WriteBack => self.write_back(),
-            Command::Save => self.shows_save = !self.shows_save,
+            Command::Save => {
+                self.shows_save = !self.shows_save;
+                self.has_opened_save = self.shows_save;
+            }
             Command::Fit | Command::ActualPixels | Command::Larger | Command::Smaller => {}
         }
     }

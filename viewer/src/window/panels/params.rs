@@ -67,20 +67,24 @@ fn name(ui: &mut Ui, param: &Param, is_set: bool, is_open: bool) -> Response {
     };
     let text = RichText::new(&interface.label).color(color);
     let width = NAME.min(0.34 * ui.available_width());
-    let (rect, _) =
-        ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
+    let size = vec2(width, ui.spacing().interact_size.y);
+    let (rect, area) = ui.allocate_exact_size(size, Sense::hover());
     let mut inside = ui.new_child(
         egui::UiBuilder::new()
             .max_rect(rect)
             .layout(Layout::left_to_right(Align::Center)),
     );
-    let label = inside.add(Label::new(text).truncate());
-    label.on_hover_ui(|ui| tooltip(ui, param, is_open))
+    let label = Label::new(text).truncate().show_tooltip_when_elided(false);
+    let label = inside.add(label.selectable(false));
+    // All of the room for a name tells of it, and not its letters alone.
+    area.on_hover_ui(|ui| tooltip(ui, param, is_open));
+    label
 }
 
 fn tooltip(ui: &mut Ui, param: &Param, is_open: bool) {
     let interface = &param.interface;
     ui.set_max_width(340.0);
+    ui.label(RichText::new(&interface.label).strong());
     if !interface.docs.is_empty() {
         ui.label(&interface.docs);
     }

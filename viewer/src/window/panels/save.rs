@@ -31,8 +31,15 @@ pub fn show(ctx: &Context, desk: &mut Desk) {
         .show(ctx, |ui| {
             let response = ui.add(TextEdit::singleline(&mut desk.save_as).desired_width(320.0));
             named(&response, "File");
-            if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
-                desk.save(None);
+            if std::mem::take(&mut desk.has_opened_save) {
+                response.request_focus();
+            }
+            if response.lost_focus() {
+                if ui.input(|i| i.key_pressed(Key::Enter)) {
+                    desk.save(None);
+                } else if ui.input(|i| i.key_pressed(Key::Escape)) {
+                    desk.shows_save = false;
+                }
             }
             ui.add_space(4.0);
             ui.horizontal(|ui| {
