@@ -331,6 +331,8 @@ pub struct Picked {
     pub object: Option<String>,
     /// The point, in metres.
     pub position: [f32; 3],
+    /// The least and greatest corner of the object in the world, in metres, if that is known.
+    pub bounds: Option<[[f32; 3]; 2]>,
     /// Distance along the view, for a camera to focus on.
     pub depth: f32,
     /// File and line, from 1, of the material.

@@ -4,3 +4,8 @@
 //! [`engine`], so that tests drive it by an engine of their own, and other displays (`--tev`) by the same one.
 
 pub mod engine;
+#[cfg(feature = "window")]
+#[doc(hidden)]
+pub mod testing;
+#[cfg(feature = "window")]
+pub mod window;

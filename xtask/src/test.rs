@@ -42,6 +42,7 @@ const LEFT_OUT: &[(&str, &[(&str, &str)])] = &[
         &[("gpu::", "pictures of small worlds, and numbers of kernels")],
     ),
     ("limits", &[]),
+    ("panels", &[]),
     (
         "pipeline",
         &[
