@@ -63,4 +63,5 @@ pub mod plot;
 pub mod set;
 pub mod shot;
 pub mod starter;
+pub mod tev;
 pub mod trace;

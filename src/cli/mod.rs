@@ -45,6 +45,7 @@ mod strategy;
 mod technique;
 mod trace;
 mod until;
+mod view;
 
 /// A material language and a wavefront path tracer for it.
 #[derive(Parser)]
@@ -121,6 +122,8 @@ enum Command {
     Eval(Box<eval::EvalArgs>),
     /// Render a scene, or a material file on a built-in set
     Render(Box<render::RenderArgs>),
+    /// Open a window that renders while you look, turn and edit; or send pictures to tev
+    View(Box<view::ViewArgs>),
     /// Measure how fast renders converge: error against run time
     Converge(Box<converge::ConvergeArgs>),
     /// Replay the path of one sample, and print every vertex
@@ -229,6 +232,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Merge(args) => merge::run(&args, &global),
         Command::Farm(command) => farm::run(&command, &global),
         Command::Lsp(args) => lsp::run(&args),
+        Command::View(args) => view::run(&args, &global),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),

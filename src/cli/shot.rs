@@ -57,7 +57,7 @@ pub(super) struct ShotArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum On {
+pub(super) enum On {
     /// A shader ball of 10 cm with a groove, an edge and a cup
     Ball,
     /// A cloth with folds

@@ -54,6 +54,7 @@ fn picked(shown: &Shown, pixel: [u32; 2]) -> Option<Picked> {
         position: seen.position.to_array(),
         depth: seen.depth,
         source: material.and_then(|material| shown.program.place(material)),
+        bounds: Some(seen.bounds.map(|corner| corner.to_array())),
     })
 }
 

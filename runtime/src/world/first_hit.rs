@@ -50,6 +50,8 @@ pub struct Seen {
     pub position: Vec3,
     /// Its distance along the camera's view, in metres.
     pub depth: f32,
+    /// The least and greatest corner of the object, in the scene's coordinates.
+    pub bounds: [Vec3; 2],
 }
 
 /// What the middle of a pixel of the scene's picture shows, from a camera; `None` where that is what surrounds
@@ -70,6 +72,27 @@ pub fn at(scene: &Scene, camera: &Camera, [column, row]: [u32; 2]) -> Option<See
         object: names.get(met.object as usize).cloned().unwrap_or_default(),
         position: frame.position + met.t * direction,
         depth: met.t * direction.dot(frame.forward),
+        bounds: bounds(scene, &met),
+    })
+}
+
+/// The least and greatest corner of the object that a ray met.
+fn bounds(scene: &Scene, met: &Met) -> [Vec3; 2] {
+    let placement = met.placement.and_then(|index| scene.placements.get(index));
+    let mesh = match placement {
+        None => &scene.mesh,
+        Some(placement) => match scene.objects.get(placement.object as usize) {
+            Some(object) => &object.mesh,
+            None => return [Vec3::ZERO; 2],
+        },
+    };
+    let corners = mesh.positions.iter().enumerate();
+    let of_it = corners.filter(|(i, _)| mesh.objects.get(*i).copied().unwrap_or(0) == met.part);
+    let placed = of_it
+        .flat_map(|(_, corners)| corners)
+        .map(|corner| placement.map_or(*corner, |placement| placement.transform.point(*corner)));
+    placed.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| {
+        [low.min(p), high.max(p)]
     })
 }
 
@@ -112,6 +135,10 @@ struct Met {
     material: u32,
     /// The index among the names of objects.
     object: u32,
+    /// Which object of its mesh that is.
+    part: u32,
+    /// The placement, if it is one.
+    placement: Option<usize>,
 }
 
 /// A hit: how far along the ray, and the index of the triangle in its mesh.
@@ -165,14 +192,13 @@ impl<'s> Caster<'s> {
         if let Some(hit) = self.world.closest(&ray) {
             ray.tmax = hit.t;
             let mesh = self.world.mesh;
+            let part = mesh.objects.get(hit.triangle as usize).copied();
             first = Some(Met {
                 t: hit.t,
                 material: *mesh.materials.get(hit.triangle as usize)?,
-                object: mesh
-                    .objects
-                    .get(hit.triangle as usize)
-                    .copied()
-                    .unwrap_or(0),
+                object: part.unwrap_or(0),
+                part: part.unwrap_or(0),
+                placement: None,
             });
         }
         let meet = |ray: &Ray, place: usize| {
@@ -216,6 +242,8 @@ impl<'s> Caster<'s> {
                 .copied()
                 .unwrap_or(NO_MATERIAL),
             object: self.firsts.get(index).copied().unwrap_or(0) + part.unwrap_or(0),
+            part: part.unwrap_or(0),
+            placement: Some(index),
         })
     }
 }

@@ -127,7 +127,7 @@ const CRATES: &[Crate] = &[
             ],
             &["driver", "plan", "starter"],
             &["converge", "measure", "shot"],
-            &["calibrate", "editor", "farm", "live"],
+            &["calibrate", "editor", "farm", "live", "tev"],
             &["cli"],
         ],
     },
