@@ -808,6 +808,92 @@ fn windows_of_every_size_and_pictures_of_every_kind() {
     assert!(test.shows("Failed: no device"));
 }
 
+/// Clicks, drags, wheels, keys and texts anywhere, in a window that changes its size.
+#[test]
+fn a_monkey_breaks_nothing() {
+    for seed in 1..=3u32 {
+        let mut state = seed.wrapping_mul(0x9E37_79B9);
+        let mut random = move |n: u32| {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state % n
+        };
+        let mut test = Test::new();
+        let mut at = Pos2::ZERO;
+        for _ in 0..250 {
+            let modifiers = [
+                Modifiers::NONE,
+                Modifiers::NONE,
+                Modifiers::SHIFT,
+                Modifiers::COMMAND,
+            ][random(4) as usize];
+            let buttons = [
+                PointerButton::Primary,
+                PointerButton::Primary,
+                PointerButton::Middle,
+                PointerButton::Secondary,
+            ];
+            let button = buttons[random(4) as usize];
+            let press = |pos, pressed| Event::PointerButton {
+                pos,
+                button,
+                pressed,
+                modifiers,
+            };
+            test.harness.event(Event::ModifiersChanged(modifiers));
+            match random(10) {
+                0 => {
+                    let row = &keys::TABLE[random(keys::TABLE.len() as u32) as usize];
+                    test.harness.key_press_modifiers(modifiers, row.key);
+                }
+                1 => {
+                    let text = ["7", "-1e9", "nan", "a/b.png", "0xffffff", ""][random(6) as usize];
+                    test.harness.event(Event::Text(text.to_owned()));
+                    test.harness.key_press(Key::Enter);
+                }
+                2 => test.harness.event(Event::MouseWheel {
+                    unit: MouseWheelUnit::Line,
+                    delta: vec2(0.0, random(9) as f32 - 4.0),
+                    phase: eframe::egui::TouchPhase::Move,
+                    source: eframe::egui::MouseWheelSource::Unknown,
+                    modifiers,
+                }),
+                3 if random(8) == 0 => {
+                    let size = vec2(random(1600) as f32, random(1000) as f32);
+                    test.harness.set_size(size);
+                }
+                4 => test.engine.break_files(random(4) == 0),
+                5 => {
+                    test.harness.event(press(at, true));
+                    test.frames(1);
+                    at += vec2(random(200) as f32 - 100.0, random(200) as f32 - 100.0);
+                    test.harness.event(Event::PointerMoved(at));
+                    test.frames(1);
+                    test.harness.event(press(at, false));
+                }
+                _ => {
+                    at = Pos2::new(random(1280) as f32, random(800) as f32);
+                    test.harness.event(Event::PointerMoved(at));
+                    test.harness.event(press(at, true));
+                    test.harness.event(press(at, false));
+                }
+            }
+            test.frames(1);
+            for order in test.engine.orders() {
+                if let Order::Look(camera) = order {
+                    let [right, up, forward] = camera.basis();
+                    assert!(
+                        camera.position.is_finite() && right.length() > 0.9,
+                        "{camera:?}"
+                    );
+                    assert!(up.dot(camera.up) > 0.0 && forward.is_finite(), "{camera:?}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn a_window_that_closes_ends_its_engine() {
     let test = Test::new();
