@@ -103,8 +103,10 @@ pub fn send(
     tell: &mut dyn FnMut(Told<'_>),
 ) -> Result<(), String> {
     let (wake, woken) = channel();
-    // Of several wakes one is enough; nobody waits for a channel that is gone.
-    engine.on_news(Box::new(move || drop(wake.send(()))));
+    engine.on_news(Box::new(move || {
+        // Nobody waits for a channel that is gone.
+        let _ = wake.send(());
+    }));
     let mut connection = Connection::new(address.clone());
     let mut problems = None;
     loop {

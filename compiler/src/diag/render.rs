@@ -13,6 +13,7 @@
 //! | `start`, `end` | the same as byte offsets in the file |
 //! | `expected`, `hint` | text or null |
 //! | `labels` | further places: objects with `message`, `file` and the six position keys |
+//! | `fixes` | changes that may repair it: objects with `title`, `text` (what takes the place), `imports` (paths to import) and the place as in `labels` |
 //!
 //! Both forms are sorted by file and place and leave out repetitions, so that they depend on
 //! the source only.
@@ -23,7 +24,7 @@ use codespan_reporting::term::termcolor::Buffer;
 use codespan_reporting::term::{Config, DisplayStyle, emit_into_string, emit_to_write_style};
 use serde::Serialize;
 
-use super::{Diagnostic, Severity};
+use super::{Diagnostic, Fix, Severity};
 use crate::source::{FileId, SourceMap, Span};
 
 /// Source lines longer than this, in bytes, are not shown under a diagnostic.
@@ -206,6 +207,16 @@ struct JsonDiagnostic<'a> {
     expected: Option<&'a str>,
     hint: Option<&'a str>,
     labels: Vec<JsonLabel<'a>>,
+    fixes: Vec<JsonFix<'a>>,
+}
+
+#[derive(Serialize)]
+struct JsonFix<'a> {
+    title: &'a str,
+    text: &'a str,
+    imports: &'a [String],
+    #[serde(flatten)]
+    place: Place<'a>,
 }
 
 #[derive(Serialize)]
@@ -231,6 +242,17 @@ fn to_json<'a>(sources: &'a SourceMap, diagnostic: &'a Diagnostic) -> JsonDiagno
         message: &label.message,
         place: place(sources, label.span),
     });
+    // One whose place says something else is not what was meant.
+    let is_meant = |fix: &&'a Fix| {
+        let there = sources.file(fix.span.file).text.get(fix.span.range());
+        fix.was.as_deref().is_none_or(|was| there == Some(was))
+    };
+    let fixes = diagnostic.fixes.iter().filter(is_meant).map(|fix| JsonFix {
+        title: &fix.title,
+        text: &fix.text,
+        imports: &fix.imports,
+        place: place(sources, fix.span),
+    });
     JsonDiagnostic {
         code: diagnostic.code.id(),
         severity: diagnostic.code.severity(),
@@ -241,6 +263,7 @@ fn to_json<'a>(sources: &'a SourceMap, diagnostic: &'a Diagnostic) -> JsonDiagno
         expected: diagnostic.expected.as_deref(),
         hint: diagnostic.hint.as_deref(),
         labels: labels.collect(),
+        fixes: fixes.collect(),
     }
 }
 
