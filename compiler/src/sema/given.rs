@@ -215,6 +215,7 @@ material m {
     param i: int = 1 in -5 .. 5;
     param f: float = 0.5 in -10.0 .. 10.0;
     param l: length = 1 mm;
+    param w: length = 10 um in 0 um .. 100 um;
     param v2: vec2 = vec2(0.0);
     param v3: vec3 = vec3(0.0) in 0.0 .. 2.0;
     param v4: vec4 = vec4(0.0);
@@ -327,5 +328,25 @@ material m {
             said.contains("E0305") && said.contains("color(0.5, 2.0, 0.5)"),
             "{said}"
         );
+    }
+
+    /// Whatever unit they are written in: the product of a number and a unit is rounded.
+    #[test]
+    fn ends_of_a_range_are_inside_in_every_unit() {
+        for text in [
+            "100 um",
+            "100000 nm",
+            "0.1 mm",
+            "0.01 cm",
+            "0.0001 m",
+            "1e-7 km",
+        ] {
+            let (values, said) = given("w", ParameterValue::Text(text.into()));
+            assert!(values.is_some(), "{said}");
+        }
+        for text in ["100000.001 nm", "100.000001 um", "0.00010000001 m"] {
+            let (values, _) = given("w", ParameterValue::Text(text.into()));
+            assert!(values.is_none(), "{text}");
+        }
     }
 }

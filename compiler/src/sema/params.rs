@@ -144,7 +144,14 @@ impl Checker<'_> {
             Const::Int(i) => vec![f64::from(*i)],
             Const::Bool(_) => return true,
         };
-        let Some(&bad) = components.iter().find(|x| !(low..=high).contains(*x)) else {
+        // The same length has other last bits in other units: 100000 nm is a little more than 100 um.
+        let is_end = |x: f64| {
+            [low, high]
+                .iter()
+                .any(|end| (x - end).abs() <= 1e-12 * end.abs())
+        };
+        let is_outside = |x: &&f64| !(low..=high).contains(*x) && !is_end(**x);
+        let Some(&bad) = components.iter().find(is_outside) else {
             return true;
         };
         let unit = match param.surface_type {
