@@ -189,7 +189,7 @@ impl Documents {
         let document = self.open.get_mut(path)?;
         document.asked = asked;
         document.analysis = Some(analysis.clone());
-        if !analysis.diagnostics.iter().any(is_syntax) {
+        if !has_syntax_errors(&analysis) {
             document.last_good = Some(analysis.clone());
         }
         Some(analysis)
@@ -214,8 +214,22 @@ impl Documents {
 /// Texts that take the place of files, by path.
 pub type Texts = Arc<HashMap<String, Arc<str>>>;
 
-fn is_syntax(diagnostic: &impasto_compiler::diag::Diagnostic) -> bool {
-    diagnostic.code.id().starts_with("E01")
+/// Where the analysed file is no text of the language, in bytes.
+pub fn syntax_errors(analysis: &Analysis) -> impl Iterator<Item = usize> {
+    let own = analysis.file();
+    let syntax = analysis
+        .diagnostics
+        .iter()
+        .filter(|d| d.code.id().starts_with("E01"));
+    syntax
+        .filter_map(|d| d.span)
+        .filter(move |s| Some(s.file) == own)
+        .map(|s| s.start as usize)
+}
+
+/// Has the analysed file syntax errors?
+pub fn has_syntax_errors(analysis: &Analysis) -> bool {
+    analysis.module.is_none() || syntax_errors(analysis).next().is_some()
 }
 
 /// Reads files as they are in the editor, and else from the disk.

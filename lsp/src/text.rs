@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 use gen_lsp_types as lsp;
 
@@ -22,6 +23,8 @@ pub enum Encoding {
 pub struct Text {
     text: Arc<str>,
     starts: Vec<usize>,
+    /// Characters of several bytes: where each ends, and how many more bytes than units there are up to there.
+    wide: Vec<(usize, usize)>,
     encoding: Encoding,
 }
 
@@ -31,10 +34,33 @@ impl Text {
         let text = text.into();
         let breaks = text.match_indices('\n').map(|(at, _)| at + 1);
         let starts = std::iter::once(0).chain(breaks).collect();
+        let mut more = 0;
+        let wide = text.char_indices().filter(|(_, c)| !c.is_ascii());
+        let wide = wide.map(|(at, c)| {
+            more += c.len_utf8() - c.len_utf16();
+            (at + c.len_utf8(), more)
+        });
         Self {
+            wide: wide.collect(),
             text,
             starts,
             encoding,
+        }
+    }
+
+    /// How many more bytes than units the text has before a byte.
+    fn more_before(&self, at: usize) -> usize {
+        let count = self.wide.partition_point(|(end, _)| *end <= at);
+        count.checked_sub(1).map_or(0, |i| self.wide[i].1)
+    }
+
+    /// How many columns lie between two bytes.
+    fn columns(&self, bytes: Range<usize>) -> usize {
+        match self.encoding {
+            Encoding::Utf8 => bytes.len(),
+            Encoding::Utf16 => {
+                bytes.len() - (self.more_before(bytes.end) - self.more_before(bytes.start))
+            }
         }
     }
 
@@ -92,11 +118,7 @@ impl Text {
     pub fn position(&self, at: usize) -> lsp::Position {
         let at = self.text.floor_char_boundary(at.min(self.text.len()));
         let line = self.line_of(at);
-        let before = &self.text[self.starts[line]..at];
-        let character = match self.encoding {
-            Encoding::Utf8 => before.len(),
-            Encoding::Utf16 => before.encode_utf16().count(),
-        };
+        let character = self.columns(self.starts[line]..at);
         lsp::Position::new(line as u32, character as u32)
     }
 
@@ -108,10 +130,11 @@ impl Text {
 
     /// How many units of the client a range of bytes has.
     pub fn width(&self, bytes: Range<usize>) -> u32 {
-        let part = self.text.get(bytes).unwrap_or_default();
-        match self.encoding {
-            Encoding::Utf8 => part.len() as u32,
-            Encoding::Utf16 => part.encode_utf16().count() as u32,
+        let is_part = self.text.get(bytes.clone()).is_some();
+        if is_part {
+            self.columns(bytes) as u32
+        } else {
+            0
         }
     }
 
@@ -135,7 +158,12 @@ impl Text {
 
     /// The edits that make `new` of this text, line by line, so that cursors and marks elsewhere stay.
     pub fn edits_to(&self, new: &str) -> Vec<lsp::TextEdit> {
-        let diff = similar::TextDiff::from_lines(self.as_str(), new);
+        /// Two texts with nothing in common take time with the product of their lines; what is found until then is
+        /// right, and longer.
+        const MOST: Duration = Duration::from_millis(500);
+        let diff = similar::TextDiff::configure()
+            .timeout(MOST)
+            .diff_lines(self.as_str(), new);
         let line = |at: usize| lsp::Position::new(at as u32, 0);
         let new_lines: Vec<&str> = new.split_inclusive('\n').collect();
         let ops = diff.ops().iter();

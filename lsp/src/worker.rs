@@ -1,6 +1,7 @@
 //! What takes longer than a key: costs, whole checks of scenes, plans. It runs on a thread of its own when typing rests, and
 //! ends early when nobody waits for it any more.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -96,8 +97,8 @@ pub struct Found {
 /// The worker, as the server sees it.
 pub struct Worker {
     jobs: Sender<Job>,
-    /// What is done.
-    pub done: Receiver<Done>,
+    /// What is done, each with the number of the last edit before it was asked for.
+    pub done: Receiver<(u64, Done)>,
     /// The number of the last edit: work for an earlier one is for nobody.
     edit: Arc<AtomicU64>,
 }
@@ -115,10 +116,12 @@ impl Worker {
                 if stop() {
                     continue;
                 }
-                let result = run(&job, host.as_ref(), &stop);
-                if let Some(result) = result.filter(|_| !stop())
-                    && sender.send(result).is_err()
-                {
+                // What panics is a defect, and must not take all hints with it.
+                let ran = catch_unwind(AssertUnwindSafe(|| run(&job, host.as_ref(), &stop)));
+                let Some(result) = ran.unwrap_or(None).filter(|_| !stop()) else {
+                    continue;
+                };
+                if sender.send((job.edit, result)).is_err() {
                     return;
                 }
             }
@@ -127,8 +130,13 @@ impl Worker {
     }
 
     /// Notes an edit: what runs for an earlier text ends.
-    pub fn edited(&self) -> u64 {
-        self.edit.fetch_add(1, Ordering::Relaxed) + 1
+    pub fn edited(&self) {
+        self.edit.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Was nothing edited since the edit of this number?
+    pub fn is_latest(&self, edit: u64) -> bool {
+        self.edit.load(Ordering::Relaxed) == edit
     }
 
     /// Asks for something to be done for the texts as they are now.

@@ -15,15 +15,24 @@
 //! | `leads` | the line, from 1, that the definition is in, or the URI of the library; `-` if nowhere |
 //! | `uses` | the lines of all references |
 //! | `codes` | the codes of all diagnostics; `-` if there are none |
-//! | `fix` | `title => line`: a quick fix at the cursor, and the line of the cursor after it |
+//! | `fix` | `title => line`: a quick fix at the cursor, and a line that there is after it; `-` if nothing is left |
+//! | `fixes` | the titles of all quick fixes at the cursor, separated by ` | `; `-` if there are none |
 //! | `renames` | `name => line`: the line of the cursor after renaming; `name => !words` if it is refused |
+//! | `prepares` | what renaming would take the place of; `!words` if it is refused |
+//! | `marks` | the lines of what is highlighted along with the name at the cursor; `-` if nothing is |
 //! | `selects` | texts that enclose the cursor, innermost first, separated by ` < ` |
+//!
+//! Beside each source lie `paints.impasto`, with a function `half` and a material `gloss`, and a picture `wood.png`.
 
 use std::path::Path;
 
 use serde_json::{Value, json};
 
 use crate::client::{Client, edited, offset, position};
+
+const PAINTS: &str = "use std::bsdf::diffuse;\n\n/// Half of it.\nfn half(x: float) -> float = 0.5 * x;\n\n\
+    private fn secret(x: float) -> float = x;\n\n/// A gloss.\nmaterial gloss {\n    param tint: color = 0.5;\n    \
+    surface = diffuse(half(secret(1.0)) * tint);\n}\n";
 
 struct Case {
     title: String,
@@ -74,6 +83,8 @@ fn fixtures_are_answered_as_annotated() {
         .collect();
     paths.sort();
     let mut client = Client::new();
+    client.write("paints.impasto", PAINTS);
+    client.write("wood.png", "");
     let (mut wrong, mut count) = (Vec::new(), 0);
     for path in paths {
         for case in cases(&path) {
@@ -214,8 +225,7 @@ fn answer(
             let codes = codes.collect::<Vec<_>>().join(", ");
             same(if codes.is_empty() { "-".into() } else { codes })
         }
-        "fix" => {
-            let (title, line) = expected.split_once(" => ").expect("`title => line`");
+        "fix" | "fixes" => {
             let here = position(&case.text, case.at);
             let params = json!({
                 "textDocument": { "uri": uri },
@@ -224,6 +234,16 @@ fn answer(
             });
             let actions = client.ask("textDocument/codeAction", params);
             let actions = actions.as_array().cloned().unwrap_or_default();
+            if question == "fixes" {
+                let titles = actions.iter().filter_map(|a| a["title"].as_str());
+                let titles = titles.collect::<Vec<_>>().join(" | ");
+                return same(if titles.is_empty() {
+                    "-".into()
+                } else {
+                    titles
+                });
+            }
+            let (title, line) = expected.split_once(" => ").expect("`title => line`");
             let titles: Vec<&str> = actions.iter().filter_map(|a| a["title"].as_str()).collect();
             let action = actions.iter().find(|a| a["title"] == title);
             let action = action.ok_or_else(|| format!("there are {titles:?}"))?;
@@ -234,7 +254,8 @@ fn answer(
             if has { Ok(()) } else { Err(after) }
         }
         "renames" => {
-            let (name, line) = expected.split_once(" => ").expect("`name => line`");
+            let (name, line) = expected.split_once("=> ").expect("`name => line`");
+            let name = name.trim();
             let mut params = at;
             params["newName"] = json!(name);
             let answer = client.try_ask("textDocument/rename", params);
@@ -252,6 +273,26 @@ fn answer(
                     }
                 }
             }
+        }
+        "prepares" => match client.try_ask("textDocument/prepareRename", at) {
+            Err(why) if expected.strip_prefix('!').is_some_and(|w| why.contains(w)) => Ok(()),
+            Err(why) => Err(why),
+            Ok(found) => {
+                let range = &found["range"];
+                let start = offset(&case.text, &range["start"]);
+                let text = &case.text[start..offset(&case.text, &range["end"])];
+                same(text.to_owned())
+            }
+        },
+        "marks" => {
+            let found = client.ask("textDocument/documentHighlight", at);
+            let found = found.as_array().cloned().unwrap_or_default();
+            let lines = found.iter().map(|l| {
+                let line = l["range"]["start"]["line"].as_u64().unwrap_or(0) + 1;
+                line.to_string()
+            });
+            let lines = lines.collect::<Vec<_>>().join(", ");
+            same(if lines.is_empty() { "-".into() } else { lines })
         }
         "selects" => {
             let params = json!({

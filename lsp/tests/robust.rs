@@ -250,7 +250,7 @@ fn ask_everything(text: &str, at: usize) {
         analyse: &mut patched,
     };
     complete(&mut known, at);
-    hover::hover(&now, at);
+    hover::hover(&now, None, at);
     signature::signatures(text, &now, None, at);
     tokens::tokens(&now);
     if let Some(ast) = now.ast() {

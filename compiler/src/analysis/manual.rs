@@ -8,6 +8,9 @@ use std::sync::OnceLock;
 /// The manual.
 const TEXT: &str = include_str!("../../../docs/language.md");
 
+/// The manual of pictures, with the arguments of the functions that read them.
+const TEXTURES: &str = include_str!("../../../docs/textures.md");
+
 /// What the manual says of a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
@@ -73,6 +76,40 @@ pub fn entry(name: &str, kinds: &[Kind]) -> Option<&'static Entry> {
     entries.find(|e| e.name == name && kinds.contains(&e.kind))
 }
 
+/// The rules of the grammar that begin with or hold a keyword, each with what the manual says beside it.
+pub fn grammar(keyword: &str) -> Vec<&'static str> {
+    static RULES: OnceLock<Vec<&str>> = OnceLock::new();
+    let rules = RULES.get_or_init(|| {
+        let grammar = TEXT.split("## Grammar\n").nth(1).unwrap_or_default();
+        let lines = grammar.lines().skip_while(|l| l.is_empty());
+        let lines = lines.take_while(|l| l.starts_with("    "));
+        lines.map(|l| l.trim().trim_start_matches("| ")).collect()
+    });
+    let quoted = format!("\"{keyword}\"");
+    let of_it = rules.iter().filter(|rule| rule.contains(&quoted));
+    of_it.copied().collect()
+}
+
+/// The functions of pictures take more than the manual of the language shows.
+fn with_all_arguments(entries: &mut [Entry]) {
+    let rows = TEXTURES
+        .lines()
+        .skip_while(|l| *l != "| argument | default | means |");
+    let mut arguments: Vec<String> = Vec::new();
+    for row in rows.skip(2).take_while(|l| l.starts_with('|')) {
+        let cells = cells(row);
+        let default = spans(cells.get(1).map_or("", |c| c)).next();
+        let default = default.map_or(String::new(), |d| format!(" = {d}"));
+        let names = spans(cells.first().map_or("", |c| c)).flat_map(|c| c.split(", "));
+        arguments.extend(names.map(|name| format!("{name}{default}")));
+    }
+    for entry in entries {
+        if ["image", "image_data", "image_alpha"].contains(&&*entry.name) {
+            entry.written = vec![format!("{}({})", entry.name, arguments.join(", "))];
+        }
+    }
+}
+
 fn read(text: &str) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut table = None;
@@ -130,6 +167,7 @@ fn read(text: &str) -> Vec<Entry> {
             }
         }
     }
+    with_all_arguments(&mut entries);
     entries
 }
 
@@ -166,6 +204,26 @@ mod tests {
         Unit::ALL
             .iter()
             .for_each(|(_, unit, _)| has(unit, &[Kind::Unit]));
+    }
+
+    #[test]
+    fn the_grammar_shows_every_keyword() {
+        for keyword in crate::lexer::Token::KEYWORDS {
+            let rules = grammar(keyword);
+            assert!(
+                !rules.is_empty(),
+                "docs/language.md has no rule of `{keyword}`"
+            );
+        }
+        assert!(grammar("use")[0].starts_with("use      = \"use\" path"));
+    }
+
+    #[test]
+    fn functions_of_pictures_show_all_arguments() {
+        let image = entry("image", &[Kind::Function]).expect("a row");
+        let all = "image(picture: texture, uv: vec2, width: vec2 = vec2(0.0), wrap: int = REPEAT, \
+                   wrap_u: int = wrap, wrap_v: int = wrap, filter: int = BILINEAR)";
+        assert_eq!(image.written, [all]);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! in definitions that do not check, since a text that is being written is wrong most of the time. Types are
 //! those that the checker noted. A test holds the two to each other.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use crate::ast::{self, ItemKind};
@@ -173,9 +173,7 @@ impl Analysis {
         match symbol {
             Symbol::Item(item) => Some(self.item(*item).name.span),
             Symbol::Local(index) => Some(self.locals.get(*index)?.span),
-            Symbol::Param(item, index) => {
-                Some(resolve::params(self.item(*item)).get(*index)?.name.span)
-            }
+            Symbol::Param(item, index) => Some(resolve::param(self.item(*item), *index)?.span),
             Symbol::Field(item, index) => match &self.item(*item).kind {
                 ItemKind::Struct(fields) => Some(fields.get(*index)?.name.span),
                 _ => None,
@@ -188,24 +186,24 @@ impl Analysis {
     /// What is in scope at byte `at` of the bodies of the file, innermost and last first; a name that another one
     /// hides is left out.
     pub fn visible_at(&self, at: u32) -> Vec<(&str, Symbol)> {
-        let mut seen: Vec<(&str, Symbol)> = Vec::new();
+        let (mut seen, mut names) = (Vec::new(), HashSet::new());
         let locals = self.locals.iter().enumerate().rev();
         for (index, local) in locals {
-            let is_new = !seen.iter().any(|(name, _)| *name == local.name);
-            if local.scope.contains(&at) && is_new {
-                seen.push((&local.name, Symbol::Local(index)));
+            if local.scope.contains(&at) && names.insert(&*local.name) {
+                seen.push((&*local.name, Symbol::Local(index)));
             }
         }
         let Some((module, ast)) = self.module.zip(self.ast()) else {
             return seen;
         };
         for (index, item) in ast.items.iter().enumerate() {
-            let inside = item.span.start <= at && at <= item.span.end;
+            if !(item.span.start..=item.span.end).contains(&at) {
+                continue;
+            }
             for (i, param) in resolve::params(item).into_iter().enumerate() {
-                let is_new = !seen.iter().any(|(name, _)| *name == param.name.node);
-                if inside && is_new {
+                if names.insert(&*param.name.node) {
                     let symbol = Symbol::Param(ItemRef { module, index }, i);
-                    seen.push((&param.name.node, symbol));
+                    seen.push((&*param.name.node, symbol));
                 }
             }
         }
@@ -235,7 +233,7 @@ pub struct ParamRef<'a> {
     pub of_material: Option<&'a ast::MaterialParam>,
 }
 
-/// The parameters of a definition, in their order; the fields of a struct.
+/// The parameters of a definition, in their order.
 pub fn params(item: &ast::Item) -> Vec<ParamRef<'_>> {
     resolve::params(item)
 }

@@ -82,7 +82,7 @@ pub enum LocalKind {
     Argument,
 }
 
-/// The parameters of a definition, or the fields of a struct.
+/// The parameters of a definition.
 pub fn params(item: &Item) -> Vec<ParamRef<'_>> {
     fn of_function(params: &[ast::Param]) -> Vec<ParamRef<'_>> {
         let params = params.iter().map(|p| ParamRef {
@@ -106,6 +106,16 @@ pub fn params(item: &Item) -> Vec<ParamRef<'_>> {
         ItemKind::Closure(c) => of_function(&c.params),
         ItemKind::Function(f) => of_function(&f.params),
         ItemKind::Struct(_) | ItemKind::Const(_) => Vec::new(),
+    }
+}
+
+/// One of the parameters of a definition.
+pub fn param(item: &Item, index: usize) -> Option<&Name> {
+    match &item.kind {
+        ItemKind::Material(m) => Some(&m.params.get(index)?.name),
+        ItemKind::Closure(c) => Some(&c.params.get(index)?.name),
+        ItemKind::Function(f) => Some(&f.params.get(index)?.name),
+        ItemKind::Struct(_) | ItemKind::Const(_) => None,
     }
 }
 
@@ -152,8 +162,11 @@ struct Resolver<'a> {
     locals: Vec<Local>,
 }
 
+/// A name, what it stands for, and whether that is a variable.
+type Visible = (String, Symbol, bool);
+
 struct Scope {
-    names: Vec<(String, Symbol, bool)>,
+    names: Vec<Visible>,
     end: u32,
 }
 
@@ -217,8 +230,9 @@ impl Resolver<'_> {
                 self.body(&f.body, end);
             }
             ItemKind::Closure(c) => {
+                let mut shared = Vec::new();
                 for method in &c.methods {
-                    self.scoped(method.span.end, |r| r.method(&c.lets, method));
+                    self.scoped(method.span.end, |r| r.method(&c.lets, method, &mut shared));
                 }
                 if c.methods.is_empty() {
                     self.scoped(end, |r| r.statements(&c.lets));
@@ -238,38 +252,28 @@ impl Resolver<'_> {
         self.scopes.pop();
     }
 
-    /// A method with the `let`s before it, which belong to each of the methods; their names are noted with the first.
-    fn method(&mut self, lets: &[Stmt], method: &ast::Method) {
-        let known = self.occurrences.len();
-        let is_first = !lets
-            .first()
-            .is_some_and(|first| self.locals.iter().any(|l| is_within(l.span, first.span)));
-        if is_first {
+    /// A method with the `let`s before it, which belong to each of the methods. Their names are noted with the first, and
+    /// kept in `shared` for the others.
+    fn method(&mut self, lets: &[Stmt], method: &ast::Method, shared: &mut Vec<Visible>) {
+        if shared.is_empty() {
             self.statements(lets);
-        } else {
-            self.again(lets);
-            self.occurrences.truncate(known);
+            let names = self.scopes.last().map_or(&[][..], |scope| &scope.names);
+            *shared = names.to_vec();
+        } else if let Some(scope) = self.scopes.last_mut() {
+            for (_, symbol, _) in &*shared {
+                if let Symbol::Local(index) = symbol {
+                    let local = &mut self.locals[*index];
+                    local.scope.end = local.scope.end.max(scope.end);
+                }
+            }
+            scope.names.extend(shared.iter().cloned());
         }
+        let symbol = Symbol::BuiltIn(method.name.node.clone());
+        self.note(method.name.span, symbol, Role::Define);
         for name in &method.args {
             self.define(name, LocalKind::Argument, method.span.start);
         }
         self.body(&method.body, method.span.end);
-    }
-
-    /// Brings names of `let`s that were noted before into scope once more.
-    fn again(&mut self, lets: &[Stmt]) {
-        for stmt in lets {
-            let StmtKind::Let { name, mutable, .. } = &stmt.kind else {
-                continue;
-            };
-            let known = self.locals.iter().position(|l| l.span == name.span);
-            if let (Some(index), Some(scope)) = (known, self.scopes.last_mut()) {
-                let local = &mut self.locals[index];
-                local.scope.end = local.scope.end.max(scope.end);
-                let symbol = Symbol::Local(index);
-                scope.names.push((name.node.clone(), symbol, *mutable));
-            }
-        }
     }
 
     fn scoped(&mut self, end: u32, f: impl FnOnce(&mut Self)) {
@@ -518,8 +522,4 @@ impl Resolver<'_> {
             self.note(name.span, symbol, Role::Give);
         }
     }
-}
-
-fn is_within(inner: Span, outer: Span) -> bool {
-    inner.file == outer.file && outer.start <= inner.start && inner.end <= outer.end
 }

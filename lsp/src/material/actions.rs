@@ -5,9 +5,12 @@ use std::ops::Range;
 use impasto_compiler::analysis::{Analysis, params};
 use impasto_compiler::ast::{self, ItemKind, Stmt, StmtKind};
 use impasto_compiler::diag::{Code, Diagnostic};
+use impasto_compiler::lexer::Token;
+use impasto_compiler::source::{FileId, Span};
 
-use super::cursor::cursor;
+use super::cursor::{self, Tokens};
 use super::imports;
+use crate::documents;
 
 /// A change that an author can ask for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,23 +38,36 @@ pub fn actions(analysis: &Analysis, range: Range<usize>) -> Vec<Action> {
         if !touches {
             continue;
         }
-        let of_it = fixes(ast, text, diagnostic).into_iter();
+        let of_it = fixes(ast, text, file, diagnostic).into_iter();
         actions.extend(of_it.map(|(title, edits)| Action {
             title,
             edits,
             repairs: Some(index),
         }));
     }
-    actions.extend(arguments(analysis, text, range.start));
-    actions.extend(output(analysis, text, range.start));
+    actions.extend(arguments(analysis, file, text, range.start));
+    actions.extend(output(analysis, file, text, range.start));
+    for action in &mut actions {
+        action.title = shortened(&action.title);
+    }
     actions
+}
+
+/// A title in one line of a menu: what is written may be an expression over several.
+fn shortened(title: &str) -> String {
+    const MOST: usize = 80;
+    let line = title.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
 }
 
 type Change = (String, Vec<(Range<usize>, String)>);
 
-fn fixes(ast: &ast::Module, text: &str, diagnostic: &Diagnostic) -> Vec<Change> {
+fn fixes(ast: &ast::Module, text: &str, file: FileId, diagnostic: &Diagnostic) -> Vec<Change> {
     let mut found = Vec::new();
-    for fix in &diagnostic.fixes {
+    for fix in diagnostic.fixes.iter().filter(|f| f.span.file == file) {
         let range = fix.span.range();
         let is_meant = match (&fix.was, text.get(range.clone())) {
             (_, None) => false,
@@ -67,7 +83,7 @@ fn fixes(ast: &ast::Module, text: &str, diagnostic: &Diagnostic) -> Vec<Change> 
             .filter_map(|path| imports::added(ast, text, path));
         let mut edits: Vec<(Range<usize>, String)> = imports.collect();
         if !(range.is_empty() && fix.text.is_empty()) {
-            edits.push((range, fix.text.clone()));
+            edits.push((range.clone(), on_its_line(text, &range, &fix.text)));
         }
         if !edits.is_empty() {
             found.push((fix.title.clone(), edits));
@@ -75,10 +91,26 @@ fn fixes(ast: &ast::Module, text: &str, diagnostic: &Diagnostic) -> Vec<Change> 
     }
     if diagnostic.code == Code::Unused
         && let Some(span) = diagnostic.span
+        && span.file == file
     {
         found.splice(0..0, unused(ast, text, span.start as usize));
     }
     found
+}
+
+/// The brace that closes a block stands on a line of its own.
+fn on_its_line(text: &str, range: &Range<usize>, new: &str) -> String {
+    let before = text.get(..range.start).unwrap_or_default();
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let is_last = text
+        .get(range.end..)
+        .is_some_and(|rest| rest.trim().is_empty());
+    let is_apart = new == "}" && is_last && !line.trim().is_empty() && before.contains('\n');
+    if is_apart {
+        format!("\n{new}")
+    } else {
+        new.to_owned()
+    }
 }
 
 /// Takes an unused name out: an import, a statement, a definition.
@@ -144,9 +176,8 @@ fn statements(ast: &ast::Module) -> Vec<&Stmt> {
 /// A range with the documentation lines before it.
 fn with_docs(text: &str, range: Range<usize>) -> Range<usize> {
     let mut start = range.start;
-    while let Some(line) = text[..start]
-        .trim_end_matches([' ', '\t'])
-        .strip_suffix('\n')
+    while let Some(before) = text.get(..start)
+        && let Some(line) = before.trim_end_matches([' ', '\t']).strip_suffix('\n')
     {
         let from = line.rfind('\n').map_or(0, |n| n + 1);
         if !line[from..].trim_start().starts_with("///") {
@@ -159,57 +190,56 @@ fn with_docs(text: &str, range: Range<usize>) -> Range<usize> {
 
 /// A range as whole lines, if nothing else is on them.
 fn lines(text: &str, range: Range<usize>) -> Range<usize> {
-    let before = text[..range.start].rfind('\n').map_or(0, |n| n + 1);
-    let after = text[range.end..]
-        .find('\n')
-        .map_or(text.len(), |n| range.end + n + 1);
-    let alone =
-        text[before..range.start].trim().is_empty() && text[range.end..after].trim().is_empty();
-    if alone { before..after } else { range }
+    let (Some(before), Some(after)) = (text.get(..range.start), text.get(range.end..)) else {
+        return range;
+    };
+    let start = before.rfind('\n').map_or(0, |n| n + 1);
+    let end = after.find('\n').map_or(after.len(), |n| n + 1);
+    let alone = before[start..].trim().is_empty() && after[..end].trim().is_empty();
+    if alone { start..range.end + end } else { range }
 }
 
 /// Offers to write the arguments that a call lacks.
-fn arguments(analysis: &Analysis, text: &str, at: usize) -> Option<Action> {
-    let (index, _) = analysis.diagnostics.iter().enumerate().find(|(_, d)| {
-        let here = d
-            .span
-            .is_some_and(|s| s.start as usize <= at && at <= s.end as usize);
-        d.code == Code::MissingArgument && here
-    })?;
-    let span = analysis.diagnostics[index].span?;
-    let open = text[span.end as usize..].find('(')? + span.end as usize + 1;
-    let cursor = cursor(text, open);
-    let call = cursor.calls.first()?;
-    let item = analysis.lookup(analysis.module?, &call.callee)?;
-    let close = closing(text, open)?;
-    let inside = &text[open..close];
-    let given = self::cursor(text, close);
-    let call = given.calls.first()?;
-    let count = if inside.trim().is_empty() {
-        0
-    } else {
-        call.position + 1
+fn arguments(analysis: &Analysis, file: FileId, text: &str, at: usize) -> Option<Action> {
+    let is_lacking = |d: &Diagnostic| {
+        let touches = |s: Span| s.file == file && s.start as usize <= at && at <= s.end as usize;
+        d.code == Code::MissingArgument && d.span.is_some_and(touches)
     };
+    let index = analysis.diagnostics.iter().position(is_lacking)?;
+    let callee = analysis.diagnostics[index].span?;
+    let tokens = cursor::tokens(text);
+    let open = tokens.partition_point(|(_, r)| r.start < callee.end as usize);
+    let close = closing(&tokens, open)?;
+    let given = cursor::cursor(text, tokens[close].1.start);
+    let call = given.calls.first()?;
+    let item = analysis.lookup(analysis.module?, &call.callee)?;
+    // Behind the last argument, before a comma that ends the list.
+    let inside = &tokens[open + 1..close];
+    let last = inside.iter().rfind(|(token, _)| *token != Token::Comma);
+    let ends_list = inside
+        .last()
+        .is_some_and(|(token, _)| *token == Token::Comma);
+    let count = call.by_place() + usize::from(last.is_some() && !ends_list);
+    let by_name = call.given.iter();
+    let by_place = count - usize::from(call.named.is_some());
     let all = params(analysis.item(item));
-    let missing = all.iter().enumerate().filter(|(i, p)| {
-        let by_place = *i + call.given.len() < count;
-        p.default.is_none() && !by_place && !call.given.contains(&p.name.node)
-    });
+    let missing = all.iter().skip(by_place);
+    let missing = missing
+        .filter(|p| p.default.is_none() && !by_name.clone().any(|given| *given == p.name.node));
     let new: Vec<String> = missing
-        .map(|(_, p)| format!("{}: {}", p.name.node, placeholder(&p.ty.node)))
+        .map(|p| format!("{}: {}", p.name.node, placeholder(&p.ty.node)))
         .collect();
     if new.is_empty() {
         return None;
     }
-    let comma = if count == 0 || inside.trim_end().ends_with(',') {
-        ""
-    } else {
-        ", "
+    let new = new.join(", ");
+    let (end, comma) = match last {
+        Some((_, range)) => (range.end, ", "),
+        None => (tokens[open].1.end, ""),
     };
-    let end = open + inside.trim_end().len();
     Some(Action {
-        title: format!("add {}", new.join(", ")),
-        edits: vec![(end..end, format!("{comma}{}", new.join(", ")))],
+        title: format!("add {new}"),
+        edits: vec![(end..end, format!("{comma}{new}"))],
         repairs: Some(index),
     })
 }
@@ -229,41 +259,44 @@ fn placeholder(ty: &str) -> &'static str {
     }
 }
 
-/// The bracket that closes what is open before a byte.
-fn closing(text: &str, from: usize) -> Option<usize> {
-    let mut depth = 0;
-    for (at, c) in text[from..].char_indices() {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' if depth == 0 => return Some(from + at),
-            ')' | ']' | '}' => depth -= 1,
+/// The bracket that closes the one at a place among the tokens.
+fn closing(tokens: &Tokens, open: usize) -> Option<usize> {
+    let mut depth = 0usize;
+    for (index, (token, _)) in tokens.iter().enumerate().skip(open) {
+        match token {
+            Token::LeftParen | Token::LeftBracket | Token::LeftBrace => depth += 1,
+            Token::RightParen | Token::RightBracket | Token::RightBrace => {
+                depth = depth.checked_sub(1)?;
+            }
             _ => {}
+        }
+        if depth == 0 {
+            return Some(index).filter(|_| index > open);
         }
     }
     None
 }
 
 /// Offers to give a material the surface that it lacks.
-fn output(analysis: &Analysis, text: &str, at: usize) -> Option<Action> {
+fn output(analysis: &Analysis, file: FileId, text: &str, at: usize) -> Option<Action> {
+    // Where the syntax is wrong, it may be there.
+    if documents::has_syntax_errors(analysis) {
+        return None;
+    }
     let (_, item) = analysis.item_at(at as u32)?;
-    let lacking = |d: &Diagnostic| {
-        d.code == Code::MissingOutput
-            && d.span
-                .is_some_and(|s| item.span.range().contains(&(s.start as usize)))
-    };
-    let index = analysis.diagnostics.iter().position(lacking)?;
-    let end = item.span.end as usize - 1;
-    let is_empty = text[..end].trim_end().ends_with('{');
-    let ends_line = text[..end].ends_with('\n');
-    let line = match (is_empty, ends_line) {
+    let lacks = |s: Span| s.file == file && item.span.range().contains(&(s.start as usize));
+    let is_lacking = |d: &Diagnostic| d.code == Code::MissingOutput && d.span.is_some_and(lacks);
+    let index = analysis.diagnostics.iter().position(is_lacking)?;
+    let inside = text.get(item.span.range())?.strip_suffix('}')?;
+    let end = item.span.start as usize + inside.len();
+    let is_empty = inside.trim_end().ends_with('{');
+    let line = match (is_empty, inside.ends_with('\n')) {
         (_, true) => "    surface = diffuse(0.5);\n",
         (true, false) => "\n    surface = diffuse(0.5);\n",
         (false, false) => " surface = diffuse(0.5); ",
     };
-    let mut edits: Vec<(Range<usize>, String)> =
-        imports::added(analysis.ast()?, text, "std::bsdf::diffuse")
-            .into_iter()
-            .collect();
+    let import = imports::added(analysis.ast()?, text, "std::bsdf::diffuse");
+    let mut edits: Vec<(Range<usize>, String)> = import.into_iter().collect();
     edits.push((end..end, line.to_owned()));
     Some(Action {
         title: "assign a matte surface".into(),

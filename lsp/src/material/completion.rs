@@ -3,12 +3,13 @@
 //! The text is broken there nearly always. So the grammar is told by tokens (`cursor`), scopes by the syntax tree, and
 //! types by an analysis of a text in which a name stands at the cursor and brackets are closed.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 
 use impasto_compiler::analysis::manual::{self, Kind};
 use impasto_compiler::analysis::{Analysis, Symbol, params};
-use impasto_compiler::ast::{ItemKind, Unit};
+use impasto_compiler::ast::{Field, ItemKind, Unit};
 use impasto_compiler::sema::{ItemRef, words};
 use impasto_stdlib::StdFile;
 
@@ -89,27 +90,47 @@ pub fn complete(known: &mut Known<'_>, at: usize) -> Proposals {
     let mut list = match &cursor.place {
         Place::Nothing => Vec::new(),
         Place::Item => items(),
-        Place::MaterialStatement => material_statements(known, at),
-        Place::Statement => statements(known, at, &cursor),
-        Place::Value => values(known, at, &cursor),
+        Place::PrivateItem => {
+            let mut list = items();
+            list.retain(|p| !["private", "use"].contains(&&*p.label));
+            list
+        }
+        Place::Delta => vec![keyword("bsdf", "bsdf ", "how light is scattered")],
+        Place::MaterialStatement => material_statements(known, &cursor),
+        Place::Statement => statements(known, &cursor),
+        Place::Value => values(known, &cursor),
         Place::Argument => {
             let mut list = arguments(known, &cursor);
-            list.extend(values(known, at, &cursor));
+            list.extend(values(known, &cursor));
             list
         }
         Place::Type => types(known),
         Place::Part(end) => parts(known, *end, &cursor),
-        Place::Import(path) => imported(known, path),
+        Place::Import(path) => imported(known, path, at),
         Place::Unit => units(),
-        Place::MetadataKey => metadata(),
-        Place::Text(_) => pictures(known, &cursor),
-        Place::Method => methods(known, at),
+        Place::MetadataKey(given) => metadata(given),
+        Place::Path => pictures(known, &cursor),
+        Place::Method => methods(known, at, &cursor),
     };
+    let rest = known.text.get(cursor.word.end..).unwrap_or_default();
+    let rest = rest.lines().next().unwrap_or_default();
+    list.iter_mut().for_each(|proposal| proposal.fit(rest));
     list.sort_by(|a, b| (a.rank, &a.label).cmp(&(b.rank, &b.label)));
     list.dedup_by(|a, b| a.label == b.label && a.kind == b.kind);
     Proposals {
         word: cursor.word,
         list,
+    }
+}
+
+/// Does a character that was typed ask for a list by itself?
+pub fn is_asked_by(text: &str, at: usize, trigger: Option<&str>) -> bool {
+    let place = |wanted: fn(&Place) -> bool| wanted(&cursor(text, at).place);
+    match trigger {
+        Some(" ") => place(|p| matches!(p, Place::Unit | Place::Import(_))),
+        Some(":") => place(|p| matches!(p, Place::Type | Place::Import(_))),
+        Some("/" | "\"") => place(|p| matches!(p, Place::Path)),
+        _ => true,
     }
 }
 
@@ -123,6 +144,27 @@ impl Proposal {
             docs: String::new(),
             rank,
             import: None,
+        }
+    }
+
+    /// Leaves out what stands behind the cursor already, in the `rest` of the line.
+    fn fit(&mut self, rest: &str) {
+        let next = rest.trim_start();
+        let (label, snippet) = (&self.label, &self.snippet);
+        let name = label.trim_end_matches(':');
+        let behind = snippet.strip_prefix(name).unwrap_or_default().trim_start();
+        let is_there = |mark: &str, longer: &str| {
+            behind.starts_with(mark) && next.starts_with(mark) && !next.starts_with(longer)
+        };
+        let goes_on = !next.is_empty() && !next.starts_with(['}', ')', ']', ';', ',', '/']);
+        let is_form = matches!(self.kind, ProposalKind::Keyword | ProposalKind::Snippet);
+        if is_there("(", "((") || is_there(":", "::") || is_there("=", "==") {
+            self.snippet = name.to_owned();
+        } else if is_form && goes_on && snippet != label {
+            let has_space = rest.starts_with([' ', '\t']);
+            self.snippet = format!("{label}{}", if has_space { "" } else { " " });
+        } else if next.starts_with(';') && snippet.ends_with(';') {
+            self.snippet.pop();
         }
     }
 
@@ -188,7 +230,7 @@ fn keyword(word: &str, snippet: &str, detail: &str) -> Proposal {
         .detail(detail)
 }
 
-fn material_statements(known: &mut Known<'_>, at: usize) -> Vec<Proposal> {
+fn material_statements(known: &mut Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
     let mut list = vec![keyword(
         "param",
         "param ${1:name}: ${2:float} = ${3:0.5} in ${4:0.0} .. ${5:1.0};",
@@ -209,7 +251,7 @@ fn material_statements(known: &mut Known<'_>, at: usize) -> Vec<Proposal> {
         list.push(proposal);
     }
     list.extend(flow());
-    list.extend(variables(known, at));
+    list.extend(scope(known, cursor).names);
     list
 }
 
@@ -232,7 +274,7 @@ fn flow() -> Vec<Proposal> {
     ]
 }
 
-fn statements(known: &mut Known<'_>, at: usize, cursor: &Cursor) -> Vec<Proposal> {
+fn statements(known: &mut Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
     let mut list = flow();
     list.push(keyword("break", "break;", "ends the loop"));
     list.push(keyword(
@@ -241,32 +283,68 @@ fn statements(known: &mut Known<'_>, at: usize, cursor: &Cursor) -> Vec<Proposal
         "goes on with the next turn",
     ));
     // The last expression of a block is its value.
-    list.extend(values(known, at, cursor));
+    list.extend(values(known, cursor));
     list
 }
 
-/// Local names at a byte, by the analysis that knows most of them.
-fn variables(known: &Known<'_>, at: usize) -> Vec<Proposal> {
-    let analysis = known.now;
-    let visible = analysis.visible_at(at as u32);
-    let proposal = |(name, symbol): (&str, Symbol)| {
-        let kind = match symbol {
-            Symbol::Param(..) => ProposalKind::Parameter,
-            _ => ProposalKind::Variable,
-        };
-        let mut proposal = Proposal::new(name, kind, 1);
-        if let Some(description) = describe::describe(analysis, &symbol) {
-            proposal = proposal.described(&description);
-        }
-        proposal
-    };
-    visible.into_iter().map(proposal).collect()
+/// What is in scope at a cursor.
+#[derive(Default)]
+struct Scope {
+    /// Local names.
+    names: Vec<Proposal>,
+    /// The definition around it.
+    own: Option<String>,
 }
 
-fn values(known: &mut Known<'_>, at: usize, cursor: &Cursor) -> Vec<Proposal> {
-    let mut list = variables(known, at);
-    let hidden: Vec<String> = list.iter().map(|p| p.label.clone()).collect();
-    let is_free = |name: &str| !hidden.iter().any(|h| h == name);
+/// What is in scope at a cursor: of a text with syntax errors, by the repair that leaves most of it.
+fn scope(known: &mut Known<'_>, cursor: &Cursor) -> Scope {
+    let word = &cursor.word;
+    let mut best = Scope::of(known.now, word.start);
+    if !documents::has_syntax_errors(known.now) {
+        return best;
+    }
+    for patch in patches(known, cursor) {
+        let analysis = (known.analyse)(patch.range, &patch.text);
+        let found = Scope::of(&analysis, word.start + patch.shift);
+        if found.names.len() > best.names.len() || best.own.is_none() {
+            best = found;
+        }
+        if !documents::has_syntax_errors(&analysis) {
+            break;
+        }
+    }
+    best
+}
+
+impl Scope {
+    fn of(analysis: &Analysis, at: usize) -> Self {
+        let visible = analysis.visible_at(at as u32);
+        let proposal = |(name, symbol): (&str, Symbol)| {
+            let kind = match symbol {
+                Symbol::Param(..) => ProposalKind::Parameter,
+                _ => ProposalKind::Variable,
+            };
+            let mut proposal = Proposal::new(name, kind, 1);
+            if let Some(description) = describe::describe(analysis, &symbol) {
+                proposal = proposal.described(&description);
+            }
+            proposal
+        };
+        let visible = visible.into_iter().filter(|(name, _)| *name != STAND_IN);
+        Self {
+            names: visible.map(proposal).collect(),
+            own: analysis
+                .item_at(at as u32)
+                .map(|(_, item)| item.name.node.clone()),
+        }
+    }
+}
+
+fn values(known: &mut Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
+    let scope = scope(known, cursor);
+    let mut list = scope.names;
+    let hidden: HashSet<String> = list.iter().map(|p| p.label.clone()).collect();
+    let is_free = |name: &str| !hidden.contains(name);
     if cursor.around == Around::Material {
         for input in words::input_names().filter(|i| is_free(i)) {
             let mut proposal = Proposal::new(input, ProposalKind::Input, 3);
@@ -301,9 +379,16 @@ fn values(known: &mut Known<'_>, at: usize, cursor: &Cursor) -> Vec<Proposal> {
         "if $1 { $2 } else { $0 }",
         "one value or the other",
     ));
-    let mut named: Vec<String> = hidden.clone();
-    list.extend(definitions(known, &mut named, |_| true));
-    list.extend(library(known, &named));
+    // Nothing calls itself, and only materials call materials.
+    let mut named = hidden;
+    named.extend(scope.own);
+    let is_callable = |kind: &ItemKind| {
+        cursor.around == Around::Material || !matches!(kind, ItemKind::Material(_))
+    };
+    list.extend(definitions(known, &mut named, is_callable));
+    let mut library = library(&named);
+    library.retain(|p| cursor.around == Around::Material || p.kind != ProposalKind::Material);
+    list.extend(library);
     list
 }
 
@@ -343,7 +428,7 @@ fn built_in(function: &str) -> Proposal {
 /// Definitions that the file sees, or saw last.
 fn definitions(
     known: &Known<'_>,
-    named: &mut Vec<String>,
+    named: &mut HashSet<String>,
     wanted: impl Fn(&ItemKind) -> bool,
 ) -> Vec<Proposal> {
     let mut list = Vec::new();
@@ -357,10 +442,9 @@ fn definitions(
             .map(|n| (n, 4))
             .chain(analysis.core.iter().map(|n| (n, 7)));
         for ((name, item), rank) in all {
-            if named.contains(name) || !wanted(&analysis.item(*item).kind) {
+            if !wanted(&analysis.item(*item).kind) || !named.insert(name.clone()) {
                 continue;
             }
-            named.push(name.clone());
             list.push(definition(analysis, *item, name, rank));
         }
     }
@@ -409,11 +493,11 @@ fn kind_of(kind: &ItemKind) -> ProposalKind {
 }
 
 /// Definitions of the library that would have to be imported.
-fn library(known: &Known<'_>, named: &[String]) -> Vec<Proposal> {
+fn library(named: &HashSet<String>) -> Vec<Proposal> {
     let mut list = Vec::new();
     for entry in crate::symbols::library() {
         let (file, item) = (entry.file, &entry.item);
-        if file.folder == "core" || named.iter().any(|n| n == &item.name) {
+        if file.folder == "core" || named.contains(&item.name) {
             continue;
         }
         let path = format!("std::{}::{}", file.folder, item.name);
@@ -424,7 +508,6 @@ fn library(known: &Known<'_>, named: &[String]) -> Vec<Proposal> {
         proposal.import = Some(path);
         list.push(proposal);
     }
-    let _ = known;
     list
 }
 
@@ -475,10 +558,11 @@ pub fn listed(file: &StdFile) -> Vec<Listed> {
 }
 
 /// Names of parameters of the innermost call that no argument has given.
-fn arguments(known: &Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
+fn arguments<'a>(known: &Known<'a>, cursor: &Cursor) -> Vec<Proposal> {
     let Some(call) = cursor.calls.first().filter(|c| c.named.is_none()) else {
         return Vec::new();
     };
+    let is_new = |name: &str| !call.given.iter().any(|given| given == name);
     let name = |name: &str, docs: Option<Description>| {
         let mut proposal = Proposal::new(&format!("{name}:"), ProposalKind::Parameter, 0)
             .snippet(format!("{name}: "));
@@ -493,18 +577,28 @@ fn arguments(known: &Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
             .and_then(|m| analysis.lookup(m, &call.callee));
         let Some(item) = item else { continue };
         let found = analysis.item(item);
-        let mut list: Vec<Proposal> = params(found)
-            .iter()
-            .enumerate()
-            .filter(|(i, p)| *i >= call.position && !call.given.contains(&p.name.node))
-            .map(|(i, p)| {
-                let symbol = Symbol::Param(item, i);
-                name(&p.name.node, describe::describe(analysis, &symbol))
-            })
+        let all: Vec<(&str, Symbol)> = match &found.kind {
+            ItemKind::Struct(fields) => {
+                let fields = fields.iter().enumerate();
+                let field = |(i, f): (usize, &'a Field)| (&*f.name.node, Symbol::Field(item, i));
+                fields.map(field).collect()
+            }
+            _ => {
+                let params = params(found).into_iter().enumerate();
+                params
+                    .map(|(i, p)| (&*p.name.node, Symbol::Param(item, i)))
+                    .collect()
+            }
+        };
+        let mut list: Vec<Proposal> = all
+            .into_iter()
+            .skip(call.by_place())
+            .filter(|(n, _)| is_new(n))
+            .map(|(n, symbol)| name(n, describe::describe(analysis, &symbol)))
             .collect();
         if matches!(found.kind, ItemKind::Closure(_)) {
             for axis in ["normal", "tangent"] {
-                if !call.given.iter().any(|g| g == axis) {
+                if is_new(axis) {
                     list.push(name(axis, None).detail("an axis of the local frame"));
                 }
             }
@@ -512,15 +606,14 @@ fn arguments(known: &Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
         return list;
     }
     let entry = manual::entry(&call.callee, &[Kind::Function]);
-    let written = entry.and_then(|e| e.written.iter().find(|w| w.contains(':')));
-    let inside = written.and_then(|w| w.split_once('('));
-    let Some((_, inside)) = inside else {
-        return Vec::new();
-    };
-    let names = inside.split(", ").filter_map(|p| p.split_once(':'));
+    let mut written = entry.into_iter().flat_map(|e| &e.written);
+    let params = written.find_map(|w| w.split_once('(').filter(|(_, inside)| inside.contains(':')));
+    let inside = params.map_or("", |(_, inside)| inside.trim_end_matches(')'));
+    let all = describe::parts(inside).into_iter().skip(call.by_place());
+    let names = all.filter_map(|p| p.split_once(':'));
     names
-        .filter(|(n, _)| !call.given.iter().any(|g| g == n))
-        .map(|(n, ty)| name(n, None).detail(ty.trim().trim_end_matches(')')))
+        .filter(|(n, _)| is_new(n))
+        .map(|(n, ty)| name(n, None).detail(ty.trim()))
         .collect()
 }
 
@@ -534,7 +627,7 @@ fn types(known: &Known<'_>) -> Vec<Proposal> {
             }
         })
         .collect();
-    let mut named = Vec::new();
+    let mut named = HashSet::new();
     let structs = definitions(known, &mut named, |k| matches!(k, ItemKind::Struct(_)));
     list.extend(structs.into_iter().map(|p| {
         let name = p.label.clone();
@@ -545,8 +638,9 @@ fn types(known: &Known<'_>) -> Vec<Proposal> {
 
 /// Components, fields and outputs of what ends at byte `end`.
 fn parts(known: &mut Known<'_>, end: usize, cursor: &Cursor) -> Vec<Proposal> {
-    for patch in patches(known.text, cursor) {
-        let analysis = (known.analyse)(patch.0, &patch.1);
+    for patch in patches(known, cursor) {
+        let end = end + patch.shift;
+        let analysis = (known.analyse)(patch.range, &patch.text);
         let of_base = |(span, _): &&(impasto_compiler::source::Span, _)| span.end as usize == end;
         let around = analysis.types_around(end as u32);
         // Of all that ends there the largest: `f(x)` and not `x)`.
@@ -558,16 +652,26 @@ fn parts(known: &mut Known<'_>, end: usize, cursor: &Cursor) -> Vec<Proposal> {
     Vec::new()
 }
 
-/// Texts in which the name at the cursor stands for itself, from the gentlest repair on: the range that is replaced,
-/// and by what.
-fn patches(text: &str, cursor: &Cursor) -> Vec<(Range<usize>, String)> {
-    let word = cursor.word.clone();
+/// A change of a text in which the name at the cursor stands for itself.
+struct Patch {
+    /// What is replaced.
+    range: Range<usize>,
+    /// What takes its place.
+    text: String,
+    /// How many bytes come to what stands before the cursor.
+    shift: usize,
+}
+
+/// Repairs of a text for a cursor, from the gentlest on.
+fn patches(known: &Known<'_>, cursor: &Cursor) -> Vec<Patch> {
+    let (text, word) = (known.text, cursor.word.clone());
     let line_end = text[word.end..]
         .find('\n')
         .map_or(text.len(), |n| word.end + n);
     let line_start = text[..word.start].rfind('\n').map_or(0, |n| n + 1);
+    let before = &text[line_start..word.start];
     let mut open = Vec::new();
-    for c in text[line_start..word.start].chars() {
+    for c in before.chars() {
         match c {
             '(' => open.push(')'),
             '[' => open.push(']'),
@@ -576,12 +680,53 @@ fn patches(text: &str, cursor: &Cursor) -> Vec<(Range<usize>, String)> {
         }
     }
     let closed: String = open.iter().rev().collect();
-    vec![
-        (word.clone(), STAND_IN.to_owned()),
-        (word.clone(), format!("{STAND_IN};")),
-        (word.start..line_end, format!("{STAND_IN}{closed};")),
-        (word.start..line_end, format!("{STAND_IN}{closed}")),
-    ]
+    let patch = |range: Range<usize>, text: String| Patch {
+        range,
+        text,
+        shift: 0,
+    };
+    // What is assigned has a type as a value.
+    let bound = format!("let {STAND_IN}_line = ");
+    let mut all = vec![
+        patch(word.clone(), STAND_IN.to_owned()),
+        patch(word.clone(), format!("{STAND_IN};")),
+        patch(word.start..line_end, format!("{STAND_IN}{closed};")),
+        patch(word.start..line_end, format!("{STAND_IN}{closed}")),
+        Patch {
+            range: line_start..line_end,
+            text: format!("{bound}{before}{STAND_IN}{closed};"),
+            shift: bound.len(),
+        },
+    ];
+    // Other lines that are broken go, and leave their bytes.
+    let lines: Vec<Range<usize>> = documents::syntax_errors(known.now)
+        .map(|at| at.min(text.len()))
+        .map(|at| {
+            let start = text[..text.floor_char_boundary(at)].rfind('\n');
+            let end = text[text.floor_char_boundary(at)..].find('\n');
+            start.map_or(0, |n| n + 1)..end.map_or(text.len(), |n| at + n)
+        })
+        .filter(|line| line.end < line_start || line_end < line.start)
+        .collect();
+    if !lines.is_empty() {
+        let mut without: Vec<u8> = text.as_bytes().to_vec();
+        for line in lines {
+            without[line].fill(b' ');
+        }
+        for end in [
+            format!("{STAND_IN}{closed};"),
+            format!("{STAND_IN}{closed}"),
+        ] {
+            let mut bytes = without.clone();
+            bytes.splice(word.start..line_end, end.into_bytes());
+            all.extend(
+                String::from_utf8(bytes)
+                    .ok()
+                    .map(|new| patch(0..text.len(), new)),
+            );
+        }
+    }
+    all
 }
 
 fn parts_of(analysis: &Analysis, ty: &impasto_compiler::analysis::TypeOf) -> Vec<Proposal> {
@@ -636,13 +781,20 @@ fn parts_of(analysis: &Analysis, ty: &impasto_compiler::analysis::TypeOf) -> Vec
 }
 
 /// Modules and names that an import can name after `path`.
-fn imported(known: &Known<'_>, path: &[String]) -> Vec<Proposal> {
+fn imported(known: &Known<'_>, path: &[String], at: usize) -> Vec<Proposal> {
     let module = |name: &str, detail: &str| {
         Proposal::new(name, ProposalKind::Module, 1)
             .snippet(name)
             .detail(detail)
     };
     let parts: Vec<&str> = path.iter().map(String::as_str).collect();
+    let is_imported = |name: &str| {
+        let uses = known.now.ast().into_iter().flat_map(|ast| &ast.uses);
+        let of_path = uses.filter(|u| u.path.iter().map(|n| &n.node).eq(path));
+        let mut names = of_path.flat_map(|u| &u.names).map(|n| &n.name);
+        names
+            .any(|n| n.node == name && !(n.span.start as usize..=n.span.end as usize).contains(&at))
+    };
     match parts.as_slice() {
         [] => {
             let mut list = vec![module("std", "the library")];
@@ -666,7 +818,7 @@ fn imported(known: &Known<'_>, path: &[String]) -> Vec<Proposal> {
                 .collect()
         }
         ["std", folder] => crate::symbols::library()
-            .filter(|entry| entry.file.folder == *folder)
+            .filter(|entry| entry.file.folder == *folder && !is_imported(&entry.item.name))
             .map(|entry| {
                 let item = &entry.item;
                 let mut proposal = Proposal::new(&item.name, item.kind, 0);
@@ -675,15 +827,14 @@ fn imported(known: &Known<'_>, path: &[String]) -> Vec<Proposal> {
                 proposal
             })
             .collect(),
-        [file, ..] => {
+        _ => {
             let path = Path::new(known.path).with_file_name(parts.join("/") + ".impasto");
-            let _ = file;
             let text = documents::text_at(&path.to_string_lossy()).unwrap_or_default();
             let (ast, _) =
                 impasto_compiler::parser::parse(impasto_compiler::source::FileId(0), &text);
             let public = ast.items.iter().filter(|item| !item.private);
-            public
-                .map(|item| Proposal::new(&item.name.node, kind_of(&item.kind), 0))
+            let new = public.filter(|item| !is_imported(&item.name.node));
+            new.map(|item| Proposal::new(&item.name.node, kind_of(&item.kind), 0))
                 .collect()
         }
     }
@@ -700,18 +851,20 @@ fn units() -> Vec<Proposal> {
     Unit::ALL.iter().enumerate().map(unit).collect()
 }
 
-fn metadata() -> Vec<Proposal> {
+fn metadata(given: &[String]) -> Vec<Proposal> {
     let key = |key: &str, snippet: &str, detail: &str| {
         Proposal::new(key, ProposalKind::Field, 0)
             .snippet(snippet)
             .detail(detail)
     };
-    vec![
+    let mut keys = vec![
         key("label", "label: \"$1\"", "the name that people see"),
         key("group", "group: \"$1\"", "what it stands together with"),
         key("soft", "soft: ${1:0.0} .. ${2:1.0}", "the ends of a slider"),
         key("unit", "unit: ${1:mm}", "what its values are shown in"),
-    ]
+    ];
+    keys.retain(|k| !given.contains(&k.label));
+    keys
 }
 
 /// Files of pictures beside the source, for a texture.
@@ -733,13 +886,22 @@ fn pictures(known: &Known<'_>, cursor: &Cursor) -> Vec<Proposal> {
     names.map(path).collect()
 }
 
-fn methods(known: &Known<'_>, at: usize) -> Vec<Proposal> {
+fn methods(known: &Known<'_>, at: usize, cursor: &Cursor) -> Vec<Proposal> {
     let mut list = vec![keyword("let", "let ${1:name} = $0;", "for all methods")];
     let item = known.now.item_at(at as u32);
     let defined: Vec<String> = match item.map(|(_, i)| &i.kind) {
         Some(ItemKind::Closure(c)) => c.methods.iter().map(|m| m.name.node.clone()).collect(),
         _ => Vec::new(),
     };
+    if cursor.around == Around::Edf {
+        list.push(
+            Proposal::new("emit", ProposalKind::Function, 0)
+                .snippet("emit(wo) = $0;")
+                .detail("emit(wo: vector) -> color"),
+        );
+        list.retain(|p| !defined.contains(&p.label));
+        return list;
+    }
     for entry in manual::entries().iter().filter(|e| e.kind == Kind::Method) {
         if defined.contains(&entry.name) {
             continue;
@@ -757,11 +919,6 @@ fn methods(known: &Known<'_>, at: usize) -> Vec<Proposal> {
                 .snippet(format!("{}({names}) = $0;", entry.name)),
         );
     }
-    list.push(
-        Proposal::new("emit", ProposalKind::Function, 0)
-            .snippet("emit(wo) = $0;")
-            .detail("emit(wo: vector) -> color, of an edf"),
-    );
     list
 }
 

@@ -27,6 +27,10 @@ pub enum Place {
     Nothing,
     /// A definition.
     Item,
+    /// A definition behind `private`.
+    PrivateItem,
+    /// What `delta` goes before.
+    Delta,
     /// A statement, or the last value of a block.
     Statement,
     /// A value.
@@ -41,10 +45,10 @@ pub enum Place {
     Import(Vec<String>),
     /// A unit, after a number.
     Unit,
-    /// A key of a parameter's metadata.
-    MetadataKey,
-    /// The inside of a string, which begins at this byte.
-    Text(usize),
+    /// A key of a parameter's metadata, after these.
+    MetadataKey(Vec<String>),
+    /// The inside of a string that may be the path of a picture.
+    Path,
     /// A method of a closure.
     Method,
     /// A statement of a material, where parameters may be declared.
@@ -68,6 +72,13 @@ pub struct Call {
     pub open: usize,
 }
 
+impl Call {
+    /// How many parameters the arguments before the cursor gave by their places.
+    pub fn by_place(&self) -> usize {
+        self.position.saturating_sub(self.given.len())
+    }
+}
+
 /// What is defined around a cursor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Around {
@@ -77,75 +88,73 @@ pub enum Around {
     Material,
     /// A function.
     Function,
-    /// A bsdf or edf.
-    Closure,
+    /// A bsdf.
+    Bsdf,
+    /// An edf.
+    Edf,
     /// A struct.
     Struct,
 }
 
-type Tokens = Vec<(Token, Range<usize>)>;
+/// Tokens with their bytes.
+pub type Tokens = Vec<(Token, Range<usize>)>;
 
 /// The cursor at byte `at` of a text.
 pub fn cursor(text: &str, at: usize) -> Cursor {
-    let (tokens, _) = lex(FileId(0), text);
-    let tokens: Tokens = tokens.into_iter().map(|(t, s)| (t, s.range())).collect();
+    let tokens = tokens(text);
     let index = tokens.partition_point(|(_, range)| range.start < at);
     let last = index.checked_sub(1).map(|i| &tokens[i]);
-    let is_word = |t: &Token| *t == Token::Ident || t.is_keyword();
-    if let Some((token, range)) = last
-        && at <= range.end
-        && matches!(
-            token,
-            Token::Str | Token::DocInner | Token::DocOuter | Token::Int | Token::Float | Token::Hex
-        )
-    {
-        let inside = *token == Token::Str && (at < range.end || !closes(text, range));
-        let place = if inside {
-            Place::Text(range.start + 1)
-        } else {
-            Place::Nothing
+    let is_comment = matches!(last, Some((Token::DocInner | Token::DocOuter, r)) if at <= r.end);
+    if is_comment || comment(text, &tokens, at).is_some() {
+        return Cursor {
+            place: Place::Nothing,
+            prefix: String::new(),
+            word: at..at,
+            calls: Vec::new(),
+            around: Around::File,
         };
-        return Cursor::nowhere(place, text, at);
     }
-    if in_comment(text, last.map_or(0, |(_, r)| r.end), at) {
-        return Cursor::nowhere(Place::Nothing, text, at);
-    }
-    let word = match last {
-        Some((token, range)) if is_word(token) && at <= range.end => range.clone(),
-        _ => match tokens.get(index) {
-            Some((token, range)) if is_word(token) && range.start == at => range.clone(),
-            _ => at..at,
-        },
+    let is_word = |t: &Token| *t == Token::Ident || t.is_keyword();
+    // The word, number or string that the cursor is in or behind. What begins there is not touched.
+    let (word, is_string, is_number) = match last {
+        Some((token, range)) if at <= range.end && is_word(token) => (range.clone(), false, false),
+        Some((Token::Str, range)) if at < range.end || !closes(text, range) => {
+            let end = range.end - usize::from(closes(text, range));
+            (range.start + 1..end, true, false)
+        }
+        Some((Token::Str | Token::Int | Token::Float | Token::Hex, range)) if at <= range.end => {
+            (range.start..at, false, true)
+        }
+        _ => (at..at, false, false),
     };
-    let before = tokens.partition_point(|(_, range)| range.end <= word.start);
+    let before = tokens.partition_point(|(_, range)| {
+        range.end <= word.start && (!is_string || range.end < word.start)
+    });
     let before = &tokens[..before];
     let open = open_brackets(before);
     let around = around(text, before, &open);
-    let place = place(text, before, &open, around);
+    let place = match (is_string, is_number) {
+        (true, _) if is_metadata(before, &open) => Place::Nothing,
+        (true, _) => Place::Path,
+        (_, true) => Place::Nothing,
+        _ => place(text, before, &open, around),
+    };
     let calls = calls(text, before, &open);
+    let prefix = text.get(word.start..at).unwrap_or_default().to_owned();
+    let word = if is_number { at..at } else { word };
     Cursor {
         place,
-        prefix: text[word.start..at].to_owned(),
+        prefix,
         word,
         calls,
         around,
     }
 }
 
-impl Cursor {
-    fn nowhere(place: Place, text: &str, at: usize) -> Self {
-        let from = match place {
-            Place::Text(start) => start,
-            _ => at,
-        };
-        Self {
-            place,
-            prefix: text.get(from..at).unwrap_or_default().to_owned(),
-            word: from..at,
-            calls: Vec::new(),
-            around: Around::File,
-        }
-    }
+/// The tokens of a text with their bytes.
+pub fn tokens(text: &str) -> Tokens {
+    let (tokens, _) = lex(FileId(0), text);
+    tokens.into_iter().map(|(t, s)| (t, s.range())).collect()
 }
 
 /// Does a string end in a quote?
@@ -153,24 +162,35 @@ fn closes(text: &str, range: &Range<usize>) -> bool {
     range.len() > 1 && text[range.clone()].ends_with('"')
 }
 
-/// Is a byte in a comment that begins behind the last token?
-fn in_comment(text: &str, from: usize, at: usize) -> bool {
-    let mut rest = text.get(from..at).unwrap_or_default();
-    loop {
-        let (line, block) = (rest.find("//"), rest.find("/*"));
-        match (line, block) {
-            (None, None) => return false,
-            (Some(l), b) if b.is_none_or(|b| l < b) => match rest[l..].find('\n') {
-                Some(end) => rest = &rest[l + end..],
-                None => return true,
-            },
-            (_, Some(b)) => match rest[b..].find("*/") {
-                Some(end) => rest = &rest[b + end + 2..],
-                None => return true,
-            },
-            (Some(_), None) => return true,
+/// The comment that byte `at` is in, without the break of its line.
+pub fn comment(text: &str, tokens: &[(Token, Range<usize>)], at: usize) -> Option<Range<usize>> {
+    let next = tokens.partition_point(|(_, range)| range.end <= at);
+    let start = next.checked_sub(1).map_or(0, |i| tokens[i].1.end);
+    let end = tokens
+        .get(next)
+        .map_or(text.len(), |(_, range)| range.start);
+    let mut from = start;
+    // Between tokens there are comments and white space only.
+    while let Some(rest) = text.get(from..end) {
+        let begin = from + rest.find('/')?;
+        let rest = &text[begin..end];
+        let (length, reaches) = if rest.starts_with("/*") {
+            let close = rest.get(2..).and_then(|inside| inside.find("*/"));
+            // One that is not closed goes on to the end.
+            (close.map_or(rest.len(), |n| n + 4), close.is_none())
+        } else {
+            (rest.find('\n').unwrap_or(rest.len()), true)
+        };
+        let whole = begin..begin + length;
+        if at <= begin {
+            return None;
         }
+        if at < whole.end || (reaches && at == whole.end) {
+            return Some(whole);
+        }
+        from = whole.end.max(begin + 1);
     }
+    None
 }
 
 /// The indices of brackets that are not closed, outermost first. A brace closes brackets that were forgotten.
@@ -237,7 +257,8 @@ fn around(text: &str, tokens: &[(Token, Range<usize>)], open: &[usize]) -> Aroun
                 // The type of a result or parameter is no beginning of a definition.
                 let before = text[..range.start].trim_end();
                 if !before.ends_with("->") && !before.ends_with(':') {
-                    return Around::Closure;
+                    let is_bsdf = *token == Token::Bsdf;
+                    return if is_bsdf { Around::Bsdf } else { Around::Edf };
                 }
             }
             Token::Struct => return Around::Struct,
@@ -287,12 +308,11 @@ fn place(text: &str, before: &[(Token, Range<usize>)], open: &[usize], around: A
                 _ if is_const && number => Place::Unit,
                 _ if is_const && statement.iter().any(|t| t.0 == Token::Assign) => Place::Value,
                 _ if is_const => Place::Nothing,
-                Token::Private
-                | Token::Delta
-                | Token::Semicolon
-                | Token::RightBrace
-                | Token::DocOuter
-                | Token::DocInner => Place::Item,
+                Token::Private => Place::PrivateItem,
+                Token::Delta => Place::Delta,
+                Token::Semicolon | Token::RightBrace | Token::DocOuter | Token::DocInner => {
+                    Place::Item
+                }
                 Token::Assign => Place::Value,
                 _ if statement.iter().any(|t| t.0 == Token::Assign) => {
                     if number {
@@ -305,6 +325,9 @@ fn place(text: &str, before: &[(Token, Range<usize>)], open: &[usize], around: A
             };
         }
         Some((Token::LeftParen, index)) => {
+            if matches!(around, Around::Bsdf | Around::Edf) && is_head(before, open) {
+                return Place::Nothing;
+            }
             if is_declaration(before, index) {
                 return match last {
                     Token::Colon => Place::Type,
@@ -326,8 +349,12 @@ fn place(text: &str, before: &[(Token, Range<usize>)], open: &[usize], around: A
         Some(_) => {}
     }
     if is_metadata(before, open) {
+        let inside = innermost.map_or(&[][..], |(_, i)| &before[i + 1..]);
+        let keys = names(text, inside);
+        let is_unit = *last == Token::Colon && keys.last().is_some_and(|k| k == "unit");
         return match last {
-            Token::LeftBrace | Token::Comma => Place::MetadataKey,
+            Token::LeftBrace | Token::Comma => Place::MetadataKey(keys),
+            Token::Colon if is_unit => Place::Unit,
             Token::Colon => Place::Value,
             _ if number => Place::Unit,
             _ => Place::Nothing,
@@ -341,7 +368,7 @@ fn place(text: &str, before: &[(Token, Range<usize>)], open: &[usize], around: A
         Token::LeftBrace | Token::Semicolon | Token::RightBrace | Token::DocOuter => {
             match (around, depth) {
                 (Around::Material, 1) => Place::MaterialStatement,
-                (Around::Closure, 1) => Place::Method,
+                (Around::Bsdf | Around::Edf, 1) => Place::Method,
                 (Around::Struct, _) => Place::Nothing,
                 _ => Place::Statement,
             }
@@ -372,7 +399,10 @@ fn import(text: &str, before: &[(Token, Range<usize>)]) -> Option<Vec<String>> {
     let is_of_import = |t: &Token| {
         matches!(
             t,
+            // Folders of the library may have the names of keywords.
             Token::Ident
+                | Token::Bsdf
+                | Token::Edf
                 | Token::PathSeparator
                 | Token::LeftBrace
                 | Token::Comma
@@ -388,7 +418,7 @@ fn import(text: &str, before: &[(Token, Range<usize>)]) -> Option<Vec<String>> {
         _ => return None,
     }
     let segments = rest.iter().take_while(|(t, _)| *t != Token::LeftBrace);
-    let names = segments.filter(|(t, _)| *t == Token::Ident);
+    let names = segments.filter(|(t, _)| *t != Token::PathSeparator);
     Some(names.map(|(_, r)| text[r.clone()].to_owned()).collect())
 }
 
@@ -397,6 +427,42 @@ fn is_declaration(tokens: &[(Token, Range<usize>)], bracket: usize) -> bool {
     let name = bracket.checked_sub(1).map(|i| tokens[i].0);
     let word = bracket.checked_sub(2).map(|i| tokens[i].0);
     name == Some(Token::Ident) && matches!(word, Some(Token::Fn | Token::Bsdf | Token::Edf))
+}
+
+/// Is the innermost bracket that of a method's arguments, which an author names?
+fn is_head(tokens: &[(Token, Range<usize>)], open: &[usize]) -> bool {
+    let [block, bracket] = open else {
+        return false;
+    };
+    let token = |i: Option<usize>| i.and_then(|i| tokens.get(i)).map(|t| t.0);
+    let begins = matches!(
+        token(bracket.checked_sub(2)),
+        Some(Token::LeftBrace | Token::Semicolon | Token::RightBrace)
+    );
+    token(Some(*block)) == Some(Token::LeftBrace)
+        && token(bracket.checked_sub(1)) == Some(Token::Ident)
+        && begins
+}
+
+/// The names before colons, in no further brackets.
+fn names(text: &str, tokens: &[(Token, Range<usize>)]) -> Vec<String> {
+    let (mut depth, mut names) = (0, Vec::new());
+    for (i, (token, _)) in tokens.iter().enumerate() {
+        match token {
+            Token::LeftParen | Token::LeftBracket | Token::LeftBrace => depth += 1,
+            Token::RightParen | Token::RightBracket | Token::RightBrace => depth -= 1,
+            Token::Colon if depth == 0 => {
+                let name = i.checked_sub(1).map(|i| &tokens[i]);
+                let name = name.filter(|(t, _)| *t == Token::Ident);
+                names.extend(
+                    name.and_then(|(_, r)| text.get(r.clone()))
+                        .map(str::to_owned),
+                );
+            }
+            _ => {}
+        }
+    }
+    names
 }
 
 /// Is the innermost bracket the block behind a parameter?

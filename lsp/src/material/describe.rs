@@ -1,5 +1,7 @@
 //! What there is to say of a symbol: its declaration as it is written, and its documentation.
 
+use std::path::Path;
+
 use impasto_compiler::analysis::manual::{self, Kind};
 use impasto_compiler::analysis::{Analysis, LocalKind, Symbol, TypeOf, params};
 use impasto_compiler::ast::{ClosureKind, Expr, Item, ItemKind, MaterialParam, TypeName};
@@ -38,10 +40,11 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<Description> {
         Symbol::Local(index) => local(analysis, *index),
         Symbol::File(module) => {
             let module = &analysis.modules[module.0];
+            let name = Path::new(&module.path).file_stem().unwrap_or_default();
             Some(Description {
-                declaration: format!("use {}", module.path),
+                declaration: format!("use {}", name.to_string_lossy()),
                 docs: prose(&module.ast.docs),
-                origin: None,
+                origin: Some(module.path.clone()),
             })
         }
         Symbol::BuiltIn(name) => built_in(name),
@@ -307,4 +310,23 @@ pub fn value(analysis: &Analysis, span: Span) -> Option<String> {
 /// A number in single precision, which the values have in the end.
 fn number(x: f64) -> String {
     format!("{}", x as f32)
+}
+
+/// Parts between commas that are in no brackets.
+pub fn parts(text: &str) -> Vec<&str> {
+    let (mut parts, mut start, mut depth) = (Vec::new(), 0, 0);
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            ',' if depth == 0 => {
+                parts.push(text[start..at].trim());
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(text[start..].trim());
+    parts.retain(|p| !p.is_empty());
+    parts
 }

@@ -19,7 +19,7 @@ pub fn added(ast: &ast::Module, text: &str, path: &str) -> Option<(Range<usize>,
     }
     if let Some(existing) = same.next() {
         let names: Vec<&ast::UseName> = existing.names.iter().collect();
-        let written = &text[existing.span.range()];
+        let written = text.get(existing.span.range())?;
         if let Some(brace) = written.find('{') {
             // In the order of the alphabet, if it is one.
             let is_sorted = names.is_sorted_by_key(|n| &n.name.node);
@@ -41,7 +41,7 @@ pub fn added(ast: &ast::Module, text: &str, path: &str) -> Option<(Range<usize>,
         let only = names.first()?;
         let start = only.name.span.start as usize;
         let end = only.alias.as_ref().unwrap_or(&only.name).span.end as usize;
-        let mut both = [text[start..end].to_owned(), name.to_owned()];
+        let mut both = [text.get(start..end)?.to_owned(), name.to_owned()];
         both.sort();
         return Some((start..end, format!("{{{}}}", both.join(", "))));
     }
@@ -56,14 +56,15 @@ pub fn added(ast: &ast::Module, text: &str, path: &str) -> Option<(Range<usize>,
         let start = first.span.start as usize;
         return Some((start..start, line));
     }
-    // Behind the documentation of the file.
+    // Behind the documentation of the file, or the mark that some editors start a file with.
     let docs: usize = text
         .split_inclusive('\n')
         .take_while(|line| line.trim_start().starts_with("//!"))
         .map(str::len)
         .sum();
     if docs == 0 {
-        return Some((0..0, format!("{line}\n")));
+        let at = if text.starts_with('\u{feff}') { 3 } else { 0 };
+        return Some((at..at, format!("{line}\n")));
     }
     let has_gap = text[docs..].starts_with('\n');
     let rest = text[docs..].trim_start_matches('\n');
@@ -97,7 +98,7 @@ pub fn removed(ast: &ast::Module, text: &str, at: usize) -> Option<Range<usize>>
 
 /// The end of a line with its break, if there is only white space up to it.
 fn line_end(text: &str, at: usize) -> usize {
-    let rest = &text[at..];
+    let rest = text.get(at..).unwrap_or_default();
     let end = rest.find('\n').map_or(rest.len(), |n| n + 1);
     if rest[..end].trim().is_empty() {
         at + end

@@ -6,8 +6,10 @@ use impasto_compiler::analysis::params;
 use impasto_compiler::ast::{
     self, Arg, Block, Body, ClosureKind, Expr, ExprKind, IfExpr, Item, ItemKind, Stmt, StmtKind,
 };
-use impasto_compiler::lexer::{Token, lex};
-use impasto_compiler::source::{FileId, Span};
+use impasto_compiler::lexer::Token;
+use impasto_compiler::source::Span;
+
+use super::cursor::{self, Tokens};
 
 /// A definition with what is defined in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,16 +142,13 @@ pub enum FoldKind {
 /// The parts of a text that fold, by bytes: what stays visible is the line that they begin in.
 pub fn folds(text: &str) -> Vec<(Range<usize>, FoldKind)> {
     let mut folds = Vec::new();
-    let (tokens, _) = lex(FileId(0), text);
-    let mut open: Vec<(Token, usize)> = Vec::new();
-    for (token, span) in &tokens {
+    let mut open: Vec<usize> = Vec::new();
+    for (token, range) in cursor::tokens(text) {
         match token {
-            Token::LeftBrace | Token::LeftParen | Token::LeftBracket => {
-                open.push((*token, span.start as usize));
-            }
+            Token::LeftBrace | Token::LeftParen | Token::LeftBracket => open.push(range.start),
             Token::RightBrace | Token::RightParen | Token::RightBracket => {
-                if let Some((_, start)) = open.pop() {
-                    folds.push((start..span.end as usize, FoldKind::Block));
+                if let Some(start) = open.pop() {
+                    folds.push((start..range.end, FoldKind::Block));
                 }
             }
             _ => {}
@@ -194,12 +193,18 @@ pub fn around(ast: &ast::Module, text: &str, at: usize) -> Vec<Range<usize>> {
         walk.span(import.span);
     }
     ast.items.iter().for_each(|item| walk.item(item));
-    let (tokens, _) = lex(FileId(0), text);
-    let touching = tokens
-        .iter()
-        .filter(|(_, s)| s.start as usize <= at && at <= s.end as usize);
+    let tokens = cursor::tokens(text);
+    let touching = tokens.iter().rfind(|(_, r)| r.start <= at && at <= r.end);
     let mut found = walk.found;
-    found.extend(touching.last().map(|(_, s)| s.range()));
+    if let Some((token, range)) = touching {
+        found.push(range.clone());
+        let inside = range.start + 1..range.end.saturating_sub(1);
+        if *token == Token::Str && inside.start <= at && at <= inside.end {
+            found.push(inside);
+        }
+    }
+    found.extend(cursor::comment(text, &tokens, at));
+    found.extend(brackets(&tokens, at));
     found.push(0..text.len());
     found.sort_by_key(|r| (r.len(), r.start));
     found.dedup();
@@ -212,6 +217,31 @@ pub fn around(ast: &ast::Module, text: &str, at: usize) -> Vec<Range<usize>> {
         }
     }
     nested
+}
+
+/// The brackets around a byte, and what is in each pair of them.
+fn brackets(tokens: &Tokens, at: usize) -> Vec<Range<usize>> {
+    let (mut open, mut found) = (Vec::new(), Vec::new());
+    for (index, (token, range)) in tokens.iter().enumerate() {
+        match token {
+            Token::LeftBrace | Token::LeftParen | Token::LeftBracket => open.push(index),
+            Token::RightBrace | Token::RightParen | Token::RightBracket => {
+                let Some(first) = open.pop() else { continue };
+                let whole = tokens[first].1.start..range.end;
+                let is_around = whole.start < at && at < whole.end;
+                if !is_around || first + 1 == index {
+                    continue;
+                }
+                let inside = tokens[first + 1].1.start..tokens[index - 1].1.end;
+                if inside.start <= at && at <= inside.end {
+                    found.push(inside);
+                }
+                found.push(whole);
+            }
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Collects what is around a byte.
@@ -231,6 +261,7 @@ impl Walk {
         self.span(item.span);
         for p in params(item) {
             p.of_material.iter().for_each(|m| self.span(m.span));
+            self.span(p.name.span.to(p.ty.span));
             p.default.iter().for_each(|d| self.expr(d));
         }
         match &item.kind {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use impasto_compiler::analysis::{Analysis, Occurrence, Role, Symbol};
+use impasto_compiler::source::Span;
 
 use crate::library;
 
@@ -29,16 +30,20 @@ pub fn of_symbol(analysis: &Analysis, symbol: &Symbol) -> Option<Definition> {
     Some(Definition {
         path: library::canonical(&file.name),
         place: span.range(),
-        name: file.text[span.range()].to_owned(),
+        name: file.text.get(span.range())?.to_owned(),
     })
 }
 
 /// The places of the names in the analysed file that stand for what is defined there or elsewhere.
 pub fn occurrences<'a>(
     analysis: &'a Analysis,
-    definition: &'a Definition,
-) -> impl Iterator<Item = &'a Occurrence> {
-    let is_it = |o: &&Occurrence| of_symbol(analysis, &o.symbol).as_ref() == Some(definition);
+    definition: &Definition,
+) -> impl Iterator<Item = &'a Occurrence> + use<'a> {
+    let mut files = analysis.sources.files();
+    let file = files.find(|(_, f)| library::canonical(&f.name) == definition.path);
+    let defined = file.map(|(id, _)| Span::new(id, definition.place.clone()));
+    let is_it =
+        move |o: &&Occurrence| defined.is_some() && analysis.definition(&o.symbol) == defined;
     analysis.occurrences.iter().filter(is_it)
 }
 

@@ -3,17 +3,30 @@
 use std::ops::Range;
 
 use impasto_compiler::analysis::{Analysis, Role, Symbol};
+use impasto_compiler::ast::ItemKind;
 use impasto_compiler::lexer::{Token, lex};
 use impasto_compiler::sema::words;
 use impasto_compiler::source::FileId;
 
+use super::describe;
 use super::references::{self, Definition};
 
-/// What can be renamed at byte `at`: the bytes of the name, and where it is defined.
+/// What can be renamed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// The bytes of the name at the cursor.
+    pub place: Range<usize>,
+    /// Where what it stands for is defined; its name is the one at the cursor.
+    pub definition: Definition,
+    /// Is it the name that an import of this file gave it (`as name`)? Then that changes, here alone.
+    pub is_alias: bool,
+}
+
+/// What can be renamed at byte `at`.
 ///
 /// # Errors
 /// Why nothing can, in words for people.
-pub fn target(analysis: &Analysis, at: usize) -> Result<(Range<usize>, Definition), String> {
+pub fn target(analysis: &Analysis, at: usize) -> Result<Target, String> {
     let none = || "there is no name here".to_owned();
     let here = analysis.occurrence_at(at as u32).ok_or_else(none)?;
     if let Symbol::BuiltIn(name) = &here.symbol {
@@ -22,18 +35,25 @@ pub fn target(analysis: &Analysis, at: usize) -> Result<(Range<usize>, Definitio
     if let Symbol::File(_) = here.symbol {
         return Err("a file is renamed with its file".to_owned());
     }
-    let definition = references::of_symbol(analysis, &here.symbol).ok_or_else(none)?;
-    if definition.path.starts_with("std::") {
+    let mut definition = references::of_symbol(analysis, &here.symbol).ok_or_else(none)?;
+    let written = describe::text(analysis, here.span);
+    let is_alias = written != definition.name;
+    definition.name = written.to_owned();
+    if definition.path.starts_with("std::") && !is_alias {
         let name = &definition.name;
         return Err(format!(
             "`{name}` is a name of the library ({})",
             definition.path
         ));
     }
-    Ok((here.span.range(), definition))
+    Ok(Target {
+        place: here.span.range(),
+        definition,
+        is_alias,
+    })
 }
 
-/// The changes in the analysed file that give what is defined somewhere another name. Aliases stay.
+/// The places in the analysed file where what is defined somewhere is called by its name there, and not by another one.
 pub fn changes(analysis: &Analysis, definition: &Definition) -> Vec<Range<usize>> {
     let Some(file) = analysis.file() else {
         return Vec::new();
@@ -41,7 +61,7 @@ pub fn changes(analysis: &Analysis, definition: &Definition) -> Vec<Range<usize>
     let text = &analysis.sources.file(file).text;
     let places = references::occurrences(analysis, definition).map(|o| o.span.range());
     places
-        .filter(|range| text[range.clone()] == definition.name)
+        .filter(|range| text.get(range.clone()) == Some(&definition.name))
         .collect()
 }
 
@@ -63,27 +83,41 @@ pub fn refused(analysis: &Analysis, definition: &Definition, new: &str) -> Optio
     if new == definition.name {
         return None;
     }
-    if words::is_input(new) || words::is_type(new) || words::built_in_functions().any(|f| f == new)
+    let is_read = |symbol: &Symbol| matches!(symbol, Symbol::BuiltIn(name) if name == new);
+    if words::is_input(new)
+        || words::is_type(new)
+        || words::built_in_functions().any(|f| f == new)
+        || analysis.occurrences.iter().any(|o| is_read(&o.symbol))
     {
         return Some(format!("`{new}` is a name of the language"));
     }
     // What is defined at the top of a file must not meet another definition there, and no local may hide it where it
-    // is used; a local must not meet another name in scope.
+    // is used; a local must not meet another name in scope. The names of arguments meet nothing.
+    let is_other = |symbol: &Symbol| {
+        let found = references::of_symbol(analysis, symbol);
+        found.is_none_or(|f| f.path != definition.path || f.place != definition.place)
+    };
+    let mut is_named = false;
     for occurrence in references::occurrences(analysis, definition) {
-        let at = occurrence.span.start;
-        let visible = analysis.visible_at(at);
-        let meets = visible.iter().any(|(name, symbol)| {
-            *name == new && references::of_symbol(analysis, symbol).as_ref() != Some(definition)
-        });
-        if meets && occurrence.role != Role::Give {
+        if let Symbol::Field(item, _) = occurrence.symbol {
+            let ItemKind::Struct(fields) = &analysis.item(item).kind else {
+                continue;
+            };
+            if fields.iter().any(|f| f.name.node == new) {
+                return Some(format!("`{new}` is another field"));
+            }
+            continue;
+        }
+        if occurrence.role == Role::Give {
+            continue;
+        }
+        is_named = true;
+        let mut visible = analysis.visible_at(occurrence.span.start).into_iter();
+        if visible.any(|(name, symbol)| name == new && is_other(&symbol)) {
             return Some(format!("`{new}` is another name in scope here"));
         }
     }
-    let is_item = analysis
-        .module
-        .and_then(|m| analysis.lookup(m, new))
-        .is_some_and(|item| analysis.item(item).name.node == new);
-    let defines = references::occurrences(analysis, definition)
-        .any(|o| matches!(o.symbol, Symbol::Item(_)) || o.role == Role::Read);
-    (is_item && defines).then(|| format!("`{new}` is another definition"))
+    let item = analysis.module.and_then(|m| analysis.lookup(m, new));
+    let is_item = item.is_some_and(|item| is_other(&Symbol::Item(item)));
+    (is_item && is_named).then(|| format!("`{new}` is another definition"))
 }

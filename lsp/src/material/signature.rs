@@ -124,7 +124,7 @@ fn of_language(call: &Call) -> Vec<Signature> {
     let calls = entry.written.iter().filter_map(|written| {
         let inside = written.strip_prefix(&call.callee)?;
         let inside = inside.strip_prefix('(')?.strip_suffix(')')?;
-        let shown: Vec<(String, String)> = split(inside)
+        let shown: Vec<(String, String)> = describe::parts(inside)
             .into_iter()
             .map(|p| (p.to_owned(), String::new()))
             .collect();
@@ -150,23 +150,4 @@ fn of_language(call: &Call) -> Vec<Signature> {
     // Those that have a place for the argument come first.
     all.sort_by_key(|s| s.active.is_none());
     all
-}
-
-/// Parts between commas that are in no brackets.
-fn split(text: &str) -> Vec<&str> {
-    let (mut parts, mut start, mut depth) = (Vec::new(), 0, 0);
-    for (at, c) in text.char_indices() {
-        match c {
-            '(' | '[' => depth += 1,
-            ')' | ']' => depth -= 1,
-            ',' if depth == 0 => {
-                parts.push(text[start..at].trim());
-                start = at + 1;
-            }
-            _ => {}
-        }
-    }
-    parts.push(text[start..].trim());
-    parts.retain(|p| !p.is_empty());
-    parts
 }

@@ -95,6 +95,9 @@ fn kind(analysis: &Analysis, symbol: &Symbol) -> (&'static str, u32) {
         Symbol::BuiltIn(name) if words::built_in_functions().any(|f| f == name) => {
             ("function", LIBRARY)
         }
-        Symbol::BuiltIn(_) => ("type", LIBRARY),
+        Symbol::BuiltIn(name) if words::is_type(name) => ("type", LIBRARY),
+        Symbol::BuiltIn(name) if name == words::NO_MEDIUM => ("variable", LIBRARY | READONLY),
+        // A method of a closure.
+        Symbol::BuiltIn(_) => ("function", LIBRARY),
     }
 }

@@ -50,7 +50,7 @@ pub fn answer(settings: &Settings) -> Value {
             },
             "inlayHintProvider": true,
             "executeCommandProvider": { "commands": [PREVIEW, COST_DIFF] },
-            "workspace": { "workspaceFolders": { "supported": true } },
+            "workspace": { "workspaceFolders": { "supported": true, "changeNotifications": true } },
         },
     })
 }

@@ -83,9 +83,9 @@ struct Server<'c> {
     unplanned: BTreeSet<PathBuf>,
     /// When typing will have rested, if anything is left to do then.
     rests_at: Option<Instant>,
-    /// Files that were edited since it last rested.
+    /// Files that were edited, and of which the worker has not told since: an edit of any file ends what it does.
     edited: BTreeSet<String>,
-    /// Does the next measurement also compare with what was committed?
+    /// The number of the last request to the client.
     next_id: i32,
     is_leaving: bool,
 }
@@ -144,8 +144,11 @@ impl<'c> Server<'c> {
                     // The client died.
                     Err(_) => return,
                 },
-                recv(done) -> done => if let Ok(done) = done {
-                    self.done(done);
+                recv(done) -> done => if let Ok((edit, done)) = done {
+                    // What was found in an earlier text has other places.
+                    if self.worker.is_latest(edit) {
+                        self.done(done);
+                    }
                 },
                 default(wait) => {}
             }
@@ -288,6 +291,11 @@ impl<'c> Server<'c> {
                     let path = crate::documents::path_of(&params.text_document.uri);
                     self.plan_scene();
                     self.edited(path);
+                    let scenes = self
+                        .documents
+                        .all()
+                        .filter(|d| d.language == Language::Scene);
+                    self.edited.extend(scenes.map(|d| d.path.clone()));
                 }
             }
             "workspace/didChangeWatchedFiles" => {
@@ -306,7 +314,7 @@ impl<'c> Server<'c> {
                 self.plan_scene();
                 self.refresh();
             }
-            "workspace/didChangeWorkspaceFolders" => {}
+            "workspace/didChangeWorkspaceFolders" => self.settings.change_roots(&params),
             _ => {}
         }
     }
@@ -315,6 +323,19 @@ impl<'c> Server<'c> {
     fn edited(&mut self, path: String) {
         self.worker.edited();
         let made = self.documents.made_of(&path);
+        let is_source = path.ends_with(".impasto");
+        if is_source {
+            // Scenes name materials and their parameters; what a whole check found waits for them to be saved.
+            let scenes = self
+                .documents
+                .all()
+                .filter(|d| d.language == Language::Scene);
+            let scenes: Vec<String> = scenes.map(|d| d.path.clone()).collect();
+            for scene in scenes {
+                self.deep.remove(&scene);
+                self.dirty.insert(scene);
+            }
+        }
         self.dirty.extend(made.iter().cloned());
         self.dirty.insert(path.clone());
         self.edited.extend(made);
@@ -335,38 +356,37 @@ impl<'c> Server<'c> {
         self.rests_at = None;
         let wanted = &self.settings.wanted.cost;
         let wants_cost = wanted.inlay_hints || wanted.lens;
-        for path in std::mem::take(&mut self.edited) {
-            let Some(document) = self.documents.at(&path) else {
-                continue;
-            };
-            let texts = self.documents.texts();
-            match document.language {
-                Language::Scene => {
-                    let path = PathBuf::from(&path);
-                    self.worker.ask(Task::Scene(path), texts);
+        for path in self.edited.clone() {
+            let task = self.task(&path, wants_cost);
+            match task {
+                Some(task) => self.worker.ask(task, self.documents.texts()),
+                None => {
+                    self.edited.remove(&path);
                 }
-                Language::Material if library::file_of(&path).is_none() => {
-                    let Some(analysis) = self.documents.analysis(&path) else {
-                        continue;
-                    };
-                    let has_errors = impasto_compiler::diag::has_errors(&analysis.diagnostics);
-                    let materials = materials_of(&analysis);
-                    if wants_cost && !has_errors && !materials.is_empty() {
-                        let committed = true;
-                        let task = Task::Cost {
-                            path,
-                            materials,
-                            committed,
-                        };
-                        self.worker.ask(task, texts);
-                    }
-                }
-                Language::Material | Language::Other => {}
             }
         }
         let wants_plan = self.settings.wanted.cost.lens;
         for scene in self.unplanned.clone().into_iter().filter(|_| wants_plan) {
             self.worker.ask(Task::Plan(scene), self.documents.texts());
+        }
+    }
+
+    /// What there is for the worker to do about an open file.
+    fn task(&mut self, path: &str, wants_cost: bool) -> Option<Task> {
+        match self.documents.at(path)?.language {
+            Language::Scene => Some(Task::Scene(PathBuf::from(path))),
+            Language::Material if library::file_of(path).is_none() => {
+                let analysis = self.documents.analysis(path)?;
+                let has_errors = impasto_compiler::diag::has_errors(&analysis.diagnostics);
+                let materials = materials_of(&analysis);
+                let is_wanted = wants_cost && !has_errors && !materials.is_empty();
+                is_wanted.then(|| Task::Cost {
+                    path: path.to_owned(),
+                    materials,
+                    committed: true,
+                })
+            }
+            Language::Material | Language::Other => None,
         }
     }
 
@@ -378,6 +398,7 @@ impl<'c> Server<'c> {
                 margin,
                 found,
             } => {
+                self.edited.remove(&path);
                 let Some(document) = self.documents.at_mut(&path) else {
                     return;
                 };
@@ -401,6 +422,7 @@ impl<'c> Server<'c> {
                 found,
             } => {
                 let path = path.to_string_lossy().into_owned();
+                self.edited.remove(&path);
                 if let Some(document) = self.documents.at(&path) {
                     let version = document.version;
                     let problems = self.scene_problems(&path, error.as_ref(), &warnings);

@@ -1,15 +1,23 @@
 //! Diagnostics of open files, as they are typed.
 
+use std::collections::{HashMap, HashSet};
+
 use gen_lsp_types as lsp;
 use impasto_compiler::diag::{Code, Diagnostic, Severity};
 use impasto_compiler::source::{FileId, SourceMap, Span};
 use serde_json::{Value, json};
 
-use super::{Server, convert};
+use super::{Deep, Server, convert};
 use crate::documents::Language;
 use crate::library;
 use crate::scene::features::Problem;
 use crate::text::Text;
+
+/// Most diagnostics of a file that are sent.
+const MOST: usize = 320;
+
+/// The texts that diagnostics point into.
+type Related = HashMap<FileId, Text>;
 
 impl Server<'_> {
     /// Sends the diagnostics of all files that changed.
@@ -47,35 +55,43 @@ impl Server<'_> {
             return Vec::new();
         };
         let text = &document.text;
-        let mut found: Vec<Value> = Vec::new();
-        for diagnostic in &analysis.diagnostics {
-            let own = analysis.file();
-            found.push(
-                self.diagnostic(text, &analysis.sources, own, diagnostic, |other| {
-                    // Of an imported file: at the import that leads to it.
-                    let module = analysis.modules.iter().position(|m| m.file == other);
-                    import_of(&analysis, module)
-                }),
-            );
-        }
+        let own = analysis.file();
+        let mut texts = Related::default();
+        // Of an imported file: at the import that leads to it.
+        let import = |other: FileId| {
+            let module = analysis.modules.iter().position(|m| m.file == other);
+            import_of(&analysis, module)
+        };
+        let shown = analysis.diagnostics.iter().take(MOST);
+        let shown =
+            shown.map(|d| self.diagnostic(text, &mut texts, &analysis.sources, own, d, import));
+        let mut found: Vec<Value> = shown.collect();
         // What only code generation finds, while the text is the one that it was found in.
-        let deep = self
-            .deep
-            .get(path)
-            .filter(|d| d.version == document.version);
-        for diagnostic in deep.iter().flat_map(|d| &d.found.diagnostics) {
-            let sources = &deep.map(|d| &d.found.sources);
-            let Some(sources) = sources else { continue };
-            let own = sources
-                .files()
-                .find(|(_, f)| f.name == path)
-                .map(|(id, _)| id);
-            let value = self.diagnostic(text, sources, own, diagnostic, |_| None);
-            if !found.contains(&value) {
-                found.push(value);
-            }
-        }
+        let deep = self.deep.get(path);
+        let Some(deep) = deep.filter(|d| d.version == document.version) else {
+            return found;
+        };
+        let of_deep = self.of_deep(text, path, deep, true);
+        let known: HashSet<String> = found.iter().map(Value::to_string).collect();
+        found.extend(
+            of_deep
+                .into_iter()
+                .filter(|d| !known.contains(&d.to_string())),
+        );
         found
+    }
+
+    /// What a whole check found in a file, and `with_others` in those that it names.
+    fn of_deep(&self, text: &Text, path: &str, deep: &Deep, with_others: bool) -> Vec<Value> {
+        let sources = &deep.found.sources;
+        let mut files = sources.files();
+        let own = files.find(|(_, f)| f.name == path).map(|(id, _)| id);
+        let mut texts = Related::default();
+        let is_shown = |d: &&Diagnostic| with_others || d.span.is_none_or(|s| Some(s.file) == own);
+        let shown = deep.found.diagnostics.iter().filter(is_shown).take(MOST);
+        shown
+            .map(|d| self.diagnostic(text, &mut texts, sources, own, d, |_| None))
+            .collect()
     }
 
     fn of_scene(&mut self, path: &str) -> Vec<Value> {
@@ -93,18 +109,8 @@ impl Server<'_> {
             }
         }
         let mut found: Vec<Value> = problems.iter().map(|p| of_problem(&text, p)).collect();
-        for diagnostic in deep.iter().flat_map(|d| &d.found.diagnostics) {
-            let Some(sources) = deep.map(|d| &d.found.sources) else {
-                continue;
-            };
-            let own = sources
-                .files()
-                .find(|(_, f)| f.name == path)
-                .map(|(id, _)| id);
-            let is_of_scene = diagnostic.span.is_none_or(|s| Some(s.file) == own);
-            if is_of_scene {
-                found.push(self.diagnostic(&text, sources, own, diagnostic, |_| None));
-            }
+        if let Some(deep) = deep {
+            found.extend(self.of_deep(&text, path, deep, false));
         }
         found
     }
@@ -114,6 +120,7 @@ impl Server<'_> {
     fn diagnostic(
         &self,
         text: &Text,
+        texts: &mut Related,
         sources: &SourceMap,
         own: Option<FileId>,
         diagnostic: &Diagnostic,
@@ -129,7 +136,8 @@ impl Server<'_> {
         let mut related: Vec<Value> = Vec::new();
         let mut relate = |span: Span, message: &str| {
             let file = sources.file(span.file);
-            let there = Text::new(file.text.as_str(), self.documents.encoding());
+            let new = || Text::new(file.text.as_str(), self.documents.encoding());
+            let there = texts.entry(span.file).or_insert_with(new);
             let uri = convert::uri_of(&file.name, None);
             let Some(uri) = uri else { return };
             let location = json!({ "uri": uri, "range": there.range(span.range()) });

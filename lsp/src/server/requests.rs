@@ -1,5 +1,6 @@
 //! Requests of a client, one by one.
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -56,7 +57,11 @@ impl Server<'_> {
     /// Answers a request. What is asked of a file that is not open is answered with nothing.
     pub(super) fn asked(&mut self, method: &str, given: Value) -> Answer {
         match method {
-            "textDocument/completion" => self.completion(&params(given)?),
+            "textDocument/completion" => {
+                let trigger = given.pointer("/context/triggerCharacter");
+                let trigger = trigger.and_then(Value::as_str).map(str::to_owned);
+                self.completion(&params(given)?, trigger.as_deref())
+            }
             "textDocument/hover" => self.hover(&params(given)?),
             "textDocument/signatureHelp" => self.signature_help(&params(given)?),
             "textDocument/definition" => self.definition(&params(given)?),
@@ -102,7 +107,8 @@ impl Server<'_> {
             .is_some_and(|d| d.language == Language::Scene)
     }
 
-    fn completion(&mut self, at: &At) -> Answer {
+    /// `trigger` is the character after which a client asks by itself.
+    fn completion(&mut self, at: &At, trigger: Option<&str>) -> Answer {
         let Some(document) = self.document(&at.text_document) else {
             return Ok(Value::Null);
         };
@@ -118,6 +124,10 @@ impl Server<'_> {
         let Some((now, last_good)) = self.documents.both(&path) else {
             return Ok(Value::Null);
         };
+        // A list that nobody asked for must not take the next key, as a line break.
+        if !completion::is_asked_by(text.as_str(), offset, trigger) {
+            return Ok(Value::Null);
+        }
         let texts = self.documents.texts();
         let mut patched = |range: std::ops::Range<usize>, new: &str| {
             let mut changed = text.as_str().to_owned();
@@ -154,8 +164,8 @@ impl Server<'_> {
         let found = if self.is_scene(&at.text_document) {
             self.with_scene(&path, |scene| scene.hover(offset))
         } else {
-            let analysis = self.documents.analysis(&path);
-            analysis.and_then(|analysis| hover::hover(&analysis, offset))
+            let both = self.documents.both(&path);
+            both.and_then(|(now, last_good)| hover::hover(&now, last_good.as_deref(), offset))
         };
         Ok(match found {
             Some((markdown, range)) => json!({
@@ -183,8 +193,9 @@ impl Server<'_> {
             let params = s.params.iter().zip(&s.docs_of_params);
             let params: Vec<Value> = params
                 .map(|(range, docs)| {
-                    // Offsets in a label count as clients count columns of UTF-16; labels are ASCII.
-                    let mut param = json!({ "label": [range.start, range.end] });
+                    // Offsets in a label count units of UTF-16.
+                    let units = |at: usize| s.label[..at].encode_utf16().count();
+                    let mut param = json!({ "label": [units(range.start), units(range.end)] });
                     if !docs.is_empty() {
                         param["documentation"] = convert::markdown(docs);
                     }
@@ -245,7 +256,9 @@ impl Server<'_> {
         let Some((text, analysis)) = self.source(&of.text_document) else {
             return Ok(Value::Null);
         };
-        if library::file_of(&path_of(&uri)).is_some() {
+        let only = given.pointer("/context/only").and_then(Value::as_array);
+        let is_wanted = only.is_none_or(|kinds| kinds.iter().any(|kind| kind == "quickfix"));
+        if library::file_of(&path_of(&uri)).is_some() || !is_wanted {
             return Ok(json!([]));
         }
         let range = text.offset(of.range.start)..text.offset(of.range.end);
@@ -274,14 +287,17 @@ impl Server<'_> {
                 "edit": { "changes": changes },
             })
         };
-        let mut found: Vec<Value> = actions::actions(&analysis, range)
-            .into_iter()
-            .map(action)
-            .collect();
-        if let Some(first) = found.first_mut() {
-            first["isPreferred"] = json!(true);
-        }
-        Ok(json!(found))
+        let mut repaired = HashSet::new();
+        let found = actions::actions(&analysis, range).into_iter().map(|found| {
+            // Of what repairs a problem, the first is the likeliest.
+            let is_first = found.repairs.is_some_and(|index| repaired.insert(index));
+            let mut value = action(found);
+            if is_first {
+                value["isPreferred"] = json!(true);
+            }
+            value
+        });
+        Ok(found.collect())
     }
 
     fn lenses(&mut self, of: &In) -> Answer {
@@ -301,7 +317,8 @@ impl Server<'_> {
             return Ok(json!([]));
         }
         let (uri, path) = (document.uri.clone(), document.path.clone());
-        let items = analysis.ast().map_or(Vec::new(), |ast| ast.items.clone());
+        let items = analysis.ast().map_or(&[][..], |ast| &ast.items);
+        let is_only = materials(items) == 1;
         let mut lenses = Vec::new();
         for item in items
             .iter()
@@ -316,7 +333,7 @@ impl Server<'_> {
             if let Some(title) = document.margin.lens(name) {
                 lens(title, COST_DIFF, json!([uri, name]));
             }
-            if let Some((title, why)) = self.kernel_of(&path, name, materials(&items) == 1) {
+            if let Some((title, why)) = self.kernel_of(&path, name, is_only) {
                 lens(title, "impasto.explain", json!([why]));
             }
             let preview = if self.settings.has_commands {
@@ -378,15 +395,11 @@ impl Server<'_> {
     }
 
     fn formatting(&mut self, of: &In) -> Answer {
-        let Some((text, edits)) = self.formatted(&of.text_document)? else {
-            return Ok(Value::Null);
-        };
-        let _ = text;
-        Ok(json!(edits))
+        Ok(json!(self.formatted(&of.text_document)?))
     }
 
     fn range_formatting(&mut self, of: &Within) -> Answer {
-        let Some((_, edits)) = self.formatted(&of.text_document)? else {
+        let Some(edits) = self.formatted(&of.text_document)? else {
             return Ok(Value::Null);
         };
         // What is formatted is formatted as a whole; of that, what the range touches.
@@ -400,18 +413,15 @@ impl Server<'_> {
     fn formatted(
         &self,
         of: &lsp::TextDocumentIdentifier,
-    ) -> Result<Option<(Text, Vec<lsp::TextEdit>)>, Failed> {
+    ) -> Result<Option<Vec<lsp::TextEdit>>, Failed> {
         let is_own =
             |d: &&Document| d.language == Language::Material && library::file_of(&d.path).is_none();
         let Some(document) = self.document(of).filter(is_own) else {
             return Ok(None);
         };
-        let text = document.text.clone();
+        let text = &document.text;
         match format::format(FileId(0), text.as_str()) {
-            Ok(formatted) => {
-                let edits = text.edits_to(&formatted);
-                Ok(Some((text, edits)))
-            }
+            Ok(formatted) => Ok(Some(text.edits_to(&formatted))),
             Err(Unformatted::Syntax(_)) => Err((
                 ErrorCode::RequestFailed,
                 "sources with syntax errors are not formatted".into(),

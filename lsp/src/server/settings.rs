@@ -110,6 +110,21 @@ impl Settings {
         }
     }
 
+    /// Takes over folders that came and went.
+    pub fn change_roots(&mut self, params: &serde_json::Value) {
+        let folders = |list: &str| {
+            let folders = params.pointer(list).and_then(|f| f.as_array());
+            let uris = folders
+                .into_iter()
+                .flatten()
+                .filter_map(|f| f.get("uri")?.as_str());
+            uris.filter_map(path).collect::<Vec<_>>()
+        };
+        let gone = folders("/event/removed");
+        self.roots.retain(|root| !gone.contains(root));
+        self.roots.extend(folders("/event/added"));
+    }
+
     /// The scene whose plan is shown.
     pub fn scene(&self) -> Option<PathBuf> {
         let scene = self.wanted.scene.as_ref().filter(|s| !s.is_empty())?;
@@ -134,8 +149,10 @@ fn roots(params: &lsp::InitializeParams) -> Vec<PathBuf> {
             .collect(),
         uris => uris,
     };
-    let paths = uris
-        .iter()
-        .filter_map(|uri| uri.parse::<lsp::Uri>().ok()?.to_file_path().ok());
-    paths.collect()
+    uris.into_iter().filter_map(path).collect()
+}
+
+/// The path of a folder.
+fn path(uri: &str) -> Option<PathBuf> {
+    uri.parse::<lsp::Uri>().ok()?.to_file_path().ok()
 }

@@ -194,8 +194,8 @@ impl Server<'_> {
             return Ok(Value::Null);
         };
         let target = rename::target(&analysis, text.offset(at.position));
-        let (place, definition) = target.map_err(|why| (ErrorCode::RequestFailed, why))?;
-        Ok(json!({ "range": text.range(place), "placeholder": definition.name }))
+        let target = target.map_err(|why| (ErrorCode::RequestFailed, why))?;
+        Ok(json!({ "range": text.range(target.place), "placeholder": target.definition.name }))
     }
 
     pub(super) fn rename(&mut self, given: Value) -> Answer {
@@ -209,21 +209,28 @@ impl Server<'_> {
         let Some(document) = self.documents.get(&at.text_document.uri) else {
             return Ok(Value::Null);
         };
-        let (path, offset) = (document.path.clone(), document.text.offset(at.position));
+        let (path, text) = (document.path.clone(), document.text.clone());
         let Some(analysis) = self.documents.analysis(&path) else {
             return Ok(Value::Null);
         };
-        let (_, definition) = rename::target(&analysis, offset).map_err(failed)?;
+        let target = rename::target(&analysis, text.offset(at.position)).map_err(failed)?;
+        let definition = target.definition;
         let mut changes = Map::new();
-        let mut sources = self.sources_with(&definition);
-        for (path, text, analysis) in &sources {
+        let (sources, scenes) = if target.is_alias {
+            (vec![(path, text, analysis)], Vec::new())
+        } else {
+            (
+                self.sources_with(&definition),
+                self.scenes_with(&definition),
+            )
+        };
+        for (path, _, analysis) in &sources {
             if let Some(why) = rename::refused(analysis, &definition, &new_name) {
                 let file = Path::new(path).file_name().unwrap_or_default();
                 return Err(failed(format!("{}: {why}", file.to_string_lossy())));
             }
-            let _ = text;
         }
-        for (path, text, analysis) in sources.drain(..) {
+        for (path, text, analysis) in sources {
             let places = rename::changes(&analysis, &definition);
             let edits: Vec<Value> = places
                 .into_iter()
@@ -233,7 +240,7 @@ impl Server<'_> {
                 changes.insert(uri.to_string(), json!(edits));
             }
         }
-        for (uri, text, places) in self.scenes_with(&definition) {
+        for (uri, text, places) in scenes {
             let edits = places.into_iter();
             let edits: Vec<Value> = edits.map(|p| convert::edit(&text, p, &new_name)).collect();
             if !edits.is_empty() {
