@@ -222,6 +222,32 @@ mod tests {
     }
 
     #[test]
+    fn a_long_line_is_counted_as_a_short_one() {
+        let text = "äx😀".repeat(50_000) + "\nä";
+        let wide = Text::new(text.as_str(), Encoding::Utf16);
+        // Each position looks at characters near it, and not at all before it.
+        for i in 0..50_000 {
+            assert_eq!(wide.position(7 * i + 3), at(0, 4 * i as u32 + 2));
+        }
+        assert_eq!(wide.width(0..7), 4);
+        assert_eq!(wide.width(2..3), 1);
+        assert_eq!(wide.position(text.len()), at(1, 1));
+    }
+
+    #[test]
+    fn texts_with_nothing_in_common_are_compared_in_bounded_time() {
+        let lines = |from: usize| {
+            (from..from + 60_000)
+                .map(|i| format!("{i}\n"))
+                .collect::<String>()
+        };
+        let (old, new) = (Text::new(lines(0), Encoding::Utf8), lines(1_000_000));
+        let begin = std::time::Instant::now();
+        assert!(!old.edits_to(&new).is_empty());
+        assert!(begin.elapsed() < Duration::from_secs(10));
+    }
+
+    #[test]
     fn positions_that_there_are_not_are_taken_to_the_nearest() {
         let text = Text::new("a😀b\nc", Encoding::Utf16);
         // Within a pair of units, behind a line, behind the text.

@@ -251,3 +251,77 @@ fn commands_say_what_they_cannot_do() {
     let unknown = client.try_ask("workspace/executeCommand", command("impasto.nothing"));
     assert!(unknown.is_err_and(|e| e.contains("impasto.nothing")));
 }
+
+#[test]
+fn a_list_that_nobody_asked_for_comes_only_where_nothing_else_can_stand() {
+    let mut client = Client::new();
+    let text =
+        "use std::bsdf::diffuse;\nmaterial m {\n    param d: length = 3 ;\n    let a = ;\n}\n";
+    let uri = client.open("m.impasto", text);
+    let mut count = |behind: &str, trigger: &str| {
+        let at = text.find(behind).expect("it is there") + behind.len();
+        let mut params = Client::at(&uri, text, at);
+        params["context"] = json!({ "triggerKind": 2, "triggerCharacter": trigger });
+        let list = client.ask("textDocument/completion", params);
+        list["items"].as_array().map_or(0, Vec::len)
+    };
+    assert_eq!(count("length = 3 ", " "), 8);
+    assert_eq!(count("let a = ", " "), 0);
+    assert!(count("param d:", ":") > 10);
+    assert!(count("std::", ":") > 3);
+    assert_eq!(count("let a =", "/"), 0);
+}
+
+#[test]
+fn a_definition_that_breaks_keeps_the_types_that_it_had() {
+    let mut client = Client::new();
+    let text = "fn f(x: float) -> float {\n    let a = 2.0 * x;\n    a + x\n}\n";
+    let uri = client.open("m.impasto", text);
+    client.diagnostics(&uri);
+    let broken = text.replace("a + x", "a + clamp(");
+    client.change(&uri, &broken);
+    let at = broken.find("a + clamp").expect("it is there");
+    let hover = client.ask("textDocument/hover", Client::at(&uri, &broken, at));
+    let shown = hover["contents"]["value"].as_str().unwrap_or_default();
+    assert!(shown.contains("let a: float"), "{shown}");
+}
+
+#[test]
+fn each_problem_has_one_fix_that_is_preferred_and_other_kinds_have_none() {
+    let mut client = Client::new();
+    let text = "fn f() -> float = clmap(0.5, 0.0, mx(1.0, 2.0));\n";
+    let uri = client.open("m.impasto", text);
+    let mut params = of(&uri);
+    params["range"] = json!({
+        "start": { "line": 0, "character": 0 },
+        "end": { "line": 1, "character": 0 },
+    });
+    params["context"] = json!({ "diagnostics": [] });
+    let actions = client.ask("textDocument/codeAction", params.clone());
+    let actions = actions.as_array().cloned().unwrap_or_default();
+    let preferred = actions.iter().filter(|a| a["isPreferred"] == true);
+    let titles: Vec<&str> = preferred.filter_map(|a| a["title"].as_str()).collect();
+    assert_eq!(titles.first(), Some(&"write `clamp`"), "{actions:?}");
+    assert_eq!(titles.len(), 2, "{actions:?}");
+    params["context"] = json!({ "diagnostics": [], "only": ["source.organizeImports"] });
+    assert_eq!(client.ask("textDocument/codeAction", params), json!([]));
+}
+
+#[test]
+fn what_one_file_costs_is_not_forgotten_for_another() {
+    let mut client = Client::new();
+    let first = client.open("first.impasto", GLAZE);
+    client.diagnostics(&first);
+    // While typing in the first has not rested, and the worker is at it, others come.
+    for i in 0..5 {
+        std::thread::sleep(std::time::Duration::from_millis(60));
+        client.open(&format!("{i}.impasto"), GLAZE);
+    }
+    let has_cost = |client: &mut Client| {
+        let lenses = client.ask("textDocument/codeLens", of(&first));
+        lenses.to_string().contains(" operations, ")
+    };
+    while !has_cost(&mut client) {
+        client.asked_for("workspace/inlayHint/refresh");
+    }
+}

@@ -260,6 +260,58 @@ fn ask_everything(text: &str, at: usize) {
     outline::folds(text);
 }
 
+/// A text of a megabyte whose lines are told by their numbers.
+fn megabyte(line: impl Fn(usize) -> String) -> String {
+    let mut text = String::new();
+    let mut i = 0;
+    while text.len() < 1_000_000 {
+        text += &line(i);
+        i += 1;
+    }
+    text
+}
+
+#[test]
+fn a_megabyte_of_anything_is_answered_in_bounded_time() {
+    let body = |line: fn(usize) -> String| {
+        let lines = megabyte(line);
+        format!("fn f(x: float) -> float {{\n{lines}x }}")
+    };
+    let texts = [
+        body(|i| format!("let b{i} = x + 1.0;\n")),
+        body(|i| format!("let b{i} = x; ")),
+        body(|i| format!("let b{i} = unknown{i};\n")),
+        body(|i| format!("if x > 0.5 {{ let b{i} = x; }}\n")),
+        megabyte(|i| format!("const C{i}: float = 0.5;\n")),
+        megabyte(|i| format!("fn f{i}(x: float -> float = x;\n")),
+        megabyte(|_| "(".into()),
+        megabyte(|_| "use std::bsdf::diffuse;\n".into()),
+        format!("// {}\nfn f(x: float) -> float = x;", "ä".repeat(400_000)),
+    ];
+    let mut client = Client::new();
+    for text in texts {
+        let begin = Instant::now();
+        let uri = client.open("m.impasto", &text);
+        client.diagnostics(&uri);
+        let mut asked = about(&uri, 0, 5);
+        asked["newName"] = json!("zzz");
+        for method in FEATURES.into_iter().chain(["textDocument/rename"]) {
+            let answer = client.try_ask(method, asked.clone());
+            // Where no name stands, none can be renamed.
+            assert!(
+                !answer.as_ref().is_err_and(|e| e.contains("defect")),
+                "{method}: {answer:?}"
+            );
+        }
+        let start: String = text.chars().take(40).collect();
+        assert!(
+            begin.elapsed() < Duration::from_secs(30),
+            "{:?} for {start}",
+            begin.elapsed()
+        );
+    }
+}
+
 #[test]
 fn every_half_typed_line_of_the_materials_is_understood_in_bounded_time() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../materials");

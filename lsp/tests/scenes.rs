@@ -158,3 +158,27 @@ fn colors_of_parameters_are_shown_as_light() {
     let presentations = client.ask("textDocument/colorPresentation", picked);
     assert_eq!(presentations[0]["label"], "[1.0, 0.0, 0.0]");
 }
+
+#[test]
+fn a_scene_is_checked_against_materials_as_they_are_in_the_editor() {
+    let (mut client, uri) = begin(SCENE);
+    assert_eq!(client.diagnostics(&uri), Vec::<Value>::new());
+    let wall = client.open("wall.impasto", &MATERIAL.replace("tint", "hue"));
+    let found = client.diagnostics_where(&uri, |list| !list.is_empty());
+    let message = found[0]["message"].to_string();
+    assert!(message.contains("no parameter `tint`"), "{message}");
+    client.change(&wall, MATERIAL);
+    client.diagnostics_where(&uri, <[Value]>::is_empty);
+}
+
+#[test]
+fn a_binding_without_a_file_does_not_hide_the_next() {
+    let text = SCENE.replace(
+        "[materials.a]",
+        "[materials.0]\nmaterial = \"x\"\n\n[materials.a]",
+    );
+    let (mut client, uri) = begin(&text);
+    let at = text.find("size =").expect("it is there") + 1;
+    let found = client.ask("textDocument/definition", Client::at(&uri, &text, at));
+    assert_eq!(found["range"]["start"]["line"], 6, "{found}");
+}

@@ -177,3 +177,35 @@ fn symbols_of_all_files_are_found_by_their_letters() {
         "impasto-std:/noise/perlin.impasto"
     );
 }
+
+#[test]
+fn an_alias_at_the_cursor_is_renamed_in_its_file_alone() {
+    let (mut client, _) = begin();
+    let uri = client.open("wall.impasto", WALL);
+    let mut params = at(&uri, WALL, "less(");
+    params["newName"] = json!("halved");
+    let answer = client.ask("textDocument/rename", params);
+    let wall = after(&client, &answer, "wall.impasto", WALL);
+    assert_eq!(wall, WALL.replace("less", "halved"));
+    assert_eq!(
+        answer["changes"].as_object().map(serde_json::Map::len),
+        Some(1)
+    );
+}
+
+#[test]
+fn folders_come_and_go() {
+    let (mut client, _) = begin();
+    let other = tempfile::tempdir().expect("a folder");
+    let text = "fn elsewhere_alone(x: float) -> float = x;\n";
+    std::fs::write(other.path().join("other.impasto"), text).expect("written");
+    let folder = json!([{ "uri": crate::client::uri(other.path()), "name": "other" }]);
+    let mut found = |added: &Value, removed: &Value| {
+        let event = json!({ "event": { "added": added, "removed": removed } });
+        client.tell("workspace/didChangeWorkspaceFolders", event);
+        let found = client.ask("workspace/symbol", json!({ "query": "elsewhere_alone" }));
+        found.as_array().map_or(0, Vec::len)
+    };
+    assert_eq!(found(&folder, &json!([])), 1);
+    assert_eq!(found(&json!([]), &folder), 0);
+}

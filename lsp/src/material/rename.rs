@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use impasto_compiler::analysis::{Analysis, Role, Symbol};
+use impasto_compiler::analysis::{Analysis, Role, Symbol, params};
 use impasto_compiler::ast::ItemKind;
 use impasto_compiler::lexer::{Token, lex};
-use impasto_compiler::sema::words;
+use impasto_compiler::sema::{ItemRef, words};
 use impasto_compiler::source::FileId;
 
 use super::describe;
@@ -97,6 +97,7 @@ pub fn refused(analysis: &Analysis, definition: &Definition, new: &str) -> Optio
         let found = references::of_symbol(analysis, symbol);
         found.is_none_or(|f| f.path != definition.path || f.place != definition.place)
     };
+    let hiding = named(analysis, new, is_other);
     let mut is_named = false;
     for occurrence in references::occurrences(analysis, definition) {
         if let Symbol::Field(item, _) = occurrence.symbol {
@@ -112,12 +113,29 @@ pub fn refused(analysis: &Analysis, definition: &Definition, new: &str) -> Optio
             continue;
         }
         is_named = true;
-        let mut visible = analysis.visible_at(occurrence.span.start).into_iter();
-        if visible.any(|(name, symbol)| name == new && is_other(&symbol)) {
+        if hiding.iter().any(|s| s.contains(&occurrence.span.start)) {
             return Some(format!("`{new}` is another name in scope here"));
         }
     }
     let item = analysis.module.and_then(|m| analysis.lookup(m, new));
     let is_item = item.is_some_and(|item| is_other(&Symbol::Item(item)));
     (is_item && is_named).then(|| format!("`{new}` is another definition"))
+}
+
+/// The scopes of the locals and parameters of a name.
+fn named(analysis: &Analysis, name: &str, wanted: impl Fn(&Symbol) -> bool) -> Vec<Range<u32>> {
+    let locals = analysis.locals.iter().enumerate();
+    let locals = locals.filter(|(i, l)| l.name == name && wanted(&Symbol::Local(*i)));
+    let mut scopes: Vec<Range<u32>> = locals.map(|(_, l)| l.scope.clone()).collect();
+    let Some((module, ast)) = analysis.module.zip(analysis.ast()) else {
+        return scopes;
+    };
+    for (index, item) in ast.items.iter().enumerate() {
+        let of_name = params(item).iter().position(|p| p.name.node == name);
+        let symbol = of_name.map(|i| Symbol::Param(ItemRef { module, index }, i));
+        if symbol.is_some_and(|symbol| wanted(&symbol)) {
+            scopes.push(item.span.start..item.span.end + 1);
+        }
+    }
+    scopes
 }

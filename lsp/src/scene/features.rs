@@ -373,7 +373,7 @@ impl Scene<'_> {
         let outline = outline(self.text);
         let touches = |place: &Range<usize>| place.start <= at && at <= place.end;
         for binding in &outline.bindings {
-            let file = binding.file.as_ref()?;
+            let Some(file) = &binding.file else { continue };
             let target = |material: Option<String>, param: Option<String>| Target::Material {
                 file: file.value.clone(),
                 material,
