@@ -1,7 +1,7 @@
 //! Requests of a client, one by one.
 
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 
 use gen_lsp_types as lsp;
@@ -360,7 +360,7 @@ impl Server<'_> {
             scene.file_name()?.to_string_lossy()
         );
         let is_it = |m: &&crate::host::PlannedMaterial| {
-            m.file == PathBuf::from(path)
+            m.file == Path::new(path)
                 && m.material
                     .as_deref()
                     .map_or(is_only, |named| named == material)
