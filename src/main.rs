@@ -1,6 +1,7 @@
 //! The `impasto` command. What it does is in [`cli`]; here only its exit code is made.
 
 use std::process::ExitCode;
+use std::sync::mpsc::channel;
 
 mod cli;
 
@@ -11,11 +12,17 @@ const STACK_BYTES: usize = 32 << 20;
 fn main() -> ExitCode {
     give_runtime_folder();
     let builder = std::thread::Builder::new().name("main".into());
-    match builder.stack_size(STACK_BYTES).spawn(cli::main) {
-        Ok(thread) => thread
-            .join()
-            .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-        Err(_) => cli::main(),
+    let (sender, jobs) = channel::<cli::Job>();
+    let work = move || cli::main(Some(&sender));
+    match builder.stack_size(STACK_BYTES).spawn(work) {
+        Ok(thread) => {
+            // Windows are the main thread's on some systems. There are no more jobs when the work is done.
+            jobs.into_iter().for_each(|job| job());
+            thread
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        }
+        Err(_) => cli::main(None),
     }
 }
 

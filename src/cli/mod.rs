@@ -5,6 +5,9 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
+use std::sync::mpsc::Sender;
+#[cfg(feature = "window")]
+use std::sync::mpsc::channel;
 
 use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
 use impasto::compiler::diag::{self, Diagnostic};
@@ -211,8 +214,28 @@ impl Failure {
 
 type Outcome = Result<(), Failure>;
 
-/// Reads the arguments, runs the command, reports its failure.
-pub(crate) fn main() -> ExitCode {
+/// Something that only the main thread may do.
+pub(crate) type Job = Box<dyn FnOnce() + Send>;
+
+/// Has something done by the main thread, which takes `jobs`; by this one if it is that.
+#[cfg(feature = "window")]
+fn on_main_thread<T: Send + 'static>(
+    jobs: Option<&Sender<Job>>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Failure> {
+    let Some(jobs) = jobs else { return Ok(work()) };
+    let (sender, done) = channel();
+    let job = Box::new(move || {
+        // Whoever asked waits for it.
+        let _ = sender.send(work());
+    });
+    let gone = |_| Failure::Error("the main thread is gone".into());
+    jobs.send(job).map_err(|_| gone(()))?;
+    done.recv().map_err(|_| gone(()))
+}
+
+/// Reads the arguments, runs the command, reports its failure. The main thread takes `jobs`, unless it is this one.
+pub(crate) fn main(jobs: Option<&Sender<Job>>) -> ExitCode {
     interrupt::outlive_file_limit();
     let cli = Cli::parse();
     let global = cli.global;
@@ -232,7 +255,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Merge(args) => merge::run(&args, &global),
         Command::Farm(command) => farm::run(&command, &global),
         Command::Lsp(args) => lsp::run(&args),
-        Command::View(args) => view::run(&args, &global),
+        Command::View(args) => view::run(&args, &global, jobs),
         Command::Info(args) => info::run(&args, &global),
         Command::Explain(args) => explain::run(&args, &global),
         Command::Completions(args) => completions::run(&args),

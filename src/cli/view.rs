@@ -1,6 +1,7 @@
 //! `impasto view`: a window on a scene or material that is rendered while one works on it, and pictures for tev.
 
 use std::path::PathBuf;
+use std::sync::mpsc::Sender;
 
 use clap::Args;
 use clap::builder::StringValueParser;
@@ -16,7 +17,7 @@ use super::outputs::{aov_help, aov_names, parse_exposure};
 use super::render::parse_size;
 use super::shot::On;
 use super::technique::TechniqueArgs;
-use super::{Failure, Global, Outcome, interrupt};
+use super::{Failure, Global, Job, Outcome, interrupt};
 
 #[derive(Args)]
 pub(super) struct ViewArgs {
@@ -79,7 +80,7 @@ pub(super) struct ViewArgs {
     technique: TechniqueArgs,
 }
 
-pub(super) fn run(args: &ViewArgs, global: &Global) -> Outcome {
+pub(super) fn run(args: &ViewArgs, global: &Global, jobs: Option<&Sender<Job>>) -> Outcome {
     args.device.check()?;
     if !args.scene.to_string_lossy().starts_with("std::") {
         // That is a slip, and nothing to wait for.
@@ -89,7 +90,7 @@ pub(super) fn run(args: &ViewArgs, global: &Global) -> Outcome {
     let live = live.map_err(|error| format!("cannot begin to render: {error}"))?;
     match &args.tev {
         Some(address) => send(&live, address, global),
-        None => args.window(live),
+        None => args.window(live, jobs),
     }
 }
 
@@ -155,7 +156,7 @@ impl ViewArgs {
     }
 
     #[cfg(feature = "window")]
-    fn window(&self, live: Live) -> Outcome {
+    fn window(&self, live: Live, jobs: Option<&Sender<Job>>) -> Outcome {
         let name = self.scene.file_name().unwrap_or(self.scene.as_os_str());
         let options = impasto_viewer::window::WindowOptions {
             title: format!("{} - Impasto", name.to_string_lossy()),
@@ -165,11 +166,12 @@ impl ViewArgs {
             save_as: self.out.clone(),
             compare_with: self.compare.clone(),
         };
-        impasto_viewer::window::run(Box::new(live), options).map_err(Failure::Error)
+        let work = move || impasto_viewer::window::run(Box::new(live), options);
+        super::on_main_thread(jobs, work)?.map_err(Failure::Error)
     }
 
     #[cfg(not(feature = "window"))]
-    fn window(&self, _: Live) -> Outcome {
+    fn window(&self, _: Live, _: Option<&Sender<Job>>) -> Outcome {
         Err(Failure::Error(
             "this program was built without windows\n  hint: build it with `--features window`, or use `--tev HOST`, or `impasto render --watch`".into(),
         ))
