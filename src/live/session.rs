@@ -20,7 +20,7 @@ use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
 use super::course::{Asked, Course, Speed, Step, is_done};
 use super::kernels;
-use super::maker::{Job, Mailbox, Maker, Outcome};
+use super::maker::{self, Job, Mailbox, Maker, Outcome};
 use super::pixels::Pixels;
 use super::problems;
 use super::project;
@@ -112,7 +112,7 @@ impl<'d, 's> Session<'d, 's> {
         options: &'s LiveOptions,
     ) -> Self {
         let (following, pictures) = shared.wanted();
-        let is_fast = matches!(device, Device::Gpu(_)) && device.info().kind != "software";
+        let is_fast = maker::is_fast(device);
         let news = shared.news();
         Self {
             device,
@@ -211,8 +211,12 @@ impl<'d, 's> Session<'d, 's> {
             != (&new.size, &new.outputs, &new.strategy, new.frame, new.reads);
         let begins = (old.restarts, old.crop, old.goals.is_some())
             != (new.restarts, new.crop, new.goals.is_some());
+        let complains = old.complaints != new.complaints;
         if begins {
             self.change();
+        }
+        if complains {
+            self.tell_project();
         }
         if is_other {
             self.make(Code::Open);
@@ -261,7 +265,9 @@ impl<'d, 's> Session<'d, 's> {
     /// Takes over what was made.
     fn adopt(&mut self, job: Job, outcome: Outcome<'d>) -> Result<(), RuntimeError> {
         match (job.code, outcome) {
-            (_, Outcome::Failed(error)) if is_loss(&error) => return Err(error),
+            (code, Outcome::Failed(error)) if is_loss(&error) && !is_full(code, &error) => {
+                return Err(error);
+            }
             (Code::Open, Outcome::Failed(error)) => {
                 self.of_files = vec![problems::of_render(&error)];
             }
@@ -284,7 +290,10 @@ impl<'d, 's> Session<'d, 's> {
                 self.open_is_final = true;
             }
             (Code::Final, Outcome::Failed(error)) => {
-                self.of_files.push(problems::of_render(&error));
+                self.of_files.push(Problem {
+                    is_warning: true,
+                    ..problems::of_render(&error)
+                });
                 self.open_is_final = true;
             }
         }
@@ -477,7 +486,7 @@ impl<'d, 's> Session<'d, 's> {
             return Ok(false);
         };
         let is_first = course.pictures == 0 && course.silent_below == 0;
-        built.select(asked.pixels, step.some)?;
+        let pixels = built.select(asked.pixels, step.some)?;
         built.renderer.select(&impasto_runtime::render::Samples {
             seed: asked.seed,
             first: 0,
@@ -492,9 +501,12 @@ impl<'d, 's> Session<'d, 's> {
             let is_soon = asked_at.elapsed() < HELD;
             is_soon && has_shown && mailbox.at_work() == Some(Code::Open)
         };
+        let mut held = Duration::ZERO;
         let mut look = |_: &_| {
+            let begun = Instant::now();
             while holds() && !ends() {
                 shared.wait(IDLE);
+                held = held.max(begun.elapsed());
             }
             if ends() {
                 ControlFlow::Break(())
@@ -507,9 +519,9 @@ impl<'d, 's> Session<'d, 's> {
             .renderer
             .take_portion(&mut course.sitting, &step.portion, &mut look)?;
         if taken {
-            let pixels = asked.pixels.list(step.some).len() as u64;
             let paths = pixels * u64::from(step.portion.count);
-            self.speed.took(step, paths, begun.elapsed());
+            self.speed
+                .took(step, paths, begun.elapsed().saturating_sub(held));
         }
         Ok(taken)
     }
@@ -613,6 +625,8 @@ impl<'d, 's> Session<'d, 's> {
             (Some(built), Some(course)) => is_done(course, &self.asked(built)),
             _ => false,
         };
+        // What open kernels have done is done again by final ones.
+        let is_done = is_done && (self.on_last || self.open_is_final);
         let state = if let Some(why) = &self.failed {
             State::Failed(why.clone())
         } else if problems::has_errors(&self.of_files) {
@@ -660,6 +674,11 @@ fn picture(
         nonfinite,
         nonfinite_pixels: Arc::new(places),
     }
+}
+
+/// Is there no room for final kernels beside the open ones? These render on.
+fn is_full(code: Code, error: &RuntimeError) -> bool {
+    code == Code::Final && matches!(error, RuntimeError::OutOfMemory(_))
 }
 
 /// Is the device to be opened anew? Calls on one that is lost are refused, and not always for that reason.
