@@ -6,6 +6,7 @@
 //! picture by open kernels stays until theirs has as many samples. So what is left alone has in the end the bits of
 //! `impasto render`, and no picture gets worse on the way.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -86,8 +87,9 @@ struct Session<'d, 's> {
     jobs: u64,
     /// When the last one was given.
     asked_at: Instant,
-    /// The job that made the open kernels.
+    /// The job that made the open kernels, and when they came.
     open_job: u64,
+    opened: Instant,
     course: Option<Course>,
     /// Samples of the last picture that was handed out of what is shown now.
     handed: u32,
@@ -128,6 +130,7 @@ impl<'d, 's> Session<'d, 's> {
             jobs: 0,
             asked_at: Instant::now(),
             open_job: 0,
+            opened: Instant::now(),
             course: None,
             handed: 0,
             speed: Speed::assumed(is_fast),
@@ -276,6 +279,7 @@ impl<'d, 's> Session<'d, 's> {
                 self.of_files = problems;
                 self.failed = None;
                 self.open_job = job.number;
+                self.opened = Instant::now();
                 self.forget_written(&built);
                 self.take_open(*built)?;
             }
@@ -379,7 +383,8 @@ impl<'d, 's> Session<'d, 's> {
         let has_open = self.open.is_some() && self.failed.is_none();
         let is_due = has_open && !self.on_last && !self.open_is_final && !self.following.paused;
         let rested = if self.is_fast { RESTED } else { RESTED_LONG };
-        let rests = !self.following.dragged && self.following.moved.elapsed() >= rested;
+        let rests =
+            !self.following.dragged && self.following.moved.max(self.opened).elapsed() >= rested;
         let has_picture = self
             .course
             .as_ref()
@@ -496,17 +501,37 @@ impl<'d, 's> Session<'d, 's> {
             let is_other = shared.pictures() != pictures && !is_first;
             is_other || mailbox.has_other() || shared.quits()
         };
-        let (has_shown, asked_at) = (self.handed > 0, self.asked_at);
+        // Files are read again at once, and the samples stay until it is known that they are of something else.
+        let reads = Cell::new(self.following.reads);
+        let asked_at = Cell::new(self.asked_at);
+        let (of, number) = (self.open_job, self.jobs + 1);
+        let read_again = || {
+            if shared.reads() == reads.get() {
+                return;
+            }
+            let (wanted, _) = shared.wanted();
+            reads.set(wanted.reads);
+            asked_at.set(Instant::now());
+            mailbox.ask(Job {
+                wanted,
+                code: Code::Open,
+                of,
+                number,
+            });
+        };
+        let has_shown = self.handed > 0;
         let holds = || {
-            let is_soon = asked_at.elapsed() < HELD;
+            let is_soon = asked_at.get().elapsed() < HELD;
             is_soon && has_shown && mailbox.at_work() == Some(Code::Open)
         };
         let mut held = Duration::ZERO;
         let mut look = |_: &_| {
             let begun = Instant::now();
+            read_again();
             while holds() && !ends() {
                 shared.wait(IDLE);
                 held = held.max(begun.elapsed());
+                read_again();
             }
             if ends() {
                 ControlFlow::Break(())
@@ -522,6 +547,10 @@ impl<'d, 's> Session<'d, 's> {
             let paths = pixels * u64::from(step.portion.count);
             self.speed
                 .took(step, paths, begun.elapsed().saturating_sub(held));
+        }
+        if reads.get() != self.following.reads {
+            self.following.reads = reads.get();
+            (self.asked_at, self.jobs) = (asked_at.get(), number);
         }
         Ok(taken)
     }
