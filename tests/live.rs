@@ -9,7 +9,7 @@ use impasto::compiler::interface::Value;
 use impasto::live::engine::{Answer, Engine, News, Order, ParamId, Picture, State};
 use impasto::live::{Live, LiveOptions};
 use impasto::runtime::film::file::FilmFile;
-use impasto::runtime::scene::{Asked, FilmSettings};
+use impasto::runtime::scene::{Asked, Camera, FilmSettings, GivenParam};
 use impasto::set::{Sample, Set};
 use impasto::shot::Subject;
 use impasto::{Choice, Device, DeviceOptions, RenderOptions, Renderer, Strategy};
@@ -167,23 +167,33 @@ impl Room {
         }
     }
 
-    /// The picture once it is done by kernels that stay.
+    /// What is shown, as it is saved.
+    #[track_caller]
+    fn film(&self) -> FilmFile {
+        let path = self.at("shown.film");
+        let answer = self.answer(Order::Save {
+            path: path.clone(),
+            exposure: 0.0,
+        });
+        assert!(matches!(answer, Answer::Saved(Ok(_))), "{answer:?}");
+        FilmFile::read(&path).expect("a film")
+    }
+
+    /// The picture once all is done.
     #[track_caller]
     fn rested(&self) -> News {
-        let mut since = Instant::now();
-        let mut number = 0;
-        loop {
-            let news = self.wait("end", |news| news.state == State::Done);
-            let now = news.picture.as_ref().map_or(0, |picture| picture.number);
-            if now != number {
-                (number, since) = (now, Instant::now());
-            }
-            if since.elapsed() > Duration::from_secs(3) {
-                return news;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
+        // An order may not have been followed yet.
+        std::thread::sleep(Duration::from_millis(300));
+        self.wait("end", |news| news.state == State::Done)
     }
+}
+
+/// One film is of the same as the other, and has the same bits.
+#[track_caller]
+fn check(film: &FilmFile, expected: &FilmFile) {
+    assert_eq!(film.sums, expected.sums);
+    assert_eq!(film.about.identity, expected.about.identity);
+    assert_eq!(film.about.ranges, expected.about.ranges);
 }
 
 fn set(binding: &str, param: &str, value: ParameterValue, dragged: bool) -> Order {
@@ -201,24 +211,44 @@ fn value(news: &News, param: &str) -> Value {
     found.expect("a parameter").value.clone()
 }
 
-/// The film of `impasto render` of a material on the ball.
-fn rendered(path: &Path, choice: Choice, samples: u32) -> FilmFile {
-    let sample = Sample {
-        file: path.to_string_lossy().into_owned(),
-        material: None,
-        turntable: None,
+/// The film of `impasto render` of what is at `path`, from a camera and with values.
+fn rendered(
+    path: &Path,
+    choice: Choice,
+    camera: Option<Camera>,
+    values: &[(&str, &str, f64)],
+) -> FilmFile {
+    let subject = if path.extension().is_some_and(|e| e == "toml") {
+        Subject::of_scene(path)
+    } else {
+        let sample = Sample {
+            file: path.to_string_lossy().into_owned(),
+            material: None,
+            turntable: None,
+        };
+        Subject::on(Set::Ball, &sample)
     };
-    let subject = Subject::on(Set::Ball, &sample).expect("a set");
-    let mut scene = subject.scene(&Asked::default()).expect("a scene");
+    let given = values.iter().map(|(binding, param, value)| GivenParam {
+        binding: (*binding).into(),
+        param: (*param).into(),
+        value: ParameterValue::Float(*value),
+        origin: "given".into(),
+    });
+    let asked = Asked {
+        given: given.collect(),
+        ..Asked::default()
+    };
+    let mut scene = subject.and_then(|s| s.scene(&asked)).expect("a scene");
     scene.film = FilmSettings {
         width: 16,
         height: 12,
     };
+    scene.camera = camera.unwrap_or(scene.camera);
     let program = impasto::compile(&scene).expect("it compiles");
     let plan = impasto::plan(&program, Strategy::OWN).expect("a plan");
     let device = Device::open(&device(choice)).expect("a device");
     let options = RenderOptions {
-        samples,
+        samples: 8,
         ..RenderOptions::default()
     };
     let renderer = Renderer::new(&device, &scene, &program, &plan, &options);
@@ -239,18 +269,9 @@ fn what_is_left_alone_has_the_bits_of_a_render() {
         assert_eq!((picture.samples, picture.samples_asked), (8, 8));
         assert!(news.problems.is_empty(), "{:?}", news.problems);
         assert!(picture.counts.iter().all(|count| *count == 8));
-        let path = room.at("own.film");
-        let Answer::Saved(Ok(_)) = room.answer(Order::Save {
-            path: path.clone(),
-            exposure: 0.0,
-        }) else {
-            panic!("it is saved");
-        };
-        let saved = FilmFile::read(&path).expect("a film");
-        let expected = rendered(&room.at("paint.impasto"), choice, 8);
-        assert_eq!(saved.sums, expected.sums, "{choice:?}");
-        assert_eq!(saved.about.identity, expected.about.identity);
-        assert_eq!(saved.about.ranges, expected.about.ranges);
+        let saved = room.film();
+        let expected = rendered(&room.at("paint.impasto"), choice, None, &[]);
+        check(&saved, &expected);
         assert_eq!(*picture.pixels, expected.sums.picture().pixels);
     }
 }
@@ -301,6 +322,13 @@ fn a_camera_and_a_value_compile_nothing() {
     let states = room.states.lock().expect("states").clone();
     let builds = [State::Compiling, State::Building];
     assert!(!states.iter().any(|s| builds.contains(s)), "{states:?}");
+    // Left alone, it is the render of that camera and these values.
+    room.live
+        .order(set("bulb", "power", ParameterValue::Float(40.0), false));
+    room.rested();
+    let values = [("wall", "roughness", 0.3), ("bulb", "power", 40.0)];
+    let expected = rendered(&room.at("scene.toml"), Choice::Cpu, Some(moved), &values);
+    check(&room.film(), &expected);
     // A reset gives back what is written, and the camera of the scene is there again.
     room.live.order(Order::ResetAll);
     room.live.order(Order::LookAsWritten);

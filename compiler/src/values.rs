@@ -41,6 +41,8 @@ pub fn with_values(program: &Program, requests: &[MaterialRequest]) -> Result<Pr
     let mut files = MemoryLoader::default();
     files.add(SCOPE, "");
     let mut checker = Checker::new(&mut files);
+    // Diagnostics point to where parameters are declared.
+    checker.sources = program.sources.clone();
     let Some(scope) = checker.load(SCOPE) else {
         return Err(code("values cannot be evaluated"));
     };

@@ -75,7 +75,8 @@ use ParameterValue::{Bool, Float, Floats, Int, Texture};
 fn given_values_are_compiled_values() {
     let first = [request("paint", &[]), request("lamp", &[])];
     let program = compiled(&first);
-    let cases: [(&[(&str, ParameterValue)], &[(&str, ParameterValue)]); 5] = [
+    type Given<'a> = &'a [(&'a str, ParameterValue)];
+    let cases: [(Given, Given); 5] = [
         (&[("gloss", Float(80.0)), ("coated", Bool(false))], &[]),
         (
             &[("tint", Floats(vec![0.1, 0.5, 0.9])), ("seed", Int(9))],

@@ -83,13 +83,13 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
         .kernels
         .device
         .clone();
-    println!(
+    eprintln!(
         "{device}, {}x{}, {}",
         size[0],
         size[1],
         args.material.display()
     );
-    println!("first picture after opening: {}", milliseconds(opened));
+    eprintln!("first picture after opening: {}", milliseconds(opened));
     let camera = first.project.camera.ok_or("the set has no camera")?;
     // Final kernels are there by then, as they are when somebody has looked for a while.
     engine.until(|news| news.state == State::Rendering)?;
@@ -153,7 +153,7 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
     let rate = |picture: &Picture| f64::from(picture.samples) / picture.elapsed.as_secs_f64();
     if let Some(picture) = engine.live.news().picture {
         let paths = rate(&picture) * f64::from(size[0]) * f64::from(size[1]);
-        println!("left alone: {:.2} million paths a second", paths * 1e-6);
+        eprintln!("left alone: {:.2} million paths a second", paths * 1e-6);
     }
     Ok(())
 }
@@ -182,9 +182,11 @@ impl Watched {
             }
             if begun.elapsed() > LONG {
                 let texts: Vec<&str> = news.problems.iter().map(|p| p.text.as_str()).collect();
-                return Err(
-                    format!("no picture came: {:?} {}", news.state, texts.join("\n")).into(),
-                );
+                return Err(format!(
+                    "no picture came: {:?} {}",
+                    news.state,
+                    texts.join("\n")
+                ));
             }
             std::thread::sleep(Duration::from_micros(200));
         }
@@ -211,7 +213,7 @@ fn print(what: &str, mut times: Vec<Duration>) {
             .copied()
             .unwrap_or_default()
     };
-    println!(
+    eprintln!(
         "{what}: {} in the median of {}, {} at most",
         milliseconds(at(5)),
         times.len(),

@@ -22,8 +22,9 @@ use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::Described;
 
-/// A submission takes about so long at most, so that orders are heard soon.
-const ANSWER: Duration = Duration::from_millis(10);
+/// A submission takes about so long at most, so that orders are heard soon: on a GPU of its own, and elsewhere.
+const ANSWER: Duration = Duration::from_millis(4);
+const SLOW_ANSWER: Duration = Duration::from_millis(10);
 
 /// Values of parameters, by what they are of.
 pub(super) type Values = BTreeMap<ParamId, ParameterValue>;
@@ -56,7 +57,7 @@ pub(super) struct Built<'d> {
     technique: Technique,
     outputs: Vec<String>,
     /// Pixels that are selected.
-    selected: Option<(Pixels, SomePixels)>,
+    selected: Option<(Pixels, SomePixels, u64)>,
 }
 
 /// What kernels are built of.
@@ -71,6 +72,8 @@ pub(super) struct Ingredients {
     pub trees: Arc<Trees>,
     pub technique: Technique,
     pub outputs: Vec<String>,
+    /// Whether a GPU of its own renders.
+    pub is_fast: bool,
 }
 
 /// Whether something could be taken over.
@@ -88,7 +91,7 @@ pub(super) enum Applied {
 impl<'d> Built<'d> {
     /// What a maker made.
     pub(super) fn new(mut renderer: Renderer<'d>, of: Ingredients) -> Self {
-        renderer.answer_within(ANSWER);
+        renderer.answer_within(if of.is_fast { ANSWER } else { SLOW_ANSWER });
         Self {
             renderer,
             code: of.code,
@@ -176,16 +179,21 @@ impl<'d> Built<'d> {
         self.renderer.renew(&world, next)
     }
 
-    /// Renders these pixels from now on.
+    /// Renders these pixels from now on; how many they are.
     ///
     /// # Errors
     /// If there are no such pixels.
-    pub(super) fn select(&mut self, pixels: Pixels, some: SomePixels) -> Result<(), RuntimeError> {
-        if self.selected != Some((pixels, some)) {
-            self.renderer.select_pixels(pixels.list(some))?;
-            self.selected = Some((pixels, some));
+    pub(super) fn select(&mut self, pixels: Pixels, some: SomePixels) -> Result<u64, RuntimeError> {
+        if let Some((selected, of, count)) = self.selected
+            && (selected, of) == (pixels, some)
+        {
+            return Ok(count);
         }
-        Ok(())
+        let list = pixels.list(some);
+        let count = list.len() as u64;
+        self.renderer.select_pixels(list)?;
+        self.selected = Some((pixels, some, count));
+        Ok(count)
     }
 }
 

@@ -24,7 +24,7 @@ pub(super) fn of(device: &Device, built: &Built<'_>, sitting: &Sitting) -> Kerne
         strategy: built.renderer.strategy().to_owned(),
         kernels: reports.into_iter().map(kernel).collect(),
         reasons: built.reasons.clone(),
-        operations: Vec::new(),
+        operations: vec![None; built.scene.materials.len()],
     }
 }
 

@@ -321,9 +321,12 @@ impl<'d, 's> Maker<'d, 's> {
         self.check_cancelled()?;
         let plan = planned(wanted.strategy, &scene, &program, self.device);
         let plan = plan.map_err(|why| Stop::Wrong(vec![problems::of_order(why)]))?;
-        let watch = |_, _| match self.mailbox.is_cancelled() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let watch = |_, _| {
+            if self.mailbox.is_cancelled() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         let renderer =
             Renderer::from_world_beside(self.device, &world, &*program, &plan, &options, &watch)?;
@@ -341,6 +344,7 @@ impl<'d, 's> Maker<'d, 's> {
                 trees: self.trees.clone(),
                 technique: options.technique,
                 outputs: options.outputs,
+                is_fast: is_fast(self.device),
             },
         );
         Ok((built, problems))
@@ -446,6 +450,11 @@ impl<'d, 's> Maker<'d, 's> {
             ..RenderOptions::default()
         }
     }
+}
+
+/// Whether a GPU renders that is no software.
+pub(super) fn is_fast(device: &Device) -> bool {
+    matches!(device, Device::Gpu(gpu) if gpu.info().kind != "software")
 }
 
 /// Paths in flight. A GPU in software takes fewer than for a render, since an iteration is what one waits for.

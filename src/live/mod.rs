@@ -163,7 +163,10 @@ impl Drop for Live {
     /// Lets threads end: drivers do not take it well if a process ends while they compile.
     fn drop(&mut self) {
         self.shared.order(Order::Quit);
-        for thread in self.threads.drain(..) {
+        let own = std::thread::current().id();
+        // Whoever is called by one of them may be the last to know the engine.
+        let others = self.threads.drain(..).filter(|t| t.thread().id() != own);
+        for thread in others {
             // One that broke off has nothing left to end.
             let _ = thread.join();
         }

@@ -6,6 +6,7 @@
 //! picture by open kernels stays until theirs has as many samples. So what is left alone has in the end the bits of
 //! `impasto render`, and no picture gets worse on the way.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
 use super::course::{Asked, Course, Speed, Step, is_done};
 use super::kernels;
-use super::maker::{Job, Mailbox, Maker, Outcome};
+use super::maker::{self, Job, Mailbox, Maker, Outcome};
 use super::pixels::Pixels;
 use super::problems;
 use super::project;
@@ -86,8 +87,9 @@ struct Session<'d, 's> {
     jobs: u64,
     /// When the last one was given.
     asked_at: Instant,
-    /// The job that made the open kernels.
+    /// The job that made the open kernels, and when they came.
     open_job: u64,
+    opened: Instant,
     course: Option<Course>,
     /// Samples of the last picture that was handed out of what is shown now.
     handed: u32,
@@ -112,7 +114,7 @@ impl<'d, 's> Session<'d, 's> {
         options: &'s LiveOptions,
     ) -> Self {
         let (following, pictures) = shared.wanted();
-        let is_fast = matches!(device, Device::Gpu(_)) && device.info().kind != "software";
+        let is_fast = maker::is_fast(device);
         let news = shared.news();
         Self {
             device,
@@ -128,6 +130,7 @@ impl<'d, 's> Session<'d, 's> {
             jobs: 0,
             asked_at: Instant::now(),
             open_job: 0,
+            opened: Instant::now(),
             course: None,
             handed: 0,
             speed: Speed::assumed(is_fast),
@@ -211,8 +214,12 @@ impl<'d, 's> Session<'d, 's> {
             != (&new.size, &new.outputs, &new.strategy, new.frame, new.reads);
         let begins = (old.restarts, old.crop, old.goals.is_some())
             != (new.restarts, new.crop, new.goals.is_some());
+        let complains = old.complaints != new.complaints;
         if begins {
             self.change();
+        }
+        if complains {
+            self.tell_project();
         }
         if is_other {
             self.make(Code::Open);
@@ -261,7 +268,9 @@ impl<'d, 's> Session<'d, 's> {
     /// Takes over what was made.
     fn adopt(&mut self, job: Job, outcome: Outcome<'d>) -> Result<(), RuntimeError> {
         match (job.code, outcome) {
-            (_, Outcome::Failed(error)) if is_loss(&error) => return Err(error),
+            (code, Outcome::Failed(error)) if is_loss(&error) && !is_full(code, &error) => {
+                return Err(error);
+            }
             (Code::Open, Outcome::Failed(error)) => {
                 self.of_files = vec![problems::of_render(&error)];
             }
@@ -270,6 +279,7 @@ impl<'d, 's> Session<'d, 's> {
                 self.of_files = problems;
                 self.failed = None;
                 self.open_job = job.number;
+                self.opened = Instant::now();
                 self.forget_written(&built);
                 self.take_open(*built)?;
             }
@@ -284,7 +294,10 @@ impl<'d, 's> Session<'d, 's> {
                 self.open_is_final = true;
             }
             (Code::Final, Outcome::Failed(error)) => {
-                self.of_files.push(problems::of_render(&error));
+                self.of_files.push(Problem {
+                    is_warning: true,
+                    ..problems::of_render(&error)
+                });
                 self.open_is_final = true;
             }
         }
@@ -370,7 +383,8 @@ impl<'d, 's> Session<'d, 's> {
         let has_open = self.open.is_some() && self.failed.is_none();
         let is_due = has_open && !self.on_last && !self.open_is_final && !self.following.paused;
         let rested = if self.is_fast { RESTED } else { RESTED_LONG };
-        let rests = !self.following.dragged && self.following.moved.elapsed() >= rested;
+        let rests =
+            !self.following.dragged && self.following.moved.max(self.opened).elapsed() >= rested;
         let has_picture = self
             .course
             .as_ref()
@@ -477,7 +491,7 @@ impl<'d, 's> Session<'d, 's> {
             return Ok(false);
         };
         let is_first = course.pictures == 0 && course.silent_below == 0;
-        built.select(asked.pixels, step.some)?;
+        let pixels = built.select(asked.pixels, step.some)?;
         built.renderer.select(&impasto_runtime::render::Samples {
             seed: asked.seed,
             first: 0,
@@ -487,14 +501,37 @@ impl<'d, 's> Session<'d, 's> {
             let is_other = shared.pictures() != pictures && !is_first;
             is_other || mailbox.has_other() || shared.quits()
         };
-        let (has_shown, asked_at) = (self.handed > 0, self.asked_at);
+        // Files are read again at once, and the samples stay until it is known that they are of something else.
+        let reads = Cell::new(self.following.reads);
+        let asked_at = Cell::new(self.asked_at);
+        let (of, number) = (self.open_job, self.jobs + 1);
+        let read_again = || {
+            if shared.reads() == reads.get() {
+                return;
+            }
+            let (wanted, _) = shared.wanted();
+            reads.set(wanted.reads);
+            asked_at.set(Instant::now());
+            mailbox.ask(Job {
+                wanted,
+                code: Code::Open,
+                of,
+                number,
+            });
+        };
+        let has_shown = self.handed > 0;
         let holds = || {
-            let is_soon = asked_at.elapsed() < HELD;
+            let is_soon = asked_at.get().elapsed() < HELD;
             is_soon && has_shown && mailbox.at_work() == Some(Code::Open)
         };
+        let mut held = Duration::ZERO;
         let mut look = |_: &_| {
+            let begun = Instant::now();
+            read_again();
             while holds() && !ends() {
                 shared.wait(IDLE);
+                held = held.max(begun.elapsed());
+                read_again();
             }
             if ends() {
                 ControlFlow::Break(())
@@ -507,9 +544,13 @@ impl<'d, 's> Session<'d, 's> {
             .renderer
             .take_portion(&mut course.sitting, &step.portion, &mut look)?;
         if taken {
-            let pixels = asked.pixels.list(step.some).len() as u64;
             let paths = pixels * u64::from(step.portion.count);
-            self.speed.took(step, paths, begun.elapsed());
+            self.speed
+                .took(step, paths, begun.elapsed().saturating_sub(held));
+        }
+        if reads.get() != self.following.reads {
+            self.following.reads = reads.get();
+            (self.asked_at, self.jobs) = (asked_at.get(), number);
         }
         Ok(taken)
     }
@@ -613,6 +654,8 @@ impl<'d, 's> Session<'d, 's> {
             (Some(built), Some(course)) => is_done(course, &self.asked(built)),
             _ => false,
         };
+        // What open kernels have done is done again by final ones.
+        let is_done = is_done && (self.on_last || self.open_is_final);
         let state = if let Some(why) = &self.failed {
             State::Failed(why.clone())
         } else if problems::has_errors(&self.of_files) {
@@ -660,6 +703,11 @@ fn picture(
         nonfinite,
         nonfinite_pixels: Arc::new(places),
     }
+}
+
+/// Is there no room for final kernels beside the open ones? These render on.
+fn is_full(code: Code, error: &RuntimeError) -> bool {
+    code == Code::Final && matches!(error, RuntimeError::OutOfMemory(_))
 }
 
 /// Is the device to be opened anew? Calls on one that is lost are refused, and not always for that reason.

@@ -95,6 +95,11 @@ impl Shared {
         self.pictures.load(Ordering::SeqCst)
     }
 
+    /// How often files were to be read again.
+    pub(super) fn reads(&self) -> u64 {
+        lock(&self.wanted).reads
+    }
+
     pub(super) fn quits(&self) -> bool {
         lock(&self.wanted).quit
     }

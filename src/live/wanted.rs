@@ -108,7 +108,11 @@ impl Wanted {
             Order::Outputs(names) => self.set_outputs(names),
             Order::Restart => self.restarts += 1,
             Order::Strategy(name) => self.set_strategy(&name),
-            Order::Reload => self.reads += 1,
+            Order::Reload => {
+                // Perhaps nothing changed that shows.
+                self.reads += 1;
+                return Effect::Course;
+            }
             Order::Quit => self.quit = true,
             Order::Until(text) => {
                 let had_goals = self.goals.is_some();

@@ -1,5 +1,7 @@
 //! The buffers of a render and how kernels bind them.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::kernels::buffers::{Access, BUFFERS, Buffer, BufferId, Cleared, Owner, Reader};
@@ -14,6 +16,8 @@ use crate::options::RenderOptions;
 #[derive(Clone, Debug)]
 pub(crate) struct Resources {
     buffers: Vec<wgpu::Buffer>,
+    /// What the film is read through, once it was: whoever looks at it often does not wait for memory each time.
+    staging: Arc<Mutex<Option<wgpu::Buffer>>>,
 }
 
 impl Resources {
@@ -43,7 +47,10 @@ impl Resources {
             buffers.push(buffer);
         }
         gpu.check()?;
-        let resources = Self { buffers };
+        let resources = Self {
+            buffers,
+            staging: Arc::default(),
+        };
         resources.set_run(gpu, options);
         resources.set_camera(gpu, &composer.camera());
         if let Some(pixels) = &options.pixels {
@@ -61,7 +68,10 @@ impl Resources {
                 *buffer = own_buffer(gpu, composer, row);
             }
         }
-        Self { buffers }
+        Self {
+            buffers,
+            staging: self.staging.clone(),
+        }
     }
 
     /// Writes the settings that kernels read.
@@ -150,18 +160,24 @@ impl Resources {
     /// The words of the film.
     pub(crate) fn read_film(&self, gpu: &Gpu) -> Result<Vec<u32>, RuntimeError> {
         let film = self.buffer(BufferId::Film);
-        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("film readback"),
-            size: film.size(),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
+        let mut kept = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
+        // One that could not be read is not used again.
+        let staging = kept.take().unwrap_or_else(|| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("film readback"),
+                size: film.size(),
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
         });
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(film, 0, &staging, 0, film.size());
         let index = gpu.queue.submit([encoder.finish()]);
-        gpu.read(&staging, index, film.size(), |bytes| {
+        let words = gpu.read(&staging, index, film.size(), |bytes| {
             bytemuck::pod_collect_to_vec(bytes)
-        })
+        })?;
+        *kept = Some(staging);
+        Ok(words)
     }
 
     pub(crate) fn bind_group_layout(

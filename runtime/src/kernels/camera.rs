@@ -5,11 +5,13 @@ use glam::Vec3;
 use crate::kernels::cones;
 use crate::world::camera::CameraFrame;
 
-/// The members of four words: a vector and a number, by their names, and how they follow from a camera and
-/// columns and rows of a picture.
+/// How a number follows from a camera and columns and rows of a picture.
+type Number = fn(&CameraFrame, [u32; 2]) -> f32;
+
+/// The members of four words: a vector and a number, by their names, and how they follow from what is seen.
 struct Row {
     vector: (&'static str, fn(&CameraFrame) -> Vec3),
-    number: (&'static str, fn(&CameraFrame, [u32; 2]) -> f32),
+    number: (&'static str, Number),
 }
 
 /// The members.
