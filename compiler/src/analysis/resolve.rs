@@ -162,11 +162,11 @@ struct Resolver<'a> {
     locals: Vec<Local>,
 }
 
-/// A name, what it stands for, and whether that is a variable.
-type Visible = (String, Symbol, bool);
+/// Names, what they stand for, and whether that is a variable; of two of one name the last.
+type Names = HashMap<String, (Symbol, bool)>;
 
 struct Scope {
-    names: Vec<Visible>,
+    names: Names,
     end: u32,
 }
 
@@ -219,7 +219,7 @@ impl Resolver<'_> {
         let end = item.span.end;
         let of_item = |(index, param): (usize, ParamRef<'_>)| {
             let symbol = Symbol::Param(itself, index);
-            (param.name.node.clone(), symbol, false)
+            (param.name.node.clone(), (symbol, false))
         };
         let names = params(item).into_iter().enumerate().map(of_item).collect();
         self.scopes.push(Scope { names, end });
@@ -230,7 +230,7 @@ impl Resolver<'_> {
                 self.body(&f.body, end);
             }
             ItemKind::Closure(c) => {
-                let mut shared = Vec::new();
+                let mut shared = Names::new();
                 for method in &c.methods {
                     self.scoped(method.span.end, |r| r.method(&c.lets, method, &mut shared));
                 }
@@ -254,19 +254,19 @@ impl Resolver<'_> {
 
     /// A method with the `let`s before it, which belong to each of the methods. Their names are noted with the first, and
     /// kept in `shared` for the others.
-    fn method(&mut self, lets: &[Stmt], method: &ast::Method, shared: &mut Vec<Visible>) {
+    fn method(&mut self, lets: &[Stmt], method: &ast::Method, shared: &mut Names) {
         if shared.is_empty() {
             self.statements(lets);
-            let names = self.scopes.last().map_or(&[][..], |scope| &scope.names);
-            *shared = names.to_vec();
+            let names = self.scopes.last().map(|scope| scope.names.clone());
+            *shared = names.unwrap_or_default();
         } else if let Some(scope) = self.scopes.last_mut() {
-            for (_, symbol, _) in &*shared {
+            for (symbol, _) in shared.values() {
                 if let Symbol::Local(index) = symbol {
                     let local = &mut self.locals[*index];
                     local.scope.end = local.scope.end.max(scope.end);
                 }
             }
-            scope.names.extend(shared.iter().cloned());
+            scope.names.extend(shared.clone());
         }
         let symbol = Symbol::BuiltIn(method.name.node.clone());
         self.note(method.name.span, symbol, Role::Define);
@@ -277,7 +277,7 @@ impl Resolver<'_> {
     }
 
     fn scoped(&mut self, end: u32, f: impl FnOnce(&mut Self)) {
-        let names = Vec::new();
+        let names = Names::new();
         self.scopes.push(Scope { names, end });
         f(self);
         self.scopes.pop();
@@ -294,7 +294,7 @@ impl Resolver<'_> {
                 scope: from..scope.end.max(from),
             });
             let mutable = kind == LocalKind::Var;
-            scope.names.push((name.node.clone(), symbol, mutable));
+            scope.names.insert(name.node.clone(), (symbol, mutable));
         }
     }
 
@@ -392,10 +392,8 @@ impl Resolver<'_> {
 
     /// The local of a name, and whether it is a variable.
     fn local(&self, name: &str) -> Option<(Symbol, bool)> {
-        let scopes = self.scopes.iter().rev();
-        let mut names = scopes.flat_map(|scope| scope.names.iter().rev());
-        let (_, symbol, mutable) = names.find(|(n, ..)| n == name)?;
-        Some((symbol.clone(), *mutable))
+        let mut scopes = self.scopes.iter().rev();
+        scopes.find_map(|scope| scope.names.get(name)).cloned()
     }
 
     fn type_name(&mut self, ty: &TypeName) {
