@@ -43,7 +43,10 @@ fn quoted(text: &str) -> Vec<&str> {
 /// The cells of the rows of the table under the heading `title`.
 fn table(page: &str, title: &str) -> Vec<Vec<String>> {
     let section = between(page, &format!("\n## {title}\n"), "\n## ");
-    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    // The first table of the section.
+    let lines = section.lines().skip_while(|line| !line.starts_with('|'));
+    let rows = lines.take_while(|line| line.starts_with('|'));
+    let rows = rows.filter(|line| line.starts_with("| `"));
     rows.map(|row| {
         let row = row.replace("\\|", "\u{1}");
         let cells = row.trim_matches('|').split('|');

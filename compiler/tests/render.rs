@@ -123,6 +123,7 @@ fn json_has_the_documented_keys() {
             "start": 0,
             "end": 8,
         }],
+        "fixes": [],
     });
     assert_eq!(unknown, &expected);
     assert_eq!(list[1]["severity"], "warning");

@@ -351,6 +351,10 @@ fn pixel(ui: &mut Ui, desk: &mut Desk) {
 
 fn render(ui: &mut Ui, desk: &mut Desk) {
     line(ui, "Samples", |ui, name| {
+        if desk.samples == 0 {
+            // The first picture says how many; a field would make its least value of that.
+            return;
+        }
         let mut samples = desk.samples;
         let speed = (f64::from(samples) * 0.02).max(0.2);
         let field = DragValue::new(&mut samples)
