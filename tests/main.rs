@@ -3,6 +3,7 @@
 mod cli;
 mod diagnostics;
 mod documentation;
+mod editor;
 mod filtering;
 mod generated;
 mod instances;

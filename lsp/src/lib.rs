@@ -11,7 +11,6 @@ pub mod margin;
 pub mod material;
 pub mod scene;
 mod server;
-pub mod symbols;
 pub mod text;
 mod worker;
 

@@ -179,7 +179,7 @@ impl Analysis {
                 _ => None,
             },
             Symbol::File(module) => Some(Span::new(self.modules[module.0].file, 0..0)),
-            Symbol::BuiltIn(_) => None,
+            Symbol::BuiltIn(_) | Symbol::Type(_) => None,
         }
     }
 

@@ -52,8 +52,10 @@ pub enum Symbol {
     Local(usize),
     /// A file that is imported from.
     File(ModuleId),
-    /// A function, type, input or output of the language.
+    /// A function, input or output of the language.
     BuiltIn(String),
+    /// A type of the language, where a type stands.
+    Type(String),
 }
 
 /// What a body defines.
@@ -405,7 +407,7 @@ impl Resolver<'_> {
             None => (ty.node.as_str(), ty.span),
         };
         if words::is_type(name) {
-            self.note(span, Symbol::BuiltIn(name.to_owned()), Role::Read);
+            self.note(span, Symbol::Type(name.to_owned()), Role::Read);
         } else if let Some(item) = self.analysis.lookup(self.module, name) {
             self.note(span, Symbol::Item(item), Role::Read);
         }

@@ -319,7 +319,10 @@ fn unclosed(open: Open, at: Span, place: &str) -> Diagnostic {
         .label(at, format!("`{closer}` is missing {place}"))
         .fix(Fix {
             title: format!("close it: `{closer}`"),
-            span: at,
+            span: Span {
+                end: at.start,
+                ..at
+            },
             was: None,
             text: closer.to_owned(),
             imports: Vec::new(),

@@ -15,7 +15,7 @@ use impasto_stdlib::StdFile;
 
 use super::cursor::{Around, Cursor, Place, cursor};
 use super::describe::{self, Description};
-use super::imports;
+use super::{imports, symbols};
 use crate::documents;
 
 /// A thing that can be written.
@@ -495,7 +495,7 @@ fn kind_of(kind: &ItemKind) -> ProposalKind {
 /// Definitions of the library that would have to be imported.
 fn library(named: &HashSet<String>) -> Vec<Proposal> {
     let mut list = Vec::new();
-    for entry in crate::symbols::library() {
+    for entry in symbols::library() {
         let (file, item) = (entry.file, &entry.item);
         if file.folder == "core" || named.contains(&item.name) {
             continue;
@@ -817,7 +817,7 @@ fn imported(known: &Known<'_>, path: &[String], at: usize) -> Vec<Proposal> {
                 .map(|f| module(f, "a folder of the library"))
                 .collect()
         }
-        ["std", folder] => crate::symbols::library()
+        ["std", folder] => symbols::library()
             .filter(|entry| entry.file.folder == *folder && !is_imported(&entry.item.name))
             .map(|entry| {
                 let item = &entry.item;

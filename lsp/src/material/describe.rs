@@ -48,6 +48,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<Description> {
             })
         }
         Symbol::BuiltIn(name) => built_in(name),
+        Symbol::Type(name) => Some(of_manual(manual::entry(name, &[Kind::Type])?)),
     }
 }
 

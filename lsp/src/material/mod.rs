@@ -11,4 +11,5 @@ pub mod outline;
 pub mod references;
 pub mod rename;
 pub mod signature;
+pub mod symbols;
 pub mod tokens;

@@ -29,7 +29,7 @@ pub struct Target {
 pub fn target(analysis: &Analysis, at: usize) -> Result<Target, String> {
     let none = || "there is no name here".to_owned();
     let here = analysis.occurrence_at(at as u32).ok_or_else(none)?;
-    if let Symbol::BuiltIn(name) = &here.symbol {
+    if let Symbol::BuiltIn(name) | Symbol::Type(name) = &here.symbol {
         return Err(format!("`{name}` is a name of the language"));
     }
     if let Symbol::File(_) = here.symbol {

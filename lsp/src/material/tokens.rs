@@ -96,6 +96,7 @@ fn kind(analysis: &Analysis, symbol: &Symbol) -> (&'static str, u32) {
             ("function", LIBRARY)
         }
         Symbol::BuiltIn(name) if words::is_type(name) => ("type", LIBRARY),
+        Symbol::Type(_) => ("type", LIBRARY),
         Symbol::BuiltIn(name) if name == words::NO_MEDIUM => ("variable", LIBRARY | READONLY),
         // A method of a closure.
         Symbol::BuiltIn(_) => ("function", LIBRARY),

@@ -14,6 +14,7 @@ use super::outline::{BindingAt, SceneOutline, outline};
 use crate::documents;
 use crate::material::colors::{self, Swatch};
 use crate::material::completion::{Proposal, ProposalKind};
+use crate::material::symbols;
 
 /// A scene file that is open.
 pub struct Scene<'a> {
@@ -261,7 +262,7 @@ impl Scene<'_> {
             }
             ("materials", "file") => {
                 let mut list = self.files(cursor, &["impasto"], quoted);
-                for entry in crate::symbols::library() {
+                for entry in symbols::library() {
                     if entry.item.kind == ProposalKind::Material {
                         let module = format!("std::{}::{}", entry.file.folder, entry.file.name);
                         list.push(text(&module, ProposalKind::Module, "of the library"));

@@ -17,9 +17,8 @@ use super::{Failed, Server, convert, files};
 use crate::documents::{self, Language, Overlay};
 use crate::library;
 use crate::material::references::{self, Definition};
-use crate::material::rename;
+use crate::material::{rename, symbols};
 use crate::scene::features::{Scene, Target};
-use crate::symbols;
 use crate::text::Text;
 
 type Answer = Result<Value, Failed>;

@@ -8,9 +8,12 @@ use crate::world::camera::CameraFrame;
 /// How a number follows from a camera and columns and rows of a picture.
 type Number = fn(&CameraFrame, [u32; 2]) -> f32;
 
+/// How a vector follows from a camera.
+type Vector = fn(&CameraFrame) -> Vec3;
+
 /// The members of four words: a vector and a number, by their names, and how they follow from what is seen.
 struct Row {
-    vector: (&'static str, fn(&CameraFrame) -> Vec3),
+    vector: (&'static str, Vector),
     number: (&'static str, Number),
 }
 

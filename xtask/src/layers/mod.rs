@@ -112,7 +112,7 @@ const CRATES: &[Crate] = &[
             &["host", "library", "text"],
             &["margin"],
             &["documents"],
-            &["material", "symbols"],
+            &["material"],
             &["scene", "worker"],
             &["server"],
         ],

@@ -8,7 +8,7 @@ use impasto_compiler::parser;
 use impasto_compiler::source::FileId;
 use impasto_stdlib::StdFile;
 
-use crate::material::completion::{Listed, ProposalKind, listed};
+use super::completion::{Listed, ProposalKind, listed};
 
 /// A public definition of the library.
 pub struct InLibrary {
