@@ -47,7 +47,8 @@ impl Address {
             _ => (text, PORT),
         };
         let host = host.trim_start_matches('[').trim_end_matches(']');
-        if host.is_empty() || host.contains(char::is_whitespace) {
+        let lacks_host = text.starts_with(':') && !text.starts_with("::");
+        if host.is_empty() || lacks_host || host.contains(char::is_whitespace) {
             return Err(EXPECTED.into());
         }
         Ok(Self {

@@ -48,20 +48,21 @@ pub(crate) fn run(args: &EditorArgs) -> Result {
     let mut server = Server::start(&impasto)?;
     let rows: Result<Vec<Row>> = paths.iter().map(|path| server.measure(path)).collect();
     let rows = rows?;
-    println!("| file | key to diagnostics | key to completion | rest to costs |");
-    println!("|---|---|---|---|");
+    let mut out =
+        "| file | key to diagnostics | key to completion | rest to costs |\n|---|---|---|---|\n"
+            .to_owned();
     for row in &rows {
         let [diagnostics, completion] = [&row.diagnostics, &row.completion].map(|v| median(v));
         let (name, costs) = (&row.name, row.costs);
-        println!("| {name} | {diagnostics:.1} | {completion:.1} | {costs:.0} |");
+        out += &format!("| {name} | {diagnostics:.1} | {completion:.1} | {costs:.0} |\n");
     }
     let all = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
     let diagnostics = all(&|row| median(&row.diagnostics));
     let completion = all(&|row| median(&row.completion));
     let costs = all(&|row| row.costs);
-    let line = |what: &str, of: &dyn Fn(&[f64]) -> f64| {
+    let mut line = |what: &str, of: &dyn Fn(&[f64]) -> f64| {
         let [a, b, c] = [&diagnostics, &completion, &costs].map(|v| of(v));
-        println!("| **{what}** | {a:.1} | {b:.1} | {c:.0} |");
+        out += &format!("| **{what}** | {a:.1} | {b:.1} | {c:.0} |\n");
     };
     line("median", &|v| median(v));
     line("most", &|v| v.iter().copied().fold(0.0, f64::max));
@@ -72,13 +73,15 @@ pub(crate) fn run(args: &EditorArgs) -> Result {
     let shown = |bytes: Option<u64>| {
         bytes.map_or("unknown".to_owned(), |b| format!("{} MB", b / 1_000_000))
     };
-    println!(
-        "\nmemory of the server: {} with {} files seen, {} after {} more edits",
+    out += &format!(
+        "\nmemory of the server: {} with {} files seen, {} after {} more edits\n",
         shown(before),
         rows.len(),
         shown(after),
         args.edits
     );
+    let printed = std::io::stdout().write_all(out.as_bytes());
+    printed.map_err(|e| format!("cannot print: {e}"))?;
     server.stop()
 }
 

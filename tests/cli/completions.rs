@@ -144,6 +144,9 @@ fn files_are_offered_where_files_are_taken() {
             "render --plan",
             "render --report",
             "render -o",
+            "view --compare",
+            "view --out",
+            "view -o",
         ]
     );
 }
