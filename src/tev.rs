@@ -1,6 +1,6 @@
 //! Pictures for tev, on this machine or another one: whatever an engine has, sent as it comes.
 //!
-//! tev (https://github.com/Tom94/tev) listens for packets: a length of four bytes that counts itself, a byte for the
+//! tev (<https://github.com/Tom94/tev>) listens for packets: a length of four bytes that counts itself, a byte for the
 //! operation, and what it takes, all little-endian. A picture is created once, and its values are replaced at each news.
 
 use std::io::{self, Write};
