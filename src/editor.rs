@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
-use impasto_compiler::partition::explain::{Subject, explain};
-use impasto_compiler::partition::{Calibrated, DeviceProfile, PlanInputs, Strategy};
+use impasto_compiler::partition::{DeviceProfile, PlanInputs, Strategy};
 use impasto_compiler::{Loader, Program, compile_until, diag};
 use impasto_lsp::{Host, PlannedMaterial, ScenePlan};
 use impasto_runtime::device::{Device, DeviceOptions};
@@ -160,17 +159,8 @@ fn of_gpu(
     let profile = DeviceProfile::shipped(&info.name, info.kind).map_err(|e| e.to_string())?;
     let inputs = materials.inputs(&workload, &profile.profile);
     let plan = Strategy::AUTO.plan(&inputs).map_err(|e| e.to_string())?;
-    let subject = Subject {
-        plan: &plan,
-        names: &materials.names,
-        model: Calibrated {
-            costs: &materials.costs,
-            workload: &workload,
-            profile: &profile.profile,
-        },
-        exact: profile.exact,
-    };
-    let explanation = explain(&subject).map_err(|e| e.to_string())?;
+    let explanation = materials.explained(&plan, &workload, &profile.profile, profile.exact);
+    let explanation = explanation.map_err(|e| e.to_string())?;
     let mut of = BTreeMap::new();
     for kernel in &explanation.kernels {
         for member in &kernel.members {

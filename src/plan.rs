@@ -22,8 +22,10 @@ use std::sync::Arc;
 
 use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
+use impasto_compiler::partition::explain::{Explanation, Subject, explain};
 use impasto_compiler::partition::{
-    DeviceProfile, Organisation, Plan, PlanInputs, PlanKernel, Strategy, Workload,
+    Calibrated, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel, Strategy,
+    Workload,
 };
 use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{NOBODY, Planner, Watch, profile_workload};
@@ -82,6 +84,31 @@ impl SceneMaterials {
             workload: Some(workload),
             profile: Some(profile),
         }
+    }
+}
+
+impl SceneMaterials {
+    /// Why a plan of these materials is as it is. Is the profile that of the device, and not one scaled from another's?
+    ///
+    /// # Errors
+    /// If the model knows nothing of the plan.
+    pub fn explained(
+        &self,
+        plan: &Plan,
+        workload: &Workload,
+        profile: &DeviceProfile,
+        exact: bool,
+    ) -> Result<Explanation, PlanError> {
+        explain(&Subject {
+            plan,
+            names: &self.names,
+            model: Calibrated {
+                costs: &self.costs,
+                workload,
+                profile,
+            },
+            exact,
+        })
     }
 }
 

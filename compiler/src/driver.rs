@@ -150,16 +150,11 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
     // First, so that the ABI's structs get their names before the file's own.
     let builder = ProgramBuilder::new(&mut checker);
     if let Some(module) = checker.load(path) {
-        checker.check_items(module);
+        checked = checker.check_all(module);
         let ast = checker.ast(module);
-        for (index, item) in ast.items.iter().enumerate() {
-            if let ast::ItemKind::Material(_) = item.kind {
-                materials.push(item.name.node.clone());
-                checked.extend(checker.material(module, index));
-            }
-        }
-        checker.report_unused_items(module);
-        checker.report_unused_imports(module);
+        let all = ast.items.iter();
+        let of_file = all.filter(|item| matches!(item.kind, ast::ItemKind::Material(_)));
+        materials.extend(of_file.map(|item| item.name.node.clone()));
     }
     if !diag::has_errors(&checker.diagnostics) {
         generate_all(&mut checker, builder, &checked);

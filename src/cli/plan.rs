@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
-use impasto::compiler::partition::explain::{Explanation, Subject, explain};
-use impasto::compiler::partition::{Calibrated, Plan, PlanInputs, Strategy, Workload, file, text};
+use impasto::compiler::partition::explain::Explanation;
+use impasto::compiler::partition::{Plan, PlanInputs, Strategy, Workload, file, text};
 use impasto::plan::{self, OnProcessor, SceneMaterials, unused};
 use impasto::{Device, Gpu, Program, Scene, files};
 use serde::Serialize;
@@ -111,17 +111,8 @@ pub(super) fn run(args: &PlanCommandArgs, global: &Global) -> Outcome {
             strategy.plan(&inputs).map_err(|e| e.to_string())?
         }
     };
-    let subject = Subject {
-        plan: &plan,
-        names: &materials.names,
-        model: Calibrated {
-            costs: &materials.costs,
-            workload: &workload,
-            profile: &profile.profile,
-        },
-        exact: profile.exact,
-    };
-    let explanation = explain(&subject).map_err(|e| e.to_string())?;
+    let explanation = materials.explained(&plan, &workload, &profile.profile, profile.exact);
+    let explanation = explanation.map_err(|e| e.to_string())?;
     drop(meter);
     args.save(&plan, &materials.names, &workload)?;
     if global.json() {

@@ -20,7 +20,7 @@ pub mod manual;
 mod resolve;
 
 pub use crate::sema::notes::{Module, TypeOf};
-pub use resolve::{Local, LocalKind, Occurrence, Role, Symbol};
+pub use resolve::{Local, LocalKind, Occurrence, Role, Symbol, params};
 
 /// What a source text means.
 pub struct Analysis {
@@ -49,15 +49,7 @@ pub fn analyse(path: &str, loader: &mut dyn Loader) -> Analysis {
     let module = checker.load(path);
     if let Some(module) = module {
         checker.take_notes(module);
-        checker.check_items(module);
-        let ast = checker.ast(module);
-        for (index, item) in ast.items.iter().enumerate() {
-            if let ItemKind::Material(_) = item.kind {
-                checker.material(module, index);
-            }
-        }
-        checker.report_unused_items(module);
-        checker.report_unused_imports(module);
+        checker.check_all(module);
     }
     diag::drop_unsure(&mut checker.diagnostics);
     Analysis::new(checker, module)
@@ -233,11 +225,6 @@ pub struct ParamRef<'a> {
     pub of_material: Option<&'a ast::MaterialParam>,
 }
 
-/// The parameters of a definition, in their order.
-pub fn params(item: &ast::Item) -> Vec<ParamRef<'_>> {
-    resolve::params(item)
-}
-
 /// Does what the checker noted of names agree with how they were resolved? What does not, for tests.
 pub fn disagreements(path: &str, loader: &mut dyn Loader) -> Vec<String> {
     let mut checker = Checker::new(loader);
@@ -245,12 +232,7 @@ pub fn disagreements(path: &str, loader: &mut dyn Loader) -> Vec<String> {
         return Vec::new();
     };
     checker.take_notes(module);
-    checker.check_items(module);
-    for index in 0..checker.ast(module).items.len() {
-        if let ItemKind::Material(_) = checker.ast(module).items[index].kind {
-            checker.material(module, index);
-        }
-    }
+    checker.check_all(module);
     let noted = checker.notes.as_ref().map(|n| n.names.clone());
     let analysis = Analysis::new(checker, Some(module));
     let mut wrong = Vec::new();

@@ -207,6 +207,20 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Checks all of a file, the bodies of its materials too; gives those of them that check.
+    pub fn check_all(&mut self, module: ModuleId) -> Vec<ir::Material> {
+        self.check_items(module);
+        let mut materials = Vec::new();
+        for (index, item) in self.ast(module).items.iter().enumerate() {
+            if let ItemKind::Material(_) = item.kind {
+                materials.extend(self.material(module, index));
+            }
+        }
+        self.report_unused_items(module);
+        self.report_unused_imports(module);
+        materials
+    }
+
     /// Warns of private definitions of a file that nothing uses, once all of the file is checked.
     pub fn report_unused_items(&mut self, module: ModuleId) {
         let ast = self.ast(module);

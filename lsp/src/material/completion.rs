@@ -482,7 +482,8 @@ fn call(name: &str, required: &[String], has_more: bool) -> String {
     }
 }
 
-fn kind_of(kind: &ItemKind) -> ProposalKind {
+/// The kind of a definition.
+pub fn kind_of(kind: &ItemKind) -> ProposalKind {
     match kind {
         ItemKind::Material(_) => ProposalKind::Material,
         ItemKind::Closure(_) => ProposalKind::Closure,

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use impasto_compiler::ast::{Item, ItemKind};
+use impasto_compiler::ast::Item;
 use impasto_compiler::parser;
 use impasto_compiler::source::FileId;
 use impasto_stdlib::StdFile;
 
-use super::completion::{Listed, ProposalKind, listed};
+use super::completion::{Listed, ProposalKind, kind_of, listed};
 
 /// A public definition of the library.
 pub struct InLibrary {
@@ -48,20 +48,10 @@ pub fn find(text: &str, query: &str) -> Vec<Found> {
     let fits = |item: &&Item| has_letters(&item.name.node, query);
     let found = |item: &Item| Found {
         name: item.name.node.clone(),
-        kind: kind(&item.kind),
+        kind: kind_of(&item.kind),
         place: item.name.span.range(),
     };
     ast.items.iter().filter(fits).map(found).collect()
-}
-
-fn kind(kind: &ItemKind) -> ProposalKind {
-    match kind {
-        ItemKind::Material(_) => ProposalKind::Material,
-        ItemKind::Closure(_) => ProposalKind::Closure,
-        ItemKind::Function(_) => ProposalKind::Function,
-        ItemKind::Struct(_) => ProposalKind::Struct,
-        ItemKind::Const(_) => ProposalKind::Constant,
-    }
 }
 
 /// Does a name have the letters of a query in their order, in either case?

@@ -318,7 +318,7 @@ impl Server<'_> {
         }
         let (uri, path) = (document.uri.clone(), document.path.clone());
         let items = analysis.ast().map_or(&[][..], |ast| &ast.items);
-        let is_only = materials(items) == 1;
+        let is_only = super::materials_of(&analysis).len() == 1;
         let mut lenses = Vec::new();
         for item in items
             .iter()
@@ -618,11 +618,6 @@ impl Server<'_> {
             }
         }
     }
-}
-
-fn materials(items: &[impasto_compiler::ast::Item]) -> usize {
-    let is_material = |i: &&impasto_compiler::ast::Item| matches!(i.kind, ItemKind::Material(_));
-    items.iter().filter(is_material).count()
 }
 
 fn library_text(given: &Value) -> Answer {
