@@ -78,7 +78,8 @@ local ok, problem = pcall(function()
 
   -- Sources of the repository are laid out already: few lines may move.
   local moved, total = 0, 0
-  for _, source in ipairs(vim.fn.glob("{stdlib,materials}/**/*.impasto", false, true)) do
+  local sources = vim.fn.globpath("stdlib,materials", "**/*.impasto", false, true)
+  for _, source in ipairs(sources) do
     vim.cmd("edit! " .. source)
     local laid_out = vim.api.nvim_buf_get_lines(0, 0, -1, false)
     vim.cmd("silent normal! gg=G")

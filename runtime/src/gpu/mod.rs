@@ -75,9 +75,7 @@ impl Failure {
 
     fn take(&self) -> Option<RuntimeError> {
         let mut first = self.first.lock().unwrap_or_else(PoisonError::into_inner);
-        let error = first.take()?;
-        let lost = self.lost.get().cloned();
-        Some(lost.map_or(error, RuntimeError::DeviceLost))
+        first.take()
     }
 }
 
@@ -237,7 +235,14 @@ impl Gpu {
 
     /// The first error since the device was opened, if there was any.
     pub(crate) fn check(&self) -> Result<(), RuntimeError> {
-        self.failure.take().map_or(Ok(()), Err)
+        let Some(error) = self.failure.take() else {
+            return Ok(());
+        };
+        // A device that was given up refuses calls before it says that it is lost: only a poll that finds its queue empty
+        // makes it say so (wgpu-core 30, `Device::maintain`).
+        let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let lost = self.failure.lost.get().cloned();
+        Err(lost.map_or(error, RuntimeError::DeviceLost))
     }
 
     /// Fails if a storage buffer of `bytes` for `what` is more than a kernel can bind.
