@@ -38,6 +38,12 @@ use crate::{Gpu, RuntimeError, Scene};
 /// Iterations whose mean a workload is.
 const ITERATIONS: u32 = 16;
 
+/// At how many points of surfaces materials are evaluated to see what they cost.
+pub const POINTS: usize = 1024;
+
+/// Materials for which a plan is renewed while rendering: searching one and compiling it takes too long for more.
+pub const MOST_RENEWED: usize = 256;
+
 /// What is known of a scene's materials without rendering it.
 #[derive(Clone, Debug)]
 pub struct SceneMaterials {

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use impasto::compiler::ParameterValue;
 use impasto::compiler::interface::Value;
-use impasto::live::engine::{Answer, Engine, News, Order, ParamId, Picture, State};
+use impasto::live::engine::{
+    Answer, Engine, LayerKind, News, Order, ParamId, Picture, PictureLayer, State,
+};
 use impasto::live::{Live, LiveOptions};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::scene::{Asked, Camera, FilmSettings, GivenParam};
@@ -529,7 +531,7 @@ fn sizes_crops_outputs_strategies_and_ends_are_followed() {
     room.picture_after(0);
     room.live
         .order(Order::Outputs(vec!["depth".into(), "material".into()]));
-    let with_layers = |news: &News| news.picture.as_ref().is_some_and(|p| p.layers.len() == 2);
+    let with_layers = |news: &News| news.picture.as_ref().is_some_and(|p| p.layers.len() >= 2);
     let picture = room.wait("layers", with_layers).picture.expect("a picture");
     let depth = picture
         .layers
@@ -570,4 +572,166 @@ fn sizes_crops_outputs_strategies_and_ends_are_followed() {
     );
     room.live.order(Order::Pause(true));
     room.wait("pause", |news| news.state == State::Paused);
+}
+
+/// A layer of a picture, by its name.
+fn layer<'p>(picture: &'p Picture, name: &str) -> Option<&'p PictureLayer> {
+    picture.layers.iter().find(|layer| layer.name == name)
+}
+
+#[test]
+fn what_pixels_see_and_how_wrong_they_are_is_found_beside_the_picture() {
+    let slow = LiveOptions {
+        samples: 4096,
+        ..options(Choice::Cpu)
+    };
+    let room = Room::new("scene.toml", slow);
+    let news = room.rested();
+    let names: Vec<&str> = news
+        .project
+        .own_layers
+        .iter()
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(names, ["error", "cost", "kernel"]);
+
+    // The curve of the error falls, though no error was asked for.
+    let errors = &news.errors;
+    assert!(errors.len() >= 3, "{errors:?}");
+    let (first, last) = (&errors[0], &errors[errors.len() - 1]);
+    assert_eq!(last.samples, 4096);
+    assert!(
+        last.relmse > 0.0 && last.relmse < 0.5 * first.relmse,
+        "{errors:?}"
+    );
+    let picture = news.picture.clone().expect("a picture");
+    let error = layer(&picture, "error").expect("errors of pixels");
+    assert_eq!(error.values.len(), 16 * 12);
+    let mean_square = error.values.iter().map(|e| e * e).sum::<f32>() / error.values.len() as f32;
+    let ratio = f64::from(mean_square) / last.relmse;
+    assert!(
+        (0.05..20.0).contains(&ratio),
+        "{ratio}: both tell of the same error"
+    );
+
+    // What materials cost is known without being asked for, and where they are seen once it is.
+    let news = room.wait("costs", |news| {
+        let operations = &news.kernels.operations;
+        operations.len() == 2 && operations.iter().all(Option::is_some)
+    });
+    let operations: Vec<f32> = news
+        .kernels
+        .operations
+        .iter()
+        .map(|o| o.unwrap_or(0.0) as f32)
+        .collect();
+    assert!(
+        operations[0] > operations[1],
+        "a coat costs more than none: {operations:?}"
+    );
+    assert!(news.picture.is_some_and(|p| layer(&p, "cost").is_none()));
+    room.live.order(Order::Survey(true));
+    let has_both = |news: &News| {
+        let picture = news.picture.as_deref();
+        picture.is_some_and(|p| layer(p, "cost").is_some() && layer(p, "kernel").is_some())
+    };
+    let seen = room.wait("layers", has_both).picture.expect("a picture");
+    assert_eq!(seen.pixels, picture.pixels, "the picture stays");
+    let (wall, bulb, beside) = (6 * 16 + 8, 3 * 16 + 8, 0);
+    let cost = layer(&seen, "cost").expect("costs");
+    let kernel = layer(&seen, "kernel").expect("kernels");
+    let LayerKind::Index(kernels) = &kernel.kind else {
+        panic!("kernels have names");
+    };
+    for (pixel, expected) in [(wall, "paint"), (bulb, "lamp")] {
+        let binding = usize::from(pixel == bulb);
+        assert_eq!(cost.values[pixel], operations[binding]);
+        let name = &kernels[kernel.values[pixel] as usize];
+        assert!(
+            name.contains(expected),
+            "{name} is the kernel of {expected}"
+        );
+    }
+    // From afar the wall has an end, and there is nothing beside it.
+    let mut far = picture.camera.expect("a camera");
+    far.position.z = 30.0;
+    room.live.order(Order::Look(far));
+    let is_far = |news: &News| {
+        let far = news.picture.as_ref().is_some_and(|p| p.camera == Some(far));
+        far && has_both(news)
+    };
+    let seen = room
+        .wait("layers from afar", is_far)
+        .picture
+        .expect("a picture");
+    let cost = layer(&seen, "cost").expect("costs");
+    assert_eq!(cost.values[beside], 0.0);
+    assert_eq!(cost.values[wall], operations[0]);
+    room.live.order(Order::Survey(false));
+    room.live.order(Order::Restart);
+    let is_without = |news: &News| {
+        let again = |p: &&Arc<Picture>| p.number > seen.number;
+        news.picture
+            .as_ref()
+            .filter(again)
+            .is_some_and(|p| layer(p, "cost").is_none())
+    };
+    room.wait("picture without them", is_without);
+}
+
+#[test]
+fn a_device_that_is_lost_is_opened_again() {
+    let room = Room::new("scene.toml", options(Choice::Gpu));
+    let done = room.rested().picture.expect("a picture");
+    let mut camera = done.camera.expect("a camera");
+    room.live.lose();
+    camera.position.y += 0.3;
+    room.live.order(Order::Look(camera));
+    let moved = |news: &News| {
+        let picture = news.picture.as_ref();
+        news.state == State::Done && picture.is_some_and(|p| p.camera == Some(camera))
+    };
+    let news = room.wait("end on the new device", moved);
+    assert!(news.problems.is_empty(), "{:?}", news.problems);
+    let expected = rendered(&room.at("scene.toml"), Choice::Gpu, Some(camera), &[]);
+    check(&room.film(), &expected);
+    // One that is lost again at once is not worth another attempt, and that is said.
+    room.live.lose();
+    room.live.order(Order::Restart);
+    let news = room.wait("failure", |news| matches!(news.state, State::Failed(_)));
+    let State::Failed(why) = &news.state else {
+        unreachable!("it was waited for");
+    };
+    assert!(why.contains("the GPU was lost while rendering"), "{why}");
+    assert!(news.picture.is_some(), "the last picture stays");
+}
+
+/// Editors that save all the time, in place and by renaming, whole and half.
+#[test]
+fn a_thousand_saves_end_with_the_last_one() {
+    let room = Room::new("paint.impasto", options(Choice::Cpu));
+    room.picture_after(0);
+    let begun = Instant::now();
+    for save in 0..1000 {
+        let text = PAINT.replace("= 0.25 in", &format!("= 0.{:03} in", 1 + save % 900));
+        match save % 4 {
+            0 => room.write("paint.impasto", &text),
+            1 => room.write("paint.impasto", &text[..text.len() / 2]),
+            2 => {
+                room.write("saved.impasto", &text);
+                std::fs::rename(room.at("saved.impasto"), room.at("paint.impasto"))
+                    .expect("renamed");
+            }
+            _ => std::fs::remove_file(room.at("paint.impasto")).expect("removed"),
+        }
+        std::thread::sleep(Duration::from_micros(500));
+    }
+    assert!(begun.elapsed() < Duration::from_secs(60));
+    room.write("paint.impasto", &PAINT.replace("= 0.25 in", "= 0.875 in"));
+    let last = room.wait("last save", |news| {
+        news.state == State::Done && value(news, "roughness") == Value::Number(0.875)
+    });
+    assert!(last.problems.is_empty(), "{:?}", last.problems);
+    let expected = rendered(&room.at("paint.impasto"), Choice::Cpu, None, &[]);
+    check(&room.film(), &expected);
 }

@@ -21,11 +21,17 @@ mod textures;
 mod trace;
 mod tutorial;
 mod until;
+#[cfg(feature = "window")]
+mod window;
 
 #[path = "../compiler/tests/common/listed.rs"]
 mod listed;
 #[path = "../compiler/tests/common/record.rs"]
 mod record;
+#[cfg(feature = "window")]
+#[path = "../viewer/tests/screen/mod.rs"]
+#[allow(clippy::unwrap_used)]
+mod screen;
 
 #[test]
 fn every_file_of_tests_is_in_the_program() {

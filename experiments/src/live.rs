@@ -155,6 +155,17 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
         let paths = rate(&picture) * f64::from(size[0]) * f64::from(size[1]);
         eprintln!("left alone: {:.2} million paths a second", paths * 1e-6);
     }
+    let kernels = engine.live.news().kernels;
+    for kernel in &kernels.kernels {
+        let share = kernel
+            .share
+            .map_or(String::new(), |share| format!("{:.1} %", 100.0 * share));
+        eprintln!("  {:<32} {share}", kernel.name);
+    }
+    kernels
+        .reasons
+        .iter()
+        .for_each(|reason| eprintln!("  {reason}"));
     Ok(())
 }
 

@@ -171,7 +171,7 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         renderer.replan(|index| {
             let (scene, program) = (scene.clone(), program.clone());
             let profile = profiles[index].profile.clone();
-            let planner = plan::planner(strategy, scene, program.clone(), profile, POINTS);
+            let planner = plan::planner(strategy, scene, program.clone(), profile, plan::POINTS);
             Replanning::new(program, planner)
         });
     }
@@ -204,12 +204,6 @@ pub(super) const COMPILING: &str = "compiling materials";
 
 /// Samples per pixel where nothing is said of them.
 const SAMPLES: u32 = 64;
-
-/// Materials for which a plan is renewed: searching one and compiling it takes too long for more.
-const MOST_RENEWED: usize = 256;
-
-/// At how many points of surfaces materials are evaluated to see what they cost.
-const POINTS: usize = 1024;
 
 /// The plan that a render begins with.
 struct Planned {
@@ -256,7 +250,7 @@ impl RenderArgs {
         match strategy.requires() {
             Requires::Nothing | Requires::Measurements => planned(&inputs),
             Requires::Costs => {
-                let materials = plan::SceneMaterials::new(scene, program, POINTS);
+                let materials = plan::SceneMaterials::new(scene, program, plan::POINTS);
                 planned(&PlanInputs {
                     costs: Some(&materials.costs),
                     ..inputs
@@ -264,7 +258,7 @@ impl RenderArgs {
             }
             Requires::Workload => Ok(Planned {
                 plan: begun(),
-                renewed_by: (names.len() <= MOST_RENEWED).then_some(strategy),
+                renewed_by: (names.len() <= plan::MOST_RENEWED).then_some(strategy),
             }),
         }
     }

@@ -9,7 +9,7 @@ use impasto::live::{Live, LiveOptions, engine::ParamId};
 use impasto::set::SAMPLE;
 use impasto::shot::param::{self, ParamOption};
 use impasto::tev::{self, Address, Told};
-use impasto::{files, shot};
+use impasto::{files, goal, shot};
 
 use super::completions::Known;
 use super::info::DeviceArgs;
@@ -35,9 +35,10 @@ pub(super) struct ViewArgs {
     /// Samples of a pixel after which the picture rests
     #[arg(long, value_name = "COUNT", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
-    /// Rest when the error is small enough or the time is up, as in `relmse=1e-3` (docs/until.md)
-    #[arg(long, value_name = "GOAL")]
-    until: Option<String>,
+    /// Rest when the error is small enough or the time is up, as `impasto render` has it. May be given several times: what
+    /// is reached first counts
+    #[arg(long, value_name = "GOAL", value_parser = Known::new(goal_text, goal::kinds), hide_possible_values = true)]
+    until: Vec<String>,
     /// Width and height of the picture in pixels, as in 640x480; the scene's own by default
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
@@ -92,6 +93,11 @@ pub(super) fn run(args: &ViewArgs, global: &Global, jobs: Option<&Sender<Job>>) 
         Some(address) => send(&live, address, global),
         None => args.window(live, jobs),
     }
+}
+
+/// A goal as it is written, if it is one.
+fn goal_text(text: &str) -> Result<String, String> {
+    goal::parse(text).map(|_| text.to_owned())
 }
 
 impl ViewArgs {
@@ -149,10 +155,15 @@ impl ViewArgs {
             frame: self.frame,
             outputs: self.aov.clone(),
             strategy: self.strategy.clone(),
-            until: self.until.clone(),
+            until: self.until(),
             pool: self.pool,
             technique: self.technique.technique(),
         })
+    }
+
+    /// All goals, if there are any.
+    fn until(&self) -> Option<String> {
+        (!self.until.is_empty()).then(|| self.until.join(","))
     }
 
     #[cfg(feature = "window")]
@@ -165,6 +176,7 @@ impl ViewArgs {
             exposure: self.exposure,
             save_as: self.out.clone(),
             compare_with: self.compare.clone(),
+            until: self.until(),
         };
         let work = move || impasto_viewer::window::run(Box::new(live), options);
         super::on_main_thread(jobs, work)?.map_err(Failure::Error)

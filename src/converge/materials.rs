@@ -7,7 +7,7 @@ use impasto_compiler::partition::Plan;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::{Renderer, Samples};
 use impasto_runtime::technique::Sampler;
-use impasto_runtime::world::first_hit;
+use impasto_runtime::world::first_hit::FirstHits;
 
 use super::StudyError;
 use super::data::MaterialShare;
@@ -39,7 +39,7 @@ pub(super) fn shares(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<MaterialShare>, StudyError> {
     let scene = stage.subject.scene;
-    let seen = first_hit::materials(scene);
+    let seen = FirstHits::new(scene).materials(&scene.camera);
     let pixels = by_material(&seen);
     let seconds = match store.times(&plan.strategy, sampler) {
         Some(kept) if kept.keys().eq(pixels.keys()) => kept,

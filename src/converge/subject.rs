@@ -11,10 +11,7 @@ use impasto_runtime::world::World;
 
 use super::StudyError;
 use super::store::Key;
-use crate::plan::{self, SceneMaterials};
-
-/// At how many points of surfaces materials are evaluated to see what they cost.
-const POINTS: usize = 1024;
+use crate::plan::{self, POINTS, SceneMaterials};
 
 /// A scene whose materials are compiled.
 #[derive(Debug)]

@@ -21,6 +21,7 @@ use impasto_viewer::engine::{ParamId, Problem};
 use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::Described;
+use super::shared::Origin;
 
 /// A submission takes about so long at most, so that orders are heard soon: on a GPU of its own, and elsewhere.
 const ANSWER: Duration = Duration::from_millis(4);
@@ -43,6 +44,7 @@ pub(super) enum Code {
 pub(super) struct Built<'d> {
     pub renderer: Renderer<'d>,
     pub code: Code,
+    pub origin: Origin,
     pub scene: Arc<Scene>,
     pub program: Arc<Program>,
     /// The requests that the program is of.
@@ -63,7 +65,8 @@ pub(super) struct Built<'d> {
 /// What kernels are built of.
 pub(super) struct Ingredients {
     pub code: Code,
-    pub scene: Scene,
+    pub origin: Origin,
+    pub scene: Arc<Scene>,
     pub program: Arc<Program>,
     pub requests: Vec<MaterialRequest>,
     pub values: Values,
@@ -96,7 +99,8 @@ impl<'d> Built<'d> {
             renderer,
             code: of.code,
             camera: of.scene.camera,
-            scene: Arc::new(of.scene),
+            origin: of.origin,
+            scene: of.scene,
             program: of.program,
             requests: of.requests,
             values: of.values,

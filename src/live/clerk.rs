@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use impasto_runtime::film::{Film, exr, output};
-use impasto_runtime::world::first_hit;
 use impasto_viewer::engine::{Answer, Order, Picked, Picture, Traced};
 
 use super::shared::{Shared, Shown};
@@ -24,7 +23,7 @@ pub(super) fn work(shared: &Shared) {
 fn done(shared: &Shared, errand: Order) -> Option<Answer> {
     let shown = shared.shown();
     Some(match errand {
-        Order::Pick(pixel) => Answer::Picked(shown.and_then(|shown| picked(&shown, pixel))),
+        Order::Pick(pixel) => Answer::Picked(shown.and_then(|shown| picked(shared, &shown, pixel))),
         Order::Trace { pixel, sample } => Answer::Traced(match shown {
             Some(shown) => traced(&shown, pixel, sample),
             None => untraced(pixel, sample, "there is no picture yet".into()),
@@ -42,8 +41,8 @@ fn done(shared: &Shared, errand: Order) -> Option<Answer> {
 const NOTHING: &str = "there is no picture yet\n  hint: save again once there is one";
 
 /// What is at a pixel.
-fn picked(shown: &Shown, pixel: [u32; 2]) -> Option<Picked> {
-    let seen = first_hit::at(&shown.scene, &shown.camera, pixel)?;
+fn picked(shared: &Shared, shown: &Shown, pixel: [u32; 2]) -> Option<Picked> {
+    let seen = shared.first_hits(shown).at(&shown.camera, pixel)?;
     let binding = seen.material.map(|material| material as usize);
     let instances = shown.program.instances();
     let material = binding.and_then(|binding| Some(instances.get(binding)?.info.material));

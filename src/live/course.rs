@@ -3,6 +3,7 @@
 //! A picture begins coarse where all of its pixels would take long: one pixel of each square, then the others. From then
 //! on portions grow, so that pictures are soon and then seldom, and handing them out takes little of the time.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use impasto_runtime::film::Sums;
@@ -19,6 +20,8 @@ const COARSEST: u32 = 8;
 const BETWEEN: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)];
 /// Handing out pictures takes at most so much of the time.
 const SHARE: u32 = 16;
+/// So long no error is estimated: a hand moves on.
+const UNESTIMATED: Duration = Duration::from_millis(250);
 
 /// How fast samples were taken lately.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +101,12 @@ pub(super) struct Course {
     /// Samples that the next half is to have as well.
     pair: Option<u32>,
     halves: Option<Halves>,
+    /// Where no error is asked for: the film at half of the samples by which it is estimated all the same, and how many it
+    /// had.
+    half: Option<(u32, Sums)>,
     pub checks: Vec<Check>,
+    /// The estimated relative standard error of each pixel, at the last check.
+    pub errors: Option<Arc<Vec<f32>>>,
     pub is_reached: bool,
     /// Pictures that were handed out.
     pub pictures: u32,
@@ -116,7 +124,9 @@ impl Course {
             coarse: None,
             pair: None,
             halves: None,
+            half: None,
             checks: Vec::new(),
+            errors: None,
             is_reached: false,
             pictures: 0,
             silent_below,
@@ -192,31 +202,66 @@ impl Course {
             || (self.samples() >= self.silent_below && (self.pair.is_none() || self.samples() == 1))
     }
 
-    /// Looks at the error after a half: the film holds the samples of both.
+    /// Looks at the error: the film holds all samples.
     pub(super) fn look(&mut self, step: &Step, asked: &Asked, sums: &Sums) {
-        let (Some(goals), None) = (&asked.goals, self.coarse) else {
+        if self.coarse.is_some() {
             return;
-        };
+        }
+        match &asked.goals {
+            Some(goals) => self.pursue(goals, step.half, sums),
+            None => self.estimate(asked, sums),
+        }
+    }
+
+    /// After a half of a pair by two seeds.
+    fn pursue(&mut self, goals: &Goals, half: usize, sums: &Sums) {
         let halves = self
             .halves
             .get_or_insert_with(|| Halves::new(&sums.emptied()));
-        halves.update(step.half, sums);
+        halves.update(half, sums);
         let seconds = self.begun.elapsed();
-        if step.half == 1
-            && let Some([mse, relmse]) = halves.errors()
-        {
-            let check = Check {
-                samples: self.samples(),
-                seconds: seconds.as_secs_f64(),
-                gpu_seconds: 0.0,
-                relmse,
-                rmse: mse.sqrt(),
-            };
-            self.checks.push(check);
+        let estimated = (half == 1).then(|| halves.errors_and_pixels()).flatten();
+        if let Some(estimated) = estimated {
+            let check = self.check(estimated);
             self.is_reached = goals.reached(&check).is_some();
         }
         let is_over = |time: Duration| seconds >= time;
         self.is_reached |= goals.time.is_some_and(is_over);
+    }
+
+    /// Of samples of one seed the earlier ones are a half and the later ones the other. They lie better than independent
+    /// ones, each half in the gaps of the other, so that the estimate is rather too large. It is made each time that
+    /// there are twice as many, so that it takes little time however long the picture is rendered.
+    fn estimate(&mut self, asked: &Asked, sums: &Sums) {
+        let samples = self.samples();
+        if self.begun.elapsed() < UNESTIMATED {
+            return;
+        }
+        let estimated = match &self.half {
+            Some((at, _)) if samples < 2 * at && samples < asked.samples || samples == *at => {
+                return;
+            }
+            Some((_, half)) => Halves::of(half, sums).errors_and_pixels(),
+            None => None,
+        };
+        if let Some(estimated) = estimated {
+            self.check(estimated);
+        }
+        self.half = Some((samples, sums.without_outputs()));
+    }
+
+    /// Notes an estimated error.
+    fn check(&mut self, ([mse, relmse], pixels): ([f64; 2], Vec<f32>)) -> Check {
+        let check = Check {
+            samples: self.samples(),
+            seconds: self.begun.elapsed().as_secs_f64(),
+            gpu_seconds: 0.0,
+            relmse,
+            rmse: mse.sqrt(),
+        };
+        self.errors = Some(Arc::new(pixels));
+        self.checks.push(check);
+        check
     }
 
     /// Must sums be read after a step even if nobody is shown them?

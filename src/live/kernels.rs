@@ -7,10 +7,19 @@ use impasto_runtime::render::Sitting;
 use impasto_viewer::engine::{Kernel, Kernels};
 
 use super::built::Built;
+use super::survey::Survey;
 use crate::plan::OnProcessor;
 
-/// The kernels that render, since a sitting began.
-pub(super) fn of(device: &Device, built: &Built<'_>, sitting: &Sitting) -> Kernels {
+/// The kernels that render, since a sitting began, with what was found beside the picture.
+pub(super) fn of(
+    device: &Device,
+    built: &Built<'_>,
+    sitting: &Sitting,
+    survey: Option<&Survey>,
+) -> Kernels {
+    let survey = survey.filter(|survey| survey.origin == Some(built.origin));
+    let explained = survey.and_then(|survey| survey.explained.as_ref());
+    let explained = explained.filter(|(plan, _)| plan == built.renderer.plan());
     let reports = built.renderer.kernels_of(sitting);
     let all: f64 = reports.iter().map(|kernel| kernel.gpu_seconds).sum();
     let is_timed = built.renderer.is_timed() && all > 0.0;
@@ -23,8 +32,14 @@ pub(super) fn of(device: &Device, built: &Built<'_>, sitting: &Sitting) -> Kerne
         device: device.info().name,
         strategy: built.renderer.strategy().to_owned(),
         kernels: reports.into_iter().map(kernel).collect(),
-        reasons: built.reasons.clone(),
-        operations: vec![None; built.scene.materials.len()],
+        reasons: match explained {
+            Some((_, lines)) if !lines.is_empty() => lines.clone(),
+            _ => built.reasons.clone(),
+        },
+        operations: match survey {
+            Some(survey) => survey.operations.clone(),
+            None => vec![None; built.scene.materials.len()],
+        },
     }
 }
 
@@ -62,5 +77,5 @@ pub(super) fn reasons(
 }
 
 /// What `auto` does while one changes things.
-const AUTO: &str = "a kernel a material while things change: `impasto plan` says what `auto` makes of the scene in a \
-                    long render";
+const AUTO: &str = "a kernel a material while things change; on a GPU of its own a plan is made once the picture is left \
+                    alone";

@@ -8,30 +8,31 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 use impasto_compiler::diag;
-use impasto_compiler::partition::{Plan, PlanInputs, Requires, Strategy};
+use impasto_compiler::partition::{DeviceProfile, Plan, PlanInputs, Requires, Strategy};
 use impasto_compiler::{self as compiler, MaterialRequest, Moment, Program};
 use impasto_runtime::device::Device;
 use impasto_runtime::error::{RuntimeError, SceneError};
 use impasto_runtime::film::outputs::ask_for_looks;
 use impasto_runtime::options::RenderOptions;
-use impasto_runtime::render::Renderer;
+use impasto_runtime::render::{Renderer, Replanning};
 use impasto_runtime::scene::{Asked, FilmSettings, Scene};
 use impasto_runtime::world::bvh::Trees;
 use impasto_runtime::world::{MaterialSource, World};
 use impasto_viewer::engine::{Problem, State};
 
+use super::LiveOptions;
 use super::built::{Built, Code, Ingredients, requests, settable};
 use super::kernels;
 use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::describe;
-use super::shared::{Shared, lock};
+use super::shared::{Origin, Shared, lock};
 use super::wanted::Wanted;
-use super::{LiveOptions, POINTS};
 use crate::files::FileLoader;
-use crate::plan::{self, SceneMaterials};
+use crate::plan::{self, POINTS, SceneMaterials};
 use crate::set::Sample;
 use crate::shot::{self, Subject};
 
@@ -306,7 +307,17 @@ impl<'d, 's> Maker<'d, 's> {
         }
         problems.extend(scene.warnings.iter().map(|w| problems::warning(w)));
         self.tell(is_shown, State::Building);
-        let options = self.render_options(&scene, wanted);
+        let scene = Arc::new(scene);
+        let strategy = wanted.strategy.unwrap_or_else(|| self.device.strategy());
+        // What is final renders for long enough to be worth a plan of its own.
+        let is_renewed = job.code == Code::Final
+            && is_fast(self.device)
+            && strategy.requires() == Requires::Workload
+            && program.materials().len() <= plan::MOST_RENEWED;
+        let options = RenderOptions {
+            count_hits: is_renewed,
+            ..self.render_options(&scene, wanted)
+        };
         let instances = MaterialSource::instances(&*program);
         let (technique, outputs) = (&options.technique, &options.outputs);
         let world = World::of_instances(
@@ -319,7 +330,7 @@ impl<'d, 's> Maker<'d, 's> {
         )?;
         described.project.bounds = Some(world.parts.bounds.map(|corner| corner.to_array()));
         self.check_cancelled()?;
-        let plan = planned(wanted.strategy, &scene, &program, self.device);
+        let plan = planned(strategy, &scene, &program);
         let plan = plan.map_err(|why| Stop::Wrong(vec![problems::of_order(why)]))?;
         let watch = |_, _| {
             if self.mailbox.is_cancelled() {
@@ -328,13 +339,21 @@ impl<'d, 's> Maker<'d, 's> {
                 ControlFlow::Continue(())
             }
         };
-        let renderer =
+        let mut renderer =
             Renderer::from_world_beside(self.device, &world, &*program, &plan, &options, &watch)?;
+        if is_renewed {
+            self.renew(&mut renderer, strategy, &scene, &program);
+        }
         let reasons = kernels::reasons(&plan, renderer.plan(), &program, self.device);
         let built = Built::new(
             renderer.named(&scene.name),
             Ingredients {
                 code: job.code,
+                origin: Origin {
+                    reading: self.readings,
+                    frame: wanted.frame,
+                    size: [scene.film.width, scene.film.height],
+                },
                 scene,
                 program,
                 requests,
@@ -437,6 +456,27 @@ impl<'d, 's> Maker<'d, 's> {
         Ok((program, problems))
     }
 
+    /// Lets a plan be made in the midst of the render, for what paths turn out to hit.
+    fn renew(
+        &self,
+        renderer: &mut Renderer<'_>,
+        strategy: Strategy,
+        scene: &Arc<Scene>,
+        program: &Arc<Program>,
+    ) {
+        let info = self.device.info();
+        // Without a profile the plan stays.
+        let Ok(choice) = DeviceProfile::shipped(&info.name, info.kind) else {
+            return;
+        };
+        let (profile, of) = (choice.profile, (scene.clone(), program.clone()));
+        let planner = plan::planner(strategy, of.0, of.1, profile, POINTS);
+        renderer.replan(Replanning {
+            worthwhile: Duration::ZERO,
+            ..Replanning::new(program.clone(), planner)
+        });
+    }
+
     fn render_options(&self, scene: &Scene, wanted: &Wanted) -> RenderOptions {
         let size = [scene.film.width, scene.film.height];
         RenderOptions {
@@ -475,17 +515,10 @@ fn is_same(a: &Program, b: &Program) -> bool {
     a.tables() == b.tables() && text(a) == text(b)
 }
 
-/// The plan of a strategy. Those that must know how paths hit materials have a kernel a material: what `auto` would
-/// change in the midst of a render is not worth as much to who changes the scene all the time.
-fn planned(
-    strategy: Option<Strategy>,
-    scene: &Scene,
-    program: &Program,
-    device: &Device,
-) -> Result<Plan, String> {
+/// The plan of a strategy. Those that must know how paths hit materials begin with a kernel a material.
+fn planned(strategy: Strategy, scene: &Scene, program: &Program) -> Result<Plan, String> {
     let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
     let unused = plan::unused(scene, program);
-    let strategy = strategy.unwrap_or_else(|| device.strategy());
     let inputs = PlanInputs {
         unused: &unused,
         ..PlanInputs::of_names(&names)

@@ -10,6 +10,7 @@
 //! | `make` (`maker`) | reads files, compiles, and builds kernels beside the render |
 //! | `watch` | looks whether files changed |
 //! | `errands` (`clerk`) | picks, replays paths, reads and writes files |
+//! | `survey` | finds what is said beside the picture once the hand rests: costs, reasons, what pixels see |
 //!
 //! Cameras and values of parameters are data: an order that changes them begins the picture again and compiles
 //! nothing. The first picture after an order is coarse where all pixels would take long. What is left alone ends with
@@ -40,6 +41,7 @@ mod problems;
 mod project;
 mod session;
 mod shared;
+mod survey;
 mod wanted;
 mod written;
 
@@ -49,8 +51,6 @@ use wanted::Wanted;
 
 /// Compiling materials recurses.
 const STACK_BYTES: usize = 32 << 20;
-/// Points at which materials are evaluated to see what they cost.
-const POINTS: usize = 1024;
 /// How long files are left alone that are saved: editors save in several steps.
 const SETTLED: Duration = Duration::from_millis(20);
 
@@ -129,8 +129,16 @@ impl Live {
         live.spawn("live", move || render(&own, &path, &options))?;
         let own = shared.clone();
         live.spawn("watch", move || watch(&own))?;
+        let own = shared.clone();
+        live.spawn("survey", move || survey::work(&own))?;
         live.spawn("errands", move || clerk::work(&shared))?;
         Ok(live)
+    }
+
+    /// Has the device given up, as a driver does that a kernel takes too long. So that one can test what is shown then.
+    #[doc(hidden)]
+    pub fn lose(&self) {
+        self.shared.lose();
     }
 
     fn spawn(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
@@ -183,6 +191,7 @@ fn wanted(options: &LiveOptions) -> Wanted {
         dragged: false,
         frame: options.frame,
         outputs: Vec::new(),
+        surveys: false,
         samples: options.samples.max(1),
         goals: None,
         strategy: None,

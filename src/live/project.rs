@@ -65,6 +65,7 @@ pub(super) fn describe(path: &Path, is_scene: bool, scene: &Scene) -> Described 
             .iter()
             .map(|output| (output.name.to_owned(), output.what.to_owned()))
             .collect(),
+        own_layers: super::survey::own_layers(),
         strategies: strategies(),
         frames: keys.frames,
     };

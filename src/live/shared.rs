@@ -2,24 +2,36 @@
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use impasto_compiler::Program;
 use impasto_runtime::film::file::FilmFile;
 use impasto_runtime::scene::{Camera, Scene};
+use impasto_runtime::world::first_hit::FirstHits;
 use impasto_viewer::engine::{Answer, News, Order, Picture};
 
+use super::survey::{Planned, Survey};
 use super::wanted::{Effect, Wanted};
 use crate::shot::watch::Watched;
 
 /// Calls a window.
 type Wake = Arc<dyn Fn() + Send + Sync>;
 
+/// What a scene was made of: of two with the same, all is the same but camera and values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Origin {
+    /// Counts how often files were read.
+    pub reading: u64,
+    pub frame: Option<u32>,
+    pub size: [u32; 2],
+}
+
 /// What is shown: what errands are about.
 #[derive(Clone)]
 pub(super) struct Shown {
+    pub origin: Origin,
     pub scene: Arc<Scene>,
     pub program: Arc<Program>,
     pub camera: Camera,
@@ -27,7 +39,12 @@ pub(super) struct Shown {
     /// The sums that the picture is the mean of, unless it is a coarse one; and whether they are of one seed.
     pub film: Option<(Arc<FilmFile>, bool)>,
     pub seed: u32,
+    /// The plan, where it is known how paths hit materials.
+    pub planned: Option<Planned>,
 }
+
+/// A scene that rays are cast through, and what it was made of.
+type Cast = (Origin, Arc<FirstHits<Arc<Scene>>>);
 
 /// What threads share.
 pub(super) struct Shared {
@@ -41,6 +58,9 @@ pub(super) struct Shared {
     answers: Mutex<Vec<Answer>>,
     wake: Mutex<Option<Wake>>,
     shown: Mutex<Option<Shown>>,
+    survey: Mutex<Option<Arc<Survey>>>,
+    loses: AtomicBool,
+    cast: Mutex<Option<Cast>>,
     watched: Mutex<Watched>,
 }
 
@@ -59,6 +79,9 @@ impl Shared {
             answers: Mutex::default(),
             wake: Mutex::default(),
             shown: Mutex::default(),
+            survey: Mutex::default(),
+            loses: AtomicBool::new(false),
+            cast: Mutex::default(),
             watched: Mutex::default(),
         }
     }
@@ -179,6 +202,39 @@ impl Shared {
 
     pub(super) fn shown(&self) -> Option<Shown> {
         lock(&self.shown).clone()
+    }
+
+    /// What can be asked of the scene that is shown. Whoever asks first makes it, and others wait for that.
+    pub(super) fn first_hits(&self, shown: &Shown) -> Arc<FirstHits<Arc<Scene>>> {
+        let mut cast = lock(&self.cast);
+        if let Some((_, hits)) = cast.as_ref().filter(|(of, _)| *of == shown.origin) {
+            return hits.clone();
+        }
+        let hits = Arc::new(FirstHits::new(shown.scene.clone()));
+        *cast = Some((shown.origin, hits.clone()));
+        hits
+    }
+
+    /// Has the device given up before anything else is done.
+    pub(super) fn lose(&self) {
+        self.loses.store(true, Ordering::SeqCst);
+        self.ring();
+    }
+
+    /// Whether the device is to be given up, once each time.
+    pub(super) fn takes_loss(&self) -> bool {
+        self.loses.swap(false, Ordering::SeqCst)
+    }
+
+    /// Notes what was found, and tells whoever renders.
+    pub(super) fn set_survey(&self, survey: Arc<Survey>) {
+        *lock(&self.survey) = Some(survey);
+        self.ring();
+    }
+
+    /// What was found since the last call, if anything was.
+    pub(super) fn take_survey(&self) -> Option<Arc<Survey>> {
+        lock(&self.survey).take()
     }
 
     /// Has files looked at from now on.

@@ -35,6 +35,8 @@ pub(super) struct Wanted {
     pub dragged: bool,
     pub frame: Option<u32>,
     pub outputs: Vec<String>,
+    /// Is it looked at what pixels see, and by which kernels?
+    pub surveys: bool,
     pub samples: u32,
     pub goals: Option<Goals>,
     pub strategy: Option<Strategy>,
@@ -121,6 +123,10 @@ impl Wanted {
                 if had_goals == self.goals.is_some() {
                     return Effect::Course;
                 }
+            }
+            Order::Survey(surveys) => {
+                self.surveys = surveys;
+                return Effect::Course;
             }
             Order::Samples(samples) => {
                 self.samples = samples.max(1);

@@ -28,6 +28,24 @@ pub trait Engine {
     fn on_news(&self, wake: Box<dyn Fn() + Send + Sync>);
 }
 
+impl<E: Engine + ?Sized> Engine for Arc<E> {
+    fn order(&self, order: Order) {
+        (**self).order(order);
+    }
+
+    fn news(&self) -> News {
+        (**self).news()
+    }
+
+    fn answers(&self) -> Vec<Answer> {
+        (**self).answers()
+    }
+
+    fn on_news(&self, wake: Box<dyn Fn() + Send + Sync>) {
+        (**self).on_news(wake);
+    }
+}
+
 /// What a window asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
@@ -58,6 +76,8 @@ pub enum Order {
     Frame(u32),
     /// Outputs to record beside the picture, by the names that `--aov` has; [`Project::outputs`] lists them.
     Outputs(Vec<String>),
+    /// Whether `cost` and `kernel` of pixels are wanted, which [`Project::own_layers`] lists: they take a while to find.
+    Survey(bool),
     /// Samples of a pixel after which to rest.
     Samples(u32),
     /// An end as `--until` has it, such as `relmse=1e-3`; [`Order::Samples`] holds as well.
@@ -218,6 +238,8 @@ pub struct Project {
     pub bindings: Vec<Binding>,
     /// Outputs that can be recorded: names and what they are.
     pub outputs: Vec<(String, String)>,
+    /// Layers that the engine makes by itself, with or without an output: names and what they are.
+    pub own_layers: Vec<(String, String)>,
     /// Strategies that can be asked for: names and what they are.
     pub strategies: Vec<(String, String)>,
     /// First and last frame, if something moves.

@@ -34,6 +34,7 @@ struct Inner {
     size: [u32; 2],
     crop: Option<[[u32; 2]; 2]>,
     outputs: Vec<String>,
+    surveys: bool,
     samples: u32,
     taken: u32,
     number: u64,
@@ -238,6 +239,13 @@ pub fn project() -> Project {
                 params: floor,
             },
         ],
+        own_layers: [
+            ("error", "the estimated error of the pixel"),
+            ("cost", "operations of the materials"),
+            ("kernel", "the kernel of the first hit"),
+        ]
+        .map(|(name, about)| (name.to_owned(), about.to_owned()))
+        .to_vec(),
         outputs: [
             ("albedo", "What the material scatters in all."),
             ("normal", "The shading normal in the world."),
@@ -279,6 +287,7 @@ impl BallEngine {
             size: [64, 40],
             crop: None,
             outputs: Vec::new(),
+            surveys: false,
             samples: 64,
             taken: 64,
             number: 0,
@@ -608,29 +617,18 @@ impl Inner {
             values: Arc::new(values),
         };
         let names = vec!["glaze".to_owned(), "squares".to_owned()];
-        let mut layers = vec![
-            layer(
-                "error",
-                "The estimated error of the pixel.",
-                LayerKind::Number,
-                1,
-                error,
-            ),
-            layer(
-                "cost",
-                "Operations of the materials.",
-                LayerKind::Number,
-                1,
-                cost,
-            ),
-            layer(
-                "kernel",
-                "The kernel of the first hit.",
-                LayerKind::Index(names),
-                1,
-                kernel,
-            ),
-        ];
+        let mut layers = vec![layer(
+            "error",
+            "the estimated error",
+            LayerKind::Number,
+            1,
+            error,
+        )];
+        if self.surveys {
+            let kind = LayerKind::Index(names);
+            layers.push(layer("cost", "operations", LayerKind::Number, 1, cost));
+            layers.push(layer("kernel", "the kernel", kind, 1, kernel));
+        }
         for name in &self.outputs {
             layers.push(match name.as_str() {
                 "albedo" => layer(
@@ -796,6 +794,10 @@ impl Inner {
             }
             Order::Outputs(outputs) => {
                 self.outputs.clone_from(outputs);
+                self.paint();
+            }
+            Order::Survey(surveys) => {
+                self.surveys = *surveys;
                 self.paint();
             }
             Order::Samples(samples) => {

@@ -656,11 +656,22 @@ fn menus_ask_for_layers_goals_sizes_and_strategies() {
     assert_eq!(test.desk().layer.as_deref(), Some("albedo"));
     choose(&mut test, "Overlay", "cost");
     assert_eq!(test.desk().overlay.as_deref(), Some("cost"));
-    choose(&mut test, "Until", "relMSE");
-    assert_eq!(
-        test.engine.orders(),
-        [Order::Until(Some("relmse=1e-3".to_owned()))]
-    );
+    let survey = Order::Survey(true);
+    assert_eq!(test.engine.orders(), [survey]);
+    for (goal, expected) in [
+        ("relMSE", Some("relmse=1e-3")),
+        ("Time", Some("relmse=1e-3,time=60s")),
+        ("relMSE", Some("time=60s")),
+        ("Time", None),
+    ] {
+        let tick = test.rect(Role::CheckBox, goal);
+        test.harness
+            .get_by_role_and_label(Role::CheckBox, goal)
+            .click();
+        test.frames(3);
+        let expected = expected.map(str::to_owned);
+        assert_eq!(test.engine.orders(), [Order::Until(expected)], "{tick:?}");
+    }
     choose(&mut test, "Strategy", "threshold=");
     assert_eq!(
         test.engine.orders(),

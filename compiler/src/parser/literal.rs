@@ -108,7 +108,11 @@ fn unknown_unit(text: &str, number: Span, name: &str, span: Span) -> Diagnostic 
         return diagnostic.hint("an unsigned int ends in `u`, right after its digits: `12u`");
     }
     if matches!(name, "f" | "i" | "h" | "f32" | "i32" | "lf") {
-        return diagnostic.hint("numbers have no suffix for their type; a float has a point");
+        let is_whole = digits.bytes().all(|b| b.is_ascii_digit()) && !name.starts_with('i');
+        let plain = format!("{digits}{}", if is_whole { ".0" } else { "" });
+        return diagnostic
+            .replaced(number.to(span), None, &plain)
+            .hint("numbers have no suffix for their type; a float has a point");
     }
     let units = Unit::ALL.iter().map(|(_, name, _)| *name);
     let known = match name {

@@ -10,7 +10,7 @@ use crate::ir::{self, ExprId, LocalId};
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
-use super::expr::swizzled;
+use super::expr::{plain_number, swizzled};
 use super::outputs::WHOLE;
 use super::stmt::component;
 use super::types::Ty;
@@ -94,7 +94,8 @@ impl Body<'_, '_> {
             Some(op) => {
                 let value = self.expr(new.value)?;
                 let old = self.before(old, new.span);
-                self.binary(op, Operand::Value(old, ty), value, new.span)?
+                let operands = (Operand::Value(old, ty), value);
+                self.binary(op, operands, [None, plain_number(new.value)], new.span)?
             }
             None if ty.array().is_some() => self.expr_as(new.value, ty, "the value")?,
             None => self.expr(new.value)?,

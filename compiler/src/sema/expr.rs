@@ -122,8 +122,9 @@ impl Body<'_, '_> {
             ExprKind::Binary(op, a, b) => {
                 self.note_plain_size(*op, a, b, span);
                 // Both sides are checked even if the first is wrong, so that both are reported.
+                let numbers = [a, b].map(|operand| plain_number(operand));
                 let (a, b) = (self.expr(a), self.expr(b));
-                self.binary(*op, a?, b?, span)
+                self.binary(*op, (a?, b?), numbers, span)
             }
             ExprKind::If(branch) => self.if_value(branch, span),
             ExprKind::Block(block) => self.scoped(|cx| Some(cx.block_value(block, span)?.0)),
@@ -449,4 +450,9 @@ pub fn swizzled(ty: Ty, n: usize) -> Ty {
         (_, 3) => Ty::Vec3,
         _ => Ty::Vec4,
     }
+}
+
+/// Where an expression is that is a number without a unit.
+pub(super) fn plain_number(expr: &Expr) -> Option<Span> {
+    matches!(expr.kind, ExprKind::Int(_) | ExprKind::Float(_)).then_some(expr.span)
 }

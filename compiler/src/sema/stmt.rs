@@ -1,7 +1,7 @@
 //! Checking statements.
 
 use crate::ast::{self, BinaryOp, ExprKind, Stmt, StmtKind};
-use crate::diag::{Code, Diagnostic};
+use crate::diag::{Code, Diagnostic, Fix};
 use crate::ir::ops::Op;
 use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
 use crate::source::Span;
@@ -277,8 +277,15 @@ impl Body<'_, '_> {
         Some((low as i64, high as i64))
     }
 
-    /// An operator on two operands of any type.
-    pub fn binary(&mut self, op: BinaryOp, a: Operand, b: Operand, span: Span) -> Option<Operand> {
+    /// An operator on two operands of any type. `numbers` are the places of those that are written as a number without a
+    /// unit.
+    pub fn binary(
+        &mut self,
+        op: BinaryOp,
+        (a, b): (Operand, Operand),
+        numbers: [Option<Span>; 2],
+        span: Span,
+    ) -> Option<Operand> {
         if a.ty().is_closure() || b.ty().is_closure() {
             return self.closure_operator(op, a, b, span);
         }
@@ -288,7 +295,7 @@ impl Body<'_, '_> {
         let is_int = |ty: Ty| matches!(ty, Ty::Int | Ty::Uint);
         if is_int(xt) && is_int(yt) && (xt, yt) != (Ty::Int, Ty::Int) {
             let found = self.unsigned_operator(op, (x, xt), (y, yt), span);
-            return found.or_else(|| self.no_operator(op, xt, yt, span));
+            return found.or_else(|| self.no_operator(op, (xt, yt), numbers, span));
         }
         let (x, xt, y, yt) = match (is_int(xt), is_int(yt)) {
             (true, false) => (self.promoted(x, xt, span), Ty::Float, y, yt),
@@ -297,13 +304,20 @@ impl Body<'_, '_> {
         };
         if xt.order().is_some() || yt.order().is_some() {
             let product = self.matrix_operator(op, (x, xt), (y, yt), span);
-            return product.or_else(|| self.no_operator(op, xt, yt, span));
+            return product.or_else(|| self.no_operator(op, (xt, yt), numbers, span));
         }
-        let (ir_op, ty) = operator(op, xt, yt).or_else(|| self.no_operator(op, xt, yt, span))?;
+        let known = operator(op, xt, yt);
+        let (ir_op, ty) = known.or_else(|| self.no_operator(op, (xt, yt), numbers, span))?;
         Some(Operand::Value(self.builder.op(ir_op, &[x, y], span), ty))
     }
 
-    fn no_operator<T>(&mut self, op: BinaryOp, a: Ty, b: Ty, span: Span) -> Option<T> {
+    fn no_operator<T>(
+        &mut self,
+        op: BinaryOp,
+        (a, b): (Ty, Ty),
+        numbers: [Option<Span>; 2],
+        span: Span,
+    ) -> Option<T> {
         let (a_text, b_text) = (self.cx.type_text(a), self.cx.type_text(b));
         let message = format!("`{}` does not apply to {a_text} and {b_text}", op.symbol());
         let wrong = Diagnostic::new(Code::NoOperator, span, message);
@@ -311,9 +325,25 @@ impl Body<'_, '_> {
             (Ty::Color, v) | (v, Ty::Color) if v.is_geometric() => wrong
                 .expected("two colors, two directions, or a float beside either")
                 .hint("convert one of them: `color(...)` or `vec3(...)`"),
-            (d, Ty::Float) | (Ty::Float, d) if d.is_dimension() => wrong
-                .expected(format!("two values of type {}", self.cx.type_text(d)))
-                .hint("give the number a unit, or take the plain number with `float(...)`"),
+            (d, Ty::Float) | (Ty::Float, d) if d.is_dimension() => {
+                let wrong = wrong
+                    .expected(format!("two values of type {}", self.cx.type_text(d)))
+                    .hint("give the number a unit, or take the plain number with `float(...)`");
+                let unit = if d == Ty::Length { "mm" } else { "deg" };
+                let number = numbers.into_iter().flatten().next();
+                number.into_iter().fold(wrong, |wrong, number| {
+                    wrong.fix(Fix {
+                        title: format!("give the number a unit: `{unit}`"),
+                        span: Span {
+                            start: number.end,
+                            ..number
+                        },
+                        was: None,
+                        text: format!(" {unit}"),
+                        imports: Vec::new(),
+                    })
+                })
+            }
             (Ty::Point, Ty::Length) | (Ty::Length, Ty::Point) if op == BinaryOp::Mul => wrong
                 .expected("a point over a length, which is a plain vec3")
                 .hint("divide by the size of a feature: `position / 3 cm`"),

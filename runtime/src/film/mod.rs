@@ -108,7 +108,7 @@ impl Sums {
     }
 
     /// The picture's sums alone.
-    pub(crate) fn without_outputs(&self) -> Self {
+    pub fn without_outputs(&self) -> Self {
         Self {
             layers: Layers::default(),
             words: self.words[..PLANES * self.pixel_count()].to_vec(),

@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use impasto_compiler::partition::Plan;
+use impasto_compiler::partition::{Plan, Workload};
 
 use super::{Renderer, Taking};
 use crate::error::RuntimeError;
@@ -116,6 +116,11 @@ impl Renderer<'_> {
     pub fn kernels_of(&self, sitting: &Sitting) -> Vec<KernelReport> {
         let (status, paths) = (&sitting.taking.status, sitting.taking.pass.paths);
         self.ran(&self.built).report(status, paths)
+    }
+
+    /// How paths have hit materials in a sitting, or before the plan was renewed; `None` where hits are not counted.
+    pub fn workload_of(&self, sitting: &Sitting) -> Option<Workload> {
+        self.workload(&sitting.taking.status)
     }
 
     /// The strategy of the plan, or the one that the device has in its place.

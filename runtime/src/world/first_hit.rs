@@ -3,6 +3,8 @@
 //! Rays go where the camera's do, from the centre of its lens, through four places of a pixel; the material
 //! that most of them meet is the pixel's. Placed objects are not copied: a ray is taken to where they are.
 
+use std::ops::Deref;
+
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -17,28 +19,6 @@ use crate::world::camera::CameraFrame;
 /// Where rays go through a pixel, in parts of its sides.
 const PLACES: [(f32, f32); 4] = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
 
-/// For each pixel of the scene's picture, row by row, the index into [`Scene::materials`] of what it sees
-/// first; `None` where that is a light, or what surrounds everything.
-pub fn materials(scene: &Scene) -> Vec<Option<u32>> {
-    let caster = Caster::new(scene);
-    let (width, height) = (scene.film.width, scene.film.height);
-    let frame = CameraFrame::new(&scene.camera, width as f32 / height as f32);
-    let seen = |pixel: u32| {
-        let found = PLACES.map(|(x, y)| {
-            let column = (pixel % width) as f32 + x;
-            let row = (pixel / width) as f32 + y;
-            let across = 2.0 * column / width as f32 - 1.0;
-            let up = 1.0 - 2.0 * row / height as f32;
-            caster.material(
-                frame.position,
-                frame.forward + across * frame.right + up * frame.up,
-            )
-        });
-        most_frequent(found)
-    };
-    (0..width * height).into_par_iter().map(seen).collect()
-}
-
 /// What lies at a pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
@@ -52,28 +32,6 @@ pub struct Seen {
     pub depth: f32,
     /// The least and greatest corner of the object, in the scene's coordinates.
     pub bounds: [Vec3; 2],
-}
-
-/// What the middle of a pixel of the scene's picture shows, from a camera; `None` where that is what surrounds
-/// everything, or no pixel.
-pub fn at(scene: &Scene, camera: &Camera, [column, row]: [u32; 2]) -> Option<Seen> {
-    let (width, height) = (scene.film.width, scene.film.height);
-    if column >= width || row >= height {
-        return None;
-    }
-    let frame = CameraFrame::new(camera, width as f32 / height as f32);
-    let across = 2.0 * (column as f32 + 0.5) / width as f32 - 1.0;
-    let up = 1.0 - 2.0 * (row as f32 + 0.5) / height as f32;
-    let direction = (frame.forward + across * frame.right + up * frame.up).normalize_or_zero();
-    let met = Caster::new(scene).meets(frame.position, direction)?;
-    let names = scene.object_names();
-    Some(Seen {
-        material: Some(met.material).filter(|m| *m != NO_MATERIAL),
-        object: names.get(met.object as usize).cloned().unwrap_or_default(),
-        position: frame.position + met.t * direction,
-        depth: met.t * direction.dot(frame.forward),
-        bounds: bounds(scene, &met),
-    })
 }
 
 /// The least and greatest corner of the object that a ray met.
@@ -108,23 +66,19 @@ fn most_frequent(found: [Option<u32>; 4]) -> Option<u32> {
     best
 }
 
-/// What rays are cast through.
-struct Caster<'s> {
-    scene: &'s Scene,
-    world: Tree<'s>,
-    objects: Vec<Tree<'s>>,
+/// What can be asked of a scene, in a picture of its size from any camera. To make it takes trees over all geometry; the
+/// scene is held by reference or shared.
+pub struct FirstHits<S> {
+    scene: S,
+    /// Over the triangles of the scene's own mesh, and of each object's.
+    world: Bvh2,
+    objects: Vec<Bvh2>,
     /// Over the placements.
     upper: Bvh2,
     /// From the world to each placement's object.
     inverses: Vec<Inverse>,
     /// The first name of each placement.
     firsts: Vec<u32>,
-}
-
-/// A mesh, with a tree over its triangles.
-struct Tree<'s> {
-    mesh: &'s Mesh,
-    bvh: Bvh2,
 }
 
 /// What a ray meets first.
@@ -153,30 +107,75 @@ struct Inverse {
     translation: DVec3,
 }
 
-impl<'s> Caster<'s> {
-    fn new(scene: &'s Scene) -> Self {
-        let objects: Vec<Tree<'s>> = scene
-            .objects
-            .par_iter()
-            .map(|o| Tree::new(&o.mesh))
-            .collect();
+impl<S: Deref<Target = Scene> + Sync> FirstHits<S> {
+    /// Prepares a scene.
+    pub fn new(scene: S) -> Self {
+        let objects = scene.objects.par_iter();
+        let objects = objects.map(|object| tree(&object.mesh)).collect();
         let boxes: Vec<Aabb> = scene
             .placements
             .iter()
-            .map(|p| placed_box(scene, p))
+            .map(|p| placed_box(&scene, p))
             .collect();
         let inverse = |p: &Placement| Inverse {
             matrix: p.transform.matrix.inverse(),
             translation: p.transform.translation,
         };
         Self {
-            scene,
-            world: Tree::new(&scene.mesh),
+            world: tree(&scene.mesh),
             objects,
             upper: bvh::binary_tree(&boxes),
             inverses: scene.placements.iter().map(inverse).collect(),
             firsts: scene.first_objects(),
+            scene,
         }
+    }
+
+    /// For each pixel, row by row, the index into [`Scene::materials`] of what it sees first; `None` where that is a
+    /// light, or what surrounds everything.
+    pub fn materials(&self, camera: &Camera) -> Vec<Option<u32>> {
+        let (width, height) = self.size();
+        let frame = CameraFrame::new(camera, width as f32 / height as f32);
+        let seen = |pixel: u32| {
+            let found = PLACES.map(|(x, y)| {
+                let column = (pixel % width) as f32 + x;
+                let row = (pixel / width) as f32 + y;
+                let across = 2.0 * column / width as f32 - 1.0;
+                let up = 1.0 - 2.0 * row / height as f32;
+                self.material(
+                    frame.position,
+                    frame.forward + across * frame.right + up * frame.up,
+                )
+            });
+            most_frequent(found)
+        };
+        (0..width * height).into_par_iter().map(seen).collect()
+    }
+
+    /// What the middle of a pixel shows; `None` where that is what surrounds everything, or no pixel.
+    pub fn at(&self, camera: &Camera, [column, row]: [u32; 2]) -> Option<Seen> {
+        let (width, height) = self.size();
+        if column >= width || row >= height {
+            return None;
+        }
+        let frame = CameraFrame::new(camera, width as f32 / height as f32);
+        let across = 2.0 * (column as f32 + 0.5) / width as f32 - 1.0;
+        let up = 1.0 - 2.0 * (row as f32 + 0.5) / height as f32;
+        let direction = (frame.forward + across * frame.right + up * frame.up).normalize_or_zero();
+        let met = self.meets(frame.position, direction)?;
+        let names = self.scene.object_names();
+        Some(Seen {
+            material: Some(met.material).filter(|m| *m != NO_MATERIAL),
+            object: names.get(met.object as usize).cloned().unwrap_or_default(),
+            position: frame.position + met.t * direction,
+            depth: met.t * direction.dot(frame.forward),
+            bounds: bounds(&self.scene, &met),
+        })
+    }
+
+    /// Columns and rows.
+    fn size(&self) -> (u32, u32) {
+        (self.scene.film.width, self.scene.film.height)
     }
 
     /// The material that a ray meets first.
@@ -189,9 +188,9 @@ impl<'s> Caster<'s> {
     fn meets(&self, origin: Vec3, direction: Vec3) -> Option<Met> {
         let mut ray = Ray::new_inf(origin.into(), direction.into());
         let mut first = None;
-        if let Some(hit) = self.world.closest(&ray) {
+        let mesh = &self.scene.mesh;
+        if let Some(hit) = closest(mesh, &self.world, &ray) {
             ray.tmax = hit.t;
-            let mesh = self.world.mesh;
             let part = mesh.objects.get(hit.triangle as usize).copied();
             first = Some(Met {
                 t: hit.t,
@@ -220,6 +219,7 @@ impl<'s> Caster<'s> {
     fn meet(&self, ray: &Ray, index: usize) -> Option<Met> {
         let placement = &self.scene.placements[index];
         let tree = self.objects.get(placement.object as usize)?;
+        let mesh = &self.scene.objects.get(placement.object as usize)?.mesh;
         let inverse = &self.inverses[index];
         let origin = Vec3::from(ray.origin).as_dvec3() - inverse.translation;
         let direction = inverse.matrix * Vec3::from(ray.direction).as_dvec3();
@@ -231,9 +231,9 @@ impl<'s> Caster<'s> {
             0.0,
             (f64::from(ray.tmax) * scale) as f32,
         );
-        let hit = tree.closest(&local)?;
-        let own = *tree.mesh.materials.get(hit.triangle as usize)?;
-        let part = tree.mesh.objects.get(hit.triangle as usize).copied();
+        let hit = closest(mesh, tree, &local)?;
+        let own = *mesh.materials.get(hit.triangle as usize)?;
+        let part = mesh.objects.get(hit.triangle as usize).copied();
         Some(Met {
             t: (f64::from(hit.t) / scale) as f32,
             material: placement
@@ -248,29 +248,26 @@ impl<'s> Caster<'s> {
     }
 }
 
-impl<'s> Tree<'s> {
-    fn new(mesh: &'s Mesh) -> Self {
-        let boxes: Vec<Aabb> = mesh.positions.iter().map(bvh::bounds).collect();
-        Self {
-            mesh,
-            bvh: bvh::binary_tree(&boxes),
-        }
-    }
+/// A tree over the triangles of a mesh.
+fn tree(mesh: &Mesh) -> Bvh2 {
+    let boxes: Vec<Aabb> = mesh.positions.iter().map(bvh::bounds).collect();
+    bvh::binary_tree(&boxes)
+}
 
-    fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let order = &self.bvh.primitive_indices;
-        let meet = |ray: &Ray, place: usize| {
-            let [v0, v1, v2] = self.mesh.positions[order[place] as usize].map(Vec3A::from);
-            Triangle { v0, v1, v2 }.intersect(ray)
-        };
-        let mut hit = RayHit::none();
-        self.bvh.ray_traverse(*ray, &mut hit, meet);
-        let found = hit.primitive_id != INVALID_ID;
-        found.then(|| Hit {
-            t: hit.t,
-            triangle: order[hit.primitive_id as usize],
-        })
-    }
+/// Which triangle of a mesh a ray meets first.
+fn closest(mesh: &Mesh, tree: &Bvh2, ray: &Ray) -> Option<Hit> {
+    let order = &tree.primitive_indices;
+    let meet = |ray: &Ray, place: usize| {
+        let [v0, v1, v2] = mesh.positions[order[place] as usize].map(Vec3A::from);
+        Triangle { v0, v1, v2 }.intersect(ray)
+    };
+    let mut hit = RayHit::none();
+    tree.ray_traverse(*ray, &mut hit, meet);
+    let found = hit.primitive_id != INVALID_ID;
+    found.then(|| Hit {
+        t: hit.t,
+        triangle: order[hit.primitive_id as usize],
+    })
 }
 
 /// A box around an object where it is placed.
@@ -350,6 +347,10 @@ mod tests {
             labels: Default::default(),
             warnings: Vec::new(),
         }
+    }
+
+    fn materials(scene: &Scene) -> Vec<Option<u32>> {
+        FirstHits::new(scene).materials(&scene.camera)
     }
 
     /// The picture reaches from -2 to 2, so that a pixel is a unit wide.

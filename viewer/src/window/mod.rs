@@ -14,6 +14,7 @@ use crate::engine::{Engine, Order};
 pub mod canvas;
 pub mod compare;
 pub mod desk;
+pub mod goals;
 mod hands;
 pub mod keys;
 pub mod navigate;
@@ -27,6 +28,7 @@ pub mod view;
 
 use canvas::Canvas;
 use desk::Desk;
+use goals::Goals;
 use keys::Command;
 
 /// How a window opens.
@@ -44,6 +46,8 @@ pub struct WindowOptions {
     pub save_as: Option<PathBuf>,
     /// A picture to compare with from the start.
     pub compare_with: Option<PathBuf>,
+    /// The goals that the engine pursues from the start, as `--until` has them.
+    pub until: Option<String>,
 }
 
 /// Opens a window and shows what `engine` has until it is closed; then the engine is asked to quit.
@@ -152,6 +156,9 @@ impl Window {
         desk.look.exposure = options.exposure;
         if let Some(path) = &options.save_as {
             desk.save_as = path.display().to_string();
+        }
+        if let Some(goals) = &options.until {
+            desk.goals = Goals::of(goals);
         }
         if let Some(path) = &options.compare_with {
             desk.read_from = path.display().to_string();

@@ -10,6 +10,7 @@ pub(crate) mod course;
 
 use std::time::Duration;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::film::Sums;
@@ -115,6 +116,14 @@ impl Halves {
         }
     }
 
+    /// Of a film as it was, and of the same with more samples.
+    pub fn of(first: &Sums, all: &Sums) -> Self {
+        Self {
+            first: first.without_outputs(),
+            all: all.without_outputs(),
+        }
+    }
+
     /// Takes note of the film after samples were added by one of the halves.
     pub fn update(&mut self, half: usize, film: &Sums) {
         let film = film.without_outputs();
@@ -136,29 +145,94 @@ impl Halves {
     /// chance, divided by its own brightness, would hide that it is wrong. The median of A, B and the mean of
     /// the pixels around is near the truth even then, and becomes the truth with more samples.
     pub fn errors(&self) -> Option<[f64; 2]> {
+        errors(&self.by_pixel())
+    }
+
+    /// The same, and the estimated standard error of each pixel over its brightness, row by row; 0 where a half has no
+    /// samples. An estimate by two means says little of one pixel, so it is the root of the mean over those around as well.
+    pub fn errors_and_pixels(&self) -> Option<([f64; 2], Vec<f32>)> {
+        let of_pixels = self.by_pixel();
+        let errors = errors(&of_pixels)?;
+        let (width, height) = self.all.size();
+        let relative = |channels: [OfChannel; 3]| {
+            let mean = |of: fn(OfChannel) -> f64| channels.map(of).iter().sum::<f64>() / 3.0;
+            mean(|c| c.error) / (mean(|c| c.truth).powi(2) + RELATIVE_FLOOR)
+        };
+        let of_pixels = of_pixels.into_par_iter();
+        let squares: Vec<Option<f64>> = of_pixels.map(|p| p.map(relative)).collect();
+        let smooth = |pixel: usize| {
+            let around = pixels_around(pixel, [width as usize, height as usize], SMOOTH);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for square in around.filter_map(|at| squares[at]) {
+                sum += square;
+                count += 1.0;
+            }
+            // Conversion saturates.
+            squares[pixel].map_or(0.0, |_| f64::sqrt(sum / count) as f32)
+        };
+        let smooth = (0..squares.len()).into_par_iter().map(smooth);
+        Some((errors, smooth.collect()))
+    }
+
+    /// What is known of each pixel's three channels; none where a half has no samples.
+    fn by_pixel(&self) -> Vec<Option<[OfChannel; 3]>> {
         let (width, height) = self.all.size();
         let means = Means::of(&self.all, width as usize);
-        let (mut sums, mut counted) = ([0.0; 2], 0.0);
-        for pixel in 0..width as usize * height as usize {
+        let of = |pixel: usize| {
             let (first, all) = (self.first.count(pixel), self.all.count(pixel));
             let [a, b] = [f64::from(first), f64::from(all.saturating_sub(first))];
             if a == 0.0 || b == 0.0 {
-                continue;
+                return None;
             }
-            counted += 3.0;
             let around = means.around(pixel);
-            for (channel, around) in around.into_iter().enumerate() {
+            Some([0, 1, 2].map(|channel: usize| {
                 let sum = self.first.radiance(channel, pixel);
                 let first = sum / a;
                 let second = (self.all.radiance(channel, pixel) - sum) / b;
-                let error = a * b / (a + b).powi(2) * (first - second).powi(2);
-                let truth = median(first, second, around);
-                sums[0] += error;
-                sums[1] += error / (truth * truth + RELATIVE_FLOOR);
-            }
-        }
-        (counted > 0.0).then(|| sums.map(|sum| sum / counted))
+                OfChannel {
+                    error: a * b / (a + b).powi(2) * (first - second).powi(2),
+                    truth: median(first, second, around[channel]),
+                }
+            }))
+        };
+        let pixels = 0..width as usize * height as usize;
+        pixels.into_par_iter().map(of).collect()
     }
+}
+
+/// The mean squared error of some pixels, and the relative one.
+fn errors(of_pixels: &[Option<[OfChannel; 3]>]) -> Option<[f64; 2]> {
+    let (mut sums, mut counted) = ([0.0; 2], 0.0);
+    for channel in of_pixels.iter().flatten().flatten() {
+        counted += 1.0;
+        sums[0] += channel.error;
+        sums[1] += channel.error / (channel.truth * channel.truth + RELATIVE_FLOOR);
+    }
+    (counted > 0.0).then(|| sums.map(|sum| sum / counted))
+}
+
+/// The pixels by which an estimate of one is smoothed, on each side.
+const SMOOTH: usize = 2;
+
+/// What is known of a channel of a pixel.
+#[derive(Clone, Copy)]
+struct OfChannel {
+    /// The estimated squared error of the mean of all samples.
+    error: f64,
+    /// About what the mean will be.
+    truth: f64,
+}
+
+/// The pixels of a picture of such a size that are at most `far` columns and rows from one, itself too.
+fn pixels_around(
+    pixel: usize,
+    [width, height]: [usize; 2],
+    far: usize,
+) -> impl Iterator<Item = usize> {
+    let (x, y) = (pixel % width, pixel / width);
+    let columns = x.saturating_sub(far)..(x + far + 1).min(width);
+    let rows = y.saturating_sub(far)..(y + far + 1).min(height);
+    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x))
 }
 
 /// The means of a picture's pixels; none where there are no samples.
@@ -177,22 +251,21 @@ impl Means {
         };
         Self {
             width,
-            pixels: (0..width * height as usize).map(mean).collect(),
+            pixels: (0..width * height as usize)
+                .into_par_iter()
+                .map(mean)
+                .collect(),
         }
     }
 
     /// The mean of the up to eight pixels around one; of a pixel alone its own.
     fn around(&self, pixel: usize) -> [f64; 3] {
-        let (x, y) = (pixel % self.width, pixel / self.width);
-        let height = self.pixels.len() / self.width;
+        let size = [self.width, self.pixels.len() / self.width];
         let (mut sum, mut count) = ([0.0; 3], 0.0);
-        for y in y.saturating_sub(1)..(y + 2).min(height) {
-            for x in x.saturating_sub(1)..(x + 2).min(self.width) {
-                let at = y * self.width + x;
-                if let Some(mean) = self.pixels[at].filter(|_| at != pixel) {
-                    sum = [0, 1, 2].map(|c: usize| sum[c] + mean[c]);
-                    count += 1.0;
-                }
+        for at in pixels_around(pixel, size, 1).filter(|at| *at != pixel) {
+            if let Some(mean) = self.pixels[at] {
+                sum = [0, 1, 2].map(|c: usize| sum[c] + mean[c]);
+                count += 1.0;
             }
         }
         if count > 0.0 {

@@ -260,3 +260,34 @@ fn the_seeds_of_halves_differ() {
         assert!(seen.insert(second_seed(seed)));
     }
 }
+
+/// A picture of which the left part is the same in both halves, and the right part is not.
+#[test]
+fn errors_of_pixels_lie_where_the_error_is() {
+    const SIDE: usize = 16;
+    let unit = 1u64 << 24;
+    let is_noisy = |pixel: usize| pixel % SIDE >= SIDE / 2;
+    // Means of 0.5 and 1.5, or of 1 in both; 8 samples each.
+    let first = |pixel| if is_noisy(pixel) { 4 * unit } else { 8 * unit };
+    let pixels = 0..SIDE * SIDE;
+    let half: Vec<u64> = pixels.clone().map(first).collect();
+    let all = vec![16 * unit; SIDE * SIDE];
+    let halves = Halves::of(&film(&half, 8), &film(&all, 16));
+    let (errors, by_pixel) = halves.errors_and_pixels().expect("two halves");
+    assert_eq!(halves.errors(), Some(errors));
+    // The error of the mean of two that are 1 apart is 1/2.
+    assert!((errors[0] - 0.125).abs() < 1e-9, "{errors:?}");
+    let expected = (0.25f64 / (1.0 + RELATIVE_FLOOR)).sqrt() as f32;
+    for pixel in pixels {
+        let column = pixel % SIDE;
+        let error = by_pixel[pixel];
+        match column {
+            0..=5 => assert_eq!(error, 0.0, "{pixel}"),
+            10.. => assert!((error - expected).abs() < 1e-6, "{pixel}: {error}"),
+            // Smoothed over two columns on each side.
+            _ => assert!(error > 0.0 && error < expected, "{pixel}: {error}"),
+        }
+    }
+    let empty = Halves::of(&film(&[0; 4], 0), &film(&[unit; 4], 1));
+    assert_eq!(empty.errors_and_pixels(), None);
+}

@@ -1,7 +1,7 @@
 //! What outputs say of the first hit, against what is known of scenes: places, normals, albedos and ids.
 
 use impasto_runtime::film::outputs::{At, Kind, OUTPUTS};
-use impasto_runtime::world::first_hit;
+use impasto_runtime::world::first_hit::FirstHits;
 
 use crate::gpu::outputs::studio::{
     STUDIO, asking, assert_near, at, everything, load, names, render, value,
@@ -91,7 +91,8 @@ fn ids_are_those_that_rays_of_the_host_meet() {
     let seen = render(&studio, "own", &asking(&["material", "alpha"], 16));
     let alpha = seen.sums.sums.values("alpha");
     let mut whole = 0;
-    for (pixel, expected) in first_hit::materials(&studio.0).into_iter().enumerate() {
+    let seen_by_host = FirstHits::new(&studio.0).materials(&studio.0.camera);
+    for (pixel, expected) in seen_by_host.into_iter().enumerate() {
         let ids = names(&seen, "material", pixel);
         let covered: f32 = ids.iter().map(|(_, coverage)| coverage).sum();
         assert!(covered <= alpha[0][pixel] + 1e-6, "{pixel}: {ids:?}");

@@ -3,7 +3,7 @@
 
 use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 
-use super::super::desk::{Desk, Goal};
+use super::super::desk::Desk;
 use super::super::picture::number;
 use super::super::theme;
 use super::quiet;
@@ -94,9 +94,7 @@ fn is_drawn(point: &ErrorPoint) -> bool {
 }
 
 fn goal(desk: &Desk) -> Option<f64> {
-    let (goal, size) = &desk.goal;
-    let size: f64 = size.trim().parse().ok()?;
-    (*goal == Goal::RelMse && size.is_finite() && size > 0.0).then_some(size)
+    desk.goals.relmse()
 }
 
 fn seconds(power: i32) -> String {

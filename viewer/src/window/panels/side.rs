@@ -8,7 +8,7 @@ use eframe::egui::{
 
 use super::super::canvas::Canvas;
 use super::super::compare::Mode;
-use super::super::desk::{Desk, Goal, OVERLAYS};
+use super::super::desk::{Desk, OVERLAYS};
 use super::super::keys::{self, Command};
 use super::super::picture::{self, Channel};
 use super::super::theme;
@@ -130,10 +130,10 @@ fn layers(ui: &mut Ui, desk: &mut Desk, name: Id) {
                 };
                 let is_shown = desk.layer.as_deref() == Some(&layer);
                 let row = ui.selectable_label(is_shown, text);
-                let tip = if is_there {
-                    about
-                } else {
-                    format!("{about}\nIt is recorded once it is chosen.")
+                let tip = match (is_there, desk.is_own(&layer)) {
+                    (true, _) => about,
+                    (false, true) => format!("{about}\nIt is there once the picture rests."),
+                    (false, false) => format!("{about}\nIt is recorded once it is chosen."),
                 };
                 if row.on_hover_text(tip).clicked() {
                     desk.show(Some(layer));
@@ -369,30 +369,7 @@ fn render(ui: &mut Ui, desk: &mut Desk) {
             desk.take_samples(samples);
         }
     });
-    line(ui, "Until", |ui, name| {
-        let (mut goal, mut size) = desk.goal.clone();
-        ComboBox::from_id_salt("goal")
-            .selected_text(goal.name())
-            .width(84.0)
-            .show_ui(ui, |ui| {
-                for one in Goal::ALL {
-                    ui.selectable_value(&mut goal, one, one.name());
-                }
-            })
-            .response
-            .labelled_by(name);
-        desk.end_by(goal);
-        if goal != Goal::Samples && goal == desk.goal.0 {
-            let field = TextEdit::singleline(&mut size).desired_width(52.0);
-            let response = ui.add(field).labelled_by(name);
-            if response.changed() {
-                desk.goal.1 = size;
-            }
-            if response.lost_focus() {
-                desk.order_goal();
-            }
-        }
-    });
+    goals(ui, desk);
     line(ui, "Size", |ui, name| sizes(ui, desk, name));
     line(ui, "Crop", |ui, _| match desk.crop {
         Some([from, to]) => {
@@ -409,6 +386,22 @@ fn render(ui: &mut Ui, desk: &mut Desk) {
         }
     });
     outputs(ui, desk);
+}
+
+fn goals(ui: &mut Ui, desk: &mut Desk) {
+    let mut asks = false;
+    for goal in &mut desk.goals.0 {
+        line(ui, goal.name, |ui, name| {
+            let tick = ui.checkbox(&mut goal.is_on, "").labelled_by(name);
+            asks |= tick.on_hover_text(goal.about).changed();
+            let field = TextEdit::singleline(&mut goal.size).desired_width(60.0);
+            let response = ui.add_enabled(goal.is_on, field).labelled_by(name);
+            asks |= response.lost_focus();
+        });
+    }
+    if asks {
+        desk.order_goals();
+    }
 }
 
 fn sizes(ui: &mut Ui, desk: &mut Desk, name: Id) {

@@ -348,6 +348,7 @@ fn layers_are_recorded_when_they_are_wanted() {
     let expected = [
         "error", "cost", "kernel", "samples", "albedo", "normal", "depth",
     ];
+    assert!(!desk.has_layer("cost"), "nobody looks at it");
     assert_eq!(names, expected);
     desk.show(Some("albedo".to_owned()));
     let orders = frame(&mut desk, &engine, false, 0.0);
@@ -359,6 +360,13 @@ fn layers_are_recorded_when_they_are_wanted() {
         frame(&mut desk, &engine, false, 0.0).is_empty(),
         "they are there already"
     );
+    desk.lay_over(Some("kernel".to_owned()));
+    let orders = frame(&mut desk, &engine, false, 0.0);
+    assert_eq!(orders, [Order::Survey(true)]);
+    assert!(desk.has_layer("cost") && desk.has_layer("kernel"));
+    desk.lay_over(None);
+    let orders = frame(&mut desk, &engine, false, 0.0);
+    assert_eq!(orders, [Order::Survey(false)]);
     desk.record("albedo", false);
     assert_eq!(
         frame(&mut desk, &engine, false, 0.0),
@@ -388,17 +396,15 @@ fn renders_end_as_they_are_asked_to() {
     assert_eq!(desk.samples, 64, "as the engine has it");
     desk.take_samples(64);
     desk.take_samples(0);
-    desk.end_by(Goal::Samples);
     assert!(frame(&mut desk, &engine, false, 0.0).is_empty());
     desk.take_samples(128);
-    desk.end_by(Goal::RelMse);
-    desk.goal.1 = " 1e-4 ".to_owned();
-    desk.order_goal();
-    desk.end_by(Goal::Samples);
+    desk.goals = Goals::of("relmse=1e-3,time=5min");
+    desk.order_goals();
+    desk.goals = Goals::default();
+    desk.order_goals();
     let expected = [
         Order::Samples(128),
-        Order::Until(Some("relmse=1e-3".to_owned())),
-        Order::Until(Some("relmse=1e-4".to_owned())),
+        Order::Until(Some("relmse=1e-3,time=5min".to_owned())),
         Order::Until(None),
     ];
     assert_eq!(frame(&mut desk, &engine, false, 0.0), expected);

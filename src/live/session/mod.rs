@@ -6,6 +6,8 @@
 //! picture by open kernels stays until theirs has as many samples. So what is left alone has in the end the bits of
 //! `impasto render`, and no picture gets worse on the way.
 
+mod tell;
+
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -14,18 +16,16 @@ use std::time::{Duration, Instant};
 
 use impasto_runtime::device::Device;
 use impasto_runtime::error::RuntimeError;
-use impasto_runtime::film::Sums;
-use impasto_viewer::engine::{ErrorPoint, Picture, Problem, State};
+use impasto_viewer::engine::{Picture, Problem};
 
 use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
 use super::course::{Asked, Course, Speed, Step, is_done};
-use super::kernels;
 use super::maker::{self, Job, Mailbox, Maker, Outcome};
 use super::pixels::Pixels;
 use super::problems;
-use super::project;
-use super::shared::{Shared, Shown};
+use super::shared::Shared;
+use super::survey::Survey;
 use super::wanted::Wanted;
 
 /// A hand has rested when it has done nothing for so long; where the processor renders, making kernels takes its time,
@@ -104,6 +104,8 @@ struct Session<'d, 's> {
     number: u64,
     shown: Option<Arc<Picture>>,
     told_kernels: Option<Instant>,
+    /// What was found beside the picture.
+    survey: Option<Arc<Survey>>,
 }
 
 impl<'d, 's> Session<'d, 's> {
@@ -141,6 +143,7 @@ impl<'d, 's> Session<'d, 's> {
             number: news.picture.as_ref().map_or(0, |picture| picture.number),
             shown: news.picture,
             told_kernels: None,
+            survey: None,
         }
     }
 
@@ -165,6 +168,9 @@ impl<'d, 's> Session<'d, 's> {
         if self.shared.quits() {
             return Ok(false);
         }
+        if let (true, Device::Gpu(gpu)) = (self.shared.takes_loss(), self.device) {
+            gpu.lose();
+        }
         if let Some(made) = self.mailbox.take() {
             self.adopt(made.job, made.outcome)?;
         }
@@ -173,6 +179,10 @@ impl<'d, 's> Session<'d, 's> {
             self.follow(wanted)?;
         }
         self.pictures = pictures;
+        if let Some(survey) = self.shared.take_survey() {
+            self.survey = Some(survey);
+            self.show_again();
+        }
         self.finish();
         if !self.portion()? {
             self.shared.wait(IDLE);
@@ -553,155 +563,6 @@ impl<'d, 's> Session<'d, 's> {
             (self.asked_at, self.jobs) = (asked_at.get(), number);
         }
         Ok(taken)
-    }
-
-    /// Looks at the film, and hands it out as a picture.
-    fn look(&mut self, step: &Step, asked: &Asked, has_picture: bool) -> Result<(), RuntimeError> {
-        let built = if self.on_last { &self.last } else { &self.open };
-        let (Some(built), Some(course)) = (built, &mut self.course) else {
-            return Ok(());
-        };
-        let sums = built.renderer.sums_of(&course.sitting)?;
-        course.look(step, asked, &sums);
-        if !has_picture {
-            return Ok(());
-        }
-        self.number += 1;
-        let before = self.shown.as_deref();
-        let picture = Arc::new(picture(self.number, built, course, asked, &sums, before));
-        let is_coarse = course.stride() > 1;
-        let film = (!is_coarse).then(|| {
-            let film = built.renderer.film_of(&course.sitting, sums);
-            (Arc::new(film), asked.goals.is_none())
-        });
-        course.pictures += 1;
-        self.handed = course.samples();
-        self.shared.show(Shown {
-            scene: built.scene.clone(),
-            program: built.program.clone(),
-            camera: built.camera,
-            picture: picture.clone(),
-            film,
-            seed: asked.seed,
-        });
-        let due = self
-            .told_kernels
-            .is_none_or(|told| told.elapsed() >= KERNELS_EVERY);
-        let kernels = due.then(|| Arc::new(kernels::of(self.device, built, &course.sitting)));
-        if due {
-            self.told_kernels = Some(Instant::now());
-        }
-        let errors: Vec<ErrorPoint> = course
-            .checks
-            .iter()
-            .map(|check| ErrorPoint {
-                seconds: check.seconds,
-                samples: check.samples,
-                relmse: check.relmse,
-            })
-            .collect();
-        self.shown = Some(picture.clone());
-        self.shared.tell(|news| {
-            news.picture = Some(picture);
-            if let Some(kernels) = kernels
-                && *news.kernels != *kernels
-            {
-                news.kernels = kernels;
-            }
-            if *news.errors != errors {
-                news.errors = Arc::new(errors);
-            }
-        });
-        Ok(())
-    }
-
-    /// Says what is shown, with its values, and what is wrong.
-    fn tell_project(&mut self) {
-        let built = if self.on_last { &self.last } else { &self.open };
-        let project = built.as_ref().map(|built| {
-            let values = &built.values;
-            Arc::new(project::with_values(
-                &built.described.project,
-                &built.program,
-                values,
-            ))
-        });
-        let complaints = self.following.complaints.values();
-        let all = self
-            .of_files
-            .iter()
-            .chain(&self.of_values)
-            .chain(complaints);
-        let all: Vec<Problem> = all.cloned().collect();
-        self.shared.tell(|news| {
-            if let Some(project) = project {
-                news.project = project;
-            }
-            if *news.problems != all {
-                news.problems = Arc::new(all);
-            }
-        });
-    }
-
-    /// Says what the engine is at.
-    fn tell_state(&mut self) {
-        if self.mailbox.at_work() == Some(Code::Open) {
-            // The maker says what it is at.
-            return;
-        }
-        let built = if self.on_last { &self.last } else { &self.open };
-        let is_done = match (built, &self.course) {
-            (Some(built), Some(course)) => is_done(course, &self.asked(built)),
-            _ => false,
-        };
-        // What open kernels have done is done again by final ones.
-        let is_done = is_done && (self.on_last || self.open_is_final);
-        let state = if let Some(why) = &self.failed {
-            State::Failed(why.clone())
-        } else if problems::has_errors(&self.of_files) {
-            State::Broken
-        } else if self.following.paused {
-            State::Paused
-        } else if is_done {
-            State::Done
-        } else {
-            State::Rendering
-        };
-        if self.shared.news().state != state {
-            self.shared.tell(|news| news.state = state);
-        }
-    }
-}
-
-/// The picture that a film holds.
-fn picture(
-    number: u64,
-    built: &Built<'_>,
-    course: &Course,
-    asked: &Asked,
-    sums: &Sums,
-    before: Option<&Picture>,
-) -> Picture {
-    let [width, height] = built.size();
-    let (pixels, counts) = super::picture::pixels(sums, &asked.pixels, course.stride(), before);
-    let (nonfinite, dropped) = built.renderer.dropped_of(&course.sitting);
-    let examples = dropped.iter().filter_map(|d| d.example.as_ref());
-    let mut places: Vec<u32> = examples.map(|e| e.pixel[1] * width + e.pixel[0]).collect();
-    places.sort_unstable();
-    places.dedup();
-    Picture {
-        number,
-        width,
-        height,
-        camera: Some(built.camera),
-        samples: course.samples().max(1),
-        samples_asked: asked.samples,
-        elapsed: course.begun.elapsed(),
-        pixels: Arc::new(pixels),
-        counts: Arc::new(counts),
-        layers: super::picture::layers(sums),
-        nonfinite,
-        nonfinite_pixels: Arc::new(places),
     }
 }
 
