@@ -1,5 +1,5 @@
 //! `impasto view` on a screen (`screen`), with the engine that renders: what an author does with hand, editor and eye, and
-//! that the picture on the screen has the bytes of the one that `impasto shot` writes.
+//! that the picture on the screen has the bytes of the one that `impasto render` writes.
 
 use std::path::Path;
 use std::process::Command;
@@ -22,7 +22,8 @@ material paint {
 }
 ";
 
-const SIZE: [u32; 2] = [320, 240];
+/// So large that each pixel of the picture is one of the screen.
+const SIZE: [u32; 2] = [400, 300];
 const SAMPLES: u32 = 2;
 
 fn impasto() -> Command {
@@ -33,12 +34,12 @@ fn size() -> String {
     format!("{}x{}", SIZE[0], SIZE[1])
 }
 
-/// The picture that `impasto shot` makes of a file, as bytes of red, green and blue.
+/// The picture that `impasto render` makes of a file, as bytes of red, green and blue.
 fn written(file: &Path) -> Vec<[u8; 3]> {
     let folder = tempfile::tempdir().expect("a folder");
     let png = folder.path().join("shot.png");
     let output = impasto()
-        .arg("shot")
+        .arg("render")
         .arg(file)
         .args(["--size", &size(), "--spp", &SAMPLES.to_string(), "-o"])
         .arg(&png)
@@ -74,7 +75,11 @@ fn places(file: &Path) -> Places {
     };
     let live = Arc::new(Live::new(file, options).expect("threads"));
     let begun = Instant::now();
-    while live.news().picture.is_none() {
+    let is_known = || {
+        let news = live.news();
+        news.picture.is_some() && news.kernels.operations.iter().any(Option::is_some)
+    };
+    while !is_known() {
         assert!(begun.elapsed() < Duration::from_secs(90), "no picture");
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -146,7 +151,7 @@ fn an_author_works_in_the_window() {
         let (left, top) = (picture.left() as usize, picture.top() as usize);
         let is_same =
             |x: usize, y: usize| broken.at(left + x, top + y - up) == edited.at(left + x, top + y);
-        top + 10 > up && (0..SIZE[0] as usize).all(|x| is_same(x, 10) && is_same(x, 120))
+        top + 10 > up && (0..SIZE[0] as usize).all(|x| is_same(x, 10) && is_same(x, 150))
     });
     assert!(
         has_moved_up,

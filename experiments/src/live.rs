@@ -1,9 +1,11 @@
 //! `cargo experiments live`: how long one waits for a new picture while one looks around in a scene, drags a value, or
 //! saves a source. It measures the engine behind `impasto view`, without its window.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::{Args, ValueEnum};
 use impasto::compiler::ParameterValue;
@@ -34,6 +36,9 @@ pub(crate) struct LiveArgs {
     /// Columns and rows of the picture
     #[arg(long, value_name = "WxH", default_value = "480x360")]
     size: String,
+    /// Paths in flight; by default as the window has them
+    #[arg(long, value_name = "PATHS")]
+    pool: Option<u32>,
     /// Orders of each kind; half as many edits
     #[arg(long, default_value_t = 20)]
     rounds: u32,
@@ -50,6 +55,9 @@ enum DeviceArg {
 const LONG: Duration = Duration::from_secs(60);
 /// How long a hand stays between two orders, so that the second finds a render under way.
 const BETWEEN: Duration = Duration::from_millis(150);
+
+/// How long an author looks at an edit before the next one.
+const LOOK: Duration = Duration::from_secs(3);
 
 pub(crate) fn run(args: &LiveArgs) -> Result {
     let sides = args.size.split_once('x');
@@ -72,10 +80,14 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
         },
         size: Some(size),
         samples: 1 << 16,
+        pool: args.pool,
         ..LiveOptions::default()
     };
     let live = Live::new(&file, options).map_err(|e| e.to_string())?;
-    let engine = Watched { live };
+    let engine = Watched {
+        live,
+        spent: RefCell::default(),
+    };
     let first = engine.until(|news| news.picture.is_some())?;
     let opened = begun.elapsed();
     let device = engine
@@ -129,12 +141,20 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
     print("drag", drags);
 
     let mut edits = Vec::new();
+    // No driver may have seen the source before: they keep kernels on disk.
+    let unseen = SystemTime::now().duration_since(UNIX_EPOCH);
+    let unseen = unseen.map_err(|e| e.to_string())?.as_millis() % 1_000_000;
+    engine.spent.take();
     for round in 0..args.rounds.div_ceil(2) {
-        std::thread::sleep(4 * BETWEEN);
+        // The kernels of a long look are there by then.
+        std::thread::sleep(LOOK);
         let before = engine.live.news();
         let number = before.picture.as_ref().map_or(0, |picture| picture.number);
         let edited = args.edited.trim_end_matches(|c: char| c.is_ascii_digit());
-        let text = source.replace(&args.edited, &format!("{edited}{}", 500 + round));
+        let text = source.replace(
+            &args.edited,
+            &format!("{edited}{}", edited_number(unseen, round)),
+        );
         if text == source {
             return Err(format!("the source has no `{}`", args.edited));
         }
@@ -146,10 +166,14 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
         })?;
         edits.push(begun.elapsed());
     }
+    let all = edits.len().max(1) as u32;
     print("edit", edits);
+    for (state, time) in engine.spent.take() {
+        eprintln!("  {state}: {} on average", milliseconds(time / all));
+    }
 
     // How fast it is meanwhile, once it is left alone.
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(LOOK);
     let rate = |picture: &Picture| f64::from(picture.samples) / picture.elapsed.as_secs_f64();
     if let Some(picture) = engine.live.news().picture {
         let paths = rate(&picture) * f64::from(size[0]) * f64::from(size[1]);
@@ -169,6 +193,15 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
     Ok(())
 }
 
+/// A number like no other of this hour, to seven digits.
+fn edited_number(unseen: u128, round: u32) -> String {
+    format!(
+        "{}.{:04}",
+        300 + 50 * (round % 12),
+        (unseen + u128::from(round) * 7) % 10_000
+    )
+}
+
 fn write(path: &Path, text: &str) -> Result {
     impasto::files::write_whole(path, text.as_bytes()).map_err(String::from)?;
     Ok(())
@@ -181,13 +214,19 @@ fn has(news: &News, holds: impl Fn(&Picture) -> bool) -> bool {
 /// An engine whose news are looked at all the time.
 struct Watched {
     live: Live,
+    /// How long it was in each state.
+    spent: RefCell<BTreeMap<String, Duration>>,
 }
 
 impl Watched {
     fn until(&self, holds: impl Fn(&News) -> bool) -> Result<News> {
         let begun = Instant::now();
+        let mut last = begun;
         loop {
             let news = self.live.news();
+            let state = format!("{:?}", news.state);
+            *self.spent.borrow_mut().entry(state).or_default() += last.elapsed();
+            last = Instant::now();
             if holds(&news) {
                 return Ok(news);
             }

@@ -60,7 +60,12 @@ pub(super) struct Built<'d> {
     outputs: Vec<String>,
     /// Pixels that are selected.
     selected: Option<(Pixels, SomePixels, u64)>,
+    /// Those that were, so that a hand that moves does not wait for them again.
+    lists: Vec<(Pixels, SomePixels, Arc<[u32]>)>,
 }
+
+/// Lists of pixels that are kept: coarse ones of a few strides, their rests, and all.
+const LISTS: usize = 8;
 
 /// What kernels are built of.
 pub(super) struct Ingredients {
@@ -110,6 +115,7 @@ impl<'d> Built<'d> {
             technique: of.technique,
             outputs: of.outputs,
             selected: None,
+            lists: Vec::new(),
         }
     }
 
@@ -193,7 +199,18 @@ impl<'d> Built<'d> {
         {
             return Ok(count);
         }
-        let list = pixels.list(some);
+        let mut known = self.lists.iter();
+        let list = match known.find(|(of, part, _)| (*of, *part) == (pixels, some)) {
+            Some((.., list)) => list.clone(),
+            None => {
+                if self.lists.len() == LISTS {
+                    self.lists.remove(0);
+                }
+                let list = pixels.list(some);
+                self.lists.push((pixels, some, list.clone()));
+                list
+            }
+        };
         let count = list.len() as u64;
         self.renderer.select_pixels(list)?;
         self.selected = Some((pixels, some, count));

@@ -7,8 +7,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use impasto_runtime::film::Sums;
-use impasto_runtime::render::until::{Check, Goals, Halves, next, second_seed};
+use impasto_runtime::film::file::FilmFile;
+use impasto_runtime::render::until::{Check, Estimate, Goals, Halves, estimate, next, second_seed};
 use impasto_runtime::render::{Portion, Sitting};
+use impasto_viewer::engine::ErrorPoint;
 
 use super::pixels::{Pixels, Some as SomePixels};
 
@@ -20,8 +22,6 @@ const COARSEST: u32 = 8;
 const BETWEEN: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)];
 /// Handing out pictures takes at most so much of the time.
 const SHARE: u32 = 16;
-/// So long no error is estimated: a hand moves on.
-const UNESTIMATED: Duration = Duration::from_millis(250);
 
 /// How fast samples were taken lately.
 #[derive(Clone, Copy, Debug)]
@@ -103,8 +103,10 @@ pub(super) struct Course {
     halves: Option<Halves>,
     /// Where no error is asked for: the film at half of the samples by which it is estimated all the same, and how many it
     /// had.
-    half: Option<(u32, Sums)>,
-    pub checks: Vec<Check>,
+    half: Option<(u32, Arc<FilmFile>)>,
+    checks: Vec<Check>,
+    /// The errors of a picture that was the same but for its last bits.
+    before: Vec<ErrorPoint>,
     /// The estimated relative standard error of each pixel, at the last check.
     pub errors: Option<Arc<Vec<f32>>>,
     pub is_reached: bool,
@@ -115,8 +117,9 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// Nothing yet.
-    pub(super) fn new(sitting: Sitting, silent_below: u32) -> Self {
+    /// Nothing yet. If it is silent, it goes on from what is known of the same picture `before`.
+    pub(super) fn new(sitting: Sitting, silent_below: u32, before: Option<&Self>) -> Self {
+        let before = before.filter(|_| silent_below > 0);
         Self {
             sitting,
             begun: Instant::now(),
@@ -126,7 +129,8 @@ impl Course {
             halves: None,
             half: None,
             checks: Vec::new(),
-            errors: None,
+            before: before.map_or_else(Vec::new, Self::error_points),
+            errors: before.and_then(|course| course.errors.clone()),
             is_reached: false,
             pictures: 0,
             silent_below,
@@ -220,7 +224,7 @@ impl Course {
             .get_or_insert_with(|| Halves::new(&sums.emptied()));
         halves.update(half, sums);
         let seconds = self.begun.elapsed();
-        let estimated = (half == 1).then(|| halves.errors_and_pixels()).flatten();
+        let estimated = (half == 1).then(|| halves.estimate()).flatten();
         if let Some(estimated) = estimated {
             let check = self.check(estimated);
             self.is_reached = goals.reached(&check).is_some();
@@ -234,34 +238,50 @@ impl Course {
     /// there are twice as many, so that it takes little time however long the picture is rendered.
     fn estimate(&mut self, asked: &Asked, sums: &Sums) {
         let samples = self.samples();
-        if self.begun.elapsed() < UNESTIMATED {
+        let Some((at, half)) = &self.half else {
+            return;
+        };
+        let is_due = samples >= 2 * at || samples >= asked.samples;
+        if !is_due || samples <= *at {
             return;
         }
-        let estimated = match &self.half {
-            Some((at, _)) if samples < 2 * at && samples < asked.samples || samples == *at => {
-                return;
-            }
-            Some((_, half)) => Halves::of(half, sums).errors_and_pixels(),
-            None => None,
-        };
-        if let Some(estimated) = estimated {
+        if let Some(estimated) = estimate(&half.sums, sums) {
             self.check(estimated);
         }
-        self.half = Some((samples, sums.without_outputs()));
+        self.half = None;
+    }
+
+    /// Keeps a film as the half by which an error is estimated later, if that needs one.
+    pub(super) fn keep(&mut self, film: &Arc<FilmFile>) {
+        if self.half.is_none() {
+            self.half = Some((self.samples(), film.clone()));
+        }
     }
 
     /// Notes an estimated error.
-    fn check(&mut self, ([mse, relmse], pixels): ([f64; 2], Vec<f32>)) -> Check {
+    fn check(&mut self, estimated: Estimate) -> Check {
         let check = Check {
             samples: self.samples(),
             seconds: self.begun.elapsed().as_secs_f64(),
             gpu_seconds: 0.0,
-            relmse,
-            rmse: mse.sqrt(),
+            relmse: estimated.relmse,
+            rmse: estimated.mse.sqrt(),
         };
-        self.errors = Some(Arc::new(pixels));
+        self.errors = Some(Arc::new(estimated.pixels));
         self.checks.push(check);
         check
+    }
+
+    /// The course of the error: that of the picture before, which was the same, as far as this one has not got yet.
+    pub(super) fn error_points(&self) -> Vec<ErrorPoint> {
+        let own = self.checks.first().map_or(u32::MAX, |check| check.samples);
+        let before = self.before.iter().filter(|point| point.samples < own);
+        let of = |check: &Check| ErrorPoint {
+            seconds: check.seconds,
+            samples: check.samples,
+            relmse: check.relmse,
+        };
+        before.copied().chain(self.checks.iter().map(of)).collect()
     }
 
     /// Must sums be read after a step even if nobody is shown them?

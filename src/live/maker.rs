@@ -316,7 +316,7 @@ impl<'d, 's> Maker<'d, 's> {
             && program.materials().len() <= plan::MOST_RENEWED;
         let options = RenderOptions {
             count_hits: is_renewed,
-            ..self.render_options(&scene, wanted)
+            ..self.render_options(&scene, wanted, job.code)
         };
         let instances = MaterialSource::instances(&*program);
         let (technique, outputs) = (&options.technique, &options.outputs);
@@ -477,12 +477,12 @@ impl<'d, 's> Maker<'d, 's> {
         });
     }
 
-    fn render_options(&self, scene: &Scene, wanted: &Wanted) -> RenderOptions {
+    fn render_options(&self, scene: &Scene, wanted: &Wanted, code: Code) -> RenderOptions {
         let size = [scene.film.width, scene.film.height];
         RenderOptions {
             samples: wanted.most_samples(),
             seed: self.options.seed,
-            pool: self.options.pool.or_else(|| pool(self.device)),
+            pool: self.options.pool.or_else(|| pool(self.device, code, size)),
             technique: self.options.technique,
             outputs: wanted.outputs.clone(),
             // All of them, so that others can be chosen.
@@ -497,11 +497,18 @@ pub(super) fn is_fast(device: &Device) -> bool {
     matches!(device, Device::Gpu(gpu) if gpu.info().kind != "software")
 }
 
-/// Paths in flight. A GPU in software takes fewer than for a render, since an iteration is what one waits for.
-fn pool(device: &Device) -> Option<u32> {
+/// Paths in flight, where they are not as many as in a render. A GPU in software takes fewer, since an iteration is what one
+/// waits for. Open kernels of another GPU have about one for each pixel: they are there sooner without so much memory, and
+/// are looked at for a moment.
+fn pool(device: &Device, code: Code, [width, height]: [u32; 2]) -> Option<u32> {
     const SOFTWARE: u32 = 1 << 14;
+    const OPEN: [u32; 2] = [1 << 16, 1 << 20];
     match device {
         Device::Gpu(gpu) if gpu.info().kind == "software" => Some(SOFTWARE),
+        Device::Gpu(_) if code == Code::Open => {
+            let pixels = width.saturating_mul(height).clamp(OPEN[0], OPEN[1]);
+            Some(pixels.next_power_of_two())
+        }
         _ => None,
     }
 }

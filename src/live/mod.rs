@@ -28,7 +28,6 @@ pub use impasto_viewer::engine;
 use impasto_viewer::engine::{Answer, Engine, News, Order, ParamId, State};
 
 use crate::set::Set;
-use crate::shot::watch::EVERY;
 
 mod built;
 mod clerk;
@@ -52,7 +51,9 @@ use wanted::Wanted;
 /// Compiling materials recurses.
 const STACK_BYTES: usize = 32 << 20;
 /// How long files are left alone that are saved: editors save in several steps.
-const SETTLED: Duration = Duration::from_millis(20);
+const SETTLED: Duration = Duration::from_millis(15);
+/// How often files are looked at.
+const EVERY: Duration = Duration::from_millis(15);
 
 /// What to begin with.
 #[derive(Clone, Debug)]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use naga::BuiltIn;
+use rayon::prelude::*;
 
 use super::build::Kernel;
 use super::layout::STOP;
@@ -19,6 +20,9 @@ pub struct Buffer {
 
 /// Words behind a buffer: code reads four where it needs fewer, and lanes that have nothing to store store there.
 const BEHIND: usize = 4;
+
+/// Words that a thread reads at a time, at least.
+const READ_AT_ONCE: usize = 1 << 14;
 
 impl Buffer {
     /// So many words, all of them zero.
@@ -47,12 +51,10 @@ impl Buffer {
             .for_each(|word| word.store(0, Ordering::Relaxed));
     }
 
-    /// A copy of its words.
+    /// A copy of its words. New memory costs more to take than to fill, so threads take it together.
     pub fn read(&self) -> Vec<u32> {
-        self.words()
-            .iter()
-            .map(|word| word.load(Ordering::Relaxed))
-            .collect()
+        let words = self.words().par_iter().with_min_len(READ_AT_ONCE);
+        words.map(|word| word.load(Ordering::Relaxed)).collect()
     }
 }
 

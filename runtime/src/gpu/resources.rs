@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
+
 use crate::error::RuntimeError;
 use crate::gpu::Gpu;
 use crate::kernels::buffers::{Access, BUFFERS, Buffer, BufferId, Cleared, Owner, Reader};
@@ -173,9 +175,7 @@ impl Resources {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(film, 0, &staging, 0, film.size());
         let index = gpu.queue.submit([encoder.finish()]);
-        let words = gpu.read(&staging, index, film.size(), |bytes| {
-            bytemuck::pod_collect_to_vec(bytes)
-        })?;
+        let words = gpu.read(&staging, index, film.size(), words_of)?;
         *kept = Some(staging);
         Ok(words)
     }
@@ -270,4 +270,14 @@ fn own_buffer(gpu: &Gpu, composer: &Composer<'_>, buffer: &Buffer) -> wgpu::Buff
         usage: kernels | others | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
+}
+
+/// Bytes that a thread takes at a time, at least: whole pages of a processor.
+const AT_ONCE: usize = 1 << 16;
+
+/// Words of a mapped buffer. New memory costs more to take than to fill, so threads take it together.
+fn words_of(bytes: &[u8]) -> Vec<u32> {
+    let pieces = bytes.par_chunks_exact(4).with_min_len(AT_ONCE / 4);
+    let word = |piece: &[u8]| piece.try_into().map_or(0, u32::from_ne_bytes);
+    pieces.map(word).collect()
 }

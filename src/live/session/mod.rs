@@ -429,7 +429,8 @@ impl<'d, 's> Session<'d, 's> {
         let silent_below = self.handed.min(self.following.most_samples());
         if let Some(built) = self.active() {
             let sitting = built.renderer.sit();
-            self.course = Some(Course::new(sitting, silent_below));
+            let before = self.course.take();
+            self.course = Some(Course::new(sitting, silent_below, before.as_ref()));
         }
     }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use impasto_runtime::device::Device;
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::film::Sums;
-use impasto_viewer::engine::{ErrorPoint, Picture, PictureLayer, Problem, State};
+use impasto_viewer::engine::{Picture, PictureLayer, Problem, State};
 
 use super::super::built::{Built, Code};
 use super::super::course::{Asked, Course, Step, is_done};
@@ -43,6 +43,9 @@ impl Session<'_, '_> {
             let film = built.renderer.film_of(&course.sitting, sums);
             (Arc::new(film), asked.goals.is_none())
         });
+        if let Some((film, true)) = &film {
+            course.keep(film);
+        }
         course.pictures += 1;
         self.handed = course.samples();
         self.shared.show(Shown {
@@ -64,15 +67,7 @@ impl Session<'_, '_> {
         if due {
             self.told_kernels = Some(Instant::now());
         }
-        let errors: Vec<ErrorPoint> = course
-            .checks
-            .iter()
-            .map(|check| ErrorPoint {
-                seconds: check.seconds,
-                samples: check.samples,
-                relmse: check.relmse,
-            })
-            .collect();
+        let errors = course.error_points();
         self.shown = Some(picture.clone());
         self.shared.tell(|news| {
             news.picture = Some(picture);

@@ -116,14 +116,6 @@ impl Halves {
         }
     }
 
-    /// Of a film as it was, and of the same with more samples.
-    pub fn of(first: &Sums, all: &Sums) -> Self {
-        Self {
-            first: first.without_outputs(),
-            all: all.without_outputs(),
-        }
-    }
-
     /// Takes note of the film after samples were added by one of the halves.
     pub fn update(&mut self, half: usize, film: &Sums) {
         let film = film.without_outputs();
@@ -145,59 +137,83 @@ impl Halves {
     /// chance, divided by its own brightness, would hide that it is wrong. The median of A, B and the mean of
     /// the pixels around is near the truth even then, and becomes the truth with more samples.
     pub fn errors(&self) -> Option<[f64; 2]> {
-        errors(&self.by_pixel())
+        errors(&by_pixel(&self.first, &self.all))
     }
 
-    /// The same, and the estimated standard error of each pixel over its brightness, row by row; 0 where a half has no
-    /// samples. An estimate by two means says little of one pixel, so it is the root of the mean over those around as well.
-    pub fn errors_and_pixels(&self) -> Option<([f64; 2], Vec<f32>)> {
-        let of_pixels = self.by_pixel();
-        let errors = errors(&of_pixels)?;
-        let (width, height) = self.all.size();
-        let relative = |channels: [OfChannel; 3]| {
-            let mean = |of: fn(OfChannel) -> f64| channels.map(of).iter().sum::<f64>() / 3.0;
-            mean(|c| c.error) / (mean(|c| c.truth).powi(2) + RELATIVE_FLOOR)
-        };
-        let of_pixels = of_pixels.into_par_iter();
-        let squares: Vec<Option<f64>> = of_pixels.map(|p| p.map(relative)).collect();
-        let smooth = |pixel: usize| {
-            let around = pixels_around(pixel, [width as usize, height as usize], SMOOTH);
-            let (mut sum, mut count) = (0.0, 0.0);
-            for square in around.filter_map(|at| squares[at]) {
-                sum += square;
-                count += 1.0;
-            }
-            // Conversion saturates.
-            squares[pixel].map_or(0.0, |_| f64::sqrt(sum / count) as f32)
-        };
-        let smooth = (0..squares.len()).into_par_iter().map(smooth);
-        Some((errors, smooth.collect()))
+    /// The same, with the error of each pixel.
+    pub fn estimate(&self) -> Option<Estimate> {
+        estimate(&self.first, &self.all)
     }
+}
 
-    /// What is known of each pixel's three channels; none where a half has no samples.
-    fn by_pixel(&self) -> Vec<Option<[OfChannel; 3]>> {
-        let (width, height) = self.all.size();
-        let means = Means::of(&self.all, width as usize);
-        let of = |pixel: usize| {
-            let (first, all) = (self.first.count(pixel), self.all.count(pixel));
-            let [a, b] = [f64::from(first), f64::from(all.saturating_sub(first))];
-            if a == 0.0 || b == 0.0 {
-                return None;
-            }
-            let around = means.around(pixel);
-            Some([0, 1, 2].map(|channel: usize| {
-                let sum = self.first.radiance(channel, pixel);
-                let first = sum / a;
-                let second = (self.all.radiance(channel, pixel) - sum) / b;
-                OfChannel {
-                    error: a * b / (a + b).powi(2) * (first - second).powi(2),
-                    truth: median(first, second, around[channel]),
-                }
-            }))
-        };
-        let pixels = 0..width as usize * height as usize;
-        pixels.into_par_iter().map(of).collect()
+/// What is estimated of a picture's error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// The mean squared error.
+    pub mse: f64,
+    /// The relative one.
+    pub relmse: f64,
+    /// The standard error of each pixel over its brightness, row by row; 0 where a half has no samples. An estimate by two
+    /// means says little of one pixel, so it is the root of the mean over those around as well.
+    pub pixels: Vec<f32>,
+}
+
+/// The error of a film by its `first` samples, and by the others among `all`, as [`Halves::errors`] has it. `None` if one of
+/// the halves has no samples, or the pictures are not of one size.
+pub fn estimate(first: &Sums, all: &Sums) -> Option<Estimate> {
+    if first.size() != all.size() {
+        return None;
     }
+    let (width, height) = all.size();
+    let of_pixels = by_pixel(first, all);
+    let [mse, relmse] = errors(&of_pixels)?;
+    let relative = |channels: [OfChannel; 3]| {
+        let mean = |of: fn(OfChannel) -> f64| channels.map(of).iter().sum::<f64>() / 3.0;
+        mean(|c| c.error) / (mean(|c| c.truth).powi(2) + RELATIVE_FLOOR)
+    };
+    let of_pixels = of_pixels.into_par_iter();
+    let squares: Vec<Option<f64>> = of_pixels.map(|p| p.map(relative)).collect();
+    let smooth = |pixel: usize| {
+        let around = pixels_around(pixel, [width as usize, height as usize], SMOOTH);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for square in around.filter_map(|at| squares[at]) {
+            sum += square;
+            count += 1.0;
+        }
+        // Conversion saturates.
+        squares[pixel].map_or(0.0, |_| f64::sqrt(sum / count) as f32)
+    };
+    let pixels = (0..squares.len()).into_par_iter().map(smooth).collect();
+    Some(Estimate {
+        mse,
+        relmse,
+        pixels,
+    })
+}
+
+/// What is known of each pixel's three channels; none where a half has no samples.
+fn by_pixel(first: &Sums, all: &Sums) -> Vec<Option<[OfChannel; 3]>> {
+    let (width, height) = all.size();
+    let means = Means::of(all, width as usize);
+    let of = |pixel: usize| {
+        let (count, of_both) = (first.count(pixel), all.count(pixel));
+        let [a, b] = [f64::from(count), f64::from(of_both.saturating_sub(count))];
+        if a == 0.0 || b == 0.0 {
+            return None;
+        }
+        let around = means.around(pixel);
+        Some([0, 1, 2].map(|channel: usize| {
+            let sum = first.radiance(channel, pixel);
+            let first = sum / a;
+            let second = (all.radiance(channel, pixel) - sum) / b;
+            OfChannel {
+                error: a * b / (a + b).powi(2) * (first - second).powi(2),
+                truth: median(first, second, around[channel]),
+            }
+        }))
+    };
+    let pixels = 0..width as usize * height as usize;
+    pixels.into_par_iter().map(of).collect()
 }
 
 /// The mean squared error of some pixels, and the relative one.

@@ -272,15 +272,19 @@ fn errors_of_pixels_lie_where_the_error_is() {
     let pixels = 0..SIDE * SIDE;
     let half: Vec<u64> = pixels.clone().map(first).collect();
     let all = vec![16 * unit; SIDE * SIDE];
-    let halves = Halves::of(&film(&half, 8), &film(&all, 16));
-    let (errors, by_pixel) = halves.errors_and_pixels().expect("two halves");
-    assert_eq!(halves.errors(), Some(errors));
+    let (half, all) = (film(&half, 8), film(&all, 16));
+    let estimated = estimate(&half, &all).expect("two halves");
+    let mut halves = Halves::new(&film(&[0; SIDE * SIDE], 0));
+    halves.update(0, &half);
+    halves.update(1, &all);
+    assert_eq!(halves.estimate().as_ref(), Some(&estimated));
+    assert_eq!(halves.errors(), Some([estimated.mse, estimated.relmse]));
     // The error of the mean of two that are 1 apart is 1/2.
-    assert!((errors[0] - 0.125).abs() < 1e-9, "{errors:?}");
+    assert!((estimated.mse - 0.125).abs() < 1e-9, "{}", estimated.mse);
     let expected = (0.25f64 / (1.0 + RELATIVE_FLOOR)).sqrt() as f32;
     for pixel in pixels {
         let column = pixel % SIDE;
-        let error = by_pixel[pixel];
+        let error = estimated.pixels[pixel];
         match column {
             0..=5 => assert_eq!(error, 0.0, "{pixel}"),
             10.. => assert!((error - expected).abs() < 1e-6, "{pixel}: {error}"),
@@ -288,6 +292,7 @@ fn errors_of_pixels_lie_where_the_error_is() {
             _ => assert!(error > 0.0 && error < expected, "{pixel}: {error}"),
         }
     }
-    let empty = Halves::of(&film(&[0; 4], 0), &film(&[unit; 4], 1));
-    assert_eq!(empty.errors_and_pixels(), None);
+    let one = film(&[unit; 4], 1);
+    assert_eq!(estimate(&film(&[0; 4], 0), &one), None);
+    assert_eq!(estimate(&one, &all), None, "they are of other sizes");
 }

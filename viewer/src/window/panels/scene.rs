@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    Align, CollapsingHeader, DragValue, Layout, RichText, ScrollArea, TextEdit, Ui,
+    Align, CollapsingHeader, DragValue, Label, Layout, RichText, ScrollArea, TextEdit, Ui,
 };
 use glam::Vec3;
 use impasto_runtime::scene::Camera;
@@ -92,11 +92,14 @@ fn show_binding(ui: &mut Ui, desk: &mut Desk, index: usize, binding: &Binding, i
         .open(open)
         .show_unindented(ui, |ui| {
             let operations = desk.news.kernels.operations.get(index).copied().flatten();
-            let mut about = format!("{} in {}", binding.material, binding.file);
-            if let Some(operations) = operations {
-                about += &format!(", {operations:.0} operations");
-            }
-            ui.label(quiet(about)).on_hover_text(&binding.docs);
+            let about = quiet(format!("{} in {}", binding.material, binding.file));
+            let about = ui.add(Label::new(about).truncate());
+            about.on_hover_text(&binding.docs);
+            // The line is there before the number, so that nothing moves below a hand.
+            let cost = operations.map_or("operations not counted".to_owned(), |operations| {
+                format!("{operations:.0} operations")
+            });
+            ui.label(quiet(cost));
             let mut group: Option<&str> = None;
             for (place, i) in shown.iter().enumerate() {
                 let param = &binding.params[*i];
@@ -156,7 +159,7 @@ fn camera(ui: &mut Ui, desk: &mut Desk) {
 
 fn vector(ui: &mut Ui, name: &str, vector: &mut Vec3) {
     ui.horizontal(|ui| {
-        ui.add_sized([58.0, 18.0], eframe::egui::Label::new(name));
+        ui.add_sized([58.0, 18.0], Label::new(name));
         let width = (ui.available_width() - 18.0) / 3.0;
         let axes = [
             (&mut vector.x, "x"),
@@ -183,7 +186,7 @@ fn scalar(
     suffix: &str,
 ) {
     ui.horizontal(|ui| {
-        let label = ui.add_sized([58.0, 18.0], eframe::egui::Label::new(name));
+        let label = ui.add_sized([58.0, 18.0], Label::new(name));
         let field = DragValue::new(value)
             .speed(speed)
             .range(range)
