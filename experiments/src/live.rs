@@ -149,7 +149,9 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
         std::thread::sleep(LOOK);
         let before = engine.live.news();
         let number = before.picture.as_ref().map_or(0, |picture| picture.number);
-        let edited = args.edited.trim_end_matches(|c: char| c.is_ascii_digit());
+        let edited = args
+            .edited
+            .trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
         let text = source.replace(
             &args.edited,
             &format!("{edited}{}", edited_number(unseen, round)),
