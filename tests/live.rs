@@ -675,6 +675,17 @@ fn what_pixels_see_and_how_wrong_they_are_is_found_beside_the_picture() {
         .expect("a picture");
     let cost = layer(&seen, "cost").expect("costs");
     assert_eq!(cost.values[beside], 0.0);
+    // Another size is the same program.
+    room.live.order(Order::Size([24, 10]));
+    let is_sized = |news: &News| {
+        let picture = news.picture.as_deref().filter(|p| p.width == 24);
+        let cost = picture.and_then(|p| layer(p, "cost"));
+        cost.is_some_and(|cost| cost.values.len() == 240) && costs(news)[0] > 0.0
+    };
+    let seen = room
+        .wait("layers of another size", is_sized)
+        .picture
+        .expect("a picture");
     room.live.order(Order::Survey(false));
     room.live.order(Order::Restart);
     let is_without = |news: &News| {

@@ -80,19 +80,26 @@ struct Surveyor {
 impl Surveyor {
     /// Does what is to be done next; `false` if all is known.
     fn goes_on(&mut self, shared: &Shared, shown: &Shown, sees: bool) -> bool {
-        if self.survey.origin != Some(shown.origin) {
-            self.survey.seen = None;
-            self.survey.explained = None;
+        let is_other = self.survey.origin != Some(shown.origin);
+        if is_other {
+            self.survey = Survey {
+                origin: Some(shown.origin),
+                operations: std::mem::take(&mut self.survey.operations),
+                ..Survey::default()
+            };
         }
         let known = self.program.as_ref();
         let known = known.filter(|(program, _)| Arc::ptr_eq(program, &shown.program));
         let Some((_, materials)) = known else {
             let materials = SceneMaterials::new(&shown.scene, &shown.program, POINTS);
-            self.survey.origin = Some(shown.origin);
             self.survey.operations = operations(&shown.program, &materials);
             self.program = Some((shown.program.clone(), materials));
             return true;
         };
+        if is_other {
+            // Materials that cost what they did, in a picture of another size or frame.
+            return true;
+        }
         if let Some(planned) = &shown.planned
             && self.survey.explained.as_ref().map(|(plan, _)| plan) != Some(&planned.plan)
         {

@@ -330,9 +330,8 @@ impl Body<'_, '_> {
                     .expected(format!("two values of type {}", self.cx.type_text(d)))
                     .hint("give the number a unit, or take the plain number with `float(...)`");
                 let unit = if d == Ty::Length { "mm" } else { "deg" };
-                let number = numbers.into_iter().flatten().next();
-                number.into_iter().fold(wrong, |wrong, number| {
-                    wrong.fix(Fix {
+                match numbers.into_iter().flatten().next() {
+                    Some(number) => wrong.fix(Fix {
                         title: format!("give the number a unit: `{unit}`"),
                         span: Span {
                             start: number.end,
@@ -341,8 +340,9 @@ impl Body<'_, '_> {
                         was: None,
                         text: format!(" {unit}"),
                         imports: Vec::new(),
-                    })
-                })
+                    }),
+                    None => wrong,
+                }
             }
             (Ty::Point, Ty::Length) | (Ty::Length, Ty::Point) if op == BinaryOp::Mul => wrong
                 .expected("a point over a length, which is a plain vec3")

@@ -138,14 +138,8 @@ impl<S: Deref<Target = Scene> + Sync> FirstHits<S> {
         let frame = CameraFrame::new(camera, width as f32 / height as f32);
         let seen = |pixel: u32| {
             let found = PLACES.map(|(x, y)| {
-                let column = (pixel % width) as f32 + x;
-                let row = (pixel / width) as f32 + y;
-                let across = 2.0 * column / width as f32 - 1.0;
-                let up = 1.0 - 2.0 * row / height as f32;
-                self.material(
-                    frame.position,
-                    frame.forward + across * frame.right + up * frame.up,
-                )
+                let place = [(pixel % width) as f32 + x, (pixel / width) as f32 + y];
+                self.material(frame.position, self.toward(&frame, place))
             });
             most_frequent(found)
         };
@@ -159,9 +153,8 @@ impl<S: Deref<Target = Scene> + Sync> FirstHits<S> {
             return None;
         }
         let frame = CameraFrame::new(camera, width as f32 / height as f32);
-        let across = 2.0 * (column as f32 + 0.5) / width as f32 - 1.0;
-        let up = 1.0 - 2.0 * (row as f32 + 0.5) / height as f32;
-        let direction = (frame.forward + across * frame.right + up * frame.up).normalize_or_zero();
+        let place = [column as f32 + 0.5, row as f32 + 0.5];
+        let direction = self.toward(&frame, place).normalize_or_zero();
         let met = self.meets(frame.position, direction)?;
         let names = self.scene.object_names();
         Some(Seen {
@@ -171,6 +164,14 @@ impl<S: Deref<Target = Scene> + Sync> FirstHits<S> {
             depth: met.t * direction.dot(frame.forward),
             bounds: bounds(&self.scene, &met),
         })
+    }
+
+    /// The way from the camera through a place of the picture, in columns and rows; of any length.
+    fn toward(&self, frame: &CameraFrame, [column, row]: [f32; 2]) -> Vec3 {
+        let (width, height) = self.size();
+        let across = 2.0 * column / width as f32 - 1.0;
+        let up = 1.0 - 2.0 * row / height as f32;
+        frame.forward + across * frame.right + up * frame.up
     }
 
     /// Columns and rows.

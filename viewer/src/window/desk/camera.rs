@@ -31,7 +31,7 @@ impl Desk {
         self.pivot.or(looked_at).unwrap_or_default()
     }
 
-    pub(super) fn least_distance(&self) -> f64 {
+    fn least_distance(&self) -> f64 {
         let bounds = self.news.project.bounds;
         let size =
             bounds.map(|[low, high]| f64::from((Vec3::from(high) - Vec3::from(low)).length()));

@@ -70,7 +70,7 @@ impl Desk {
         self.look.exposure = stops.clamp(-20.0, 20.0);
     }
 
-    pub(super) fn toggle(&mut self, mode: Mode) {
+    fn toggle(&mut self, mode: Mode) {
         self.compare_by(if self.compare == mode {
             Mode::Off
         } else {
@@ -78,7 +78,7 @@ impl Desk {
         });
     }
 
-    pub(super) fn leave(&mut self) {
+    fn leave(&mut self) {
         if self.shows_help || self.shows_save {
             self.shows_help = false;
             self.shows_save = false;
@@ -96,7 +96,7 @@ impl Desk {
     }
 
     /// What was picked in the middle of the picture, or else everything.
-    pub(super) fn frame_selection(&mut self) {
+    fn frame_selection(&mut self) {
         let Some(camera) = self.camera() else {
             return;
         };
@@ -117,7 +117,7 @@ impl Desk {
         self.look_from(framed);
     }
 
-    pub(super) fn next_layer(&mut self) {
+    fn next_layer(&mut self) {
         let there: Vec<String> = self.layers().into_iter().map(|(name, _)| name).collect();
         let there: Vec<String> = there
             .into_iter()

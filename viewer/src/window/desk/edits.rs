@@ -34,7 +34,7 @@ impl Desk {
     }
 
     /// Gives a value. What was there before, unless a hand already holds it; nothing if nothing changes.
-    pub(super) fn put(&mut self, id: &ParamId, value: Value) -> Option<Option<Value>> {
+    fn put(&mut self, id: &ParamId, value: Value) -> Option<Option<Value>> {
         let project = Arc::clone(&self.news.project);
         let param = param_of(&project, id)?;
         if param.is_animated || !param.interface.settable {

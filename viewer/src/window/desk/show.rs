@@ -117,7 +117,7 @@ impl Desk {
         self.overlay = layer;
     }
 
-    pub(super) fn record_if_needed(&mut self, name: &str) {
+    fn record_if_needed(&mut self, name: &str) {
         let can_be = self
             .news
             .project
