@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::build::alike::{self, Requested};
-use crate::build::{ProgramBuilder, Setting};
+use crate::build::{ProgramBuilder, Setting, constants};
 use crate::diag::{self, Code, Diagnostic};
 use crate::ir::{self, Module};
 use crate::loader::Loader;
@@ -50,6 +50,9 @@ pub enum Parameters {
     Baked,
     /// All into the table: the code holds for any values.
     Table,
+    /// All into the table, and the floats that its file and others beside it write as well, other than 0 and 1: editing
+    /// one takes no other code.
+    Open,
 }
 
 impl MaterialRequest {
@@ -259,7 +262,7 @@ fn compile_all(
 fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Requested> {
     let mut found: Vec<Requested> = Vec::new();
     let mut known: BTreeMap<(&str, usize), Option<ir::Material>> = BTreeMap::new();
-    let mut places: BTreeMap<(&str, usize, Option<String>), usize> = BTreeMap::new();
+    let mut places: BTreeMap<((&str, usize), bool, String), usize> = BTreeMap::new();
     for (place, request) in requests.iter().enumerate() {
         if checker.progress.is_stopped() {
             break;
@@ -282,22 +285,34 @@ fn requested(checker: &mut Checker, requests: &[MaterialRequest]) -> Vec<Request
         );
         let moment = request.moment.unwrap_or_default();
         let values = values.and_then(|v| checker.values_at(material, v, moment));
-        let Some(values) = values else { continue };
+        let Some(mut values) = values else { continue };
+        let parameters = request.parameters;
         // Requests for constants share code with those for the same constants.
-        let baked = request.parameters == Parameters::Baked;
-        let constants = baked.then(|| format!("{values:?}"));
-        let at = *places.entry((key.0, key.1, constants)).or_insert_with(|| {
+        let baked = parameters == Parameters::Baked;
+        let constants = if baked {
+            format!("{values:?}")
+        } else {
+            String::new()
+        };
+        let key = (key, parameters == Parameters::Open, constants);
+        let at = *places.entry(key).or_insert_with(|| {
+            let mut material = material.clone();
+            if parameters == Parameters::Open {
+                constants::open(&mut checker.ir, &mut material);
+            }
             found.push(Requested {
-                material: material.clone(),
+                material,
                 apart: request.apart,
                 settings: Vec::new(),
             });
             found.len() - 1
         });
+        let written = &found[at].material.params[values.len()..];
+        values.extend(written.iter().map(|constant| constant.default.clone()));
         let setting = Setting {
             name: request.name.clone(),
             values,
-            open: request.parameters == Parameters::Table,
+            open: matches!(parameters, Parameters::Table | Parameters::Open),
             moving: if baked || request.moment.is_none() {
                 Vec::new()
             } else {

@@ -19,6 +19,7 @@ mod interpreter;
 mod layering;
 mod materials;
 mod mutations;
+mod numbers;
 mod optimise;
 mod oracle;
 mod outputs;

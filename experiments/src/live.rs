@@ -30,6 +30,9 @@ pub(crate) struct LiveArgs {
     /// A text of the source that edits change, with another number each time
     #[arg(long, value_name = "TEXT", default_value = "exponent: 900")]
     edited: String,
+    /// A text of the source with an int at its end, so that edits of it take other code
+    #[arg(long, value_name = "TEXT", default_value = "seed: 1")]
+    recoded: String,
     /// Which device renders
     #[arg(long, value_enum, default_value = "best")]
     device: DeviceArg,
@@ -57,7 +60,7 @@ const LONG: Duration = Duration::from_secs(60);
 const BETWEEN: Duration = Duration::from_millis(150);
 
 /// How long an author looks at an edit before the next one.
-const LOOK: Duration = Duration::from_secs(3);
+const LOOK: Duration = Duration::from_secs(5);
 
 pub(crate) fn run(args: &LiveArgs) -> Result {
     let sides = args.size.split_once('x');
@@ -140,38 +143,24 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
     }
     print("drag", drags);
 
-    let mut edits = Vec::new();
     // No driver may have seen the source before: they keep kernels on disk.
     let unseen = 7919 * u64::from(std::process::id()) + opened.as_nanos() as u64;
-    engine.spent.take();
-    for round in 0..args.rounds.div_ceil(2) {
-        // The kernels of a long look are there by then.
-        std::thread::sleep(LOOK);
-        let before = engine.live.news();
-        let number = before.picture.as_ref().map_or(0, |picture| picture.number);
-        let edited = args
-            .edited
-            .trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
-        let text = source.replace(
-            &args.edited,
-            &format!("{edited}{}", edited_number(unseen, round)),
-        );
-        if text == source {
-            return Err(format!("the source has no `{}`", args.edited));
-        }
-        let begun = Instant::now();
-        write(&file, &text)?;
-        engine.until(|news| {
-            !Arc::ptr_eq(&news.project, &before.project)
-                && has(news, |p| p.number > number && p.samples == 1)
-        })?;
-        edits.push(begun.elapsed());
-    }
-    let all = edits.len().max(1) as u32;
-    print("edit", edits);
-    for (state, time) in engine.spent.take() {
-        eprintln!("  {state}: {} on average", milliseconds(time / all));
-    }
+    let number = |round| edited_number(unseen, round);
+    engine.edits(
+        "edit of a number",
+        &file,
+        (&source, &args.edited),
+        args.rounds,
+        number,
+    )?;
+    let code = |round| (unseen % 1_000_000_000 + u64::from(round)).to_string();
+    engine.edits(
+        "edit of code",
+        &file,
+        (&source, &args.recoded),
+        args.rounds,
+        code,
+    )?;
 
     // How fast it is meanwhile, once it is left alone.
     std::thread::sleep(LOOK);
@@ -241,6 +230,43 @@ impl Watched {
             }
             std::thread::sleep(Duration::from_micros(200));
         }
+    }
+
+    /// Saves a source with one text of it changed again and again, as an author who looks in between.
+    fn edits(
+        &self,
+        what: &str,
+        file: &Path,
+        (source, edited): (&str, &str),
+        rounds: u32,
+        number: impl Fn(u32) -> String,
+    ) -> Result {
+        if !source.contains(edited) {
+            return Err(format!("the source has no `{edited}`"));
+        }
+        let before = edited.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+        let mut times = Vec::new();
+        self.spent.take();
+        for round in 0..rounds.div_ceil(2) {
+            // The kernels of a long look are there by then.
+            std::thread::sleep(LOOK);
+            let news = self.live.news();
+            let shown = news.picture.as_ref().map_or(0, |picture| picture.number);
+            let text = source.replace(edited, &format!("{before}{}", number(round)));
+            let begun = Instant::now();
+            write(file, &text)?;
+            self.until(|now| {
+                !Arc::ptr_eq(&now.project, &news.project)
+                    && has(now, |p| p.number > shown && p.samples == 1)
+            })?;
+            times.push(begun.elapsed());
+        }
+        let all = times.len().max(1) as u32;
+        print(what, times);
+        for (state, time) in self.spent.take() {
+            eprintln!("  {state}: {} on average", milliseconds(time / all));
+        }
+        Ok(())
     }
 
     /// The time from an order to the news that follow from it.

@@ -22,6 +22,7 @@ use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::Described;
 use super::shared::Origin;
+use crate::shot::is_library;
 
 /// A submission takes about so long at most, so that orders are heard soon: on a GPU of its own, and elsewhere.
 const ANSWER: Duration = Duration::from_millis(4);
@@ -238,14 +239,17 @@ pub(super) fn requests(
     moment: Option<Moment>,
 ) -> Vec<MaterialRequest> {
     let touched: BTreeSet<&str> = values.keys().map(|id| id.binding.as_str()).collect();
-    let mut requests = match code {
-        Code::Open => crate::shot::open_requests(scene),
-        Code::Final => crate::driver::requests(scene),
-    };
+    let mut requests = crate::driver::requests(scene);
     for request in &mut requests {
         request.moment = moment;
-        if code == Code::Open && touched.contains(request.name.as_str()) {
-            request.parameters = Parameters::Table;
+        if code == Code::Open {
+            request.parameters = if !is_library(&request.file) {
+                Parameters::Open
+            } else if touched.contains(request.name.as_str()) {
+                Parameters::Table
+            } else {
+                request.parameters
+            };
         }
     }
     give(&mut requests, scene, values);

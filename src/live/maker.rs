@@ -1,13 +1,12 @@
-//! Reads files, compiles materials and builds kernels, on a thread beside the one that renders.
+//! Reads files, compiles materials and builds kernels, on threads beside the one that renders.
 //!
-//! There is one job at a time: a newer one takes the place of what is still waiting, and of what is under way. What one
-//! job has of the one before is kept: files that did not change, the program, trees over geometry; and the device
-//! keeps kernels.
+//! One makes open kernels, and another final ones: drivers do not give up what they compile, and nobody who edits is to
+//! wait for kernels of before the edit. What jobs have in common is kept: files that did not change, programs, trees
+//! over geometry; and the device keeps kernels.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use impasto_compiler::diag;
@@ -26,6 +25,7 @@ use impasto_viewer::engine::{Problem, State};
 use super::LiveOptions;
 use super::built::{Built, Code, Ingredients, requests, settable};
 use super::kernels;
+use super::mailbox::Mailbox;
 use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::describe;
@@ -50,6 +50,8 @@ pub(super) struct Job {
 pub(super) struct Made<'d> {
     pub job: Job,
     pub outcome: Outcome<'d>,
+    /// Is the picture another one than that of what was made before?
+    pub is_other: bool,
 }
 
 /// The end of a job.
@@ -88,131 +90,23 @@ impl From<RuntimeError> for Stop {
     }
 }
 
-/// What passes between the maker and whoever renders.
-pub(super) struct Mailbox<'d> {
-    inside: Mutex<Inside<'d>>,
-    bell: Condvar,
-    /// Is the job under way for nothing?
-    cancelled: AtomicBool,
-    has_made: AtomicBool,
-    /// Does what was made make another picture?
-    is_other: AtomicBool,
-}
-
-struct Inside<'d> {
-    job: Option<Job>,
-    /// The code of the job under way.
-    at_work: Option<Code>,
-    made: Option<Made<'d>>,
-    ended: bool,
-}
-
-impl<'d> Mailbox<'d> {
-    pub(super) fn new() -> Self {
-        Self {
-            inside: Mutex::new(Inside {
-                job: None,
-                at_work: None,
-                made: None,
-                ended: false,
-            }),
-            bell: Condvar::new(),
-            cancelled: AtomicBool::new(false),
-            has_made: AtomicBool::new(false),
-            is_other: AtomicBool::new(false),
-        }
-    }
-
-    /// Asks for kernels, in the place of those that were asked for before.
-    pub(super) fn ask(&self, job: Job) {
-        let mut inside = lock(&self.inside);
-        inside.job = Some(job);
-        inside.made = None;
-        self.has_made.store(false, Ordering::SeqCst);
-        self.cancelled.store(true, Ordering::SeqCst);
-        self.bell.notify_all();
-    }
-
-    /// The code that is being made, or is to be.
-    pub(super) fn at_work(&self) -> Option<Code> {
-        let inside = lock(&self.inside);
-        let waiting = inside.job.as_ref().map(|job| job.code);
-        waiting.or(inside.at_work)
-    }
-
-    /// Takes what was made.
-    pub(super) fn take(&self) -> Option<Made<'d>> {
-        if !self.has_made.swap(false, Ordering::SeqCst) {
-            return None;
-        }
-        lock(&self.inside).made.take()
-    }
-
-    /// Is there something made by which the picture is not what it was?
-    pub(super) fn has_other(&self) -> bool {
-        self.has_made.load(Ordering::SeqCst) && self.is_other.load(Ordering::SeqCst)
-    }
-
-    /// Gives up final kernels that are being made or are to be.
-    pub(super) fn drop_final(&self) {
-        let mut inside = lock(&self.inside);
-        inside.job.take_if(|job| job.code == Code::Final);
-        if inside.at_work == Some(Code::Final) {
-            self.cancelled.store(true, Ordering::SeqCst);
-        }
-    }
-
-    /// Gives up what is under way, and ends the thread.
-    pub(super) fn end(&self) {
-        lock(&self.inside).ended = true;
-        self.cancelled.store(true, Ordering::SeqCst);
-        self.bell.notify_all();
-    }
-
-    fn next(&self) -> Option<Job> {
-        let mut inside = lock(&self.inside);
-        loop {
-            if inside.ended {
-                return None;
-            }
-            if let Some(job) = inside.job.take() {
-                inside.at_work = Some(job.code);
-                self.cancelled.store(false, Ordering::SeqCst);
-                return Some(job);
-            }
-            inside = self
-                .bell
-                .wait(inside)
-                .unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
-    fn put(&self, made: Option<Made<'d>>, is_other: bool) {
-        let mut inside = lock(&self.inside);
-        inside.at_work = None;
-        // Of a job that another one has replaced, nobody wants to hear.
-        if let Some(made) = made.filter(|_| inside.job.is_none()) {
-            inside.made = Some(made);
-            self.is_other.store(is_other, Ordering::SeqCst);
-            self.has_made.store(true, Ordering::SeqCst);
-        }
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::SeqCst)
-    }
-}
-
-/// The maker, and what it keeps from job to job.
+/// Makes kernels of one kind.
 pub(super) struct Maker<'d, 's> {
     pub device: &'d Device,
     pub shared: &'s Shared,
     pub mailbox: &'s Mailbox<'d>,
     pub path: &'s PathBuf,
     pub options: &'s LiveOptions,
+    pub kept: &'s Mutex<Kept>,
+    pub code: Code,
+}
+
+/// What makers keep from job to job.
+#[derive(Default)]
+pub(super) struct Kept {
     trees: Arc<Trees>,
-    /// What was read, and at which count of [`Wanted::reads`].
-    read: Option<(u64, Arc<Subject>)>,
+    /// What was read last, and at which count of [`Wanted::reads`].
+    read: Option<(u64, Read)>,
     /// How often files were read.
     readings: u64,
     /// Of the last kernels that were made.
@@ -221,7 +115,15 @@ pub(super) struct Maker<'d, 's> {
     compiled: [Option<Compiled>; 2],
 }
 
+/// Files as they were read, and the number of that reading.
+#[derive(Clone)]
+struct Read {
+    number: u64,
+    subject: Arc<Subject>,
+}
+
 /// A program, and what it was compiled from.
+#[derive(Clone)]
 struct Compiled {
     reading: u64,
     requests: Vec<MaterialRequest>,
@@ -230,31 +132,10 @@ struct Compiled {
     problems: Vec<Problem>,
 }
 
-impl<'d, 's> Maker<'d, 's> {
-    pub(super) fn new(
-        device: &'d Device,
-        shared: &'s Shared,
-        mailbox: &'s Mailbox<'d>,
-        path: &'s PathBuf,
-        options: &'s LiveOptions,
-    ) -> Self {
-        Self {
-            device,
-            shared,
-            mailbox,
-            path,
-            options,
-            trees: Arc::default(),
-            read: None,
-            readings: 0,
-            last_print: None,
-            compiled: [None, None],
-        }
-    }
-
+impl<'d> Maker<'d, '_> {
     /// Does jobs until the end.
-    pub(super) fn work(mut self) {
-        while let Some(job) = self.mailbox.next() {
+    pub(super) fn work(&self) {
+        while let Some(job) = self.mailbox.next(self.code) {
             let outcome = match self.make(&job) {
                 Ok((built, problems)) => Some(Outcome::Built(Box::new(built), problems)),
                 Err(Stop::Cancelled) => None,
@@ -262,25 +143,36 @@ impl<'d, 's> Maker<'d, 's> {
                 Err(Stop::Wrong(problems)) => Some(Outcome::Wrong(problems)),
                 Err(Stop::Failed(error)) => Some(Outcome::Failed(error)),
             };
-            let is_other = match &outcome {
-                Some(Outcome::Built(built, _)) => {
-                    let print = Some(built.renderer.fingerprint_but_camera());
-                    std::mem::replace(&mut self.last_print, print) != print
-                }
-                Some(Outcome::Failed(_)) => true,
-                _ => false,
-            };
-            let made = outcome.map(|outcome| Made { job, outcome });
-            self.mailbox.put(made, is_other);
+            let made = outcome.map(|outcome| Made {
+                is_other: self.is_other(&outcome),
+                job,
+                outcome,
+            });
+            self.mailbox.put(self.code, made);
             self.shared.ring();
         }
     }
 
-    fn make(&mut self, job: &Job) -> Result<(Built<'d>, Vec<Problem>), Stop> {
+    /// Is the picture another one than that of the kernels before?
+    fn is_other(&self, outcome: &Outcome<'_>) -> bool {
+        match outcome {
+            Outcome::Built(built, _) => {
+                let print = Some(built.renderer.fingerprint_but_camera());
+                std::mem::replace(&mut lock(self.kept).last_print, print) != print
+            }
+            Outcome::Failed(_) => true,
+            Outcome::Same | Outcome::Wrong(_) => false,
+        }
+    }
+
+    fn make(&self, job: &Job) -> Result<(Built<'d>, Vec<Problem>), Stop> {
         let wanted = &job.wanted;
         let is_shown = job.code == Code::Open;
         self.tell(is_shown, State::Reading);
-        let subject = self.subject(wanted.reads)?;
+        let Read {
+            number: reading,
+            subject,
+        } = self.read(wanted.reads)?;
         let asked = Asked {
             frame: wanted.frame.unwrap_or(0).into(),
             ..Asked::default()
@@ -300,8 +192,8 @@ impl<'d, 's> Maker<'d, 's> {
         let requests = requests(&scene, &values, job.code, moment);
         self.check_cancelled()?;
         self.tell(is_shown, State::Compiling);
-        let (program, mut problems) = self.program(&scene, &requests, job.code, &wanted.outputs)?;
-        let open = self.compiled[Code::Open as usize].as_ref();
+        let (program, mut problems) = self.program(&scene, reading, &requests, &wanted.outputs)?;
+        let open = lock(self.kept).compiled[Code::Open as usize].clone();
         if job.code == Code::Final && open.is_some_and(|open| is_same(&open.program, &program)) {
             return Err(Stop::Same);
         }
@@ -320,20 +212,14 @@ impl<'d, 's> Maker<'d, 's> {
         };
         let instances = MaterialSource::instances(&*program);
         let (technique, outputs) = (&options.technique, &options.outputs);
-        let world = World::of_instances(
-            &scene,
-            &program,
-            &instances,
-            technique,
-            outputs,
-            &self.trees,
-        )?;
+        let trees = lock(self.kept).trees.clone();
+        let world = World::of_instances(&scene, &program, &instances, technique, outputs, &trees)?;
         described.project.bounds = Some(world.parts.bounds.map(|corner| corner.to_array()));
         self.check_cancelled()?;
         let plan = planned(strategy, &scene, &program);
         let plan = plan.map_err(|why| Stop::Wrong(vec![problems::of_order(why)]))?;
         let watch = |_, _| {
-            if self.mailbox.is_cancelled() {
+            if self.mailbox.is_cancelled(self.code) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -350,7 +236,7 @@ impl<'d, 's> Maker<'d, 's> {
             Ingredients {
                 code: job.code,
                 origin: Origin {
-                    reading: self.readings,
+                    reading,
                     frame: wanted.frame,
                     size: [scene.film.width, scene.film.height],
                 },
@@ -360,7 +246,7 @@ impl<'d, 's> Maker<'d, 's> {
                 values,
                 described,
                 reasons,
-                trees: self.trees.clone(),
+                trees,
                 technique: options.technique,
                 outputs: options.outputs,
                 is_fast: is_fast(self.device),
@@ -370,7 +256,7 @@ impl<'d, 's> Maker<'d, 's> {
     }
 
     fn check_cancelled(&self) -> Result<(), Stop> {
-        if self.mailbox.is_cancelled() {
+        if self.mailbox.is_cancelled(self.code) {
             Err(Stop::Cancelled)
         } else {
             Ok(())
@@ -384,15 +270,19 @@ impl<'d, 's> Maker<'d, 's> {
         }
     }
 
-    /// What is rendered, read again if that was asked for since it was.
-    fn subject(&mut self, reads: u64) -> Result<Arc<Subject>, Stop> {
-        if let Some((at, subject)) = &self.read
-            && *at == reads
-        {
-            return Ok(subject.clone());
-        }
-        self.readings += 1;
-        self.read = None;
+    /// What is rendered, read again if that was asked for since it was. Where it cannot be read, the open kernels that
+    /// are there stay: final ones are of what was read for open ones.
+    fn read(&self, reads: u64) -> Result<Read, Stop> {
+        let number = {
+            let mut kept = lock(self.kept);
+            match &kept.read {
+                Some((at, read)) if *at == reads => return Ok(read.clone()),
+                _ if self.code == Code::Final => return Err(Stop::Same),
+                _ => kept.read = None,
+            }
+            kept.readings += 1;
+            kept.readings
+        };
         self.shared.watch([self.path.clone()]);
         let subject = self.open().inspect_err(|error| {
             // A file that the scene names and that is not there may yet come.
@@ -400,8 +290,9 @@ impl<'d, 's> Maker<'d, 's> {
         })?;
         self.shared.watch(subject.files().to_vec());
         let subject = Arc::new(subject);
-        self.read = Some((reads, subject.clone()));
-        Ok(subject)
+        let read = Read { number, subject };
+        lock(self.kept).read = Some((reads, read.clone()));
+        Ok(read)
     }
 
     fn open(&self) -> Result<Subject, SceneError> {
@@ -418,36 +309,34 @@ impl<'d, 's> Maker<'d, 's> {
 
     /// The program of some requests, compiled unless it is there, and the compiler's warnings.
     fn program(
-        &mut self,
+        &self,
         scene: &Scene,
+        reading: u64,
         requests: &[MaterialRequest],
-        code: Code,
         outputs: &[String],
     ) -> Result<(Arc<Program>, Vec<Problem>), Stop> {
         let looks = ask_for_looks(outputs);
-        if let Some(known) = &self.compiled[code as usize]
-            && (known.reading, known.looks) == (self.readings, looks)
+        let at = self.code as usize;
+        if let Some(known) = &lock(self.kept).compiled[at]
+            && (known.reading, known.looks) == (reading, looks)
             && known.requests == requests
         {
             return Ok((known.program.clone(), known.problems.clone()));
         }
         let mut loader = FileLoader::new(&scene.base);
-        let mailbox = self.mailbox;
-        let compiled =
-            compiler::compile_until(requests, &mut loader, looks, &|| mailbox.is_cancelled());
+        let stops = || self.mailbox.is_cancelled(self.code);
+        let compiled = compiler::compile_until(requests, &mut loader, looks, &stops);
         self.shared.watch(loader.asked());
         self.check_cancelled()?;
         let problems = problems::of_sources(&compiled.sources, &compiled.diagnostics);
-        if compiled.program.is_none() || diag::has_errors(&compiled.diagnostics) {
-            return Err(Stop::Wrong(problems));
-        }
-        let Some(program) = compiled.program else {
+        let has_errors = diag::has_errors(&compiled.diagnostics);
+        let Some(program) = compiled.program.filter(|_| !has_errors) else {
             return Err(Stop::Wrong(problems));
         };
         self.shared.watch(shot::textures(scene, &program));
         let program = Arc::new(program);
-        self.compiled[code as usize] = Some(Compiled {
-            reading: self.readings,
+        lock(self.kept).compiled[at] = Some(Compiled {
+            reading,
             requests: requests.to_vec(),
             looks,
             program: program.clone(),

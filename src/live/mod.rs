@@ -33,6 +33,7 @@ mod built;
 mod clerk;
 mod course;
 mod kernels;
+mod mailbox;
 mod maker;
 mod picture;
 mod pixels;

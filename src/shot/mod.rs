@@ -41,7 +41,7 @@ pub fn is_material(path: &Path) -> bool {
     extension.eq_ignore_ascii_case("impasto") || is_library(&path.to_string_lossy())
 }
 
-fn is_library(file: &str) -> bool {
+pub(crate) fn is_library(file: &str) -> bool {
     file.starts_with("std::")
 }
 

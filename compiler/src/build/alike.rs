@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use super::Setting;
+use super::{Setting, constants};
 use crate::diag::{Code, Diagnostic};
-use crate::ir::{Closure, Const, ExprKind, Lobe, Material, MaterialParam};
+use crate::ir::{Closure, Const, ExprKind, Lobe, Material};
 
 /// A material that requests ask for, with the settings they ask for it in.
 pub(crate) struct Requested {
@@ -112,23 +112,7 @@ fn instances(group: Vec<Requested>) -> Option<Requested> {
     let differing: Vec<usize> = (0..first.body.exprs.len()).filter(differ).collect();
     let mut material = first.clone();
     for &at in &differing {
-        let index = material.params.len() as u32;
-        let expr = &mut material.body.exprs[at];
-        let ExprKind::Const(default) =
-            std::mem::replace(&mut expr.kind, ExprKind::MaterialParam(index))
-        else {
-            continue;
-        };
-        material.params.push(MaterialParam {
-            name: format!("constant {index}"),
-            docs: Vec::new(),
-            surface_type: "float",
-            ty: expr.ty,
-            default,
-            range: None,
-            is_input: false,
-            span: expr.span,
-        });
+        constants::to_parameter(&mut material, at);
     }
     let settings = group.into_iter().flat_map(|one| {
         let own: Vec<Const> = differing

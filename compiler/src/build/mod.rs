@@ -16,6 +16,7 @@ use crate::sema::Checker;
 use crate::stages::{Progress, Stage};
 
 pub(crate) mod alike;
+pub(crate) mod constants;
 pub(crate) mod errors;
 mod functions;
 pub(crate) mod instances;

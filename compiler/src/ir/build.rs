@@ -174,7 +174,7 @@ impl Builder {
     pub fn op(&mut self, op: Op, args: &[ExprId], span: Span) -> ExprId {
         let types: Vec<Type> = args.iter().map(|&a| self.ty(a)).collect();
         if let Some(folded) = self.fold(op, args) {
-            return self.constant(folded, span);
+            return self.constant(folded, self.written(args, span));
         }
         let ty = op.result(&types).unwrap_or(types[0]);
         self.add(ExprKind::Op(op, args.to_vec()), ty, span)
@@ -191,9 +191,17 @@ impl Builder {
         let constants: Option<Vec<&Const>> =
             parts.iter().map(|&a| self.function.constant(a)).collect();
         match constants.and_then(|c| fold_compose(ty, &c)) {
-            Some(folded) => self.constant(folded, span),
+            Some(folded) => self.constant(folded, self.written(parts, span)),
             None => self.add(ExprKind::Compose(parts.to_vec()), ty, span),
         }
+    }
+
+    /// Where a constant at `span` was written that is made of others: what authors give functions of the library, which
+    /// come before them, stays theirs.
+    fn written(&self, parts: &[ExprId], span: Span) -> Span {
+        let spans = parts.iter().map(|&part| self.function.expr(part).span);
+        let last = spans.max_by_key(|span| span.file);
+        last.filter(|last| last.file > span.file).unwrap_or(span)
     }
 
     /// Components of a vector.
@@ -203,7 +211,7 @@ impl Builder {
                 .iter()
                 .filter_map(|&c| v.get(usize::from(c)).copied());
             let picked = Const::Float(picked.collect());
-            return self.constant(picked, span);
+            return self.constant(picked, self.written(&[value], span));
         }
         let ty = Type::of_width(components.len());
         self.add(ExprKind::Swizzle(value, components.to_vec()), ty, span)

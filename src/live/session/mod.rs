@@ -11,7 +11,7 @@ mod tell;
 use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use impasto_runtime::device::Device;
@@ -21,7 +21,8 @@ use impasto_viewer::engine::{Picture, Problem};
 use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
 use super::course::{Asked, Course, Speed, Step, is_done};
-use super::maker::{self, Job, Mailbox, Maker, Outcome};
+use super::mailbox::Mailbox;
+use super::maker::{self, Job, Maker, Outcome};
 use super::pixels::Pixels;
 use super::problems;
 use super::shared::Shared;
@@ -49,18 +50,28 @@ pub(super) enum End {
 
 /// Renders until the end.
 pub(super) fn run(device: &Device, shared: &Shared, path: &PathBuf, options: &LiveOptions) -> End {
-    let mailbox = Mailbox::new();
-    let builder = std::thread::Builder::new()
-        .name("make".into())
-        .stack_size(super::STACK_BYTES);
+    let (mailbox, kept) = (Mailbox::default(), Mutex::default());
     std::thread::scope(|scope| {
-        let maker = Maker::new(device, shared, &mailbox, path, options);
-        if let Err(error) = builder.spawn_scoped(scope, move || maker.work()) {
-            let why = RuntimeError::Threads {
-                threads: 1,
-                reason: error.to_string(),
+        for (code, name) in [(Code::Open, "make"), (Code::Final, "make final")] {
+            let builder = std::thread::Builder::new()
+                .name(name.into())
+                .stack_size(super::STACK_BYTES);
+            let maker = Maker {
+                device,
+                shared,
+                mailbox: &mailbox,
+                path,
+                options,
+                kept: &kept,
+                code,
             };
-            return End::Lost(why);
+            if let Err(error) = builder.spawn_scoped(scope, move || maker.work()) {
+                mailbox.end();
+                return End::Lost(RuntimeError::Threads {
+                    threads: 1,
+                    reason: error.to_string(),
+                });
+            }
         }
         let mut session = Session::new(device, shared, &mailbox, options);
         let end = session.render();
@@ -356,9 +367,9 @@ impl<'d, 's> Session<'d, 's> {
             self.open = Some(built);
             self.last = None;
             self.on_last = false;
-            self.open_is_final = false;
             self.change();
         }
+        self.open_is_final = false;
         if other {
             self.make(Code::Open);
             return Ok(());
