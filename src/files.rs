@@ -43,7 +43,8 @@ impl FileLoader {
 
     /// The files that were asked for, whether they were there or not; those of the library are none.
     pub fn asked(&self) -> impl Iterator<Item = PathBuf> {
-        self.loaded.keys().map(|path| self.base.join(path))
+        let paths = self.loaded.keys().map(|path| self.base.join(path));
+        paths.map(|path| input::on_disk(&path).to_owned())
     }
 
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {

@@ -112,7 +112,8 @@ fn assert_near(found: &[f64], expected: &[f64], what: &str) {
     }
 }
 
-/// The text with its floats, those of declarations of parameters apart, times `by`: all, or one of them.
+/// The text with its floats other than 0 and 1, those of declarations of parameters apart, times `by`: all, or one of
+/// them.
 fn edited(text: &str, by: f64, only: Option<usize>) -> Option<String> {
     let (tokens, _) = lexer::lex(FileId(0), text);
     let declared = |at: usize| {

@@ -20,6 +20,7 @@ pub mod device;
 pub mod error;
 pub mod film;
 pub mod fingerprint;
+pub mod gltf;
 pub mod gpu;
 mod image_file;
 pub mod input;

@@ -30,6 +30,7 @@ mod exhaustive;
 mod explain;
 mod farm;
 mod fmt;
+mod import;
 mod info;
 mod interrupt;
 mod lsp;
@@ -111,6 +112,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Make a material to start from
     New(new::NewArgs),
+    /// Make a folder of a glTF file: its scene, its materials as sources, its pictures
+    Import(import::ImportArgs),
     /// Format sources, keeping every comment
     Fmt(fmt::FmtArgs),
     /// Print a stage of the compilation of a material file
@@ -244,6 +247,7 @@ pub(crate) fn main(jobs: Option<&Sender<Job>>) -> ExitCode {
         Command::Emit(args) => emit::run(&args, &global),
         Command::New(args) => new::run(&args, &global),
         Command::Fmt(args) => fmt::run(&args, &global),
+        Command::Import(args) => import::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Converge(args) => converge::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),

@@ -111,7 +111,9 @@ impl RenderArgs {
                 if is_named_so || !is_it || error.hint.is_some() {
                     return error;
                 }
-                error.hint("scenes are `.toml` files, and materials `.impasto` files")
+                error.hint(
+                    "scenes are `.toml` and glTF files (`.gltf`, `.glb`), and materials `.impasto` files",
+                )
             });
         }
         let sample = Sample {

@@ -10,6 +10,7 @@ use impasto_compiler::partition::Plan;
 use impasto_compiler::{MaterialRequest, Parameters, Program};
 use impasto_runtime::device::Device;
 use impasto_runtime::error::{RuntimeError, SceneError};
+use impasto_runtime::input;
 use impasto_runtime::multi::MultiRenderer;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::NOBODY;
@@ -113,7 +114,9 @@ pub fn open_requests(scene: &Scene) -> Vec<MaterialRequest> {
 /// The files that the materials of a program read as textures.
 pub fn textures(scene: &Scene, program: &Program) -> Vec<PathBuf> {
     let textures = program.textures().into_iter();
-    textures.map(|t| scene.base.join(t.path)).collect()
+    textures
+        .map(|t| input::on_disk(&scene.base.join(t.path)).to_owned())
+        .collect()
 }
 
 /// Devices that render together, and what is kept on them from one picture to the next.

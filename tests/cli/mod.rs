@@ -19,6 +19,7 @@ mod faults;
 mod film;
 mod fmt;
 mod hostile;
+mod import;
 mod limits;
 mod new;
 mod plan;

@@ -134,6 +134,8 @@ impl<'f> SceneFile<'f> {
         files.extend(description.files(base));
         let libraries = sources.values().flat_map(|s| &s.geometry.libraries);
         files.extend(libraries.cloned());
+        let mut files: Vec<PathBuf> = files.iter().map(|f| input::on_disk(f).into()).collect();
+        files.dedup();
         Ok(Self {
             path: path.to_owned(),
             formats,

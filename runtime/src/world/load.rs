@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::lights::{LIGHT_KINDS, readers};
 use crate::error::SceneError;
+use crate::input;
 use crate::scene::formats::{FORMATS, Format};
 use crate::scene::{Scene, SceneFile, load_with};
 
@@ -12,7 +13,7 @@ use crate::scene::{Scene, SceneFile, load_with};
 /// # Errors
 /// The first thing that is wrong, with its place.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    load_with(path, FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
+    load_with(&input::scene(path), FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
 }
 
 /// Reads a scene file with every format of geometry and every kind of light, for scenes at any frame and with other
@@ -21,7 +22,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// # Errors
 /// The first thing that is wrong, with its place.
 pub fn open(path: &Path) -> Result<SceneFile<'static>, SceneError> {
-    SceneFile::read_with(path, FORMATS, &readers(LIGHT_KINDS)).map_err(explain_generated)
+    SceneFile::read_with(&input::scene(path), FORMATS, &readers(LIGHT_KINDS))
+        .map_err(explain_generated)
 }
 
 /// The same of the text of a scene, whose geometry is of the `formats`.

@@ -11,13 +11,14 @@ use impasto_compiler::ParameterValue;
 
 use crate::error::SceneError;
 
+mod gltf;
 mod obj;
 mod polygon;
 #[cfg(test)]
 mod tests;
 
 /// The formats of geometry that can be read.
-pub const FORMATS: &[Format] = &[obj::FORMAT];
+pub const FORMATS: &[Format] = &[obj::FORMAT, gltf::FORMAT];
 
 /// A format of geometry files.
 #[derive(Clone, Copy, Debug)]

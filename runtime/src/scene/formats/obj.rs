@@ -88,7 +88,6 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
 fn other_format(name: &str) -> Option<&'static str> {
     let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
     Some(match extension.as_str() {
-        "gltf" | "glb" => "glTF",
         "ply" => "PLY",
         "fbx" => "FBX",
         "usd" | "usda" | "usdc" | "usdz" => "USD",

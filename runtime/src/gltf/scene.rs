@@ -1,0 +1,273 @@
+//! The scene that a glTF file shows, as the text of a scene file.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use glam::{DMat4, DVec3};
+use gltf::khr_lights_punctual::Kind;
+
+use super::{ALL, Model};
+
+/// Lumens of a watt: of lights, glTF tells what eyes see, and a renderer counts energy. It is what Blender takes.
+const LUMENS_A_WATT: f64 = 683.0;
+
+/// Angular diameter of a distant light, in degrees: of the sun.
+const SUN: f64 = 0.53;
+
+/// Edge of the square that stands for a light at a point, in metres, or by the size of the scene if that is small.
+const LAMP: f64 = 0.05;
+const LAMP_SHARE: f64 = 0.01;
+
+/// Vertical field of view of a camera that the file does not have, in degrees.
+const FOV: f64 = 35.0;
+
+/// How much wider than everything the picture is.
+const MARGIN: f64 = 1.1;
+
+/// Columns and rows of the picture, the rows for a camera that does not say its shape.
+const COLUMNS: u32 = 1024;
+const ROWS: u32 = 768;
+
+impl Model {
+    /// The text of a scene file, in which names of meshes begin with `prefix`.
+    pub(super) fn scene(&self, prefix: &str) -> String {
+        let mut seen = Seen::default();
+        // What is wrong with nodes is told where the geometry is read, which the scene then names whole.
+        let visited = self.visit(&mut |node, transform| seen.node(node, transform));
+        let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut text = format!("name = {}\n", quoted(&name));
+        seen.write_camera(&mut text);
+        let mut write = |line: String| {
+            text.push_str(&line);
+            text.push('\n');
+        };
+        if visited.is_err() || seen.meshes.is_empty() {
+            let all = quoted(&format!("{prefix}{ALL}"));
+            write(format!("[[geometry]]\nfile = {all}\n"));
+        }
+        for (mesh, places) in &seen.meshes {
+            let places: Vec<String> = places.iter().map(matrix).collect();
+            let file = quoted(&format!("{prefix}meshes/{mesh}.gltf"));
+            write(format!("[[geometry]]\nfile = {file}"));
+            match &places[..] {
+                [one] => write(format!("matrix = {one}\n")),
+                all => {
+                    let all: Vec<String> = all
+                        .iter()
+                        .map(|m| format!("  {{ matrix = {m} }},\n"))
+                        .collect();
+                    write(format!("placements = [\n{}]\n", all.concat()));
+                }
+            }
+        }
+        for (name, source) in self.material_names().iter().zip(self.source_names()) {
+            write(format!("[materials.{}]", quoted(name)));
+            write(format!("file = \"{source}.impasto\"\n"));
+        }
+        write("[materials.\"*\"]\nfile = \"std::surface::gltf_pbr\"\n".into());
+        seen.write_lights(&mut text);
+        text
+    }
+}
+
+/// What nodes show.
+#[derive(Default)]
+struct Seen {
+    /// Where meshes are, by their number.
+    meshes: BTreeMap<usize, Vec<DMat4>>,
+    bounds: Option<[DVec3; 2]>,
+    /// The first camera: where it is, its vertical field of view in degrees, and its shape.
+    camera: Option<(DMat4, f64, Option<f64>)>,
+    lights: Vec<(DMat4, Kind, f64, [f32; 3])>,
+}
+
+impl Seen {
+    fn node(&mut self, node: &gltf::Node<'_>, transform: &DMat4) {
+        if let Some(mesh) = node.mesh() {
+            self.meshes
+                .entry(mesh.index())
+                .or_default()
+                .push(*transform);
+            for primitive in mesh.primitives() {
+                self.grow(&primitive, transform);
+            }
+        }
+        if let (None, Some(camera)) = (self.camera, node.camera()) {
+            let perspective = match camera.projection() {
+                gltf::camera::Projection::Perspective(perspective) => Some(perspective),
+                gltf::camera::Projection::Orthographic(_) => None,
+            };
+            self.camera = perspective.map(|p| {
+                let shape = p.aspect_ratio().map(f64::from);
+                (*transform, f64::from(p.yfov()).to_degrees(), shape)
+            });
+        }
+        if let Some(light) = node.light() {
+            let intensity = f64::from(light.intensity());
+            let light = (*transform, light.kind(), intensity, light.color());
+            self.lights.push(light);
+        }
+    }
+
+    /// Grows by the box that the positions of a primitive are in, which every file tells.
+    fn grow(&mut self, primitive: &gltf::Primitive<'_>, transform: &DMat4) {
+        let Some(positions) = primitive.get(&gltf::Semantic::Positions) else {
+            return;
+        };
+        let corner = |value: Option<gltf::json::Value>| {
+            let value = value?;
+            let at = |i: usize| value.get(i)?.as_f64();
+            Some(DVec3::new(at(0)?, at(1)?, at(2)?))
+        };
+        let (Some(low), Some(high)) = (corner(positions.min()), corner(positions.max())) else {
+            return;
+        };
+        for i in 0..8 {
+            let pick = |bit: u32, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
+            let corner = DVec3::new(
+                pick(0, low.x, high.x),
+                pick(1, low.y, high.y),
+                pick(2, low.z, high.z),
+            );
+            let place = transform.transform_point3(corner);
+            if place.is_finite() {
+                let [a, b] = self.bounds.unwrap_or([place; 2]);
+                self.bounds = Some([a.min(place), b.max(place)]);
+            }
+        }
+    }
+
+    /// The centre of everything, and how far it reaches from there.
+    fn extent(&self) -> (DVec3, f64) {
+        let [low, high] = self.bounds.unwrap_or([-DVec3::ONE, DVec3::ONE]);
+        let radius = 0.5 * low.distance(high);
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        (0.5 * (low + high), radius)
+    }
+
+    fn write_camera(&self, text: &mut String) {
+        let (centre, radius) = self.extent();
+        let (position, look_at, up, fov, shape) = match self.camera {
+            Some((transform, fov, shape)) => {
+                let position = transform.w_axis.truncate();
+                let forward = -transform.z_axis.truncate().normalize_or(DVec3::Z);
+                let up = transform.y_axis.truncate().normalize_or(DVec3::Y);
+                let distance = (centre - position).dot(forward);
+                let distance = if distance > 0.0 { distance } else { 1.0 };
+                (position, position + distance * forward, up, fov, shape)
+            }
+            None => {
+                let direction = DVec3::new(0.55, 0.4, 1.0).normalize();
+                let distance = self.distance(direction, radius);
+                (centre + distance * direction, centre, DVec3::Y, FOV, None)
+            }
+        };
+        let rows = shape.filter(|s| (0.01..100.0).contains(s));
+        let rows = rows.map_or(ROWS, |s| (f64::from(COLUMNS) / s).round().max(1.0) as u32);
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "\n[camera]\nposition = {}\nlook_at = {}\nup = {}\nfov = {:?}\n\n\
+             [film]\nwidth = {COLUMNS}\nheight = {rows}\n\n",
+            array(position),
+            array(look_at),
+            array(up),
+            fov.clamp(0.1, 179.0)
+        );
+    }
+
+    /// How far from the centre, in this direction, one sees everything in a square picture with a margin.
+    fn distance(&self, direction: DVec3, radius: f64) -> f64 {
+        let right = DVec3::Y.cross(direction).normalize();
+        let up = direction.cross(right);
+        let slope = (0.5 * FOV).to_radians().tan();
+        let half = self
+            .bounds
+            .map_or(DVec3::splat(radius), |[low, high]| 0.5 * (high - low));
+        let corners = (0..8).map(|i| {
+            let sign = |bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let corner = half * DVec3::new(sign(0), sign(1), sign(2));
+            let across = corner.dot(right).abs().max(corner.dot(up).abs());
+            corner.dot(direction) + MARGIN * across / slope
+        });
+        corners.fold(radius, f64::max)
+    }
+
+    fn write_lights(&self, text: &mut String) {
+        if self.lights.is_empty() {
+            // Like a photographer's: a soft light from above and behind the camera, and a bright room.
+            text.push_str(
+                "[environment]\ncolor = 0.4\n\n\
+                 [[lights]]\nkind = \"distant\"\nto_light = [0.4, 0.9, 0.6]\nirradiance = 1.5\nangle = 20\n",
+            );
+            return;
+        }
+        let (_, radius) = self.extent();
+        let edge = LAMP.min(LAMP_SHARE * radius);
+        for (transform, kind, intensity, color) in &self.lights {
+            let place = transform.w_axis.truncate();
+            let back = transform.z_axis.truncate().normalize_or(DVec3::Z);
+            let power = color.map(|c| f64::from(c) * intensity / LUMENS_A_WATT);
+            let power = DVec3::from(power).max(DVec3::ZERO);
+            match kind {
+                Kind::Directional => {
+                    let _ = write!(
+                        text,
+                        "[[lights]]\nkind = \"distant\"\nto_light = {}\nirradiance = {}\nangle = {SUN}\n\n",
+                        array(back),
+                        array(power)
+                    );
+                }
+                // A cube's six faces shine into all directions; of a spot only that in front does.
+                Kind::Point | Kind::Spot { .. } => {
+                    let is_spot = matches!(kind, Kind::Spot { .. });
+                    let sides: &[DVec3] = if is_spot {
+                        &[-back]
+                    } else {
+                        &[
+                            DVec3::X,
+                            DVec3::NEG_X,
+                            DVec3::Y,
+                            DVec3::NEG_Y,
+                            DVec3::Z,
+                            DVec3::NEG_Z,
+                        ]
+                    };
+                    // Of a convex body a direction sees a quarter of the surface on average; of a square that one looks
+                    // at, all.
+                    let area = edge * edge * if is_spot { 1.0 } else { 6.0 / 4.0 };
+                    for side in sides {
+                        let u = edge * side.any_orthonormal_vector();
+                        let v = edge * side.cross(u / edge);
+                        let depth = if is_spot { 0.0 } else { 0.5 * edge };
+                        let corner = place + depth * *side - 0.5 * (u + v);
+                        let _ = write!(
+                            text,
+                            "[[lights]]\nkind = \"quad\"\ncorner = {}\nu = {}\nv = {}\nradiance = {}\n\n",
+                            array(corner),
+                            array(u),
+                            array(v),
+                            array(power / area)
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn array(v: DVec3) -> String {
+    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+/// The upper three rows of a matrix.
+fn matrix(m: &DMat4) -> String {
+    let rows = [m.row(0), m.row(1), m.row(2)];
+    let numbers = rows.iter().flat_map(|row| row.to_array());
+    let numbers: Vec<String> = numbers.map(|x| format!("{x:?}")).collect();
+    format!("[{}]", numbers.join(", "))
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
