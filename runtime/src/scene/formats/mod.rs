@@ -12,12 +12,13 @@ use impasto_compiler::ParameterValue;
 use crate::error::SceneError;
 
 mod obj;
+mod ply;
 mod polygon;
 #[cfg(test)]
 mod tests;
 
 /// The formats of geometry that can be read.
-pub const FORMATS: &[Format] = &[obj::FORMAT];
+pub const FORMATS: &[Format] = &[obj::FORMAT, ply::FORMAT];
 
 /// A format of geometry files.
 #[derive(Clone, Copy, Debug)]
@@ -154,6 +155,14 @@ impl Warning {
         let line = self.line.map_or(String::new(), |line| format!("{line}:"));
         format!("{name}:{line} {}", self.message)
     }
+}
+
+/// A warning of how often something is in a file, if it is.
+fn counted(what: &str, count: usize) -> Option<Warning> {
+    (count > 0).then(|| Warning {
+        line: None,
+        message: format!("{what}: {count}"),
+    })
 }
 
 impl FileValue {
