@@ -1,13 +1,14 @@
 //! PLY files: what scanners and programs for meshes write.
 //!
 //! The header says which numbers follow, so the format has as many forms as writers. The reader is our own:
-//! crates either take a struct that fixes the properties before the file is seen, or build a map of names
-//! and boxed values for each vertex, and trust the counts of the header when they allocate.
+//! ply-rs, the crate for them, calls a setter by name for each number or fills a map of names for each vertex.
+//! It takes negative counts for huge ones, and its errors say no place.
 
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 use impasto_compiler::ParameterValue;
+use rayon::prelude::*;
 
 use self::body::{Ascii, Binary, Body, Entry, entries};
 use self::header::{Element, Encoding, Header, Scalar};
@@ -61,51 +62,54 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         let message = format!("cannot read the PLY file: {}", input::reason(&e));
         SceneError::in_file(path, message)
     })?;
-    let header = Header::read(path, &bytes)?;
+    decode(path, name, &bytes)
+}
+
+/// What the bytes of the file `name` at `path` say.
+fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Geometry, SceneError> {
+    let header = Header::read(path, bytes)?;
     let mut contents = Contents::new(path);
     match header.encoding {
-        Encoding::Ascii => contents.read(&header, Ascii::new(&header, &bytes)),
-        Encoding::LittleEndian => contents.read(&header, Binary::<false>::new(&header, &bytes)),
-        Encoding::BigEndian => contents.read(&header, Binary::<true>::new(&header, &bytes)),
+        Encoding::Ascii => contents.read(&header, Ascii::new(&header, bytes)),
+        Encoding::LittleEndian => contents.read(&header, Binary::<false>::new(&header, bytes)),
+        Encoding::BigEndian => contents.read(&header, Binary::<true>::new(&header, bytes)),
     }?;
     let (triangles, crossing) = contents.triangles();
     let several = header.pictures.len().saturating_sub(1);
-    contents.warnings.extend(
-        [
-            counted(
-                "faces of fewer than three corners, left out",
-                contents.degenerate,
-            ),
-            counted(
-                "faces that cross themselves, cut into triangles that overlap",
-                crossing,
-            ),
-            counted(
-                "pictures (`TextureFile`) after the first, not used",
-                several,
-            ),
-        ]
-        .into_iter()
-        .flatten(),
-    );
-    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
-    let picture = header.pictures.first();
-    let picture = picture.and_then(|file| {
-        folder
-            .join(file.replace('\\', "/"))
-            .to_str()
-            .map(str::to_owned)
-    });
-    let values = picture.map(|file| (PICTURE, ParameterValue::Texture(file)));
+    let warnings = [
+        header.unknown,
+        counted(
+            "faces of fewer than three corners, left out",
+            contents.degenerate,
+        ),
+        counted(
+            "faces that cross themselves, cut into triangles that overlap",
+            crossing,
+        ),
+        counted(
+            "pictures (`TextureFile`) after the first, not used",
+            several,
+        ),
+        contents.oddity,
+    ];
+    let named = header.pictures.first();
+    let picture = named.and_then(|file| picture(name, file));
     Ok(Geometry {
         triangles,
         materials: vec![FileMaterial {
             name: String::new(),
-            values: values.into_iter().collect(),
+            values: picture.into_iter().collect(),
         }],
-        warnings: contents.warnings,
+        warnings: warnings.into_iter().flatten().collect(),
         ..Geometry::default()
     })
+}
+
+/// The value that is the picture `file` of the mesh in the file `name`.
+fn picture(name: &str, file: &str) -> Option<(&'static str, ParameterValue)> {
+    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+    let path = folder.join(file.replace('\\', "/"));
+    Some((PICTURE, ParameterValue::Texture(path.to_str()?.to_owned())))
 }
 
 /// Words of a file for messages, which may be no text and of any length.
@@ -134,7 +138,8 @@ struct Contents<'p> {
     face_colors: Vec<Option<Vec3>>,
     /// Faces of fewer than three corners.
     degenerate: usize,
-    warnings: Vec<Warning>,
+    /// What is odd after the header.
+    oddity: Option<Warning>,
 }
 
 /// What vertices have; a list is empty if they have no such thing.
@@ -157,7 +162,7 @@ impl<'p> Contents<'p> {
             corner_uvs: Vec::new(),
             face_colors: Vec::new(),
             degenerate: 0,
-            warnings: Vec::new(),
+            oddity: None,
         }
     }
 
@@ -171,7 +176,7 @@ impl<'p> Contents<'p> {
                 _ => entries(&mut body, self.path, element, |_, _| Ok(())),
             }?;
         }
-        self.warnings.extend(body.oddities());
+        self.oddity = body.oddity();
         if self.ends.is_empty() {
             return Err(self.no_faces());
         }
@@ -201,27 +206,20 @@ impl<'p> Contents<'p> {
         }
         self.count = vertices.count;
         let faces = ["face", "tristrips"].map(|name| header.element(name));
-        let faces = faces
+        let mut faces = faces
             .into_iter()
             .flatten()
-            .filter(|element| element.count > 0);
-        let mut lacking = None;
-        let mut any = false;
-        for element in faces {
-            any = true;
-            if element.list(&CORNERS).is_none() {
-                lacking = Some(element.name);
-            }
-        }
-        if let Some(name) = lacking {
-            return error(&format!(
-                "the element `{name}` has no list `vertex_indices`"
-            ));
-        }
-        if !any {
+            .filter(|e| e.count > 0)
+            .peekable();
+        if faces.peek().is_none() {
             return Err(self.no_faces());
         }
-        Ok(())
+        match faces.find(|element| element.list(&CORNERS).is_none()) {
+            Some(Element { name, .. }) => error(&format!(
+                "the element `{name}` has no list `vertex_indices`"
+            )),
+            None => Ok(()),
+        }
     }
 
     fn no_faces(&self) -> SceneError {
@@ -347,6 +345,12 @@ impl<'p> Contents<'p> {
 
     /// The triangles, and how many faces cross themselves.
     fn triangles(&self) -> (Vec<Triangle>, usize) {
+        let faces = self.ends.len();
+        if self.corners.len() == 3 * faces {
+            let color = |face: usize| self.face_colors.get(face).copied().flatten();
+            let triangle = |face| self.triangle([0, 1, 2].map(|k| 3 * face + k), color(face));
+            return ((0..faces).into_par_iter().map(triangle).collect(), 0);
+        }
         let mut triangles = Vec::with_capacity(self.corners.len() - 2 * self.ends.len());
         let mut crossing = 0;
         let mut first = 0;

@@ -29,8 +29,8 @@ pub(super) trait Body {
     /// Says where the entry is that something is wrong with.
     fn locate(&self, path: &Path, message: String) -> SceneError;
 
-    /// What is odd once all entries were read.
-    fn oddities(&self) -> Option<Warning>;
+    /// What is odd, once all entries were read.
+    fn oddity(&self) -> Option<Warning>;
 }
 
 /// What keeps a number from being read.
@@ -241,7 +241,7 @@ impl Body for Ascii<'_> {
         SceneError::in_file(path, message).line(self.line)
     }
 
-    fn oddities(&self) -> Option<Warning> {
+    fn oddity(&self) -> Option<Warning> {
         let what = "lines of more numbers than the header says, of which the last are left out";
         counted(what, self.longer).or_else(|| follows(self.rest))
     }
@@ -349,7 +349,7 @@ impl<const BIG_ENDIAN: bool> Body for Binary<'_, BIG_ENDIAN> {
         SceneError::in_file(path, format!("{message}, at byte {}", self.entry))
     }
 
-    fn oddities(&self) -> Option<Warning> {
+    fn oddity(&self) -> Option<Warning> {
         follows(self.rest)
     }
 }

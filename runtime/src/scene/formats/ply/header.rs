@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::super::Warning;
 use super::shown;
 use crate::error::SceneError;
 
@@ -119,6 +120,8 @@ pub(super) struct Header<'f> {
     pub(super) elements: Vec<Element<'f>>,
     /// The pictures that comments of MeshLab name.
     pub(super) pictures: Vec<&'f str>,
+    /// The first line that is none of a header. Old programs forget the word `comment`.
+    pub(super) unknown: Option<Warning>,
     /// What ends lines. Of two characters it is the second.
     pub(super) newline: u8,
     /// How many lines the header has.
@@ -136,6 +139,7 @@ impl<'f> Header<'f> {
             encoding: Encoding::Ascii,
             elements: Vec::new(),
             pictures: Vec::new(),
+            unknown: None,
             newline,
             lines: 0,
             bytes: 0,
@@ -182,10 +186,7 @@ impl<'f> Header<'f> {
     fn line(&mut self, line: &'f [u8]) -> Result<Option<Encoding>, String> {
         let is_remark = line.starts_with(b"comment") || line.starts_with(b"obj_info");
         // Remarks may be in any encoding of text.
-        let Ok(text) = str::from_utf8(line) else {
-            let unknown = || format!("`{}` is no line of a header", shown(line));
-            return if is_remark { Ok(None) } else { Err(unknown()) };
-        };
+        let text = str::from_utf8(line).unwrap_or(if is_remark { "comment" } else { "" });
         let mut words = text.split_whitespace();
         match words.next().unwrap_or_default() {
             "comment" => self.pictures.extend(picture(text)),
@@ -198,7 +199,13 @@ impl<'f> Header<'f> {
                 };
                 element.properties.push(property(words)?);
             }
-            _ => return Err(format!("`{}` is no line of a header", shown(line))),
+            _ if self.unknown.is_none() => {
+                self.unknown = Some(Warning {
+                    line: Some(self.lines),
+                    message: format!("`{}` is no line of a header, left out", shown(line)),
+                });
+            }
+            _ => {}
         }
         Ok(None)
     }
