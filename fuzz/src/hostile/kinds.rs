@@ -437,9 +437,12 @@ fn ply(_: &Seeds, random: &mut Random, folder: &Path) -> io::Result<Vec<String>>
 fn ply_bytes(header: &str, is_big: bool) -> Vec<u8> {
     let order = if is_big { "big" } else { "little" };
     let mut out = format!("ply\nformat binary_{order}_endian 1.0\n{header}").into_bytes();
-    let word = |bits: u32| match is_big {
-        true => bits.to_be_bytes(),
-        false => bits.to_le_bytes(),
+    let word = |bits: u32| {
+        if is_big {
+            bits.to_be_bytes()
+        } else {
+            bits.to_le_bytes()
+        }
     };
     for corner in 0..4 {
         for at in [corner % 2, corner / 2, 0] {
