@@ -29,6 +29,7 @@ pub const KINDS: &[Kind] = &[
     kind("shape", shape),
     kind("scene", scene),
     kind("geometry", geometry),
+    kind("ply", ply),
     kind("material", material),
     kind("placements", placements),
     kind("picture", picture),
@@ -289,6 +290,34 @@ const OBJ: &[&str] = &[
     "mtllib .\n",
     "v 1 2 3 4 5 6 7\n",
 ];
+/// Words of PLY files.
+const PLY: &[&str] = &[
+    "ply\n",
+    "format ascii 1.0\n",
+    "format binary_little_endian 1.0\n",
+    "format binary_big_endian 1.0\n",
+    "element vertex 3\n",
+    "element vertex 4294967295\n",
+    "element face 99999999999999999999\n",
+    "element tristrips 1\n",
+    "property float x\n",
+    "property double nx\n",
+    "property uchar red\n",
+    "property list uchar int vertex_indices\n",
+    "property list int int64 vertex_index\n",
+    "property list char float texcoord\n",
+    "comment TextureFile x.png\n",
+    "end_header\n",
+    "-1",
+    "255",
+    "nan",
+    "1e39",
+    "4294967295",
+    "\r",
+    "\n",
+    "\0",
+    "\u{7f}\u{7f}",
+];
 /// Words of MTL files.
 const MTL: &[&str] = &[
     "newmtl",
@@ -316,6 +345,11 @@ const MTL: &[&str] = &[
     "Kd nan nan nan\n",
     "Pr 2\n",
     "Pm 1\n",
+    "Pcr 2\n",
+    "aniso -1\n",
+    "disp m.mtl\n",
+    "map_Bump -bm nan -s 2 x.png\n",
+    "norm -clamp on x.png\n",
 ];
 
 /// Numbers that a text of geometry may have, and some that it may not.
@@ -371,6 +405,57 @@ fn geometry(_: &Seeds, random: &mut Random, folder: &Path) -> io::Result<Vec<Str
     };
     std::fs::write(folder.join("g.obj"), obj)?;
     Ok(words("plan --needs scene.toml"))
+}
+
+/// A scene with a PLY file, whose text or bytes are those of two triangles but for some.
+fn ply(_: &Seeds, random: &mut Random, folder: &Path) -> io::Result<Vec<String>> {
+    hard(random, folder)?;
+    let header = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n\
+        property list uchar float texcoord\nend_header\n";
+    let text = "0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n1 1 0 7 8 9\n3 0 1 2 0\n4 0 1 3 2 8 0 0 1 0 1 1 0 1\n";
+    let text = format!("ply\nformat ascii 1.0\n{header}{text}").into_bytes();
+    let is_big = random.below(2) == 0;
+    let bytes = ply_bytes(header, is_big);
+    let (good, other) = match random.below(2) {
+        0 => (text, bytes),
+        _ => (bytes, text),
+    };
+    let file = match random.below(8) {
+        0 => [b"ply\n".as_slice(), &soup(random, PLY, 40)].concat(),
+        1..5 => mutate(random, &good, &[good.clone(), other], PLY),
+        _ => revalue(random, &good, NUMBERS),
+    };
+    std::fs::write(folder.join("g.ply"), file)?;
+    let scene = std::fs::read_to_string(folder.join("scene.toml"))?;
+    let scene = scene.replace("obj = 'g.obj'", "file = 'g.ply'");
+    std::fs::write(folder.join("scene.toml"), scene)?;
+    Ok(words("plan --needs scene.toml"))
+}
+
+/// The same two triangles as bytes.
+fn ply_bytes(header: &str, is_big: bool) -> Vec<u8> {
+    let order = if is_big { "big" } else { "little" };
+    let mut out = format!("ply\nformat binary_{order}_endian 1.0\n{header}").into_bytes();
+    let word = |bits: u32| {
+        if is_big {
+            bits.to_be_bytes()
+        } else {
+            bits.to_le_bytes()
+        }
+    };
+    for corner in 0..4 {
+        for at in [corner % 2, corner / 2, 0] {
+            out.extend(word((at as f32).to_bits()));
+        }
+        out.extend([1, 2, 3]);
+    }
+    for face in [[0, 1, 2], [2, 1, 3]] {
+        out.push(3);
+        out.extend(face.into_iter().flat_map(word));
+        out.push(0);
+    }
+    out
 }
 
 fn material(_: &Seeds, random: &mut Random, folder: &Path) -> io::Result<Vec<String>> {

@@ -571,7 +571,8 @@ fn file_value(
 ) -> Result<&'static FileValue, SceneError> {
     let all = || formats.iter().flat_map(|f| f.values);
     all().find(|v| v.name == key).ok_or_else(|| {
-        let sources: Vec<&str> = formats.iter().map(|f| f.values_of).collect();
+        let giving = formats.iter().filter(|f| !f.values.is_empty());
+        let sources: Vec<&str> = giving.map(|f| f.values_of).collect();
         let known: Vec<String> = all().map(|v| format!("${}", v.name)).collect();
         value
             .error(format!("`${key}` is no value of {}", sources.join(" or ")))

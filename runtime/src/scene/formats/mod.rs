@@ -13,12 +13,13 @@ use crate::error::SceneError;
 
 mod gltf;
 mod obj;
+mod ply;
 mod polygon;
 #[cfg(test)]
 mod tests;
 
 /// The formats of geometry that can be read.
-pub const FORMATS: &[Format] = &[obj::FORMAT, gltf::FORMAT];
+pub const FORMATS: &[Format] = &[obj::FORMAT, ply::FORMAT, gltf::FORMAT];
 
 /// A format of geometry files.
 #[derive(Clone, Copy, Debug)]
@@ -155,6 +156,14 @@ impl Warning {
         let line = self.line.map_or(String::new(), |line| format!("{line}:"));
         format!("{name}:{line} {}", self.message)
     }
+}
+
+/// A warning of how often something is in a file, if it is.
+fn counted(what: &str, count: usize) -> Option<Warning> {
+    (count > 0).then(|| Warning {
+        line: None,
+        message: format!("{what}: {count}"),
+    })
 }
 
 impl FileValue {

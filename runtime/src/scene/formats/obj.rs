@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3, Vec3};
 use impasto_compiler::ParameterValue;
 
-use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning, polygon};
+use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning, counted, polygon};
 use crate::error::SceneError;
 use crate::image_file::srgb_to_linear;
 use crate::input;
@@ -32,7 +32,7 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     if let Some(other) = other_format(name) {
         let error = SceneError::in_file(path, format!("{other} files are not read"));
-        return Err(error.hint("export the geometry as OBJ"));
+        return Err(error.hint("export the geometry as OBJ or PLY"));
     }
     let bytes = input::read(path).map_err(|e| {
         SceneError::in_file(
@@ -80,6 +80,7 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         ]
         .into_iter()
         .flatten()
+        .chain(library.warnings)
         .collect(),
     })
 }
@@ -88,20 +89,12 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
 fn other_format(name: &str) -> Option<&'static str> {
     let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
     Some(match extension.as_str() {
-        "ply" => "PLY",
         "fbx" => "FBX",
         "usd" | "usda" | "usdc" | "usdz" => "USD",
         "stl" => "STL",
         "abc" => "Alembic",
         "blend" => "Blender",
         _ => return None,
-    })
-}
-
-fn counted(what: &str, count: usize) -> Option<Warning> {
-    (count > 0).then(|| Warning {
-        line: None,
-        message: format!("{what}: {count}"),
     })
 }
 
@@ -112,6 +105,8 @@ struct Library {
     materials: HashMap<String, Vec<(&'static str, ParameterValue)>>,
     /// The first MTL file that could not be read.
     missing: Option<SceneError>,
+    /// What is odd in those that could be.
+    warnings: Vec<Warning>,
     /// All of them.
     files: Vec<PathBuf>,
 }
@@ -129,9 +124,10 @@ impl Library {
             for file in if is_one { &whole[..] } else { &several[..] } {
                 library.files.push(base.join(folder).join(file));
                 match mtl::load(base, &folder.join(file)) {
-                    Ok(materials) => {
-                        let named = materials.into_iter().map(|m| (m.name, m.values));
+                    Ok(mtl) => {
+                        let named = mtl.materials.into_iter().map(|m| (m.name, m.values));
                         library.materials.extend(named);
+                        library.warnings.extend(mtl.warnings);
                     }
                     Err(error) => library.missing = library.missing.or(Some(error)),
                 }

@@ -126,7 +126,7 @@ fn messages_say_what_the_table_holds() {
     // A name that is under `obj` need not say so.
     let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
     let empty = said("obj = 'a.txt'", &[("a.txt", flat)], FORMATS);
-    assert!(empty.contains("no face of its OBJ files"), "{empty}");
+    assert!(empty.contains("no face of its OBJ or PLY files"), "{empty}");
     let unnamed = "[[geometry]]\nfile = 'a.obj'\n[materials.m]\nfile = 'm'\nparams.p = '$colour'\n";
     let unnamed = scene(unnamed, &[], BOTH).expect_err("no such value");
     let expected = "no value of an MTL file or a list of triangles";
@@ -147,4 +147,22 @@ fn objects_and_groups_have_their_triangles() {
         .collect();
     assert_eq!(parts, [("lid", 1..4), ("rim of it", 1..4), ("foot", 4..5)]);
     assert_eq!(geometry.triangles.len(), 5);
+}
+
+#[test]
+fn a_scene_reads_ply_files_beside_obj_files() {
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile wood.png\nelement vertex 3\nproperty float x\n\
+        property float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+        end_header\n0 0 0\n1 0 0\n0 3 0\n3 0 1 2\n";
+    let text = "[[geometry]]\nobj = 'a.obj'\n[[geometry]]\nfile = 'b.PLY'\n\
+        [[geometry]]\nobj = 'b.PLY'\ntranslate = [0, 0, 1]\nmaterial = 'm'\n\
+        [materials.\"*\"]\nfile = 'm.impasto'\nparams = { picture = '$TextureFile' }\n\
+        [materials.m]\nfile = 'm.impasto'\n";
+    let scene = scene(text, &[("a.obj", OBJ), ("b.PLY", ply)], FORMATS).expect("it loads");
+    assert_eq!(scene.mesh.positions[1][2], Vec3::new(0.0, 3.0, 0.0));
+    assert_eq!(scene.mesh.len(), 3);
+    let picture = ParameterValue::Texture("wood.png".into());
+    let params: Vec<_> = scene.materials.iter().map(|m| m.params.clone()).collect();
+    // The OBJ file names no picture, so that its binding is the same as `m`.
+    assert_eq!(params, [vec![], vec![("picture".to_owned(), picture)]]);
 }
