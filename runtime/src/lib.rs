@@ -4,7 +4,7 @@
 //!
 //! | layer | does |
 //! |---|---|
-//! | [`error`], [`options`], [`technique`], [`film`], `wgsl` | what every layer may name |
+//! | [`error`], [`input`], [`options`], [`technique`], [`film`], `wgsl` | what every layer may name |
 //! | [`scene`] | files to a [`scene::Scene`] |
 //! | [`world`] | a scene as kernels read it: [`wgsl::ShaderPart`]s, which are WGSL text with the buffers that it reads |
 //! | `kernels` | the text of every kernel that a plan needs |
@@ -20,7 +20,6 @@ pub mod device;
 pub mod error;
 pub mod film;
 pub mod fingerprint;
-pub mod gltf;
 pub mod gpu;
 mod image_file;
 pub mod input;

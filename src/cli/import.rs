@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use impasto::files::{reason, write_whole};
-use impasto::runtime::gltf;
+use impasto::runtime::input::gltf;
 use serde_json::json;
 
 use super::{Failure, Global, Outcome, print};

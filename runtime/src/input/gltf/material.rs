@@ -122,7 +122,7 @@ fn transformed(place: vec2, offset: vec2, turn: float, scale: vec2) -> vec2 {
 
 impl Model {
     /// What scenes call its materials, by their number: their names, none twice.
-    pub(super) fn material_names(&self) -> Vec<String> {
+    pub(crate) fn material_names(&self) -> Vec<String> {
         let mut taken = BTreeSet::new();
         let materials = self.document.materials();
         let names = materials.filter_map(|m| Some((m.index()?, m.name().map(str::to_owned))));

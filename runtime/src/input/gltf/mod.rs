@@ -16,18 +16,18 @@ use std::path::{Path, PathBuf};
 use gltf::json::validation::{Error as Invalid, Validate};
 use serde_json::Value;
 
+use super::file;
 use crate::error::SceneError;
-use crate::input;
 
 mod accessor;
-mod geometry;
 mod material;
+mod nodes;
 mod pictures;
 mod scene;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use geometry::geometry;
+pub(crate) use accessor::Buffers;
 
 /// Extensions of files that are folders to everyone.
 pub(crate) const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
@@ -57,26 +57,25 @@ const KNOWN: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Reads a file that a glTF file names, or the file itself.
-pub(crate) type Read<'r> = &'r dyn Fn(&Path) -> io::Result<Vec<u8>>;
-
 /// A file that was read and whose indices are within what it has.
 pub(crate) struct Model {
     path: PathBuf,
-    document: gltf::Document,
+    pub(crate) document: gltf::Document,
     /// The same as it is written, for extensions.
     json: Value,
     /// The binary part of a `.glb`.
     binary: Option<Vec<u8>>,
 }
 
+/// Does the extension say that it is a glTF file?
+pub(super) fn is_named_so(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str());
+    extension.is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
+}
+
 /// The glTF file that `path` leads into, and the name of the member there; none if it leads into no such file.
 pub(crate) fn inside(path: &Path) -> Option<(&Path, &Path)> {
-    let has_extension = |file: &&Path| {
-        let extension = file.extension().and_then(|e| e.to_str());
-        extension.is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
-    };
-    let mut parents = path.ancestors().skip(1).filter(has_extension);
+    let mut parents = path.ancestors().skip(1).filter(|file| is_named_so(file));
     let file = parents.find(|file| file.is_file())?;
     Some((file, path.strip_prefix(file).ok()?))
 }
@@ -85,8 +84,8 @@ pub(crate) fn inside(path: &Path) -> Option<(&Path, &Path)> {
 ///
 /// # Errors
 /// There is no such member, or the file is damaged.
-pub(crate) fn member(path: &Path, name: &Path, read: Read<'_>) -> io::Result<Vec<u8>> {
-    let model = Model::read(path, read).map_err(|e| io::Error::other(said(e)))?;
+pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
+    let model = Model::read(path).map_err(|e| io::Error::other(said(e)))?;
     let missing = || io::Error::from(io::ErrorKind::NotFound);
     let name = name.to_str().ok_or_else(missing)?;
     if name == SCENE {
@@ -97,7 +96,7 @@ pub(crate) fn member(path: &Path, name: &Path, read: Read<'_>) -> io::Result<Vec
         return source.map(String::into_bytes).ok_or_else(missing);
     }
     let number = name.strip_prefix("images/").and_then(|n| n.parse().ok());
-    model.picture(number.ok_or_else(missing)?, read)
+    model.picture(number.ok_or_else(missing)?)
 }
 
 /// The members of the file at `path` as files of a folder: the scene, sources and pictures. Meshes stay in the file, which
@@ -106,7 +105,7 @@ pub(crate) fn member(path: &Path, name: &Path, read: Read<'_>) -> io::Result<Vec
 /// # Errors
 /// What is wrong with the file.
 pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
-    let model = Model::read(path, &input::read)?;
+    let model = Model::read(path)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let scene = model.scene(&format!("{file}/"));
     let mut files = vec![(SCENE.into(), scene.into_bytes())];
@@ -115,23 +114,23 @@ pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
         files.push((format!("{name}.impasto").into(), source.into_bytes()));
     }
     let wrong = |why: std::io::Error| {
-        let why = input::reason(&why);
+        let why = file::reason(&why);
         SceneError::in_file(path, format!("the glTF file cannot be copied: {why}"))
     };
     let own = path.file_name().unwrap_or_default();
-    files.push((own.into(), input::read(path).map_err(wrong)?));
+    files.push((own.into(), file::read(path).map_err(wrong)?));
     for buffer in model.document.buffers() {
         if let gltf::buffer::Source::Uri(uri) = buffer.source()
             && !uri.starts_with("data:")
         {
-            let bytes = model.buffer(&buffer, &input::read)?;
+            let bytes = model.buffer(&buffer)?;
             files.push((pictures::decoded(uri).into(), bytes));
         }
     }
     for image in model.document.images() {
         let number = image.index();
-        let picture = model.picture(number, &input::read).map_err(|e| {
-            let why = input::reason(&e);
+        let picture = model.picture(number).map_err(|e| {
+            let why = file::reason(&e);
             SceneError::in_file(path, format!("picture {number} cannot be read: {why}"))
         })?;
         files.push((format!("images/{number}").into(), picture));
@@ -156,10 +155,10 @@ impl Model {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub(crate) fn read(path: &Path, read: Read<'_>) -> Result<Self, SceneError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, SceneError> {
         let wrong = |message: String| SceneError::in_file(path, message);
-        let bytes = read(path).map_err(|e| {
-            let why = input::reason(&e);
+        let bytes = file::read(path).map_err(|e| {
+            let why = file::reason(&e);
             wrong(format!("cannot read the glTF file: {why}"))
         })?;
         Self::parse(path, bytes)
@@ -206,12 +205,16 @@ impl Model {
     }
 
     /// The bytes of each buffer.
-    fn buffers(&self, read: Read<'_>) -> Result<Vec<Vec<u8>>, SceneError> {
+    ///
+    /// # Errors
+    /// One is not there, or is cut off.
+    pub(crate) fn buffers(&self) -> Result<Buffers, SceneError> {
         let buffers = self.document.buffers();
-        buffers.map(|buffer| self.buffer(&buffer, read)).collect()
+        let buffers: Result<_, SceneError> = buffers.map(|buffer| self.buffer(&buffer)).collect();
+        Ok(Buffers(buffers?))
     }
 
-    fn buffer(&self, buffer: &gltf::Buffer<'_>, read: Read<'_>) -> Result<Vec<u8>, SceneError> {
+    fn buffer(&self, buffer: &gltf::Buffer<'_>) -> Result<Vec<u8>, SceneError> {
         let number = buffer.index();
         let wrong = |message: String| SceneError::in_file(&self.path, message);
         let bytes = match buffer.source() {
@@ -220,7 +223,7 @@ impl Model {
                     "buffer {number} is the binary part of a .glb, which is missing"
                 ))
             })?,
-            gltf::buffer::Source::Uri(uri) => pictures::resource(&self.path, uri, read)
+            gltf::buffer::Source::Uri(uri) => pictures::resource(&self.path, uri)
                 .map_err(|why| wrong(format!("buffer {number} cannot be read: {why}")))?,
         };
         if bytes.len() < buffer.length() {
@@ -234,7 +237,7 @@ impl Model {
     }
 
     /// The name of a node, mesh or material, or what it is and its number.
-    fn named(name: Option<&str>, what: &str, index: usize) -> String {
+    pub(crate) fn named(name: Option<&str>, what: &str, index: usize) -> String {
         match name {
             Some(name) if !name.trim().is_empty() => name.trim().to_owned(),
             _ => format!("{what}_{index}"),

@@ -1,12 +1,11 @@
-use std::io;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::{Value, json};
 
-use super::{Model, geometry, member};
+use super::{Model, member};
 use crate::error::SceneError;
-use crate::scene::formats::Geometry;
+use crate::scene::formats::{FORMATS, Geometry};
 use crate::world;
 
 /// Two triangles of a square in the plane of x and y, with texture coordinates, and a mirrored and moved copy.
@@ -69,16 +68,22 @@ fn packed(json: &Value, binary: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A file in memory.
-fn read_of(bytes: Vec<u8>) -> impl Fn(&Path) -> io::Result<Vec<u8>> {
-    move |path| match path.extension().and_then(|e| e.to_str()) {
-        Some("glb" | "gltf") => Ok(bytes.clone()),
-        _ => Err(io::ErrorKind::NotFound.into()),
-    }
+/// A file of these bytes, in a folder of its own.
+fn file_of(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("m.glb");
+    std::fs::write(&path, bytes).expect("a file");
+    (folder, path)
+}
+
+fn read(path: &Path) -> Result<Geometry, SceneError> {
+    let format = FORMATS.iter().find(|f| f.name == "glTF").expect("a row");
+    (format.read)(path.parent().expect("a folder"), "m.glb")
 }
 
 fn geometry_of(bytes: Vec<u8>) -> Result<Geometry, SceneError> {
-    geometry(Path::new("m.glb"), None, &read_of(bytes))
+    let (_folder, path) = file_of(&bytes);
+    read(&path)
 }
 
 fn of_json(change: impl Fn(&mut Value)) -> Result<Geometry, SceneError> {
@@ -93,8 +98,8 @@ fn source_of(material: Value) -> String {
     json["images"] = json!([{ "uri": "a.png" }, { "uri": "b.png" }]);
     json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
     json["textures"] = json!([{ "source": 0 }, { "source": 1, "sampler": 0 }]);
-    let read = read_of(packed(&json, &binary));
-    let model = Model::read(Path::new("m.glb"), &read).unwrap_or_else(|e| panic!("{e}"));
+    let (_folder, path) = file_of(&packed(&json, &binary));
+    let model = Model::read(&path).unwrap_or_else(|e| panic!("{e}"));
     let name = model.source_names().swap_remove(0);
     model.source(&name).expect("a source")
 }
@@ -390,15 +395,16 @@ fn damage_is_told() {
 fn no_byte_is_trusted() {
     let (json, binary) = square();
     let whole = packed(&json, &binary);
-    let ask = |bytes: Vec<u8>| {
-        let read = read_of(bytes);
-        let _ = geometry(Path::new("m.glb"), None, &read);
+    let (_folder, path) = file_of(&whole);
+    let ask = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).expect("a file");
+        let _ = read(&path);
         for name in ["scene.toml", "old_paint.impasto", "images/0", "../x"] {
-            let _ = member(Path::new("m.glb"), Path::new(name), &read);
+            let _ = member(&path, Path::new(name));
         }
     };
     for end in 0..whole.len() {
-        ask(whole[..end].to_vec());
+        ask(&whole[..end]);
     }
     let mut state = 1u64;
     for _ in 0..3000 {
@@ -410,6 +416,6 @@ fn no_byte_is_trusted() {
             let at = (state >> 33) as usize % bytes.len();
             bytes[at] = (state >> 24) as u8;
         }
-        ask(bytes);
+        ask(&bytes);
     }
 }

@@ -7,8 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::GeneralPurpose;
 use base64::engine::{DecodePaddingMode, GeneralPurposeConfig};
 
-use super::{Model, Read};
-use crate::input;
+use super::{Model, file};
 
 /// Base 64 with padding or without.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -18,17 +17,17 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 impl Model {
     /// The encoded picture of that number.
-    pub(super) fn picture(&self, number: usize, read: Read<'_>) -> io::Result<Vec<u8>> {
+    pub(super) fn picture(&self, number: usize) -> io::Result<Vec<u8>> {
         let mut images = self.document.images();
         let image = images
             .nth(number)
             .ok_or_else(|| io::Error::from(io::ErrorKind::NotFound))?;
         match image.source() {
             gltf::image::Source::Uri { uri, .. } => {
-                resource(&self.path, uri, read).map_err(io::Error::other)
+                resource(&self.path, uri).map_err(io::Error::other)
             }
             gltf::image::Source::View { view, .. } => {
-                let buffer = self.buffer(&view.buffer(), read);
+                let buffer = self.buffer(&view.buffer());
                 let buffer = buffer.map_err(|e| io::Error::other(e.to_string()))?;
                 let end = view.offset().checked_add(view.length());
                 let bytes = end.and_then(|end| buffer.get(view.offset()..end));
@@ -43,7 +42,7 @@ impl Model {
 ///
 /// # Errors
 /// Why it cannot be had, in words.
-pub(super) fn resource(path: &Path, uri: &str, read: Read<'_>) -> Result<Vec<u8>, String> {
+pub(super) fn resource(path: &Path, uri: &str) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (kind, data) = data.split_once(',').ok_or("its data URI has no data")?;
         if !kind.ends_with(";base64") {
@@ -59,7 +58,7 @@ pub(super) fn resource(path: &Path, uri: &str, read: Read<'_>) -> Result<Vec<u8>
         return Err(format!("`{name}` is not in the file's folder"));
     }
     let base = path.parent().unwrap_or(Path::new(""));
-    read(&base.join(relative)).map_err(|e| format!("`{name}`: {}", input::reason(&e)))
+    file::read(&base.join(relative)).map_err(|e| format!("`{name}`: {}", file::reason(&e)))
 }
 
 /// A URI with its `%20` and the like read.

@@ -1,13 +1,8 @@
-//! Opening files that are read to their end. A FIFO or a socket that nobody writes to, or a device, would never
-//! come to one: they are refused by their kind, before anything waits for them.
-//!
-//! A glTF file is a folder here: what it has within can be opened by paths that lead into it.
+//! Plain files, opened by their kind, and why they cannot be.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, Write};
+use std::io::{self, Read};
 use std::path::Path;
-
-use crate::gltf;
 
 /// Standard input by its name as a file, and what a shell puts for `<(command)`: whoever names one of these means
 /// to wait for it.
@@ -17,13 +12,7 @@ const STREAMS: [&str; 2] = ["/dev/stdin", "/dev/fd"];
 ///
 /// # Errors
 /// If it cannot be opened, or is neither a file nor standard input.
-pub fn open(path: &Path) -> io::Result<File> {
-    if let Some((file, member)) = gltf::inside(path) {
-        let mut copy = tempfile::tempfile()?;
-        copy.write_all(&gltf::member(file, member, &read)?)?;
-        copy.rewind()?;
-        return Ok(copy);
-    }
+pub(super) fn open(path: &Path) -> io::Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     let is_stream = STREAMS.iter().any(|stream| path.starts_with(stream));
     // Reading a folder fails with an error of its own.
@@ -37,39 +26,10 @@ pub fn open(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// As [`open`], or if it cannot be read.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if let Some((file, member)) = gltf::inside(path) {
-        return gltf::member(file, member, &read);
-    }
+pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
-}
-
-/// The text of the file at `path`.
-///
-/// # Errors
-/// As [`read`], or if it is not UTF-8.
-pub fn read_to_string(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    open(path)?.read_to_string(&mut text)?;
-    Ok(text)
-}
-
-/// The file on disk that holds what `path` names: that itself, or the glTF file that it leads into.
-pub fn on_disk(path: &Path) -> &Path {
-    gltf::inside(path).map_or(path, |(file, _)| file)
-}
-
-/// Where the scene is that `path` names: a scene file, or the scene in a glTF file.
-pub fn scene(path: &Path) -> std::path::PathBuf {
-    let extension = path.extension().and_then(|e| e.to_str());
-    let extension = extension.unwrap_or_default().to_ascii_lowercase();
-    if gltf::EXTENSIONS.contains(&extension.as_str()) {
-        path.join(gltf::SCENE)
-    } else {
-        path.to_owned()
-    }
 }
 
 /// May the same work on another try, or on another machine? A disk that is full may be emptied and a server may come

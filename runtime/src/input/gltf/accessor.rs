@@ -4,7 +4,7 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::json::accessor::ComponentType;
 
 /// Reads the numbers of accessors.
-pub(super) struct Buffers(pub(super) Vec<Vec<u8>>);
+pub(crate) struct Buffers(pub(super) Vec<Vec<u8>>);
 
 impl Buffers {
     /// The elements of an accessor of `N` floats, or of integers that stand for floats where they are normalised or
@@ -12,7 +12,7 @@ impl Buffers {
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub(super) fn floats<const N: usize>(
+    pub(crate) fn floats<const N: usize>(
         &self,
         accessor: &gltf::Accessor<'_>,
     ) -> Result<Vec<[f32; N]>, String> {
@@ -34,7 +34,7 @@ impl Buffers {
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub(super) fn indices(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, String> {
+    pub(crate) fn indices(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, String> {
         let kind = accessor.data_type();
         let is_index = matches!(kind, DataType::U8 | DataType::U16 | DataType::U32);
         if !is_index || accessor.dimensions() != Dimensions::Scalar {

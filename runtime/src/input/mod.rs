@@ -1,0 +1,62 @@
+//! Opening files that are read to their end. A FIFO or a socket that nobody writes to, or a device, would never
+//! come to one: they are refused by their kind, before anything waits for them.
+//!
+//! A glTF file is a folder here: what it has within can be opened by paths that lead into it.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+mod file;
+pub mod gltf;
+
+pub use file::{is_transient, reason};
+
+/// Opens the file at `path` for reading.
+///
+/// # Errors
+/// If it cannot be opened, or is neither a file nor standard input.
+pub fn open(path: &Path) -> io::Result<File> {
+    let Some((file, member)) = gltf::inside(path) else {
+        return file::open(path);
+    };
+    let mut copy = tempfile::tempfile()?;
+    copy.write_all(&gltf::member(file, member)?)?;
+    copy.rewind()?;
+    Ok(copy)
+}
+
+/// The contents of the file at `path`.
+///
+/// # Errors
+/// As [`open`], or if it cannot be read.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    match gltf::inside(path) {
+        Some((file, member)) => gltf::member(file, member),
+        None => file::read(path),
+    }
+}
+
+/// The text of the file at `path`.
+///
+/// # Errors
+/// As [`read`], or if it is not UTF-8.
+pub fn read_to_string(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    open(path)?.read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// The file on disk that holds what `path` names: that itself, or the glTF file that it leads into.
+pub fn on_disk(path: &Path) -> &Path {
+    gltf::inside(path).map_or(path, |(file, _)| file)
+}
+
+/// Where the scene is that `path` names: a scene file, or the scene in a glTF file.
+pub fn scene(path: &Path) -> PathBuf {
+    if gltf::is_named_so(path) {
+        path.join(gltf::SCENE)
+    } else {
+        path.to_owned()
+    }
+}
