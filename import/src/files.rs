@@ -44,28 +44,29 @@ pub(crate) fn joined(base: &str, name: &str) -> (String, bool) {
     let name = name.replace('\\', "/");
     let absolute = name.starts_with('/') || name.get(1..2) == Some(":");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
-    let mut parts: Vec<&str> = Vec::new();
+    let (start, folder) = match absolute {
+        true => (&name[..usize::from(name.starts_with('/'))], ""),
+        false => (&folder[..usize::from(folder.starts_with('/'))], folder),
+    };
+    let mut parts: Vec<&str> = folder.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
     let mut inside = !absolute;
-    for part in name.split('/') {
-        match part {
-            "" | "." => {}
-            ".." if parts.last().is_some_and(|last| *last != "..") => {
-                parts.pop();
-            }
-            ".." => {
-                inside = false;
-                parts.push("..");
-            }
-            part => parts.push(part),
+    let mut depth = 0usize;
+    for part in name.split('/').filter(|part| !matches!(*part, "" | ".")) {
+        if part != ".." {
+            depth += 1;
+            parts.push(part);
+            continue;
+        }
+        inside &= depth > 0;
+        depth = depth.saturating_sub(1);
+        match parts.last() {
+            Some(last) if *last != ".." => drop(parts.pop()),
+            _ => parts.push(".."),
         }
     }
-    let below = parts.join("/");
-    let path = match (absolute, folder) {
-        (true, _) if name.starts_with('/') => format!("/{below}"),
-        (true, _) | (false, "") => below,
-        (false, folder) => format!("{folder}/{below}"),
-    };
-    (path, inside)
+    // `/folder` of a file that lies in the root folder alone.
+    let start = if base.starts_with('/') && !absolute { "/" } else { start };
+    (format!("{start}{}", parts.join("/")), inside)
 }
 
 #[cfg(test)]
@@ -77,8 +78,10 @@ mod tests {
         let cases = [
             ("a/b.mtlx", "c.png", "a/c.png", true),
             ("b.mtlx", "./x/../c.png", "c.png", true),
-            ("a/b.mtlx", "../c.png", "a/../c.png", false),
-            ("a/b.mtlx", "x/../../c.png", "a/../c.png", false),
+            ("a/b.mtlx", "../c.png", "c.png", false),
+            ("/a/b.mtlx", "x/../../c.png", "/c.png", false),
+            ("/b.mtlx", "c.png", "/c.png", true),
+            ("../b.mtlx", "x/../c.png", "../c.png", true),
             ("a/b.mtlx", "/etc/passwd", "/etc/passwd", false),
             ("b.mtlx", "C:\\c.png", "C:/c.png", false),
             ("b.mtlx", "..\\c.png", "../c.png", false),

@@ -1,1 +1,7 @@
-//! Tests.
+//! Documents of MaterialX, good and bad, and what becomes of them.
+
+mod bad_input;
+mod common;
+mod documents;
+mod page;
+mod values;

@@ -6,7 +6,7 @@ use crate::error::ImportError;
 use crate::mtlx::document::Id;
 use crate::mtlx::graph::Key;
 use crate::mtlx::material::Builder;
-use crate::mtlx::nodes::{InputRow, Kind, Made, Make, NodeRow, one};
+use crate::mtlx::nodes::{InputRow, Kind, Made, Make, NodeRow, matrices, one};
 use crate::mtlx::text;
 use crate::mtlx::types::{Literal, Type};
 use crate::mtlx::value::Value;
@@ -24,6 +24,9 @@ impl Call<'_, '_, '_> {
     /// The outputs of the node.
     pub fn made(&mut self) -> Result<Made, ImportError> {
         self.check_names();
+        if matrices::is_known(self)? {
+            return matrices::computed(self);
+        }
         match self.row.make {
             Make::Text(template) => self.from_template(template),
             Make::Each(templates) => {

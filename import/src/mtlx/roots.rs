@@ -204,7 +204,10 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
         Type::Integer => format!("color(float({text}))"),
         Type::Boolean => format!("if {text} {{ color(1.0) }} else {{ color(0.0) }}"),
         Type::Vector2 => {
-            let text = builder.bind("value", &text);
+            let text = match text::is_simple(&text) {
+                true => text,
+                false => builder.bind("value", &text),
+            };
             format!("color({text}.x, {text}.y, 0.0)")
         }
         Type::Vector3 => format!("color({text})"),

@@ -180,7 +180,7 @@ fn normal_map(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let frame = frame(call)?;
     let scale = call.arg("scale")?;
     let text = match (scale.ty, scale.single()) {
-        (Float | Integer, Some(1.0)) => call.filled(&format!("@pattern::normal_map(color({{in}}), {frame})"))?,
+        (_, Some(1.0)) => call.filled(&format!("@pattern::normal_map(color({{in}}), {frame})"))?,
         (Vector2, None) => call.filled(&format!(
             "@pattern::normal_map(#scaled_normal_map({{in}}, {{scale}}), {frame})"
         ))?,

@@ -2,7 +2,7 @@
 
 use crate::error::ImportError;
 use crate::mtlx::call::Call;
-use crate::mtlx::color_spaces::{self, Space};
+use crate::mtlx::color_spaces::{self, Curve, LINEAR};
 use crate::mtlx::nodes::Make::{Code, Text};
 use crate::mtlx::nodes::{Made, NodeRow, one, row};
 use crate::mtlx::text::{Level, bound};
@@ -117,26 +117,28 @@ fn looked_up(call: &mut Call<'_, '_, '_>, picture: &Picture<'_>, uv: &str, ty: T
     let Picture { file, space, arguments } = picture;
     let data = format!("image_data({file}, {uv}{arguments})");
     let space = match color_spaces::find(space.unwrap_or_default()) {
-        _ if !matches!(ty, Color3 | Color4) => Space::Linear,
+        _ if !matches!(ty, Color3 | Color4) => LINEAR,
         Some(space) => space,
         None => {
             let name = space.unwrap_or_default().to_owned();
             call.warn(format!("the color space `{name}` is not known; texels are taken as linear Rec. 709"));
-            Space::Linear
+            LINEAR
         }
     };
-    let color = match space {
-        Space::Linear => format!("color({data}.xyz)"),
-        Space::Srgb => format!("image({file}, {uv}{arguments})"),
-        Space::Gamma(gamma) => format!("pow(color({data}.xyz), color({}))", number(gamma)),
-        Space::AcesCg => {
-            let convert = call.builder.source.names_in("@color::from_acescg");
-            format!("{convert}(color({data}.xyz))")
-        }
+    let color = match space.curve {
+        Curve::Linear => format!("color({data}.xyz)"),
+        Curve::Srgb => format!("image({file}, {uv}{arguments})"),
+        Curve::Gamma(gamma) => format!("pow(color({data}.xyz), color({}))", number(gamma)),
     };
+    // Paths of pictures may have any sign: only what stands around them is a template.
+    let (before, after) = match space.to_rec709("COLOR").split_once("COLOR") {
+        Some((before, after)) => (call.builder.source.names_in(before), after.to_owned()),
+        None => Default::default(),
+    };
+    let color = format!("{before}{color}{after}");
     match ty {
         Color3 => color,
-        Color4 if space == Space::Linear => data,
+        Color4 if space == LINEAR => data,
         Color4 => format!("vec4(vec3({color}), image_alpha({file}, {uv}{arguments}))"),
         Float => format!("{data}.x"),
         Vector2 => format!("{data}.xy"),
@@ -217,7 +219,10 @@ fn triplanar(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
             Some(c) => format!("-{p}.{c}"),
             None => format!("{p}.{c}"),
         };
-        let uv = format!("vec2({}, {})", part(u), part(v));
+        let uv = match u.strip_prefix('-') {
+            Some(_) => format!("vec2({}, {})", part(u), part(v)),
+            None => format!("{p}.{u}{v}"),
+        };
         let text = looked_up(call, &picture, &uv, call.ty);
         terms.push(format!("{w}.{weight} * {text}"));
     }
@@ -231,7 +236,8 @@ fn hex_tiled(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let Some(picture) = picture(call, "file", ["", ""])? else {
         return without(call);
     };
-    if color_spaces::find(picture.space.unwrap_or_default()) != Some(Space::Srgb) {
+    let space = color_spaces::find(picture.space.unwrap_or_default());
+    if space.map(|space| space.curve) != Some(Curve::Srgb) {
         call.warn("`hex_tiling` reads pictures of integers as sRGB");
     }
     call.warn("`hex_tiling` has other hexagons, which are turned but not scaled");

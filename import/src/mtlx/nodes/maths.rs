@@ -3,7 +3,7 @@
 use crate::error::ImportError;
 use crate::mtlx::call::Call;
 use crate::mtlx::nodes::Make::{Code, Each, Text};
-use crate::mtlx::nodes::{Made, NodeRow, one, row};
+use crate::mtlx::nodes::{Made, NodeRow, matrices, one, row};
 use crate::mtlx::text::{Level, bound, is_simple};
 use crate::mtlx::types::Type::{self, *};
 use crate::mtlx::types::{Literal, list};
@@ -15,7 +15,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     row("constant", "value:same=0", Code(passed), "its value"),
     row("dot", "in:same=0 note:string=", Code(passed), "its input"),
     row("add", "in1:same=0 in2:any=0", Code(add), "`in1 + in2`; sums of closures can gain energy, as the compiler warns"),
-    row("subtract", "in1:same=0 in2:scalar=0", Text("{in1} - {in2}"), ""),
+    row("subtract", "in1:same=0 in2:any=0", Code(subtract), "`in1 - in2`"),
     row("multiply", "in1:same=0 in2:any=1", Code(multiply), "`in1 * in2`"),
     row("divide", "in1:same=0 in2:any=1", Each(&[
         (FLOATS, "{in1} / {in2}"),
@@ -59,12 +59,12 @@ pub(super) const ROWS: &[NodeRow] = &[
         doclamp:boolean=false", Code(remap), "as `remap`, with a power between"),
     row("smoothstep", "in:same=0 low:scalar=0 high:scalar=1", Code(smoothstep), "`smoothstep(low, high, in)`"),
     row("trianglewave", "in:float=0", Text("0.5 - abs(mod(abs({in}), 1.0) - 0.5)"), ""),
-    row("creatematrix", "in1:vector3=1,0,0 in2:vector3=0,1,0 in3:vector3=0,0,1", Each(&[(&[Matrix33],
-        "mat3({in1}, {in2}, {in3})")]), "`mat3(in1, in2, in3)`; matrices of 4 by 4 have no counterpart"),
-    row("transpose", "in:same", Each(&[(&[Matrix33], "transpose({in})")]), "`transpose(in)`, of 3 by 3"),
-    row("determinant", "in:any", Each(&[(&[Matrix33], "determinant({in})")]), "`determinant(in)`, of 3 by 3"),
-    row("invertmatrix", "in:same", Each(&[(&[Matrix33], "inverse({in})")]), "`inverse(in)`, of 3 by 3"),
-    row("transformmatrix", "in:same=0 mat:any", Code(transform), "`mat * in`; a matrix of 4 by 4 must be a value"),
+    row("creatematrix", "in1:any=1,0,0 in2:any=0,1,0 in3:any=0,0,1 in4:any=0,0,0", Each(&[(&[Matrix33],
+        "mat3({in1}, {in2}, {in3})")]), "`mat3(in1, in2, in3)`, of 3 by 3; matrices of 4 by 4 must be known"),
+    row("transpose", "in:same", Each(&[(&[Matrix33], "transpose({in})")]), "`transpose(in)`, as before"),
+    row("determinant", "in:any", Each(&[(&[Matrix33], "determinant({in})")]), "`determinant(in)`, as before"),
+    row("invertmatrix", "in:same", Each(&[(&[Matrix33], "inverse({in})")]), "`inverse(in)`, as before"),
+    row("transformmatrix", "in:same=0 mat:any", Code(matrices::transform), "`mat * in`; a matrix of 4 by 4 must be known"),
 ];
 
 pub(super) const CHOICES: &[NodeRow] = &[
@@ -106,8 +106,27 @@ fn passed(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 }
 
 fn add(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
-    let made = call.from_template("{in1} + {in2}")?;
+    let made = {
+        let template = sum(call, "+")?;
+        call.from_template(template)?
+    };
     with_medium(call, made, &["in1", "in2"])
+}
+
+fn subtract(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
+    let template = sum(call, "-")?;
+    call.from_template(template)
+}
+
+/// A number that is added to a matrix is added to all of its numbers.
+fn sum(call: &mut Call<'_, '_, '_>, operator: &str) -> Result<&'static str, ImportError> {
+    let fills = call.ty == Matrix33 && call.arg("in2")?.ty == Float;
+    Ok(match (operator, fills) {
+        ("+", false) => "{in1} + {in2}",
+        ("+", true) => "{in1} + mat3(vec3({in2}), vec3({in2}), vec3({in2}))",
+        (_, false) => "{in1} - {in2}",
+        (_, true) => "{in1} - mat3(vec3({in2}), vec3({in2}), vec3({in2}))",
+    })
 }
 
 fn multiply(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -213,39 +232,13 @@ fn reciprocal(call: &Call<'_, '_, '_>, gamma: &str) -> String {
     }
 }
 
-/// A vector or point by a matrix. Rows of the document are columns here.
-fn transform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
-    let matrix = call.arg("mat")?;
-    if matrix.ty == Matrix33 {
-        let text = match call.ty {
-            Vector2 => call.filled("({mat} * vec3({in}, 1.0)).xy")?,
-            _ => call.filled("{mat} * {in}")?,
-        };
-        return one(Value::new(call.ty, text));
-    }
-    let Some(Literal::Numbers(numbers)) = matrix.literal.filter(|_| matrix.ty == Matrix44) else {
-        let message = format!("the matrix of {} is not known", call.described());
-        return Err(call.error(message).expected("a `matrix33`, or a `matrix44` that is a value"));
-    };
-    let row = |i: usize, count: usize| format!("vec{count}({})", list(&numbers[4 * i..4 * i + count]));
-    if call.ty == Vector3 {
-        let rows = format!("mat3({}, {}, {})", row(0, 3), row(1, 3), row(2, 3));
-        let text = call.filled(&format!("{rows} * {{in}} + {}", row(3, 3)))?;
-        return one(Value::new(call.ty, text));
-    }
-    let input = call.arg("in")?;
-    let v = call.named("in", input).text;
-    let terms: Vec<String> = ["x", "y", "z", "w"]
-        .iter()
-        .enumerate()
-        .map(|(i, c)| format!("{}.{c} * {}", bound(&v, Level::Atom), row(i, 4)))
-        .collect();
-    one(Value::new(call.ty, terms.join(" + ")))
+/// Does the node give what it compares?
+fn is_test(call: &mut Call<'_, '_, '_>) -> Result<bool, ImportError> {
+    Ok(call.ty == Boolean && call.given("in1")?.is_none() && call.given("in2")?.is_none())
 }
 
 fn chosen(call: &mut Call<'_, '_, '_>, operator: &str) -> Result<Made, ImportError> {
-    let is_test = call.ty == Boolean && call.given("in1")?.is_none() && call.given("in2")?.is_none();
-    if is_test {
+    if is_test(call)? {
         return call.from_template(&format!("{{value1}} {operator} {{value2}}"));
     }
     let template = format!("if {{value1}} {operator} {{value2}} {{ {{in1}} }} else {{ {{in2}} }}");
@@ -265,6 +258,9 @@ fn equal(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let other = call.arg("value2")?;
     // A default is a number: beside a truth value it is false.
     if value.ty == Boolean && other.literal == Some(Literal::Boolean(true)) {
+        if is_test(call)? {
+            return one(value);
+        }
         return call.from_template("if {value1} { {in1} } else { {in2} }");
     }
     chosen(call, "==")
@@ -366,8 +362,11 @@ fn component(ty: Type, index: usize) -> Option<&'static str> {
 fn extract(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let value = call.arg("in")?;
     let index = call.arg("index")?;
+    if matches!(value.ty, Matrix33 | Matrix44) {
+        return matrices::column(call, &value, index.single());
+    }
     let name = index.single().and_then(|index| component(value.ty, index.max(0.0) as usize));
-    let Some(name) = name.filter(|_| value.ty.count() <= 4) else {
+    let Some(name) = name else {
         let message = format!("the index of {} is not that of a component", call.described());
         let most = value.ty.count().clamp(1, 4) - 1;
         return Err(call.error(message).expected(format!("a value from 0 to {most}")));

@@ -9,6 +9,7 @@ mod compositing;
 mod geometry;
 mod images;
 mod maths;
+pub(crate) mod matrices;
 mod missing;
 mod noise;
 mod patterns;
