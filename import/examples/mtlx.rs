@@ -34,7 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             path => walk(Path::new(path), &mut documents)?,
         }
     }
-    let options = Options { allow_outside: true };
+    let options = Options {
+        allow_outside: true,
+    };
     let mut time = Duration::ZERO;
     let (mut whole, mut wrong, mut refused) = (0, 0, 0);
     for path in &documents {
@@ -44,11 +46,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         match result {
             Ok(imported) => {
                 let problems = problems(&imported);
-                match problems.is_empty() {
-                    true => whole += 1,
-                    false => wrong += 1,
+                if problems.is_empty() {
+                    whole += 1
+                } else {
+                    wrong += 1
                 }
-                println!("{} {}", if problems.is_empty() { "ok     " } else { "WRONG  " }, path.display());
+                println!(
+                    "{} {}",
+                    if problems.is_empty() {
+                        "ok     "
+                    } else {
+                        "WRONG  "
+                    },
+                    path.display()
+                );
                 for warning in &imported.warnings {
                     println!("        {warning}");
                 }
@@ -86,7 +97,12 @@ fn problems(imported: &Imported) -> Vec<String> {
         let checked = check(&path.to_string_lossy(), &mut loader);
         if has_errors(&checked.diagnostics) {
             for problem in checked.diagnostics.iter().filter(|d| d.is_error()).take(4) {
-                problems.push(format!("{} {} {:?}", problem.code.id(), problem.message, problem.hint));
+                problems.push(format!(
+                    "{} {} {:?}",
+                    problem.code.id(),
+                    problem.message,
+                    problem.hint
+                ));
             }
         }
     }
@@ -98,10 +114,15 @@ fn walk(path: &Path, documents: &mut Vec<PathBuf>) -> std::io::Result<()> {
         documents.push(path.to_owned());
         return Ok(());
     }
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(path)?.flatten().map(|e| e.path()).collect();
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(path)?
+        .flatten()
+        .map(|e| e.path())
+        .collect();
     entries.sort();
     for entry in entries {
-        let is_document = entry.extension().is_some_and(|extension| extension == "mtlx");
+        let is_document = entry
+            .extension()
+            .is_some_and(|extension| extension == "mtlx");
         if entry.is_dir() || is_document {
             walk(&entry, documents)?;
         }

@@ -44,11 +44,15 @@ pub(crate) fn joined(base: &str, name: &str) -> (String, bool) {
     let name = name.replace('\\', "/");
     let absolute = name.starts_with('/') || name.get(1..2) == Some(":");
     let folder = base.rsplit_once('/').map_or("", |(folder, _)| folder);
-    let (start, folder) = match absolute {
-        true => (&name[..usize::from(name.starts_with('/'))], ""),
-        false => (&folder[..usize::from(folder.starts_with('/'))], folder),
+    let (start, folder) = if absolute {
+        (&name[..usize::from(name.starts_with('/'))], "")
+    } else {
+        (&folder[..usize::from(folder.starts_with('/'))], folder)
     };
-    let mut parts: Vec<&str> = folder.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
+    let mut parts: Vec<&str> = folder
+        .split('/')
+        .filter(|part| !matches!(*part, "" | "."))
+        .collect();
     let mut inside = !absolute;
     let mut depth = 0usize;
     for part in name.split('/').filter(|part| !matches!(*part, "" | ".")) {
@@ -65,7 +69,11 @@ pub(crate) fn joined(base: &str, name: &str) -> (String, bool) {
         }
     }
     // `/folder` of a file that lies in the root folder alone.
-    let start = if base.starts_with('/') && !absolute { "/" } else { start };
+    let start = if base.starts_with('/') && !absolute {
+        "/"
+    } else {
+        start
+    };
     (format!("{start}{}", parts.join("/")), inside)
 }
 

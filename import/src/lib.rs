@@ -90,6 +90,9 @@ pub fn import(
     if extension.eq_ignore_ascii_case("mtlx") {
         return mtlx::import(path, files, options);
     }
-    let error = ImportError::new(path, format!("`{path}` is of no format that can be imported"));
+    let error = ImportError::new(
+        path,
+        format!("`{path}` is of no format that can be imported"),
+    );
     Err(vec![error.expected("a MaterialX document, NAME.mtlx")])
 }

@@ -45,7 +45,11 @@ fn long_chains_take_time_by_their_length() {
     compiled(&imported);
     let start = Instant::now();
     let _ = of_text(&chain(100_000));
-    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
+    assert!(
+        start.elapsed() < Duration::from_secs(60),
+        "{:?}",
+        start.elapsed()
+    );
 }
 
 #[test]
@@ -53,8 +57,12 @@ fn definitions_that_multiply_are_refused() {
     let mut text = String::from("<materialx version=\"1.39\">");
     for i in 0..40 {
         let inner = match i {
-            0 => "<constant name=\"x\" type=\"float\"/><constant name=\"y\" type=\"float\"/>".to_owned(),
-            i => format!("<d{0} name=\"x\" type=\"float\"/><d{0} name=\"y\" type=\"float\"/>", i - 1),
+            0 => "<constant name=\"x\" type=\"float\"/><constant name=\"y\" type=\"float\"/>"
+                .to_owned(),
+            i => format!(
+                "<d{0} name=\"x\" type=\"float\"/><d{0} name=\"y\" type=\"float\"/>",
+                i - 1
+            ),
         };
         write!(
             text,
@@ -68,7 +76,11 @@ fn definitions_that_multiply_are_refused() {
     text += "<d39 name=\"top\" type=\"float\"/><output name=\"o\" type=\"float\" nodename=\"top\"/></materialx>";
     let start = Instant::now();
     let errors = of_text(&text).expect_err("too many");
-    assert!(errors[0].message.contains("grows to more than"), "{}", errors[0]);
+    assert!(
+        errors[0].message.contains("grows to more than"),
+        "{}",
+        errors[0]
+    );
     assert!(start.elapsed() < Duration::from_secs(60));
 }
 
@@ -83,13 +95,17 @@ fn deep_documents_are_refused() {
 fn files_that_include_each_other_count_once() {
     let mut files = MemoryFiles::default();
     let including = |other: &str, body: &str| {
-        format!("<materialx version=\"1.39\" colorspace=\"srgb_texture\"><include href=\"{other}\"/>{body}</materialx>")
+        format!(
+            "<materialx version=\"1.39\" colorspace=\"srgb_texture\"><include href=\"{other}\"/>{body}</materialx>"
+        )
     };
     files.add("a.mtlx", including("sub/b.mtlx", ""));
     let surface = "<standard_surface name=\"s\" type=\"surfaceshader\">\
         <input name=\"base_color\" type=\"color3\" value=\"0.5, 0.5, 0.5\"/></standard_surface>";
     files.add("sub/b.mtlx", including("../a.mtlx", surface));
-    let options = Options { allow_outside: true };
+    let options = Options {
+        allow_outside: true,
+    };
     let imported = import("a.mtlx", &mut files, &options).expect("imported");
     assert!(compiled(&imported).contains("base_color: srgb(0.5, 0.5, 0.5)"));
     assert!(import("a.mtlx", &mut files, &Options::default()).is_err());

@@ -43,10 +43,13 @@ pub fn compiled(imported: &Imported) -> &str {
     for (path, text) in &imported.files {
         loader.add(path.to_string_lossy(), text.as_str());
     }
-    let requests = imported.materials.iter().map(|(name, file)| MaterialRequest {
-        material: Some(name.clone()),
-        ..MaterialRequest::new(name, file.to_string_lossy())
-    });
+    let requests = imported
+        .materials
+        .iter()
+        .map(|(name, file)| MaterialRequest {
+            material: Some(name.clone()),
+            ..MaterialRequest::new(name, file.to_string_lossy())
+        });
     let requests: Vec<MaterialRequest> = requests.collect();
     let compilation = compile(&requests, &mut loader);
     let problems = diag::render::text(&compilation.sources, &compilation.diagnostics, false);

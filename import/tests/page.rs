@@ -15,7 +15,10 @@ fn tables() -> String {
     }
     text.push_str("\n### Without a counterpart\n\n| node | why |\n|---|---|\n");
     for missing in MISSING {
-        text.push_str(&format!("| `{}` | {} |\n", missing.category, missing.reason));
+        text.push_str(&format!(
+            "| `{}` | {} |\n",
+            missing.category, missing.reason
+        ));
     }
     text
 }
@@ -23,7 +26,8 @@ fn tables() -> String {
 /// `IMPASTO_BLESS=1` writes the page's tables.
 #[test]
 fn the_page_has_the_tables_of_nodes() {
-    const MARK: &str = "<!-- nodes: written by a test of impasto-import, with IMPASTO_BLESS=1 -->\n";
+    const MARK: &str =
+        "<!-- nodes: written by a test of impasto-import, with IMPASTO_BLESS=1 -->\n";
     let path = "../docs/materialx.md";
     let page = std::fs::read_to_string(path).expect("the page");
     let (before, after) = page.split_once(MARK).expect("the mark");
@@ -31,7 +35,11 @@ fn the_page_has_the_tables_of_nodes() {
         std::fs::write(path, format!("{before}{MARK}{}", tables())).expect("written");
         return;
     }
-    assert_eq!(after.replace("\r\n", "\n"), tables(), "IMPASTO_BLESS=1 writes the page");
+    assert_eq!(
+        after.replace("\r\n", "\n"),
+        tables(),
+        "IMPASTO_BLESS=1 writes the page"
+    );
 }
 
 #[test]

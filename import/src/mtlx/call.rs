@@ -28,7 +28,7 @@ impl Call<'_, '_, '_> {
             return matrices::computed(self);
         }
         match self.row.make {
-            Make::Text(template) => self.from_template(template),
+            Make::Text(template) => self.template(template),
             Make::Each(templates) => {
                 let first = self.row.input_rows().next();
                 let of_first = match first {
@@ -37,7 +37,9 @@ impl Call<'_, '_, '_> {
                 };
                 let wanted = templates.iter().find(|(types, _)| types.contains(&self.ty));
                 let found = wanted
-                    .or(templates.iter().find(|(types, _)| types.contains(&of_first)))
+                    .or(templates
+                        .iter()
+                        .find(|(types, _)| types.contains(&of_first)))
                     .or(templates.iter().find(|(types, _)| types.is_empty()));
                 let Some((_, template)) = found else {
                     let types = templates.iter().flat_map(|(types, _)| types.iter());
@@ -49,14 +51,14 @@ impl Call<'_, '_, '_> {
                     );
                     return Err(self.error(message).expected(types.join(", ")));
                 };
-                self.from_template(template)
+                self.template(template)
             }
             Make::Code(code) => code(self),
         }
     }
 
     /// The single output that a template gives.
-    pub fn from_template(&mut self, template: &str) -> Result<Made, ImportError> {
+    pub fn template(&mut self, template: &str) -> Result<Made, ImportError> {
         one(Value::new(self.ty, self.filled(template)?))
     }
 
@@ -97,7 +99,11 @@ impl Call<'_, '_, '_> {
             };
             let value = values.iter().find(|(known, _)| known == name);
             value.map_or(String::new(), |(_, value)| {
-                if raw { value.text.clone() } else { value.plain() }
+                if raw {
+                    value.text.clone()
+                } else {
+                    value.plain()
+                }
             })
         })
     }
@@ -129,8 +135,14 @@ impl Call<'_, '_, '_> {
             return self.builder.geometry(property, self.key.node);
         }
         match ty {
-            Type::Bsdf => Ok(Value::new(ty, self.builder.source.names_in("@bsdf::diffuse(0.0)"))),
-            Type::Edf => Ok(Value::new(ty, self.builder.source.names_in("@edf::uniform(0.0)"))),
+            Type::Bsdf => Ok(Value::new(
+                ty,
+                self.builder.source.names_in("@bsdf::diffuse(0.0)"),
+            )),
+            Type::Edf => Ok(Value::new(
+                ty,
+                self.builder.source.names_in("@edf::uniform(0.0)"),
+            )),
             Type::Matrix33 => Ok(Value::new(ty, "mat3(1.0)")),
             _ => {
                 let literal = Literal::read(default, ty);
@@ -150,7 +162,10 @@ impl Call<'_, '_, '_> {
         let Some(value) = self.builder.value_at(self.key.scope, element, declared)? else {
             return Ok(None);
         };
-        let kind = self.row.input_row(name).map_or(Kind::Any, |input| input.kind);
+        let kind = self
+            .row
+            .input_row(name)
+            .map_or(Kind::Any, |input| input.kind);
         self.fitting(element, name, kind, value).map(Some)
     }
 
@@ -169,10 +184,15 @@ impl Call<'_, '_, '_> {
     }
 
     /// The value, if its type is one that the input takes.
-    fn fitting(&self, element: Id, name: &str, kind: Kind, value: Value) -> Result<Value, ImportError> {
-        let fits = |wanted: Type| {
-            value.ty == wanted || wanted == Type::Float && value.ty == Type::Integer
-        };
+    fn fitting(
+        &self,
+        element: Id,
+        name: &str,
+        kind: Kind,
+        value: Value,
+    ) -> Result<Value, ImportError> {
+        let fits =
+            |wanted: Type| value.ty == wanted || wanted == Type::Float && value.ty == Type::Integer;
         let (fits, expected) = match kind {
             Kind::Any => (true, ""),
             Kind::Of(ty) => (fits(ty), ty.name()),
@@ -188,7 +208,9 @@ impl Call<'_, '_, '_> {
             value.ty.name()
         );
         let document = self.builder.graphs.document;
-        let error = document.error(element, message).expected(format!("`{expected}`"));
+        let error = document
+            .error(element, message)
+            .expected(format!("`{expected}`"));
         Err(error.hint("put a `convert` between them"))
     }
 
@@ -198,7 +220,9 @@ impl Call<'_, '_, '_> {
             Some(Literal::Text(text)) => Ok(text),
             _ => {
                 let message = format!("the input `{name}` of {} is not known", self.described());
-                Err(self.error(message).expected("a text that the document says"))
+                Err(self
+                    .error(message)
+                    .expected("a text that the document says"))
             }
         }
     }
@@ -227,7 +251,11 @@ impl Call<'_, '_, '_> {
     pub fn described(&self) -> String {
         let document = self.builder.graphs.document;
         let node = self.key.node;
-        format!("the `{}` node `{}`", document.category(node), document.name(node))
+        format!(
+            "the `{}` node `{}`",
+            document.category(node),
+            document.name(node)
+        )
     }
 
     /// An error about the node.

@@ -80,7 +80,10 @@ const SPACES: &[(&str, Space)] = &[
 
 /// The space of a name.
 pub(crate) fn find(name: &str) -> Option<Space> {
-    SPACES.iter().find(|(known, _)| *known == name).map(|(_, space)| *space)
+    SPACES
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map(|(_, space)| *space)
 }
 
 impl Space {
@@ -98,11 +101,7 @@ impl Space {
 }
 
 /// A color as an expression, and the space if it is not known. Alpha stays as it is.
-pub(crate) fn value<'s>(
-    ty: Type,
-    literal: Literal,
-    space: Option<&'s str>,
-) -> (Value, Option<&'s str>) {
+pub(crate) fn value(ty: Type, literal: Literal, space: Option<&str>) -> (Value, Option<&str>) {
     let plain = Value::of(ty, literal.clone());
     let Literal::Numbers(numbers) = literal else {
         return (plain, None);
@@ -120,7 +119,9 @@ pub(crate) fn value<'s>(
         Linear => format!("color({})", list(rgb)),
         Srgb => format!("srgb({})", list(rgb)),
         Gamma(gamma) => {
-            let linear = rgb.iter().map(|n| number((n.max(0.0).powf(gamma) * 1e6).round() / 1e6));
+            let linear = rgb
+                .iter()
+                .map(|n| number((n.max(0.0).powf(gamma) * 1e6).round() / 1e6));
             format!("color({})", linear.collect::<Vec<_>>().join(", "))
         }
     };

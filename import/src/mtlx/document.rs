@@ -47,7 +47,9 @@ impl Document {
     pub fn attribute(&self, id: Id, name: &str) -> Option<&str> {
         let attributes = &self.element(id).attributes;
         let found = attributes.iter().find(|(key, _)| key == name);
-        found.map(|(_, value)| value.trim()).filter(|v| !v.is_empty())
+        found
+            .map(|(_, value)| value.trim())
+            .filter(|v| !v.is_empty())
     }
 
     /// The name, or nothing.
@@ -74,12 +76,18 @@ impl Document {
 
     /// The input of a name.
     pub fn input(&self, id: Id, name: &str) -> Option<Id> {
-        self.inputs.get(&id).and_then(|names| names.get(name)).copied()
+        self.inputs
+            .get(&id)
+            .and_then(|names| names.get(name))
+            .copied()
     }
 
     /// The child of a name that is no input: a node, an output or a graph.
     pub fn child(&self, id: Id, name: &str) -> Option<Id> {
-        self.names.get(&id).and_then(|names| names.get(name)).copied()
+        self.names
+            .get(&id)
+            .and_then(|names| names.get(name))
+            .copied()
     }
 
     /// Names that [`Document::child`] finds, sorted.
@@ -93,7 +101,11 @@ impl Document {
     /// What an element stands in: a graph, a node, or the document, whichever file of it.
     pub fn scope_of(&self, id: Id) -> Id {
         let parent = self.element(id).parent;
-        if self.category(parent) == "materialx" { ROOT } else { parent }
+        if self.category(parent) == "materialx" {
+            ROOT
+        } else {
+            parent
+        }
     }
 
     /// What stands in the document itself, in the order of the files and within them.
@@ -142,7 +154,11 @@ impl Document {
             let element = self.element(id);
             if matches!(element.category.as_str(), "input" | "parameter") {
                 let (name, parent) = (self.name(id).to_owned(), element.parent);
-                self.inputs.entry(parent).or_default().entry(name).or_insert(id);
+                self.inputs
+                    .entry(parent)
+                    .or_default()
+                    .entry(name)
+                    .or_insert(id);
                 continue;
             }
             if element.category == "token" || id == ROOT {
@@ -155,12 +171,17 @@ impl Document {
             let names = self.names.entry(parent).or_default();
             if let Some(first) = names.get(&name).copied() {
                 let line = self.element(first).line;
-                let message = format!("a second element is called `{name}`; the first is in line {line}");
+                let message =
+                    format!("a second element is called `{name}`; the first is in line {line}");
                 errors.push(self.error(id, message).hint("rename one of them"));
             } else {
                 names.insert(name, id);
             }
         }
-        if errors.is_empty() { Ok(()) } else { Err(errors) }
+        if errors.is_empty() {
+            Ok(())
+        } else {
+            Err(errors)
+        }
     }
 }

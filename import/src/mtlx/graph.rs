@@ -75,7 +75,10 @@ impl<'a> Graphs<'a> {
                 "nodedef" => {
                     let node = document.attribute(id, "node");
                     let node = node.or(document.attribute(id, "nodename"));
-                    definitions.entry(node.unwrap_or_default()).or_default().push(id);
+                    definitions
+                        .entry(node.unwrap_or_default())
+                        .or_default()
+                        .push(id);
                 }
                 "nodegraph" => {
                     if let Some(of) = document.attribute(id, "nodedef") {
@@ -95,7 +98,10 @@ impl<'a> Graphs<'a> {
         }
         Self {
             document,
-            scopes: vec![Scope { graph: ROOT, instance: None }],
+            scopes: vec![Scope {
+                graph: ROOT,
+                instance: None,
+            }],
             plain: HashMap::new(),
             instances: HashMap::new(),
             definitions,
@@ -109,7 +115,10 @@ impl<'a> Graphs<'a> {
         let next = self.scopes.len() as ScopeId;
         let scope = *self.plain.entry(graph).or_insert(next);
         if scope == next {
-            self.scopes.push(Scope { graph, instance: None });
+            self.scopes.push(Scope {
+                graph,
+                instance: None,
+            });
         }
         scope
     }
@@ -145,7 +154,9 @@ impl<'a> Graphs<'a> {
 
     /// The graph that says what a definition does.
     pub fn implementation(&self, definition: Id) -> Option<Id> {
-        self.implementations.get(self.document.name(definition)).copied()
+        self.implementations
+            .get(self.document.name(definition))
+            .copied()
     }
 
     /// The scope within a node that a graph of the document defines; nothing for other nodes.
@@ -165,7 +176,9 @@ impl<'a> Graphs<'a> {
             );
             let error = document.error(key.node, message);
             let error = error.expected("a nodegraph with the attribute `nodedef`");
-            return Err(error.hint("code of another language cannot be imported: write it as a graph"));
+            return Err(
+                error.hint("code of another language cannot be imported: write it as a graph")
+            );
         };
         if self.is_within(key.scope, graph) {
             let name = document.name(graph);
@@ -225,7 +238,10 @@ impl<'a> Graphs<'a> {
             }
         }
         let message = format!("`{}` is connected to itself", self.document.name(element));
-        Err(self.document.error(element, message).hint("break the circle"))
+        Err(self
+            .document
+            .error(element, message)
+            .hint("break the circle"))
     }
 
     /// A node: itself, or the source of the first output of its definition.
@@ -274,7 +290,10 @@ impl<'a> Graphs<'a> {
         }
         let is_interface = document.category(document.element(at).parent) == "nodegraph";
         Ok(Step::End(
-            match (document.attribute(at, "value"), document.attribute(at, "defaultgeomprop")) {
+            match (
+                document.attribute(at, "value"),
+                document.attribute(at, "defaultgeomprop"),
+            ) {
                 (Some(_), _) if is_interface && document.category(at) != "output" => {
                     Source::Parameter(at)
                 }
@@ -301,7 +320,10 @@ impl<'a> Graphs<'a> {
         if let Some(given) = document.input(key.node, name) {
             return Ok(Step::To(key.scope, given));
         }
-        match document.input(definition, name).or(document.input(graph, name)) {
+        match document
+            .input(definition, name)
+            .or(document.input(graph, name))
+        {
             // Values of definitions are defaults, and no parameters of the material.
             Some(default) => Ok(Step::End(
                 match (
@@ -422,7 +444,10 @@ impl<'a> Graphs<'a> {
     fn circle(&self, circle: &[Key]) -> ImportError {
         const MOST_NAMED: usize = 12;
         let document = self.document;
-        let names = circle.iter().take(MOST_NAMED).map(|key| document.name(key.node));
+        let names = circle
+            .iter()
+            .take(MOST_NAMED)
+            .map(|key| document.name(key.node));
         let mut names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
         if circle.len() > MOST_NAMED {
             names.push(format!("{} more", circle.len() - MOST_NAMED));
@@ -436,7 +461,9 @@ impl<'a> Graphs<'a> {
     pub fn token(&self, key: Key, name: &str) -> Option<&'a str> {
         let document = self.document;
         let value = |of: Id| {
-            let token = document.children(of, "token").find(|id| document.name(*id) == name);
+            let token = document
+                .children(of, "token")
+                .find(|id| document.name(*id) == name);
             token.and_then(|token| document.attribute(token, "value"))
         };
         let mut key = key;

@@ -43,7 +43,10 @@ pub(crate) fn find(name: &str) -> Option<&'static Helper> {
 
 /// What a helper imports from the library, as folders and names.
 pub(crate) fn imports(helper: &Helper) -> Vec<(&'static str, &'static str)> {
-    let lines = helper.file.lines().filter_map(|line| line.strip_prefix("use std::"));
+    let lines = helper
+        .file
+        .lines()
+        .filter_map(|line| line.strip_prefix("use std::"));
     let paths = lines.filter_map(|line| line.strip_suffix(';')?.split_once("::"));
     paths
         .flat_map(|(folder, names)| {

@@ -37,7 +37,11 @@ pub(crate) struct Builder<'b, 'a> {
 }
 
 impl<'b, 'a> Builder<'b, 'a> {
-    pub fn new(graphs: &'b mut Graphs<'a>, source: &'b mut SourceText, allow_outside: bool) -> Self {
+    pub fn new(
+        graphs: &'b mut Graphs<'a>,
+        source: &'b mut SourceText,
+        allow_outside: bool,
+    ) -> Self {
         let names = source.names.clone();
         Self {
             graphs,
@@ -88,8 +92,11 @@ impl<'b, 'a> Builder<'b, 'a> {
             document.name(key.node)
         );
         let error = document.error(key.node, message);
-        let error = error.expected("a node of docs/materialx.md, or one that the document defines by a graph");
-        let known = nodes::MISSING.iter().find(|missing| missing.category == category);
+        let error = error
+            .expected("a node of docs/materialx.md, or one that the document defines by a graph");
+        let known = nodes::MISSING
+            .iter()
+            .find(|missing| missing.category == category);
         let near = nearest(&category, nodes::node_rows().map(|row| row.category));
         Some(error.hint(match (known, near) {
             (Some(missing), _) => missing.reason.to_owned(),
@@ -102,17 +109,28 @@ impl<'b, 'a> Builder<'b, 'a> {
         let document = self.graphs.document;
         let category = upgrade::category(document, key.node);
         let written = document.attribute(key.node, "type");
-        let ty = written.map_or(Some(Type::Several), Type::of).ok_or_else(|| {
-            let written = written.unwrap_or_default();
-            let message = format!("`{}` has the unknown type `{written}`", document.name(key.node));
-            let near = nearest(written, Type::names());
-            let error = document.error(key.node, message);
-            error.maybe_hint(near.map(|near| format!("did you mean `{near}`?")))
-        })?;
+        let ty = written
+            .map_or(Some(Type::Several), Type::of)
+            .ok_or_else(|| {
+                let written = written.unwrap_or_default();
+                let message = format!(
+                    "`{}` has the unknown type `{written}`",
+                    document.name(key.node)
+                );
+                let near = nearest(written, Type::names());
+                let error = document.error(key.node, message);
+                error.maybe_hint(near.map(|near| format!("did you mean `{near}`?")))
+            })?;
         let Some(row) = nodes::find(&category) else {
             return Err(document.error(key.node, format!("no row for `{category}`")));
         };
-        Call { builder: self, key, row, ty }.made()
+        Call {
+            builder: self,
+            key,
+            row,
+            ty,
+        }
+        .made()
     }
 
     /// Gives a name to what is used more than once, or was named by a person.
@@ -129,9 +147,10 @@ impl<'b, 'a> Builder<'b, 'a> {
         let given = is_given(document.name(key.node), category);
         let used = self.uses.get(&key).copied().unwrap_or(0);
         let is_simple = text::is_simple(&value.text);
-        let wanted = match is_simple {
-            true => given && category == "constant",
-            false => given || used > 1 || value.text.len() > MOST_INLINE,
+        let wanted = if is_simple {
+            given && category == "constant"
+        } else {
+            given || used > 1 || value.text.len() > MOST_INLINE
         };
         if wanted {
             if category == "position" {
@@ -175,7 +194,9 @@ impl<'b, 'a> Builder<'b, 'a> {
                 let own = document.attribute(at, "type").and_then(Type::of);
                 let Some(ty) = own.or(declared) else {
                     let message = format!("`{}` has no type", document.name(element));
-                    return Err(document.error(element, message).expected("the attribute `type`"));
+                    return Err(document
+                        .error(element, message)
+                        .expected("the attribute `type`"));
                 };
                 self.literal(scope, at, ty)?
             }
@@ -184,14 +205,17 @@ impl<'b, 'a> Builder<'b, 'a> {
         };
         if let Some(declared) = declared.filter(|declared| *declared != value.ty) {
             // Integers stand where floats may; documents of old versions call outputs of several `multioutput`.
-            if !(declared == Type::Float && value.ty == Type::Integer) && declared != Type::Several {
+            if !(declared == Type::Float && value.ty == Type::Integer) && declared != Type::Several
+            {
                 let message = format!(
                     "`{}` has the type `{}`, but is connected to a `{}`",
                     document.name(element),
                     declared.name(),
                     value.ty.name()
                 );
-                return Err(document.error(element, message).hint("put a `convert` between them"));
+                return Err(document
+                    .error(element, message)
+                    .hint("put a `convert` between them"));
             }
         }
         Ok(Some(value))
@@ -202,10 +226,13 @@ impl<'b, 'a> Builder<'b, 'a> {
         let made = self.values.get(&key).map(Vec::as_slice).unwrap_or_default();
         let found = match output {
             None => made.first(),
-            Some(name) => made.iter().find(|(known, _)| *known == name).or(match made {
-                [only] if name == "out" || only.0 == "out" => Some(only),
-                _ => None,
-            }),
+            Some(name) => made
+                .iter()
+                .find(|(known, _)| *known == name)
+                .or(match made {
+                    [only] if name == "out" || only.0 == "out" => Some(only),
+                    _ => None,
+                }),
         };
         if let Some((_, value)) = found {
             return Ok(value.clone());
@@ -231,7 +258,9 @@ impl<'b, 'a> Builder<'b, 'a> {
         }
         let mut literal = Literal::read(written, ty).map_err(|expected| {
             let message = format!("`{}` has the value `{written}`", document.name(at));
-            document.error(at, message).expected(format!("{expected}, for the type `{}`", ty.name()))
+            document
+                .error(at, message)
+                .expected(format!("{expected}, for the type `{}`", ty.name()))
         })?;
         if let (Literal::Numbers(numbers), Some(size)) = (&mut literal, self.unit(at)?) {
             numbers.iter_mut().for_each(|number| *number *= size);
@@ -242,10 +271,15 @@ impl<'b, 'a> Builder<'b, 'a> {
         let space = document.inherited(at, "colorspace");
         let (value, unknown) = color_spaces::value(ty, literal, space);
         if let Some(space) = unknown {
-            let message = format!("the color space `{space}` is not known; values are taken as linear Rec. 709");
+            let message = format!(
+                "the color space `{space}` is not known; values are taken as linear Rec. 709"
+            );
             self.source.warn(document.warning(at, message));
         }
-        Ok(Value { text: self.source.names_in(&value.text), ..value })
+        Ok(Value {
+            text: self.source.names_in(&value.text),
+            ..value
+        })
     }
 
     /// What the unit of a value is in metres or degrees.
@@ -279,7 +313,10 @@ impl<'b, 'a> Builder<'b, 'a> {
     /// A picture that an element names.
     fn file(&mut self, scope: ScopeId, at: Id, written: &str) -> Result<Value, ImportError> {
         let document = self.graphs.document;
-        let holder = Key { scope, node: document.element(at).parent };
+        let holder = Key {
+            scope,
+            node: document.element(at).parent,
+        };
         let mut name = String::new();
         let mut rest = written;
         while let Some((before, after)) = rest.split_once('[') {
@@ -297,16 +334,22 @@ impl<'b, 'a> Builder<'b, 'a> {
         for token in ["<UVTILE>", "<AOVS>"] {
             if name.contains(token) {
                 let message = format!("the picture `{name}` has the token `{token}`");
-                return Err(document.error(at, message).expected("`<UDIM>`, or no token"));
+                return Err(document
+                    .error(at, message)
+                    .expected("`<UDIM>`, or no token"));
             }
         }
         if name.trim().is_empty() {
             let message = format!("`{}` names no picture", document.name(at));
-            return Err(document.error(at, message).expected("the path of a picture"));
+            return Err(document
+                .error(at, message)
+                .expected("the path of a picture"));
         }
         let prefix = document.inherited(at, "fileprefix").unwrap_or_default();
         let base = &document.files[document.element(at).file as usize];
-        let found = self.source.texture(base, &format!("{prefix}{name}"), self.allow_outside);
+        let found = self
+            .source
+            .texture(base, &format!("{prefix}{name}"), self.allow_outside);
         let texture = found.map_err(|message| {
             let error = document.error(at, message);
             error.hint("allow it with `--allow-outside` if you trust the document")
@@ -344,7 +387,9 @@ impl<'b, 'a> Builder<'b, 'a> {
     /// A property of the geometry.
     pub fn geometry(&self, property: &str, at: Id) -> Result<Value, ImportError> {
         Ok(match property {
-            "UV0" | "st" | "uv" | "st0" | "st_0" | "uv0" | "map1" => Value::new(Type::Vector2, "uv"),
+            "UV0" | "st" | "uv" | "st0" | "st_0" | "uv0" | "map1" => {
+                Value::new(Type::Vector2, "uv")
+            }
             "UV1" | "st1" | "st_1" | "uv1" | "uv_1" | "map2" => Value::new(Type::Vector2, "uv1"),
             "Pworld" => Value::geometric("position"),
             "Pobject" | "Pmodel" => Value::geometric("object_position"),
@@ -367,7 +412,11 @@ impl<'b, 'a> Builder<'b, 'a> {
     }
 
     /// What the color space of a picture is: said where its path is, or around it.
-    pub fn color_space(&mut self, scope: ScopeId, element: Id) -> Result<Option<&'a str>, ImportError> {
+    pub fn color_space(
+        &mut self,
+        scope: ScopeId,
+        element: Id,
+    ) -> Result<Option<&'a str>, ImportError> {
         let document = self.graphs.document;
         if let Some(space) = document.attribute(element, "colorspace") {
             return Ok(Some(space));
@@ -390,8 +439,11 @@ impl<'b, 'a> Builder<'b, 'a> {
         }
         lets.reverse();
         self.params.sort_by_key(|(at, _)| *at);
-        let names: HashMap<Id, &str> =
-            self.parameters.iter().map(|(at, value)| (*at, value.text.as_str())).collect();
+        let names: HashMap<Id, &str> = self
+            .parameters
+            .iter()
+            .map(|(at, value)| (*at, value.text.as_str()))
+            .collect();
         let params = self.params.iter();
         let params = params.filter(|(at, _)| names.get(at).is_some_and(|n| used.contains(*n)));
         let params: Vec<&str> = params.map(|(_, text)| text.as_str()).collect();

@@ -47,7 +47,7 @@ pub(crate) fn import(
     let mut materials: HashMap<Id, String> = HashMap::new();
     let mut names = Vec::new();
     for root in &roots {
-        let name = source.names.unique(root.name(&document), "material");
+        let name = source.names.unique(&root.name(&document), "material");
         match roots::written(root, &name, &mut graphs, &mut source, options.allow_outside) {
             Ok(Some(material)) => {
                 source.add(material);
@@ -73,13 +73,23 @@ pub(crate) fn import(
     }
     if names.is_empty() {
         let error = ImportError::new(path, "there is no material in the document");
-        let error = error.expected("a `surfacematerial`, a surface shader, or an output of colors or numbers");
-        let said = source.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let error = error
+            .expected("a `surfacematerial`, a surface shader, or an output of colors or numbers");
+        let said = source
+            .warnings
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>();
         return Err(vec![error.maybe_hint(said.first().cloned())]);
     }
     let file = file_name(path);
-    let header = format!("//! Imported from {}.\n", path.rsplit('/').next().unwrap_or(path));
-    let text = source.finished(path, &header).map_err(|error| vec![error])?;
+    let header = format!(
+        "//! Imported from {}.\n",
+        path.rsplit('/').next().unwrap_or(path)
+    );
+    let text = source
+        .finished(path, &header)
+        .map_err(|error| vec![error])?;
     let textures = source.textures(&text, files);
     let assignments = assignments(&document, &roots, &materials, &mut source);
     Ok(Imported {
@@ -95,7 +105,10 @@ pub(crate) fn import(
 fn file_name(path: &str) -> PathBuf {
     let file = path.rsplit(['/', '\\']).next().unwrap_or(path);
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
-    PathBuf::from(format!("{}.impasto", Names::default().unique(stem, "document")))
+    PathBuf::from(format!(
+        "{}.impasto",
+        Names::default().unique(stem, "document")
+    ))
 }
 
 /// What the looks of the document say.

@@ -22,7 +22,10 @@ fn is_taken(name: &str) -> bool {
                 let line = line.strip_prefix("private ").unwrap_or(line);
                 let line = line.strip_prefix("delta ").unwrap_or(line);
                 let (word, rest) = line.split_once(' ')?;
-                let defines = matches!(word, "fn" | "bsdf" | "edf" | "struct" | "const" | "material");
+                let defines = matches!(
+                    word,
+                    "fn" | "bsdf" | "edf" | "struct" | "const" | "material"
+                );
                 let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_');
                 defines.then(|| &rest[..end.unwrap_or(rest.len())])
             })
@@ -88,13 +91,18 @@ pub(crate) fn is_given(name: &str, category: &str) -> bool {
     let plain = |text: &str| text.to_ascii_lowercase().replace('_', "");
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_');
     let stem = plain(stem);
-    let stem = stem.strip_prefix("node").or(stem.strip_prefix("nmtlx")).unwrap_or(&stem);
+    let stem = stem
+        .strip_prefix("node")
+        .or(stem.strip_prefix("nmtlx"))
+        .unwrap_or(&stem);
     let category = plain(category);
     if stem.is_empty() || matches!(stem, "n" | "t" | "m") {
         return false;
     }
     let bare = stem.strip_prefix('n').unwrap_or(stem);
-    let kinds = ["", "float", "color3", "color4", "vector2", "vector3", "vector4", "color", "integer"];
+    let kinds = [
+        "", "float", "color3", "color4", "vector2", "vector3", "vector4", "color", "integer",
+    ];
     let bare_category = category.trim_end_matches(|c: char| c.is_ascii_digit());
     !kinds.iter().any(|kind| {
         [stem, bare].iter().any(|stem| {

@@ -8,7 +8,13 @@ use crate::mtlx::value::Value;
 const MOST_COLUMNS: usize = 92;
 
 /// The declaration of a parameter.
-pub(crate) fn declaration(document: &Document, at: Id, name: &str, ty: Type, value: &Value) -> String {
+pub(crate) fn declaration(
+    document: &Document,
+    at: Id,
+    name: &str,
+    ty: Type,
+    value: &Value,
+) -> String {
     let mut text = String::new();
     let docs = document.attribute(at, "doc").unwrap_or_default();
     for line in wrapped(docs) {
@@ -26,8 +32,8 @@ pub(crate) fn declaration(document: &Document, at: Id, name: &str, ty: Type, val
     if let Some(group) = document.attribute(at, "uifolder") {
         metadata.push(format!("group: {}", quoted(&ascii(group))));
     }
-    if let Some((low, high)) = range(document, at, ("uisoftmin", "uisoftmax"), ty, value)
-        .filter(|_| hard.is_none())
+    if let Some((low, high)) =
+        range(document, at, ("uisoftmin", "uisoftmax"), ty, value).filter(|_| hard.is_none())
     {
         metadata.push(format!("soft: {low} .. {high}"));
     }

@@ -34,24 +34,31 @@ impl Root {
     }
 
     /// The name that the material should have.
-    pub fn name<'a>(&self, document: &'a Document) -> &'a str {
+    pub fn name(&self, document: &Document) -> String {
         let id = self.element();
         let graph = document.scope_of(id);
+        let name = document.name(id);
         match self {
-            // Most graphs have one output, `out`.
-            Self::Output(_) if graph != ROOT && document.children(graph, "output").count() == 1 => {
-                document.name(graph)
+            Self::Output(_) if graph != ROOT => {
+                // Most graphs have one output, `out`.
+                match document.children(graph, "output").nth(1) {
+                    None => document.name(graph).to_owned(),
+                    Some(_) => format!("{}_{name}", document.name(graph)),
+                }
             }
-            _ => document.name(id),
+            _ => name.to_owned(),
         }
     }
 }
 
 /// What of the document becomes materials, in its order.
 pub(crate) fn find(document: &Document, source: &mut SourceText) -> Vec<Root> {
-    let implementations = document.top().filter(|id| document.category(*id) == "implementation");
-    let implementing: HashSet<&str> =
-        implementations.filter_map(|id| document.attribute(id, "nodegraph")).collect();
+    let implementations = document
+        .top()
+        .filter(|id| document.category(*id) == "implementation");
+    let implementing: HashSet<&str> = implementations
+        .filter_map(|id| document.attribute(id, "nodegraph"))
+        .collect();
     let graphs: Vec<Id> = document
         .top()
         .filter(|id| document.category(*id) == "nodegraph")
@@ -59,8 +66,12 @@ pub(crate) fn find(document: &Document, source: &mut SourceText) -> Vec<Root> {
         .filter(|id| !implementing.contains(document.name(*id)))
         .collect();
     let nodes = |category: &str| -> Vec<Id> {
-        let top = document.top().filter(|id| document.category(*id) == category);
-        let inner = graphs.iter().flat_map(|graph| document.children(*graph, category));
+        let top = document
+            .top()
+            .filter(|id| document.category(*id) == category);
+        let inner = graphs
+            .iter()
+            .flat_map(|graph| document.children(*graph, category));
         let mut found: Vec<Id> = top.chain(inner).collect();
         found.sort_unstable();
         found
@@ -80,7 +91,12 @@ pub(crate) fn find(document: &Document, source: &mut SourceText) -> Vec<Root> {
         .iter()
         .filter(|id| is_shader(id) && !matches!(document.category(**id), "output" | "nodegraph"))
         .map(|id| Root::Node(*id))
-        .chain(outputs.iter().filter(|id| is_shader(id)).map(|id| Root::Output(*id)))
+        .chain(
+            outputs
+                .iter()
+                .filter(|id| is_shader(id))
+                .map(|id| Root::Output(*id)),
+        )
         .collect();
     if !shaders.is_empty() {
         return shaders;
@@ -95,9 +111,27 @@ pub(crate) fn find(document: &Document, source: &mut SourceText) -> Vec<Root> {
         .filter_map(|input| document.attribute(input, "nodename"))
         .collect();
     const DECLARATIONS: &[&str] = &[
-        "nodedef", "nodegraph", "implementation", "typedef", "unitdef", "unittypedef", "geominfo", "look",
-        "collection", "propertyset", "backdrop", "token", "input", "variant", "variantset", "targetdef", "output",
-        "geompropdef", "attributedef", "lookgroup", "include",
+        "nodedef",
+        "nodegraph",
+        "implementation",
+        "typedef",
+        "unitdef",
+        "unittypedef",
+        "geominfo",
+        "look",
+        "collection",
+        "propertyset",
+        "backdrop",
+        "token",
+        "input",
+        "variant",
+        "variantset",
+        "targetdef",
+        "output",
+        "geompropdef",
+        "attributedef",
+        "lookgroup",
+        "include",
     ];
     let loose = top.into_iter().filter(|id| {
         !DECLARATIONS.contains(&document.category(*id)) && !taken.contains(document.name(*id))
@@ -141,7 +175,9 @@ pub(crate) fn written(
             };
             value.map_err(|error| vec![error])?
         }
-        _ => builder.value_at(scope, id, None).map_err(|error| vec![error])?,
+        _ => builder
+            .value_at(scope, id, None)
+            .map_err(|error| vec![error])?,
     };
     let Some(assignments) = value.and_then(|value| assignments(&value, &mut builder)) else {
         let message = format!("`{name}` has no surface to show and is left out");
@@ -161,7 +197,10 @@ fn shader_of(
     source: &mut SourceText,
 ) -> Result<Source, ImportError> {
     let document = graphs.document;
-    for (input, what) in [("displacementshader", "displacement"), ("backsurfaceshader", "back side")] {
+    for (input, what) in [
+        ("displacementshader", "displacement"),
+        ("backsurfaceshader", "back side"),
+    ] {
         let Some(element) = document.input(material, input) else {
             continue;
         };
@@ -186,7 +225,9 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
     let text = value.plain();
     let color = match value.ty {
         Type::SurfaceShader => match &value.extra {
-            Extra::Shader(Shader::Call(call)) => return Some(vec![format!("material = {call};\n")]),
+            Extra::Shader(Shader::Call(call)) => {
+                return Some(vec![format!("material = {call};\n")]);
+            }
             Extra::Shader(Shader::Outputs(outputs)) => return Some(assigned(outputs)),
             _ => return None,
         },
@@ -204,9 +245,10 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
         Type::Integer => format!("color(float({text}))"),
         Type::Boolean => format!("if {text} {{ color(1.0) }} else {{ color(0.0) }}"),
         Type::Vector2 => {
-            let text = match text::is_simple(&text) {
-                true => text,
-                false => builder.bind("value", &text),
+            let text = if text::is_simple(&text) {
+                text
+            } else {
+                builder.bind("value", &text)
             };
             format!("color({text}.x, {text}.y, 0.0)")
         }
@@ -214,7 +256,10 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
         Type::Color4 | Type::Vector4 => {
             format!("color({}.xyz)", text::bound(&text, text::Level::Atom))
         }
-        Type::Matrix33 => format!("color({} * vec3(1.0))", text::bound(&text, text::Level::Product)),
+        Type::Matrix33 => format!(
+            "color({} * vec3(1.0))",
+            text::bound(&text, text::Level::Product)
+        ),
         _ => return None,
     };
     let shown = builder.source.names_in("@edf::uniform");
@@ -229,6 +274,10 @@ fn assigned(outputs: &Outputs) -> Vec<String> {
         ("opacity", &outputs.opacity),
         ("interior", &outputs.interior),
     ];
-    let given = all.iter().filter_map(|(name, text)| text.as_ref().map(|text| (name, text)));
-    given.map(|(name, text)| format!("{name} = {text};\n")).collect()
+    let given = all
+        .iter()
+        .filter_map(|(name, text)| text.as_ref().map(|text| (name, text)));
+    given
+        .map(|(name, text)| format!("{name} = {text};\n"))
+        .collect()
 }

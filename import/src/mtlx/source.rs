@@ -74,7 +74,8 @@ impl SourceText {
                 ("edf", "generalized_schlick") => "generalized_schlick_edf",
                 _ => name,
             };
-            self.imports.insert(local.to_owned(), (folder.to_owned(), name.to_owned()));
+            self.imports
+                .insert(local.to_owned(), (folder.to_owned(), name.to_owned()));
             text.push_str(local);
         }
         text.push_str(rest);
@@ -93,13 +94,20 @@ impl SourceText {
     ) -> Result<Texture, String> {
         let (found, inside) = joined(base, name);
         if !inside && !allow_outside {
-            return Err(format!("`{name}` lies outside of the folder of the document"));
+            return Err(format!(
+                "`{name}` lies outside of the folder of the document"
+            ));
         }
         if let Some(texture) = self.textures.get(&found) {
             return Ok(texture.clone());
         }
-        let file = found.rsplit_once('/').map_or(found.as_str(), |(_, file)| file);
-        let file: String = file.chars().filter(|c| !c.is_control() && *c != '"').collect();
+        let file = found
+            .rsplit_once('/')
+            .map_or(found.as_str(), |(_, file)| file);
+        let file: String = file
+            .chars()
+            .filter(|c| !c.is_control() && *c != '"')
+            .collect();
         let (stem, extension) = file.rsplit_once('.').unwrap_or((&file, ""));
         let mut written = format!("{TEXTURES}/{file}");
         let mut count = 1;
@@ -147,7 +155,8 @@ impl SourceText {
         for helper in HELPERS.iter().rev() {
             if words.contains(helper.name) {
                 for (folder, name) in helpers::imports(helper) {
-                    self.imports.insert(name.to_owned(), (folder.to_owned(), name.to_owned()));
+                    self.imports
+                        .insert(name.to_owned(), (folder.to_owned(), name.to_owned()));
                 }
                 let text = helpers::text(helper);
                 words.extend(self::words(text));
@@ -159,9 +168,10 @@ impl SourceText {
         let mut folders: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
         for (local, (folder, name)) in &self.imports {
             if words.contains(local) {
-                let import = match local == name {
-                    true => name.clone(),
-                    false => format!("{name} as {local}"),
+                let import = if local == name {
+                    name.clone()
+                } else {
+                    format!("{name} as {local}")
                 };
                 folders.entry(folder).or_default().insert(import);
             }
@@ -184,12 +194,14 @@ impl SourceText {
             return Err(too_long());
         }
         let formatted = format(FileId(0), &text).map_err(|reason| {
-            let message = format!("the source cannot be formatted, a defect of the importer: {reason:?}");
+            let message =
+                format!("the source cannot be formatted, a defect of the importer: {reason:?}");
             ImportError::new(path, message)
         })?;
-        match formatted.len() > MOST_BYTES {
-            true => Err(too_long()),
-            false => Ok(formatted),
+        if formatted.len() > MOST_BYTES {
+            Err(too_long())
+        } else {
+            Ok(formatted)
         }
     }
 }

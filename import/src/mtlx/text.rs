@@ -67,7 +67,10 @@ pub(crate) fn weighted(weight: &str, text: &str) -> String {
 
 /// Is it a name, perhaps with fields, or a number? Then it may be repeated.
 pub(crate) fn is_simple(text: &str) -> bool {
-    text.len() <= 40 && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.')
+    text.len() <= 40
+        && text
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.')
 }
 
 /// The holes of a template, `{name}`, in order, with repetitions.

@@ -121,7 +121,9 @@ impl Literal {
             },
             Integer => {
                 let value: Result<i32, _> = text.parse();
-                value.map(Self::Integer).map_err(|_| "a whole number of 32 bits".into())
+                value
+                    .map(Self::Integer)
+                    .map_err(|_| "a whole number of 32 bits".into())
             }
             Type::Text | Filename => Ok(Self::Text(text.to_owned())),
             _ if ty.count() > 0 => {
@@ -138,7 +140,11 @@ impl Literal {
                 }
                 let finite = numbers.iter().all(|n| (*n as f32).is_finite());
                 let fits = numbers.len() == ty.count() && finite;
-                if fits { Ok(Self::Numbers(numbers)) } else { Err(expected()) }
+                if fits {
+                    Ok(Self::Numbers(numbers))
+                } else {
+                    Err(expected())
+                }
             }
             _ => Err("no value: it is connected to a node".into()),
         }
@@ -157,10 +163,15 @@ impl Literal {
             }
             Self::Numbers(numbers) if numbers.len() == 1 => number(numbers[0]),
             Self::Numbers(numbers) => {
-                let name = if ty.impasto().is_empty() { "vec4" } else { ty.impasto() };
-                match numbers.windows(2).all(|pair| pair[0] == pair[1]) {
-                    true => format!("{name}({})", number(numbers[0])),
-                    false => format!("{name}({})", list(numbers)),
+                let name = if ty.impasto().is_empty() {
+                    "vec4"
+                } else {
+                    ty.impasto()
+                };
+                if numbers.windows(2).all(|pair| pair[0] == pair[1]) {
+                    format!("{name}({})", number(numbers[0]))
+                } else {
+                    format!("{name}({})", list(numbers))
                 }
             }
         }
@@ -180,7 +191,11 @@ impl Literal {
 
 /// Numbers with commas between them.
 pub(crate) fn list(numbers: &[f64]) -> String {
-    numbers.iter().map(|n| number(*n)).collect::<Vec<_>>().join(", ")
+    numbers
+        .iter()
+        .map(|n| number(*n))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// The shortest float literal of Impasto that gives this number in single precision.
@@ -194,7 +209,9 @@ pub(crate) fn number(value: f64) -> String {
 
 /// A text in quotes, without what a string of Impasto cannot hold.
 pub(crate) fn quoted(text: &str) -> String {
-    let safe = text.chars().filter(|c| !c.is_control() && *c != '"' && *c != '\\');
+    let safe = text
+        .chars()
+        .filter(|c| !c.is_control() && *c != '"' && *c != '\\');
     format!("\"{}\"", safe.collect::<String>())
 }
 

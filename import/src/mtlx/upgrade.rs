@@ -40,11 +40,20 @@ pub(crate) fn category(document: &Document, node: Id) -> String {
     };
     match category {
         "invert" if ty.starts_with("matrix") => "invertmatrix".into(),
-        "rotate" => (if ty == "vector2" { "rotate2d" } else { "rotate3d" }).into(),
+        "rotate" => (if ty == "vector2" {
+            "rotate2d"
+        } else {
+            "rotate3d"
+        })
+        .into(),
         "combine" => counted(ty),
         "separate" => {
             let input = document.input(node, "in");
-            counted(input.and_then(|input| document.attribute(input, "type")).unwrap_or_default())
+            counted(
+                input
+                    .and_then(|input| document.attribute(input, "type"))
+                    .unwrap_or_default(),
+            )
         }
         "transformpoint" | "transformvector" | "transformnormal" if has("mat") => {
             "transformmatrix".into()

@@ -48,7 +48,9 @@ impl Medium {
             ("anisotropy", &self.anisotropy),
         ];
         let parts = parts.iter().filter(|(_, text)| !text.is_empty());
-        let parts: Vec<String> = parts.map(|(name, text)| format!("{name}: {text}")).collect();
+        let parts: Vec<String> = parts
+            .map(|(name, text)| format!("{name}: {text}"))
+            .collect();
         format!("medium({})", parts.join(", "))
     }
 
@@ -115,9 +117,10 @@ impl Value {
 
     /// The expression for arithmetic, which points and directions take part in as vectors.
     pub fn plain(&self) -> String {
-        match self.is_geometric {
-            true => format!("vec3({})", self.text),
-            false => self.text.clone(),
+        if self.is_geometric {
+            format!("vec3({})", self.text)
+        } else {
+            self.text.clone()
         }
     }
 

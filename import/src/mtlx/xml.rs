@@ -41,6 +41,9 @@ pub(crate) fn read(
     Ok(document)
 }
 
+/// A file that is to be read, and what includes it: a file and a line.
+type Wanted = (String, Option<(String, u32)>);
+
 struct Reader<'a> {
     document: Document,
     files: &'a mut dyn Files,
@@ -76,11 +79,7 @@ impl Reader<'_> {
     }
 
     /// Adds the elements of one file; the result is what it includes, and where.
-    fn text(
-        &mut self,
-        path: &str,
-        bytes: &[u8],
-    ) -> Result<Vec<(String, Option<(String, u32)>)>, ImportError> {
+    fn text(&mut self, path: &str, bytes: &[u8]) -> Result<Vec<Wanted>, ImportError> {
         let wrong = |message: String| ImportError::new(path, message);
         if bytes.len() > MOST_BYTES {
             let message = format!("the file has more than {} MiB", MOST_BYTES >> 20);
@@ -96,13 +95,16 @@ impl Reader<'_> {
         };
         // The parser recurses into elements: what nests too deep is found before.
         if levels(text) > MOST_LEVELS {
-            return Err(wrong(format!("elements nest more than {MOST_LEVELS} levels deep")));
+            return Err(wrong(format!(
+                "elements nest more than {MOST_LEVELS} levels deep"
+            )));
         }
         let xml = roxmltree::Document::parse_with_options(text, options).map_err(|error| {
             let dtd = matches!(error, roxmltree::Error::DtdDetected);
-            let message = match dtd {
-                true => "the file has a DTD, which is not read".to_owned(),
-                false => format!("the file is no XML: {error}"),
+            let message = if dtd {
+                "the file has a DTD, which is not read".to_owned()
+            } else {
+                format!("the file is no XML: {error}")
             };
             wrong(message).line(error.pos().row)
         })?;
@@ -120,15 +122,16 @@ impl Reader<'_> {
         // element of its own, and their children count as those of the document.
         let own = self.push(root, ROOT, file, &lines)?;
         let mut stack: Vec<(Node, Id)> = Vec::new();
-        let children = |of: Node<'_, '_>| of.children().filter(Node::is_element).count();
-        debug_assert!(children(root) <= MOST_ELEMENTS);
         let mut top: Vec<Node> = root.children().filter(Node::is_element).collect();
         top.reverse();
         stack.extend(top.into_iter().map(|child| (child, own)));
         while let Some((node, parent)) = stack.pop() {
             let line = lines.line(node.range().start);
             if node.tag_name().name() == "include" {
-                included.push((self.included(path, node, line)?, Some((path.to_owned(), line))));
+                included.push((
+                    self.included(path, node, line)?,
+                    Some((path.to_owned(), line)),
+                ));
                 continue;
             }
             let id = self.push(node, parent, file, &lines)?;
@@ -148,7 +151,9 @@ impl Reader<'_> {
         let (found, inside) = joined(path, href);
         if !inside && !self.allow_outside {
             let message = format!("`{href}` lies outside of the folder of the document");
-            return Err(error(message).hint("allow it with `--allow-outside` if you trust the document"));
+            return Err(
+                error(message).hint("allow it with `--allow-outside` if you trust the document")
+            );
         }
         Ok(found)
     }
@@ -170,7 +175,9 @@ impl Reader<'_> {
         let attributes = node.attributes();
         self.document.elements.push(Element {
             category: node.tag_name().name().to_owned(),
-            attributes: attributes.map(|a| (a.name().to_owned(), a.value().to_owned())).collect(),
+            attributes: attributes
+                .map(|a| (a.name().to_owned(), a.value().to_owned()))
+                .collect(),
             children: Vec::new(),
             parent,
             file,

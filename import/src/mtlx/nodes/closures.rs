@@ -11,50 +11,138 @@ use crate::mtlx::types::{Literal, number};
 use crate::mtlx::value::{Extra, Medium, Value};
 
 pub(super) const ROWS: &[NodeRow] = &[
-    row("oren_nayar_diffuse_bsdf", "weight:float=1 color:color3=0.18 roughness:float=0 normal:vector3=@Nworld \
-        energy_compensation:boolean=false", Code(oren_nayar), "`oren_nayar_diffuse`; `diffuse` where it is not rough"),
-    row("burley_diffuse_bsdf", "weight:float=1 color:color3=0.18 roughness:float=0 normal:vector3=@Nworld",
-        Code(burley), "`burley_diffuse`, which keeps energy"),
-    row("translucent_bsdf", "weight:float=1 color:color3=1 normal:vector3=@Nworld", Code(translucent), "`translucent`"),
-    row("dielectric_bsdf", "weight:float=1 tint:color3=1 ior:float=1.5 roughness:vector2=0.05 \
+    row(
+        "oren_nayar_diffuse_bsdf",
+        "weight:float=1 color:color3=0.18 roughness:float=0 normal:vector3=@Nworld \
+        energy_compensation:boolean=false",
+        Code(oren_nayar),
+        "`oren_nayar_diffuse`; `diffuse` where it is not rough",
+    ),
+    row(
+        "burley_diffuse_bsdf",
+        "weight:float=1 color:color3=0.18 roughness:float=0 normal:vector3=@Nworld",
+        Code(burley),
+        "`burley_diffuse`, which keeps energy",
+    ),
+    row(
+        "translucent_bsdf",
+        "weight:float=1 color:color3=1 normal:vector3=@Nworld",
+        Code(translucent),
+        "`translucent`",
+    ),
+    row(
+        "dielectric_bsdf",
+        "weight:float=1 tint:color3=1 ior:float=1.5 roughness:vector2=0.05 \
         retroreflective:boolean=false thinfilm_thickness:float=0 thinfilm_ior:float=1.5 normal:vector3=@Nworld \
-        tangent:vector3=@Tworld distribution:string=ggx scatter_mode:string=R", Code(dielectric),
-        "`dielectric_reflection` (R), `dielectric_transmission` (T) or `dielectric` (RT)"),
-    row("conductor_bsdf", "weight:float=1 ior:color3=0.183,0.421,1.373 extinction:color3=3.424,2.346,1.770 \
+        tangent:vector3=@Tworld distribution:string=ggx scatter_mode:string=R",
+        Code(dielectric),
+        "`dielectric_reflection` (R), `dielectric_transmission` (T) or `dielectric` (RT)",
+    ),
+    row(
+        "conductor_bsdf",
+        "weight:float=1 ior:color3=0.183,0.421,1.373 extinction:color3=3.424,2.346,1.770 \
         roughness:vector2=0.05 retroreflective:boolean=false thinfilm_thickness:float=0 thinfilm_ior:float=1.5 \
-        normal:vector3=@Nworld tangent:vector3=@Tworld distribution:string=ggx", Code(conductor), "`conductor`"),
-    row("generalized_schlick_bsdf", "weight:float=1 color0:color3=1 color82:color3=1 color90:color3=1 exponent:float=5 \
+        normal:vector3=@Nworld tangent:vector3=@Tworld distribution:string=ggx",
+        Code(conductor),
+        "`conductor`",
+    ),
+    row(
+        "generalized_schlick_bsdf",
+        "weight:float=1 color0:color3=1 color82:color3=1 color90:color3=1 exponent:float=5 \
         roughness:vector2=0.05 retroreflective:boolean=false thinfilm_thickness:float=0 thinfilm_ior:float=1.5 \
-        normal:vector3=@Nworld tangent:vector3=@Tworld distribution:string=ggx scatter_mode:string=R", Code(schlick),
-        "`generalized_schlick`; what it lets through (T, RT) is that of a dielectric as bright as `color0`"),
-    row("subsurface_bsdf", "weight:float=1 color:color3=0.18 radius:color3=1 anisotropy:float=0 \
-        normal:vector3=@Nworld", Code(subsurface), "`subsurface`, its radius in metres"),
-    row("sheen_bsdf", "weight:float=1 color:color3=1 roughness:float=0.3 normal:vector3=@Nworld \
-        mode:string=conty_kulla", Code(sheen), "`sheen_conty_kulla` or `sheen_zeltner`"),
+        normal:vector3=@Nworld tangent:vector3=@Tworld distribution:string=ggx scatter_mode:string=R",
+        Code(schlick),
+        "`generalized_schlick`; what it lets through (T, RT) is that of a dielectric as bright as `color0`",
+    ),
+    row(
+        "subsurface_bsdf",
+        "weight:float=1 color:color3=0.18 radius:color3=1 anisotropy:float=0 \
+        normal:vector3=@Nworld",
+        Code(subsurface),
+        "`subsurface`, its radius in metres",
+    ),
+    row(
+        "sheen_bsdf",
+        "weight:float=1 color:color3=1 roughness:float=0.3 normal:vector3=@Nworld \
+        mode:string=conty_kulla",
+        Code(sheen),
+        "`sheen_conty_kulla` or `sheen_zeltner`",
+    ),
     row("uniform_edf", "color:color3=1", Code(uniform), "`uniform`"),
-    row("conical_edf", "color:color3=1 normal:vector3=@Nworld inner_angle:float=60 outer_angle:float=0", Code(conical),
-        "`conical`"),
-    row("generalized_schlick_edf", "color0:color3=1 color90:color3=1 exponent:float=5 base:EDF", Code(schlick_edf),
-        "`generalized_schlick` of emission, over a `uniform_edf`"),
-    row("absorption_vdf", "absorption:vector3=0", Code(volume), "`medium(absorption)`, 1/m"),
-    row("anisotropic_vdf", "absorption:vector3=0 scattering:vector3=0 anisotropy:float=0", Code(volume),
-        "`medium(absorption, scattering, anisotropy)`, 1/m"),
-    row("layer", "top:BSDF base:any", Code(layer), "`layer(top, base)`; the `interior` where the base is a volume"),
-    row("roughness_anisotropy", "roughness:float=0 anisotropy:float=0", Code(roughness),
-        "`roughness` and `anisotropy` of the library's bsdfs, whose anisotropy is 0.9 of this"),
-    row("roughness_dual", "roughness:vector2=0", Code(roughness_dual), "the same from two roughnesses"),
-    row("glossiness_anisotropy", "glossiness:float=1 anisotropy:float=0", Code(roughness), "the same from 1 - glossiness"),
-    row("artistic_ior", "reflectivity:color3=0.944,0.776,0.373 edge_color:color3=0.998,0.981,0.751", Code(artistic_ior),
-        "`artistic_ior(reflectivity, edge_color)`"),
-    row("complex_to_artistic", "ior:color3 extinction:color3", Code(complex), "`ior_reflectivity` and `ior_edge_color`"),
+    row(
+        "conical_edf",
+        "color:color3=1 normal:vector3=@Nworld inner_angle:float=60 outer_angle:float=0",
+        Code(conical),
+        "`conical`",
+    ),
+    row(
+        "generalized_schlick_edf",
+        "color0:color3=1 color90:color3=1 exponent:float=5 base:EDF",
+        Code(schlick_edf),
+        "`generalized_schlick` of emission, over a `uniform_edf`",
+    ),
+    row(
+        "absorption_vdf",
+        "absorption:vector3=0",
+        Code(volume),
+        "`medium(absorption)`, 1/m",
+    ),
+    row(
+        "anisotropic_vdf",
+        "absorption:vector3=0 scattering:vector3=0 anisotropy:float=0",
+        Code(volume),
+        "`medium(absorption, scattering, anisotropy)`, 1/m",
+    ),
+    row(
+        "layer",
+        "top:BSDF base:any",
+        Code(layer),
+        "`layer(top, base)`; the `interior` where the base is a volume",
+    ),
+    row(
+        "roughness_anisotropy",
+        "roughness:float=0 anisotropy:float=0",
+        Code(roughness),
+        "`roughness` and `anisotropy` of the library's bsdfs, whose anisotropy is 0.9 of this",
+    ),
+    row(
+        "roughness_dual",
+        "roughness:vector2=0",
+        Code(roughness_dual),
+        "the same from two roughnesses",
+    ),
+    row(
+        "glossiness_anisotropy",
+        "glossiness:float=1 anisotropy:float=0",
+        Code(roughness),
+        "the same from 1 - glossiness",
+    ),
+    row(
+        "artistic_ior",
+        "reflectivity:color3=0.944,0.776,0.373 edge_color:color3=0.998,0.981,0.751",
+        Code(artistic_ior),
+        "`artistic_ior(reflectivity, edge_color)`",
+    ),
+    row(
+        "complex_to_artistic",
+        "ior:color3 extinction:color3",
+        Code(complex),
+        "`ior_reflectivity` and `ior_edge_color`",
+    ),
 ];
 
 /// A named argument, unless the library has that value by default.
-fn argument(call: &mut Call<'_, '_, '_>, input: &str, name: &str, default: &str) -> Result<String, ImportError> {
+fn argument(
+    call: &mut Call<'_, '_, '_>,
+    input: &str,
+    name: &str,
+    default: &str,
+) -> Result<String, ImportError> {
     let text = call.arg(input)?.text;
-    Ok(match text == default {
-        true => String::new(),
-        false => format!(", {name}: {text}"),
+    Ok(if text == default {
+        String::new()
+    } else {
+        format!(", {name}: {text}")
     })
 }
 
@@ -65,7 +153,9 @@ fn frame(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
         if call.row.input_row(name).is_none() {
             continue;
         }
-        let given = call.given(name)?.filter(|value| !value.is_zero() && value.text != name);
+        let given = call
+            .given(name)?
+            .filter(|value| !value.is_zero() && value.text != name);
         if let Some(value) = given {
             text.push_str(&format!(", {name}: {}", value.text));
         }
@@ -77,9 +167,10 @@ fn frame(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
 fn microfacets(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
     let widths = call.arg("roughness")?;
     if let Extra::Roughness(roughness, anisotropy) = &widths.extra {
-        return Ok(match anisotropy == "0.0" {
-            true => format!(", roughness: {roughness}"),
-            false => format!(", roughness: {roughness}, anisotropy: {anisotropy}"),
+        return Ok(if anisotropy == "0.0" {
+            format!(", roughness: {roughness}")
+        } else {
+            format!(", roughness: {roughness}, anisotropy: {anisotropy}")
         });
     }
     if let Some(width) = widths.single() {
@@ -87,9 +178,17 @@ fn microfacets(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
     }
     if let Some(Literal::Numbers(n)) = &widths.literal {
         let (x, y) = (n[0].max(1e-9), n[1].max(1e-9));
-        let anisotropy = if x >= y { (1.0 - y / x) / 0.9 } else { (x / y - 1.0) / 0.9 };
+        let anisotropy = if x >= y {
+            (1.0 - y / x) / 0.9
+        } else {
+            (x / y - 1.0) / 0.9
+        };
         let roughness = (x * y).sqrt().sqrt();
-        return Ok(format!(", roughness: {}, anisotropy: {}", rounded(roughness), rounded(anisotropy)));
+        return Ok(format!(
+            ", roughness: {}, anisotropy: {}",
+            rounded(roughness),
+            rounded(anisotropy)
+        ));
     }
     let widths = call.named("widths", widths).text;
     let text = call.builder.source.names_in(&format!(
@@ -113,7 +212,10 @@ fn film(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
         Some(nanometres) => format!("{} nm", number(nanometres).trim_end_matches(".0")),
         None => format!("{} * 1 nm", bound(&thickness.text, Level::Product)),
     };
-    Ok(format!(", thinfilm_thickness: {text}{}", argument(call, "thinfilm_ior", "thinfilm_ior", "1.5")?))
+    Ok(format!(
+        ", thinfilm_thickness: {text}{}",
+        argument(call, "thinfilm_ior", "thinfilm_ior", "1.5")?
+    ))
 }
 
 /// A bsdf times its weight.
@@ -127,8 +229,13 @@ fn bsdf(call: &mut Call<'_, '_, '_>, template: &str, arguments: &str) -> Result<
 /// Refuses what the library's microfacets do not do.
 fn check_microfacets(call: &mut Call<'_, '_, '_>) -> Result<(), ImportError> {
     if call.differs("retroreflective")? {
-        let message = format!("{} is retroreflective, for which it has no counterpart", call.described());
-        return Err(call.error(message).hint("`std::bsdf::retroreflective` may do"));
+        let message = format!(
+            "{} is retroreflective, for which it has no counterpart",
+            call.described()
+        );
+        return Err(call
+            .error(message)
+            .hint("`std::bsdf::retroreflective` may do"));
     }
     Ok(())
 }
@@ -139,7 +246,11 @@ fn oren_nayar(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         return bsdf(call, "@bsdf::diffuse({color}", &frame);
     }
     let compensated = argument(call, "energy_compensation", "energy_compensation", "true")?;
-    bsdf(call, "@bsdf::oren_nayar_diffuse({color}, {roughness}", &format!("{compensated}{frame}"))
+    bsdf(
+        call,
+        "@bsdf::oren_nayar_diffuse({color}, {roughness}",
+        &format!("{compensated}{frame}"),
+    )
 }
 
 fn burley(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -172,7 +283,10 @@ fn dielectric(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 /// A bsdf that lets light into the object, with the medium there.
 fn filled_below(mut made: Made, mode: &str, ior: String) -> Made {
     if let Some((_, value)) = made.first_mut().filter(|_| mode != "R") {
-        value.extra = Extra::Medium(Medium { ior, ..Medium::default() });
+        value.extra = Extra::Medium(Medium {
+            ior,
+            ..Medium::default()
+        });
     }
     made
 }
@@ -215,14 +329,22 @@ fn subsurface(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         Some(literal) => literal.written(Vector3),
         None => "vec3({radius})".to_owned(),
     };
-    bsdf(call, &format!("@bsdf::subsurface({{color}}, {radius}"), &format!("{anisotropy}{frame}"))
+    bsdf(
+        call,
+        &format!("@bsdf::subsurface({{color}}, {radius}"),
+        &format!("{anisotropy}{frame}"),
+    )
 }
 
 fn sheen(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let frame = frame(call)?;
     match call.text("mode")?.as_str() {
         "zeltner" => bsdf(call, "@bsdf::sheen_zeltner({color}, {roughness}", &frame),
-        _ => bsdf(call, "@bsdf::sheen_conty_kulla({color}, {roughness}", &frame),
+        _ => bsdf(
+            call,
+            "@bsdf::sheen_conty_kulla({color}, {roughness}",
+            &frame,
+        ),
     }
 }
 
@@ -234,7 +356,7 @@ fn uniform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 
 fn conical(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let frame = frame(call)?;
-    call.from_template(&format!(
+    call.template(&format!(
         "@edf::conical({{color}}, {{inner_angle}} * 1 deg, {{outer_angle}} * 1 deg{frame})"
     ))
 }
@@ -244,7 +366,7 @@ fn schlick_edf(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         let message = format!("the base of {} is no `uniform_edf`", call.described());
         return Err(call.error(message).expected("a `uniform_edf`"));
     };
-    call.from_template(&format!(
+    call.template(&format!(
         "@edf::generalized_schlick({radiance}, {{color0}}, {{color90}}, {{exponent}})"
     ))
 }
@@ -255,11 +377,18 @@ fn volume(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         Some(literal) => literal.written(Color3),
         None => format!("color({})", value.plain()),
     };
-    let mut medium = Medium { absorption: color(call.arg("absorption")?), ..Medium::default() };
+    let mut medium = Medium {
+        absorption: color(call.arg("absorption")?),
+        ..Medium::default()
+    };
     if call.row.category == "anisotropic_vdf" {
         medium.scattering = color(call.arg("scattering")?);
         let anisotropy = call.arg("anisotropy")?;
-        medium.anisotropy = if anisotropy.is_zero() { String::new() } else { anisotropy.text };
+        medium.anisotropy = if anisotropy.is_zero() {
+            String::new()
+        } else {
+            anisotropy.text
+        };
     }
     one(Value::new(Vdf, "").with(Extra::Medium(medium)))
 }
@@ -279,10 +408,13 @@ fn layer(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         return Err(call.error(message).expected("`BSDF` or `VDF`"));
     }
     // Layers of layers are one: the top first.
-    let inner = base.text.strip_prefix("layer(").and_then(|text| text.strip_suffix(')'));
+    let inner = base
+        .text
+        .strip_prefix("layer(")
+        .and_then(|text| text.strip_suffix(')'));
     let made = match inner.filter(|inner| closes(inner)) {
-        Some(inner) => call.from_template(&format!("layer({{top}}, {inner})"))?,
-        None => call.from_template("layer({top}, {base})")?,
+        Some(inner) => call.template(&format!("layer({{top}}, {inner})"))?,
+        None => call.template("layer({top}, {base})")?,
     };
     with_medium(call, made, &["top", "base"])
 }
@@ -311,14 +443,16 @@ fn roughness(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         None => format!("{} / 0.9", bound(&anisotropy.text, Level::Product)),
     };
     // As a pair of numbers it is seldom asked for.
-    let name = match is_simple(&roughness) {
-        true => roughness.clone(),
-        false => {
-            let name = format!("{}_roughness", call.name());
-            call.builder.bind(&name, &roughness)
-        }
+    let name = if is_simple(&roughness) {
+        roughness.clone()
+    } else {
+        let name = format!("{}_roughness", call.name());
+        call.builder.bind(&name, &roughness)
     };
-    let aspect = format!("sqrt(1.0 - clamp(0.9 * {}, 0.0, 0.98))", bound(&anisotropy, Level::Prefix));
+    let aspect = format!(
+        "sqrt(1.0 - clamp(0.9 * {}, 0.0, 0.98))",
+        bound(&anisotropy, Level::Prefix)
+    );
     let text = format!("vec2(min({name} * {name} / {aspect}, 1.0), {name} * {name} * {aspect})");
     one(Value::new(Vector2, text).with(Extra::Roughness(name, anisotropy)))
 }
@@ -329,7 +463,7 @@ fn roughness_dual(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         let squares = vec![(x * x).clamp(1e-6, 1.0), (y * y).clamp(1e-6, 1.0)];
         return one(Value::of(Vector2, Literal::Numbers(squares)));
     }
-    call.from_template("vec2({roughness}.x * {roughness}.x, if {roughness}.y < 0.0 { {roughness}.x * {roughness}.x } else { {roughness}.y * {roughness}.y })")
+    call.template("vec2({roughness}.x * {roughness}.x, if {roughness}.y < 0.0 { {roughness}.x * {roughness}.x } else { {roughness}.y * {roughness}.y })")
 }
 
 fn artistic_ior(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -338,7 +472,10 @@ fn artistic_ior(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let name = call.builder.bind(&name, &text);
     Ok(vec![
         ("ior", Value::new(Color3, format!("{name}.ior"))),
-        ("extinction", Value::new(Color3, format!("{name}.extinction"))),
+        (
+            "extinction",
+            Value::new(Color3, format!("{name}.extinction")),
+        ),
     ])
 }
 

@@ -10,31 +10,107 @@ use crate::mtlx::types::number;
 use crate::mtlx::value::Value;
 
 pub(super) const ROWS: &[NodeRow] = &[
-    row("position", "space:string=object", Code(place), "`object_position`, or `position` in world space"),
-    row("normal", "space:string=object", Code(place), "`object_normal`, or `normal` in world space"),
-    row("tangent", "space:string=object index:integer=0", Code(place), "`tangent`; that of the first texture coordinates"),
-    row("bitangent", "space:string=object index:integer=0", Code(place), "`cross(normal, tangent)`"),
-    row("texcoord", "index:integer=0", Code(texcoord), "`uv`, or `uv1` for index 1"),
-    row("geomcolor", "index:integer=0", Code(geomcolor), "`vertex_color`; opaque"),
-    row("geompropvalue", "geomprop:string= default:any", Code(property),
-        "`uv` of st, uv and UV0, `uv1` of UV1, `vertex_color` of displayColor; other properties have no counterpart"),
-    row("UsdPrimvarReader", "varname:string= fallback:any", Code(property), "as `geompropvalue`"),
-    row("viewdirection", "space:string=world", Code(place), "`-view`"),
-    row("facingratio", "viewdirection:vector3=@Vworld normal:vector3=@Nworld faceforward:boolean=true \
-        invert:boolean=false", Code(facing), "`facing` by default"),
+    row(
+        "position",
+        "space:string=object",
+        Code(place),
+        "`object_position`, or `position` in world space",
+    ),
+    row(
+        "normal",
+        "space:string=object",
+        Code(place),
+        "`object_normal`, or `normal` in world space",
+    ),
+    row(
+        "tangent",
+        "space:string=object index:integer=0",
+        Code(place),
+        "`tangent`; that of the first texture coordinates",
+    ),
+    row(
+        "bitangent",
+        "space:string=object index:integer=0",
+        Code(place),
+        "`cross(normal, tangent)`",
+    ),
+    row(
+        "texcoord",
+        "index:integer=0",
+        Code(texcoord),
+        "`uv`, or `uv1` for index 1",
+    ),
+    row(
+        "geomcolor",
+        "index:integer=0",
+        Code(geomcolor),
+        "`vertex_color`; opaque",
+    ),
+    row(
+        "geompropvalue",
+        "geomprop:string= default:any",
+        Code(property),
+        "`uv` of st, uv and UV0, `uv1` of UV1, `vertex_color` of displayColor; other properties have no counterpart",
+    ),
+    row(
+        "UsdPrimvarReader",
+        "varname:string= fallback:any",
+        Code(property),
+        "as `geompropvalue`",
+    ),
+    row(
+        "viewdirection",
+        "space:string=world",
+        Code(place),
+        "`-view`",
+    ),
+    row(
+        "facingratio",
+        "viewdirection:vector3=@Vworld normal:vector3=@Nworld faceforward:boolean=true \
+        invert:boolean=false",
+        Code(facing),
+        "`facing` by default",
+    ),
     row("frame", "", Text("frame"), ""),
     row("time", "fps:float=24", Text("time"), ""),
-    row("transformpoint", "in:vector3=0 fromspace:string= tospace:string=", Code(transform),
-        "`world_from_object(in)` or `object_from_world(in)`"),
-    row("transformvector", "in:vector3=0 fromspace:string= tospace:string=", Code(transform), "the same of a vector"),
-    row("transformnormal", "in:vector3=0,0,1 fromspace:string= tospace:string=", Code(transform), "the same of a normal"),
-    row("normalmap", "in:vector3=0.5,0.5,1 scale:any=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
-        bitangent:vector3=@Bworld space:string=tangent", Code(normal_map),
-        "`normal_map(color(in), normal, tangent, scale)`; the bitangent is at right angles to both"),
-    row("heighttonormal", "in:float=0 scale:float=1 texcoord:vector2=@UV0", Code(height_to_normal),
-        "by the gradient of the height along the surface"),
-    row("bump", "height:float=0 scale:float=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
-        bitangent:vector3=@Bworld", Code(bump), "as `heighttonormal` and `normalmap`"),
+    row(
+        "transformpoint",
+        "in:vector3=0 fromspace:string= tospace:string=",
+        Code(transform),
+        "`world_from_object(in)` or `object_from_world(in)`",
+    ),
+    row(
+        "transformvector",
+        "in:vector3=0 fromspace:string= tospace:string=",
+        Code(transform),
+        "the same of a vector",
+    ),
+    row(
+        "transformnormal",
+        "in:vector3=0,0,1 fromspace:string= tospace:string=",
+        Code(transform),
+        "the same of a normal",
+    ),
+    row(
+        "normalmap",
+        "in:vector3=0.5,0.5,1 scale:any=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
+        bitangent:vector3=@Bworld space:string=tangent",
+        Code(normal_map),
+        "`normal_map(color(in), normal, tangent, scale)`; the bitangent is at right angles to both",
+    ),
+    row(
+        "heighttonormal",
+        "in:float=0 scale:float=1 texcoord:vector2=@UV0",
+        Code(height_to_normal),
+        "by the gradient of the height along the surface",
+    ),
+    row(
+        "bump",
+        "height:float=0 scale:float=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
+        bitangent:vector3=@Bworld",
+        Code(bump),
+        "as `heighttonormal` and `normalmap`",
+    ),
 ];
 
 fn space(call: &mut Call<'_, '_, '_>, name: &str) -> Result<bool, ImportError> {
@@ -76,7 +152,9 @@ fn texcoord(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         Some(1.0) => "uv1",
         _ => {
             let message = format!("{} has an index other than 0 and 1", call.described());
-            return Err(call.error(message).expected("one of two sets of texture coordinates"));
+            return Err(call
+                .error(message)
+                .expected("one of two sets of texture coordinates"));
         }
     };
     one(match call.ty {
@@ -93,11 +171,14 @@ fn geomcolor(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 }
 
 fn vertex_color(call: &Call<'_, '_, '_>) -> Value {
-    Value::new(call.ty, match call.ty {
-        Float => "vertex_color.r",
-        Color4 => "vec4(vec3(vertex_color), 1.0)",
-        _ => "vertex_color",
-    })
+    Value::new(
+        call.ty,
+        match call.ty {
+            Float => "vertex_color.r",
+            Color4 => "vec4(vec3(vertex_color), 1.0)",
+            _ => "vertex_color",
+        },
+    )
 }
 
 fn property(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -117,12 +198,16 @@ fn property(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
                 call.described(),
                 call.ty.name()
             );
-            Err(call.error(message).expected(format!("`{}`", value.ty.name())))
+            Err(call
+                .error(message)
+                .expected(format!("`{}`", value.ty.name())))
         }
         Err(error) => match call.given(default)? {
             // What the geometry lacks has this value by its own words.
             Some(value) => {
-                call.warn(format!("the geometry has no property `{property}`: its default is taken"));
+                call.warn(format!(
+                    "the geometry has no property `{property}`: its default is taken"
+                ));
                 one(value)
             }
             None => Err(error),
@@ -139,9 +224,10 @@ fn facing(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         (_, true) => call.filled("abs(dot({viewdirection}, {normal}))")?,
         (_, false) => call.filled("-dot({viewdirection}, {normal})")?,
     };
-    let text = match is(call.arg("invert")?) {
-        true => format!("1.0 - {}", text::bound(&text, text::Level::Product)),
-        false => text,
+    let text = if is(call.arg("invert")?) {
+        format!("1.0 - {}", text::bound(&text, text::Level::Product))
+    } else {
+        text
     };
     one(Value::new(Float, text))
 }
@@ -152,11 +238,16 @@ fn transform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         return one(call.arg("in")?);
     }
     let kind = call.row.category.trim_start_matches("transform");
-    let way = if to { "world_from_object" } else { "object_from_world" };
+    let way = if to {
+        "world_from_object"
+    } else {
+        "object_from_world"
+    };
     let input = call.arg("in")?;
-    let inner = match input.is_geometric && kind != "vector" {
-        true => input.text,
-        false => format!("{kind}({})", input.plain()),
+    let inner = if input.is_geometric && kind != "vector" {
+        input.text
+    } else {
+        format!("{kind}({})", input.plain())
     };
     one(Value::geometric(format!("{way}({inner})")))
 }
@@ -169,7 +260,11 @@ fn frame(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
             _ => name.to_owned(),
         })
     };
-    Ok(format!("{}, {}", around(call, "normal")?, around(call, "tangent")?))
+    Ok(format!(
+        "{}, {}",
+        around(call, "normal")?,
+        around(call, "tangent")?
+    ))
 }
 
 fn normal_map(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -186,28 +281,36 @@ fn normal_map(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         ))?,
         (_, Some(scale)) => {
             let scale = number(scale);
-            call.filled(&format!("@pattern::normal_map(color({{in}}), {frame}, scale: {scale})"))?
+            call.filled(&format!(
+                "@pattern::normal_map(color({{in}}), {frame}, scale: {scale})"
+            ))?
         }
-        _ => call.filled(&format!("@pattern::normal_map(color({{in}}), {frame}, scale: {{scale}})"))?,
+        _ => call.filled(&format!(
+            "@pattern::normal_map(color({{in}}), {frame}, scale: {{scale}})"
+        ))?,
     };
     one(Value::geometric(text))
 }
 
 /// The texel of a normal map for a height.
-fn height_texel(call: &mut Call<'_, '_, '_>, height: &str, uv: &str) -> Result<String, ImportError> {
+fn height_texel(
+    call: &mut Call<'_, '_, '_>,
+    height: &str,
+    uv: &str,
+) -> Result<String, ImportError> {
     let height = call.arg(height)?;
     let scale = call.arg("scale")?;
     // What a filter over neighbouring texels would give, which other renderers have.
     let height = call.named("height", height).text;
     let scale = match (call.row.category, scale.single()) {
-        ("bump", _) => "1.0 / 16.0".to_owned(),
+        ("bump", _) => "0.0625".to_owned(),
         (_, Some(scale)) => number(scale / 16.0),
-        _ => format!("{} / 16.0", text::bound(&scale.text, text::Level::Prefix)),
+        _ => format!("0.0625 * {}", text::bound(&scale.text, text::Level::Prefix)),
     };
     let uv = text::bound(uv, text::Level::Atom);
     let helper = call.builder.source.names_in("#height_normal");
     Ok(format!(
-        "{helper}(gradient(({scale}) * {height}), gradient({uv}.x), gradient({uv}.y))"
+        "{helper}(gradient({scale} * {height}), gradient({uv}.x), gradient({uv}.y))"
     ))
 }
 
@@ -221,6 +324,8 @@ fn height_to_normal(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 fn bump(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let texel = height_texel(call, "height", "uv")?;
     let frame = frame(call)?;
-    let text = call.filled(&format!("@pattern::normal_map(color(TEXEL), {frame}, scale: {{scale}})"))?;
+    let text = call.filled(&format!(
+        "@pattern::normal_map(color(TEXEL), {frame}, scale: {{scale}})"
+    ))?;
     one(Value::geometric(text.replace("TEXEL", &texel)))
 }

@@ -11,41 +11,95 @@ use crate::mtlx::types::number;
 use crate::mtlx::value::Value;
 
 pub(super) const ROWS: &[NodeRow] = &[
-    row("image", "file:filename layer:string= default:same=0 texcoord:vector2=@UV0 uaddressmode:string=periodic \
+    row(
+        "image",
+        "file:filename layer:string= default:same=0 texcoord:vector2=@UV0 uaddressmode:string=periodic \
         vaddressmode:string=periodic filtertype:string=linear framerange:string= frameoffset:integer=0 \
-        frameendaction:string=constant", Code(image),
-        "`image` of colors in sRGB, `image_data` of other numbers; beyond the edge of `constant` all is 0"),
-    row("tiledimage", "file:filename default:same=0 texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 \
+        frameendaction:string=constant",
+        Code(image),
+        "`image` of colors in sRGB, `image_data` of other numbers; beyond the edge of `constant` all is 0",
+    ),
+    row(
+        "tiledimage",
+        "file:filename default:same=0 texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 \
         realworldimagesize:vector2=1 realworldtilesize:vector2=1 filtertype:string=linear framerange:string= \
-        frameoffset:integer=0 frameendaction:string=constant", Code(tiled), "as `image`, at `uv * uvtiling - uvoffset`"),
-    row("triplanarprojection", "filex:filename filey:filename filez:filename layerx:string= layery:string= \
+        frameoffset:integer=0 frameendaction:string=constant",
+        Code(tiled),
+        "as `image`, at `uv * uvtiling - uvoffset`",
+    ),
+    row(
+        "triplanarprojection",
+        "filex:filename filey:filename filez:filename layerx:string= layery:string= \
         layerz:string= default:same=0 position:vector3=@Pobject normal:vector3=@Nobject upaxis:integer=2 \
         blend:float=1 filtertype:string=linear framerange:string= frameoffset:integer=0 \
-        frameendaction:string=constant", Code(triplanar), "three lookups, weighted as there"),
-    row("hextiledimage", "file:filename default:same=0 texcoord:vector2=@UV0 tiling:vector2=1 rotation:float=1 \
+        frameendaction:string=constant",
+        Code(triplanar),
+        "three lookups, weighted as there",
+    ),
+    row(
+        "hextiledimage",
+        "file:filename default:same=0 texcoord:vector2=@UV0 tiling:vector2=1 rotation:float=1 \
         rotationrange:vector2=0,360 scale:float=1 scalerange:vector2=0.5,2 offset:float=1 offsetrange:vector2=0,1 \
-        falloff:float=0.5 falloffcontrast:float=0.5 lumacoeffs:color3=0.2722287,0.6740818,0.0536895", Code(hex_tiled),
-        "`hex_tiling`, of colors in sRGB; its hexagons lie elsewhere, are turned but not scaled"),
-    row("hextilednormalmap", "file:filename default:vector3=0.5,0.5,1 texcoord:vector2=@UV0 tiling:vector2=1 \
+        falloff:float=0.5 falloffcontrast:float=0.5 lumacoeffs:color3=0.2722287,0.6740818,0.0536895",
+        Code(hex_tiled),
+        "`hex_tiling`, of colors in sRGB; its hexagons lie elsewhere, are turned but not scaled",
+    ),
+    row(
+        "hextilednormalmap",
+        "file:filename default:vector3=0.5,0.5,1 texcoord:vector2=@UV0 tiling:vector2=1 \
         rotation:float=1 rotationrange:vector2=0,360 scale:float=1 scalerange:vector2=0.5,2 offset:float=1 \
         offsetrange:vector2=0,1 falloff:float=0.5 strength:float=1 flip_g:boolean=false normal:vector3=@Nworld \
-        tangent:vector3=@Tworld bitangent:vector3=@Bworld", Code(hex_tiled_normal), "`hex_tiling_normal`, as before"),
-    row("latlongimage", "file:filename default:color3=0 viewdir:vector3=0,0,1 rotation:float=0", Code(latlong),
-        "`latlong(file, viewdir, rotate: rotation)`"),
-    row("gltf_image", GLTF, Code(gltf_image), "as `image`, placed and multiplied by `factor`"),
-    row("gltf_colorimage", "file:filename default:color4=0 texcoord:vector2=@UV0 pivot:vector2=0,1 scale:vector2=1 \
+        tangent:vector3=@Tworld bitangent:vector3=@Bworld",
+        Code(hex_tiled_normal),
+        "`hex_tiling_normal`, as before",
+    ),
+    row(
+        "latlongimage",
+        "file:filename default:color3=0 viewdir:vector3=0,0,1 rotation:float=0",
+        Code(latlong),
+        "`latlong(file, viewdir, rotate: rotation)`",
+    ),
+    row(
+        "gltf_image",
+        GLTF,
+        Code(gltf_image),
+        "as `image`, placed and multiplied by `factor`",
+    ),
+    row(
+        "gltf_colorimage",
+        "file:filename default:color4=0 texcoord:vector2=@UV0 pivot:vector2=0,1 scale:vector2=1 \
         rotate:float=0 offset:vector2=0 operationorder:integer=1 uaddressmode:string=periodic \
-        vaddressmode:string=periodic filtertype:string=linear color:color4=1 geomcolor:color4=1", Code(gltf_color),
-        "`outcolor` and `outa`: as `image` with alpha, times both colors"),
-    row("gltf_normalmap", GLTF, Code(gltf_normal), "as `image` and `normalmap`"),
-    row("gltf_iridescence_thickness", "file:filename default:vector3=0 texcoord:vector2=@UV0 pivot:vector2=0 \
+        vaddressmode:string=periodic filtertype:string=linear color:color4=1 geomcolor:color4=1",
+        Code(gltf_color),
+        "`outcolor` and `outa`: as `image` with alpha, times both colors",
+    ),
+    row(
+        "gltf_normalmap",
+        GLTF,
+        Code(gltf_normal),
+        "as `image` and `normalmap`",
+    ),
+    row(
+        "gltf_iridescence_thickness",
+        "file:filename default:vector3=0 texcoord:vector2=@UV0 pivot:vector2=0 \
         scale:vector2=1 rotate:float=0 offset:vector2=0 uaddressmode:string=periodic vaddressmode:string=periodic \
-        filtertype:string=linear thicknessMin:float=100 thicknessMax:float=400", Code(gltf_thickness),
-        "between both by the green of the picture"),
-    row("UsdUVTexture", "file:filename st:vector2=@UV0 wrapS:string=periodic wrapT:string=periodic \
-        fallback:color4=0,0,0,1 scale:color4=1 bias:color4=0", Code(usd_texture), "as `image`; its channels are outputs"),
-    row("UsdTransform2d", "in:vector2=0 rotation:float=0 scale:vector2=1 translation:vector2=0",
-        Text("@pattern::rotation({rotation} * 1 deg) * ({in} * {scale}) + {translation}"), ""),
+        filtertype:string=linear thicknessMin:float=100 thicknessMax:float=400",
+        Code(gltf_thickness),
+        "between both by the green of the picture",
+    ),
+    row(
+        "UsdUVTexture",
+        "file:filename st:vector2=@UV0 wrapS:string=periodic wrapT:string=periodic \
+        fallback:color4=0,0,0,1 scale:color4=1 bias:color4=0",
+        Code(usd_texture),
+        "as `image`; its channels are outputs",
+    ),
+    row(
+        "UsdTransform2d",
+        "in:vector2=0 rotation:float=0 scale:vector2=1 translation:vector2=0",
+        Text("@pattern::rotation({rotation} * 1 deg) * ({in} * {scale}) + {translation}"),
+        "",
+    ),
 ];
 
 const GLTF: &str = "file:filename factor:same=1 default:same=0 texcoord:vector2=@UV0 pivot:vector2=0,1 scale:vector2=1 \
@@ -91,7 +145,11 @@ fn picture<'s>(
     if call.row.input_row("framerange").is_some() && call.given("framerange")?.is_some() {
         call.warn("sequences of pictures are not read: each frame has the same");
     }
-    Ok(Some(Picture { file: value.text, space, arguments }))
+    Ok(Some(Picture {
+        file: value.text,
+        space,
+        arguments,
+    }))
 }
 
 fn wrap(call: &mut Call<'_, '_, '_>, input: &str) -> Result<&'static str, ImportError> {
@@ -114,14 +172,20 @@ fn wrap(call: &mut Call<'_, '_, '_>, input: &str) -> Result<&'static str, Import
 
 /// The value of a picture at texture coordinates, as a value of a type.
 fn looked_up(call: &mut Call<'_, '_, '_>, picture: &Picture<'_>, uv: &str, ty: Type) -> String {
-    let Picture { file, space, arguments } = picture;
+    let Picture {
+        file,
+        space,
+        arguments,
+    } = picture;
     let data = format!("image_data({file}, {uv}{arguments})");
     let space = match color_spaces::find(space.unwrap_or_default()) {
         _ if !matches!(ty, Color3 | Color4) => LINEAR,
         Some(space) => space,
         None => {
             let name = space.unwrap_or_default().to_owned();
-            call.warn(format!("the color space `{name}` is not known; texels are taken as linear Rec. 709"));
+            call.warn(format!(
+                "the color space `{name}` is not known; texels are taken as linear Rec. 709"
+            ));
             LINEAR
         }
     };
@@ -149,7 +213,10 @@ fn looked_up(call: &mut Call<'_, '_, '_>, picture: &Picture<'_>, uv: &str, ty: T
 
 /// What a node without a picture gives.
 fn without(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
-    call.warn(format!("{} names no picture: its default is taken", call.described()));
+    call.warn(format!(
+        "{} names no picture: its default is taken",
+        call.described()
+    ));
     one(call.arg("default")?)
 }
 
@@ -175,7 +242,10 @@ fn tiled(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     if differs(&call.arg("uvoffset")?, 0.0) {
         steps.push(" - {uvoffset}");
     }
-    let (size, tile) = (call.arg("realworldimagesize")?, call.arg("realworldtilesize")?);
+    let (size, tile) = (
+        call.arg("realworldimagesize")?,
+        call.arg("realworldtilesize")?,
+    );
     if size.text != tile.text {
         if steps.contains(&" - {uvoffset}") {
             uv.insert(0, '(');
@@ -198,17 +268,30 @@ fn tiled(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 fn triplanar(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let upaxis = call.arg("upaxis")?.single().unwrap_or(2.0) as i32;
     let position = call.arg("position")?;
-    let position = match position.is_geometric {
-        true => Value::new(Vector3, position.plain()),
-        false => position,
+    let position = if position.is_geometric {
+        Value::new(Vector3, position.plain())
+    } else {
+        position
     };
     let p = call.named("position", position).text;
     let weights = call.filled("#side_weights({~normal}, {blend})")?;
     let w = call.named("weights", Value::new(Vector3, weights)).text;
     let sides = [
-        ("filex", "x", if upaxis == 2 { ["y", "z"] } else { ["z", "y"] }),
-        ("filey", "y", if upaxis == 0 { ["z", "x"] } else { ["x", "z"] }),
-        ("filez", "z", if upaxis == 0 { ["-y", "x"] } else { ["x", "y"] }),
+        (
+            "filex",
+            "x",
+            if upaxis == 2 { ["y", "z"] } else { ["z", "y"] },
+        ),
+        (
+            "filey",
+            "y",
+            if upaxis == 0 { ["z", "x"] } else { ["x", "z"] },
+        ),
+        (
+            "filez",
+            "z",
+            if upaxis == 0 { ["-y", "x"] } else { ["x", "y"] },
+        ),
     ];
     let mut terms = Vec::new();
     for (file, weight, [u, v]) in sides {
@@ -226,9 +309,10 @@ fn triplanar(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         let text = looked_up(call, &picture, &uv, call.ty);
         terms.push(format!("{w}.{weight} * {text}"));
     }
-    match terms.is_empty() {
-        true => without(call),
-        false => one(Value::new(call.ty, terms.join(" + "))),
+    if terms.is_empty() {
+        without(call)
+    } else {
+        one(Value::new(call.ty, terms.join(" + ")))
     }
 }
 
@@ -268,7 +352,9 @@ fn latlong(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         return without(call);
     };
     let file = &picture.file;
-    call.from_template(&format!("@pattern::latlong({file}, {{~viewdir}}, rotate: {{rotation}} * 1 deg)"))
+    call.template(&format!(
+        "@pattern::latlong({file}, {{~viewdir}}, rotate: {{rotation}} * 1 deg)"
+    ))
 }
 
 /// Texture coordinates as glTF's nodes place them.
@@ -281,7 +367,11 @@ fn placed(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
         Some(_) => call.arg("operationorder")?.single() == Some(1.0),
         None => false,
     };
-    let place = if is_trs { "#moved_then_scaled" } else { "@pattern::place2d" };
+    let place = if is_trs {
+        "#moved_then_scaled"
+    } else {
+        "@pattern::place2d"
+    };
     call.filled(&format!(
         "{place}({{texcoord}}, {{pivot}}, vec2(1.0) / {{scale}}, -{{rotate}} * 1 deg, {{offset}} * vec2(-1.0, 1.0))"
     ))
@@ -299,9 +389,13 @@ fn gltf_image(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let Some(text) = gltf_picture(call, call.ty)? else {
         return without(call);
     };
-    let text = match call.differs("factor")? {
-        true => format!("{text} * {}", bound(&call.arg("factor")?.text, Level::Prefix)),
-        false => text,
+    let text = if call.differs("factor")? {
+        format!(
+            "{text} * {}",
+            bound(&call.arg("factor")?.text, Level::Prefix)
+        )
+    } else {
+        text
     };
     one(Value::new(call.ty, text))
 }
@@ -309,7 +403,10 @@ fn gltf_image(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 fn gltf_color(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let text = match gltf_picture(call, Color4)? {
         Some(text) => text,
-        None => without(call)?.pop().map(|(_, value)| value.text).unwrap_or_default(),
+        None => without(call)?
+            .pop()
+            .map(|(_, value)| value.text)
+            .unwrap_or_default(),
     };
     let mut text = text;
     for factor in ["color", "geomcolor"] {
@@ -330,15 +427,18 @@ fn gltf_normal(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         return one(call.builder.geometry("Nworld", call.key.node)?);
     };
     let map = call.builder.source.names_in("@pattern::normal_map");
-    one(Value::geometric(format!("{map}(color({text}), normal, tangent)")))
+    one(Value::geometric(format!(
+        "{map}(color({text}), normal, tangent)"
+    )))
 }
 
 fn gltf_thickness(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let Some(text) = gltf_picture(call, Vector3)? else {
         return one(call.arg("thicknessMin")?);
     };
-    let template = format!("mix({{thicknessMin}}, {{thicknessMax}}, {text}.y)").replace(".xyz.y", ".y");
-    call.from_template(&template)
+    let template =
+        format!("mix({{thicknessMin}}, {{thicknessMax}}, {text}.y)").replace(".xyz.y", ".y");
+    call.template(&template)
 }
 
 fn usd_texture(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -351,10 +451,16 @@ fn usd_texture(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     };
     let mut text = text;
     if call.differs("scale")? {
-        text = format!("{text} * {}", bound(&call.arg("scale")?.text, Level::Prefix));
+        text = format!(
+            "{text} * {}",
+            bound(&call.arg("scale")?.text, Level::Prefix)
+        );
     }
     if call.differs("bias")? {
-        text = format!("{text} + {}", bound(&call.arg("bias")?.text, Level::Product));
+        text = format!(
+            "{text} + {}",
+            bound(&call.arg("bias")?.text, Level::Product)
+        );
     }
     let name = call.name();
     let name = call.builder.bind(&name, &text);

@@ -36,11 +36,21 @@ pub(crate) fn computed(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError>
             let inverse = eliminated(&known(call, "in2")?).1;
             (Matrix44, product(&known(call, "in1")?, &inverse).to_vec())
         }
-        "multiply" => (Matrix44, product(&known(call, "in1")?, &known(call, "in2")?).to_vec()),
+        "multiply" => (
+            Matrix44,
+            product(&known(call, "in1")?, &known(call, "in2")?).to_vec(),
+        ),
         "add" | "subtract" => {
-            let sign = if call.row.category == "add" { 1.0 } else { -1.0 };
+            let sign = if call.row.category == "add" {
+                1.0
+            } else {
+                -1.0
+            };
             let (a, b) = (known(call, "in1")?, known(call, "in2")?);
-            (Matrix44, a.iter().zip(b).map(|(a, b)| a + sign * b).collect())
+            (
+                Matrix44,
+                a.iter().zip(b).map(|(a, b)| a + sign * b).collect(),
+            )
         }
         _ => return Err(unknown(call)),
     };
@@ -49,7 +59,8 @@ pub(crate) fn computed(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError>
 
 fn unknown(call: &Call<'_, '_, '_>) -> ImportError {
     let message = format!("the matrix of {} is not known", call.described());
-    call.error(message).expected("a `matrix33`, or a `matrix44` of values")
+    call.error(message)
+        .expected("a `matrix33`, or a `matrix44` of values")
 }
 
 /// The matrix that an input is; a number fills it, as in GLSL.
@@ -97,7 +108,9 @@ fn eliminated(m: &Matrix) -> (f64, Matrix) {
     let mut determinant = 1.0;
     for column in 0..4 {
         let size = |row: usize| a[4 * row + column].abs();
-        let pivot = (column..4).max_by(|x, y| size(*x).total_cmp(&size(*y))).unwrap_or(column);
+        let pivot = (column..4)
+            .max_by(|x, y| size(*x).total_cmp(&size(*y)))
+            .unwrap_or(column);
         if size(pivot) == 0.0 {
             return (0.0, [0.0; 16]);
         }
@@ -158,9 +171,12 @@ pub(super) fn transform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError
     }
     let Some(Literal::Numbers(numbers)) = matrix.literal.filter(|_| matrix.ty == Matrix44) else {
         let message = format!("the matrix of {} is not known", call.described());
-        return Err(call.error(message).expected("a `matrix33`, or a `matrix44` that is a value"));
+        return Err(call
+            .error(message)
+            .expected("a `matrix33`, or a `matrix44` that is a value"));
     };
-    let row = |i: usize, count: usize| format!("vec{count}({})", list(&numbers[4 * i..4 * i + count]));
+    let row =
+        |i: usize, count: usize| format!("vec{count}({})", list(&numbers[4 * i..4 * i + count]));
     if call.ty == Vector3 {
         let rows = format!("mat3({}, {}, {})", row(0, 3), row(1, 3), row(2, 3));
         let text = call.filled(&format!("{rows} * {{in}} + {}", row(3, 3)))?;
@@ -175,4 +191,3 @@ pub(super) fn transform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError
         .collect();
     one(Value::new(call.ty, terms.join(" + ")))
 }
-

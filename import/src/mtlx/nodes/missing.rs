@@ -15,8 +15,10 @@ const fn missing(category: &'static str, reason: &'static str) -> Missing {
 
 const HAIR: &str = "Impasto has no hair: its geometry is surfaces";
 const LIGHT: &str = "lights belong to scenes: docs/scenes.md";
-const LAMA: &str = "Lama's nodes are not in the table; write them with the nodes of the pbr library";
-const VOLUME: &str = "only surfaces have materials; a surface says what fills it by `layer` over a volume";
+const LAMA: &str =
+    "Lama's nodes are not in the table; write them with the nodes of the pbr library";
+const VOLUME: &str =
+    "only surfaces have materials; a surface says what fills it by `layer` over a volume";
 
 /// All categories without a counterpart, in the order of the alphabet.
 pub const MISSING: &[Missing] = &[
@@ -33,20 +35,44 @@ pub const MISSING: &[Missing] = &[
     missing("LamaSheen", LAMA),
     missing("LamaSurface", LAMA),
     missing("LamaTranslucent", LAMA),
-    missing("ambientocclusion", "what surrounds a point is known to the path, not to a material"),
-    missing("blur", "a value is known at the point alone, not around it; blur the picture itself"),
+    missing(
+        "ambientocclusion",
+        "what surrounds a point is known to the path, not to a material",
+    ),
+    missing(
+        "blur",
+        "a value is known at the point alone, not around it; blur the picture itself",
+    ),
     missing("chiang_hair_absorption_from_color", HAIR),
     missing("chiang_hair_bsdf", HAIR),
     missing("chiang_hair_roughness", HAIR),
     missing("deon_hair_absorption_from_melanin", HAIR),
     missing("directional_light", LIGHT),
-    missing("displacement", "geometry is not displaced; `bump` bends the normal by a height"),
-    missing("geomattrvalue", "of version 1.35; geometry has texture coordinates and colors only"),
-    missing("geompropvalueuniform", "texts of the geometry are not known to a material"),
-    missing("gltf_anisotropy_image", "it gives a direction as an angle; use `image` and `atan2`"),
-    missing("gooch_shade", "a surface is lit by its scene, not by a direction of its own"),
+    missing(
+        "displacement",
+        "geometry is not displaced; `bump` bends the normal by a height",
+    ),
+    missing(
+        "geomattrvalue",
+        "of version 1.35; geometry has texture coordinates and colors only",
+    ),
+    missing(
+        "geompropvalueuniform",
+        "texts of the geometry are not known to a material",
+    ),
+    missing(
+        "gltf_anisotropy_image",
+        "it gives a direction as an angle; use `image` and `atan2`",
+    ),
+    missing(
+        "gooch_shade",
+        "a surface is lit by its scene, not by a direction of its own",
+    ),
     missing("light", LIGHT),
-    missing("measured_edf", "measured lamps belong to scenes: docs/scenes.md"),
+    missing(
+        "measured_edf",
+        "measured lamps belong to scenes: docs/scenes.md",
+    ),
     missing("point_light", LIGHT),
     missing("ramp_gradient", "a part of `ramp`, which has a counterpart"),
     missing("spot_light", LIGHT),

@@ -3,6 +3,8 @@
 //! A row declares inputs with types and defaults, and what becomes of the node: a template, or code where a template does
 //! not do. Dispatch, checks of inputs and docs/materialx.md follow from it.
 
+mod channels;
+mod choices;
 mod closures;
 mod color;
 mod compositing;
@@ -85,17 +87,17 @@ const TABLES: &[(&str, &[NodeRow])] = &[
     ("Patterns", patterns::ROWS),
     ("Geometry", geometry::ROWS),
     ("Mathematics", maths::ROWS),
-    ("Choices", maths::CHOICES),
-    ("Channels", maths::CHANNELS),
+    ("Choices", choices::ROWS),
+    ("Channels", channels::ROWS),
     ("Color", color::ROWS),
     ("Compositing", compositing::ROWS),
 ];
 
 /// All rows, by group and in the order of the table.
 pub fn node_rows() -> impl Iterator<Item = NodeRow> {
-    TABLES.iter().flat_map(|(group, rows)| {
-        rows.iter().map(|row| NodeRow { group, ..*row })
-    })
+    TABLES
+        .iter()
+        .flat_map(|(group, rows)| rows.iter().map(|row| NodeRow { group, ..*row }))
 }
 
 /// The row of a category.
@@ -141,7 +143,11 @@ impl NodeRow {
                 "scalar" => Kind::Scalar,
                 kind => Type::of(kind).map_or(Kind::Any, Kind::Of),
             };
-            InputRow { name, kind, default }
+            InputRow {
+                name,
+                kind,
+                default,
+            }
         })
     }
 
@@ -165,7 +171,9 @@ impl NodeRow {
 
 /// A template for readers.
 fn shown(template: &str) -> String {
-    let plain = template.replace(['{', '}', '~', '#'], "").replace("$T", "TYPE");
+    let plain = template
+        .replace(['{', '}', '~', '#'], "")
+        .replace("$T", "TYPE");
     // Paths of the library without their folder.
     let mut text = String::new();
     for part in plain.split('@') {

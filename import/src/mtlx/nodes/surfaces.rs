@@ -16,16 +16,50 @@ use crate::mtlx::types::number;
 use crate::mtlx::value::{Extra, Outputs, Shader, Value};
 
 pub(super) const ROWS: &[NodeRow] = &[
-    row("standard_surface", "*", Code(model), "the material `std::surface::standard_surface`"),
-    row("open_pbr_surface", "*", Code(model), "the material `std::surface::open_pbr`"),
-    row("gltf_pbr", "*", Code(model), "the material `std::surface::gltf_pbr`"),
-    row("disney_principled", "*", Code(model), "the material `std::surface::disney_principled`; `subsurfaceDistance` is left out"),
-    row("UsdPreviewSurface", "*", Code(model), "a material in the source; `normal` is one of the world where it is connected to \
-        `normalmap`, else a texel's direction; the metal is a conductor as there"),
-    row("surface", "bsdf:BSDF edf:EDF opacity:float=1 thin_walled:boolean=false", Code(surface),
-        "the outputs `surface`, `emission`, `opacity`; `interior` where a closure lets light in and it is not thin-walled"),
-    row("surface_unlit", "emission:float=1 emission_color:color3=1 transmission:float=0 transmission_color:color3=1 \
-        opacity:float=1", Code(unlit), "`uniform` emission and `transparent`"),
+    row(
+        "standard_surface",
+        "*",
+        Code(model),
+        "the material `std::surface::standard_surface`",
+    ),
+    row(
+        "open_pbr_surface",
+        "*",
+        Code(model),
+        "the material `std::surface::open_pbr`",
+    ),
+    row(
+        "gltf_pbr",
+        "*",
+        Code(model),
+        "the material `std::surface::gltf_pbr`",
+    ),
+    row(
+        "disney_principled",
+        "*",
+        Code(model),
+        "the material `std::surface::disney_principled`; `subsurfaceDistance` is left out",
+    ),
+    row(
+        "UsdPreviewSurface",
+        "*",
+        Code(model),
+        "a material in the source; `normal` is one of the world where it is connected to \
+        `normalmap`, else a texel's direction; the metal is a conductor as there",
+    ),
+    row(
+        "surface",
+        "bsdf:BSDF edf:EDF opacity:float=1 thin_walled:boolean=false",
+        Code(surface),
+        "the outputs `surface`, `emission`, `opacity`; `interior` where a closure lets light in and it is not thin-walled",
+    ),
+    row(
+        "surface_unlit",
+        "emission:float=1 emission_color:color3=1 transmission:float=0 transmission_color:color3=1 \
+        opacity:float=1",
+        Code(unlit),
+        "`uniform` emission and `transparent`",
+    ),
 ];
 
 /// A parameter of a model.
@@ -54,7 +88,13 @@ fn parameters(material: &str) -> &'static [Parameter] {
         let read = |(_, material): &(&str, &'static str)| {
             let file = impasto_stdlib::file("surface", material).map(|file| file.text);
             let file = file.or(helpers::find(material).map(|helper| helper.file));
-            (*material, file.unwrap_or_default().lines().filter_map(declared).collect())
+            (
+                *material,
+                file.unwrap_or_default()
+                    .lines()
+                    .filter_map(declared)
+                    .collect(),
+            )
         };
         MODELS.iter().map(read).collect()
     });
@@ -65,18 +105,31 @@ fn parameters(material: &str) -> &'static [Parameter] {
 fn declared(line: &'static str) -> Option<Parameter> {
     let (name, rest) = line.trim().strip_prefix("param ")?.split_once(": ")?;
     let (ty, rest) = rest.split_once(" = ")?;
-    let rest = rest.split_once(" {").map_or(rest, |(rest, _)| rest).trim_end_matches(';');
-    let (default, range) = rest.split_once(" in ").map_or((rest, None), |(d, r)| (d, Some(r)));
+    let rest = rest
+        .split_once(" {")
+        .map_or(rest, |(rest, _)| rest)
+        .trim_end_matches(';');
+    let (default, range) = rest
+        .split_once(" in ")
+        .map_or((rest, None), |(d, r)| (d, Some(r)));
     let range = range.and_then(|range| {
         let (low, high) = range.split_once(" .. ")?;
         Some((low.parse().ok()?, high.parse().ok()?))
     });
-    Some(Parameter { name, ty, default, range })
+    Some(Parameter {
+        name,
+        ty,
+        default,
+        range,
+    })
 }
 
 fn model(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let category = call.row.category;
-    let material = MODELS.iter().find(|(node, _)| *node == category).map_or("", |(_, m)| *m);
+    let material = MODELS
+        .iter()
+        .find(|(node, _)| *node == category)
+        .map_or("", |(_, m)| *m);
     let known = parameters(material);
     let document = call.builder.graphs.document;
     let inputs: Vec<_> = document.inputs(call.key.node).collect();
@@ -108,8 +161,13 @@ fn model(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 
 fn unknown_input(call: &mut Call<'_, '_, '_>, name: &str, known: &[Parameter]) {
     let near = nearest(name, known.iter().map(|parameter| parameter.name));
-    let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-    let message = format!("{} has no input `{name}`, which is left out{near}", call.described());
+    let near = near
+        .map(|near| format!("; did you mean `{near}`?"))
+        .unwrap_or_default();
+    let message = format!(
+        "{} has no input `{name}`, which is left out{near}",
+        call.described()
+    );
     call.warn(message);
 }
 
@@ -141,7 +199,10 @@ fn argument(
             "color" => "`color3`",
             _ => "`vector3`",
         };
-        return Err(call.error(message).expected(expected).hint("put a `convert` between them"));
+        return Err(call
+            .error(message)
+            .expected(expected)
+            .hint("put a `convert` between them"));
     }
     Ok(Some(match parameter.ty {
         // Documents of some programs write directions that are not given so.
@@ -161,8 +222,7 @@ fn argument(
                 None => "m",
             };
             match value.single() {
-                // A length of 0 needs no unit of its own.
-                Some(single) => format!("{} {unit}", number(single).trim_end_matches(".0")),
+                Some(single) => length(single, unit),
                 None => format!("{} * 1 {unit}", bound(&value.text, Level::Product)),
             }
         }
@@ -180,17 +240,30 @@ fn argument(
     }))
 }
 
+/// A number of units; short lengths in smaller ones.
+fn length(value: f64, unit: &str) -> String {
+    const SMALLER: [(&str, f64); 2] = [("cm", 1e2), ("mm", 1e3)];
+    let smaller = SMALLER.iter().find(|(_, count)| value * count >= 1.0);
+    let (unit, value) = match smaller.filter(|_| unit == "m" && value < 0.1) {
+        Some((unit, count)) => (*unit, value * count),
+        None => (unit, value),
+    };
+    format!("{} {unit}", number(value).trim_end_matches(".0"))
+}
+
 /// A surface of closures.
 fn surface(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let thin = call.arg("thin_walled")?;
     let bsdf = call.given("bsdf")?;
     let edf = call.given("edf")?;
     let medium = bsdf.as_ref().and_then(Value::medium).cloned();
-    let interior = medium.map(|medium| medium.text()).and_then(|medium| match thin.text.as_str() {
-        "true" => None,
-        "false" => Some(medium),
-        thin => Some(format!("if {thin} {{ none }} else {{ {medium} }}")),
-    });
+    let interior = medium
+        .map(|medium| medium.text())
+        .and_then(|medium| match thin.text.as_str() {
+            "true" => None,
+            "false" => Some(medium),
+            thin => Some(format!("if {thin} {{ none }} else {{ {medium} }}")),
+        });
     let opacity = call.arg("opacity")?.text;
     let surface = bsdf.map(|value| value.text);
     let emission = edf.map(|value| value.text);
@@ -207,17 +280,17 @@ fn surface(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 
 fn unlit(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let (emission, color) = (call.arg("emission")?, call.arg("emission_color")?);
-    let radiance = match color.single() == Some(1.0) && !emission.is_zero() {
-        true => format!("color({})", emission.text),
-        false => weighted(&emission.text, &color.text),
+    let radiance = if color.single() == Some(1.0) && !emission.is_zero() {
+        format!("color({})", emission.text)
+    } else {
+        weighted(&emission.text, &color.text)
     };
     let transmission = call.arg("transmission")?;
-    let surface = match transmission.is_zero() {
-        true => None,
-        false => {
-            let clear = call.filled("@bsdf::transparent({transmission_color})")?;
-            Some(weighted(&transmission.text, &clear))
-        }
+    let surface = if transmission.is_zero() {
+        None
+    } else {
+        let clear = call.filled("@bsdf::transparent({transmission_color})")?;
+        Some(weighted(&transmission.text, &clear))
     };
     let opacity = call.arg("opacity")?.text;
     let uniform = call.builder.source.names_in("@edf::uniform");
@@ -238,7 +311,10 @@ pub(super) fn shown(call: &mut Call<'_, '_, '_>, from: Type) -> Result<Made, Imp
         Color3 => (value, None),
         Color4 | Vector4 => (format!("color({value}.xyz)"), Some(format!("{value}.w"))),
         Vector2 => (format!("color({value}.x, {value}.y, 0.0)"), None),
-        Boolean => (format!("if {value} {{ color(1.0) }} else {{ color(0.0) }}"), None),
+        Boolean => (
+            format!("if {value} {{ color(1.0) }} else {{ color(0.0) }}"),
+            None,
+        ),
         _ => (format!("color({value})"), None),
     };
     let uniform = call.builder.source.names_in("@edf::uniform");
@@ -302,4 +378,3 @@ fn outputs(call: &mut Call<'_, '_, '_>, input: &str) -> Result<Outputs, ImportEr
         _ => Ok(Outputs::default()),
     }
 }
-
