@@ -22,12 +22,12 @@ use std::path::PathBuf;
 
 use crate::error::ImportError;
 use crate::files::Files;
+use crate::imported::{Assignment, Imported, Options};
 use crate::mtlx::document::{Document, Id};
 use crate::mtlx::graph::Graphs;
 use crate::mtlx::names::Names;
 use crate::mtlx::roots::Root;
 use crate::mtlx::source::SourceText;
-use crate::{Assignment, Imported, Options};
 
 /// Most errors that are listed.
 const MOST_ERRORS: usize = 64;

@@ -19,7 +19,7 @@ use crate::mtlx::value::{Extra, Medium, Outputs, Shader, Value};
 pub(crate) enum Root {
     /// A `surfacematerial`.
     Material(Id),
-    /// A node with an output to show.
+    /// A node with an output to show, or that is a material of its own.
     Node(Id),
     /// An output of a graph or of the document.
     Output(Id),
@@ -81,8 +81,14 @@ pub(crate) fn find(document: &Document, source: &mut SourceText) -> Vec<Root> {
         let message = format!("the volume `{}` is left out", document.name(volume));
         source.warn(document.warning(volume, message));
     }
-    if !materials.is_empty() {
-        return materials.into_iter().map(Root::Material).collect();
+    let surfaces = nodes("LamaSurface");
+    if !materials.is_empty() || !surfaces.is_empty() {
+        let materials = materials.into_iter().map(Root::Material);
+        let mut roots: Vec<Root> = materials
+            .chain(surfaces.into_iter().map(Root::Node))
+            .collect();
+        roots.sort_by_key(Root::element);
+        return roots;
     }
     let is_shader = |id: &Id| document.attribute(*id, "type") == Some("surfaceshader");
     let top: Vec<Id> = document.top().collect();

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use impasto_compiler::format::format;
 use impasto_compiler::source::FileId;
 
-use crate::Texture;
 use crate::error::{ImportError, Warning};
 use crate::files::{Files, joined};
+use crate::imported::Texture;
 use crate::mtlx::helpers::{self, HELPERS};
 use crate::mtlx::names::Names;
 

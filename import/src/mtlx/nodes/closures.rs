@@ -207,15 +207,18 @@ fn film(call: &mut Call<'_, '_, '_>) -> Result<String, ImportError> {
     if !call.differs("thinfilm_thickness")? {
         return Ok(String::new());
     }
-    let thickness = call.arg("thinfilm_thickness")?;
+    let thickness = film_of(&call.arg("thinfilm_thickness")?);
+    let ior = argument(call, "thinfilm_ior", "thinfilm_ior", "1.5")?;
+    Ok(format!("{thickness}{ior}"))
+}
+
+/// The argument `thinfilm_thickness` for a number of nanometres.
+pub(super) fn film_of(thickness: &Value) -> String {
     let text = match thickness.single() {
         Some(nanometres) => format!("{} nm", number(nanometres).trim_end_matches(".0")),
         None => format!("{} * 1 nm", bound(&thickness.text, Level::Product)),
     };
-    Ok(format!(
-        ", thinfilm_thickness: {text}{}",
-        argument(call, "thinfilm_ior", "thinfilm_ior", "1.5")?
-    ))
+    format!(", thinfilm_thickness: {text}")
 }
 
 /// A bsdf times its weight.
@@ -277,18 +280,27 @@ fn dielectric(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     };
     let made = bsdf(call, template, &arguments)?;
     let ior = call.arg("ior")?.text;
-    Ok(filled_below(made, &mode, ior))
+    Ok(if mode == "R" {
+        made
+    } else {
+        filled_below(made, clear(ior))
+    })
 }
 
 /// A bsdf that lets light into the object, with the medium there.
-fn filled_below(mut made: Made, mode: &str, ior: String) -> Made {
-    if let Some((_, value)) = made.first_mut().filter(|_| mode != "R") {
-        value.extra = Extra::Medium(Medium {
-            ior,
-            ..Medium::default()
-        });
+pub(super) fn filled_below(mut made: Made, medium: Medium) -> Made {
+    if let Some((_, value)) = made.first_mut() {
+        value.extra = Extra::Medium(medium);
     }
     made
+}
+
+/// What an index of refraction alone says of a medium.
+fn clear(ior: String) -> Medium {
+    Medium {
+        ior,
+        ..Medium::default()
+    }
 }
 
 fn conductor(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
@@ -313,7 +325,7 @@ fn schlick(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
             _ => format!("@bsdf::dielectric(ior: {ior} / exterior_ior"),
         };
         let made = bsdf(call, &template, &format!("{facets}{tint}{film}{frame}"))?;
-        return Ok(filled_below(made, &mode, ior));
+        return Ok(filled_below(made, clear(ior)));
     }
     let mut arguments = argument(call, "color82", "color82", "color(1.0)")?;
     arguments.push_str(&argument(call, "color90", "color90", "color(1.0)")?);
@@ -407,16 +419,18 @@ fn layer(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         let message = format!("the base of {} is a `{}`", call.described(), base.ty.name());
         return Err(call.error(message).expected("`BSDF` or `VDF`"));
     }
-    // Layers of layers are one: the top first.
+    let top = call.arg("top")?;
+    let text = layer_of(&top.text, &base.text);
+    with_medium(call, one(Value::new(Bsdf, text))?, &["top", "base"])
+}
+
+/// A layer over another; layers of layers are one, the top first.
+pub(super) fn layer_of(top: &str, base: &str) -> String {
     let inner = base
-        .text
         .strip_prefix("layer(")
         .and_then(|text| text.strip_suffix(')'));
-    let made = match inner.filter(|inner| closes(inner)) {
-        Some(inner) => call.template(&format!("layer({{top}}, {inner})"))?,
-        None => call.template("layer({top}, {base})")?,
-    };
-    with_medium(call, made, &["top", "base"])
+    let base = inner.filter(|inner| closes(inner)).unwrap_or(base);
+    format!("layer({top}, {base})")
 }
 
 /// Are the brackets of a text in pairs?

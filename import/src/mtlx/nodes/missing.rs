@@ -15,26 +15,11 @@ const fn missing(category: &'static str, reason: &'static str) -> Missing {
 
 const HAIR: &str = "Impasto has no hair: its geometry is surfaces";
 const LIGHT: &str = "lights belong to scenes: docs/scenes.md";
-const LAMA: &str =
-    "Lama's nodes are not in the table; write them with the nodes of the pbr library";
 const VOLUME: &str =
     "only surfaces have materials; a surface says what fills it by `layer` over a volume";
 
 /// All categories without a counterpart, in the order of the alphabet.
 pub const MISSING: &[Missing] = &[
-    missing("LamaAdd", LAMA),
-    missing("LamaConductor", LAMA),
-    missing("LamaDielectric", LAMA),
-    missing("LamaDiffuse", LAMA),
-    missing("LamaEmission", LAMA),
-    missing("LamaGeneralizedSchlick", LAMA),
-    missing("LamaIridescence", LAMA),
-    missing("LamaLayer", LAMA),
-    missing("LamaMix", LAMA),
-    missing("LamaSSS", LAMA),
-    missing("LamaSheen", LAMA),
-    missing("LamaSurface", LAMA),
-    missing("LamaTranslucent", LAMA),
     missing(
         "ambientocclusion",
         "what surrounds a point is known to the path, not to a material",

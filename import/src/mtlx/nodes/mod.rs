@@ -10,6 +10,7 @@ mod color;
 mod compositing;
 mod geometry;
 mod images;
+mod lama;
 mod maths;
 pub(crate) mod matrices;
 mod missing;
@@ -82,6 +83,7 @@ pub(crate) const fn row(
 const TABLES: &[(&str, &[NodeRow])] = &[
     ("Surfaces", surfaces::ROWS),
     ("Closures", closures::ROWS),
+    ("Lama", lama::ROWS),
     ("Images", images::ROWS),
     ("Noise", noise::ROWS),
     ("Patterns", patterns::ROWS),
