@@ -24,6 +24,11 @@ impl Call<'_, '_, '_> {
     /// The outputs of the node.
     pub fn made(&mut self) -> Result<Made, ImportError> {
         self.check_names();
+        if !self.row.takes(self.ty) {
+            let message = format!("{} has the type `{}`", self.described(), self.ty.name());
+            let expected = self.row.result().map_or("a type of values", Type::name);
+            return Err(self.error(message).expected(expected));
+        }
         if matrices::is_known(self)? {
             return matrices::computed(self);
         }
@@ -127,10 +132,19 @@ impl Call<'_, '_, '_> {
         let ty = match input.map(|input| input.kind) {
             Some(Kind::Of(ty)) => ty,
             Some(Kind::Same | Kind::Scalar) => self.ty,
+            // What gives a type of its own, or is put together, is given numbers.
+            _ if self.row.result().is_some() || self.row.category == "combine2" => Type::Float,
             _ if self.ty.is_numeric() => self.ty,
             _ => Type::Float,
         };
         let default = input.and_then(|input| input.default).unwrap_or("0");
+        let ty = match default.split(',').count() {
+            count if count == 1 || count == ty.count() => ty,
+            2 => Type::Vector2,
+            3 => Type::Vector3,
+            9 => Type::Matrix33,
+            _ => ty,
+        };
         if let Some(property) = default.strip_prefix('@') {
             return self.builder.geometry(property, self.key.node);
         }

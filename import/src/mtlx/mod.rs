@@ -18,7 +18,10 @@ mod value;
 mod xml;
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use impasto_compiler::diag::Diagnostic;
+use impasto_compiler::{MemoryLoader, check};
 
 use crate::error::ImportError;
 use crate::files::Files;
@@ -90,6 +93,10 @@ pub(crate) fn import(
     let text = source
         .finished(path, &header)
         .map_err(|error| vec![error])?;
+    let problems = problems(path, &file, &text);
+    if !problems.is_empty() {
+        return Err(problems);
+    }
     let textures = source.textures(&text, files);
     let assignments = assignments(&document, &roots, &materials, &mut source);
     Ok(Imported {
@@ -99,6 +106,33 @@ pub(crate) fn import(
         assignments,
         files: vec![(file, text)],
     })
+}
+
+/// What the compiler says against a source: nothing is written that does not compile. Nodes have no such errors of their
+/// own, but what they are put together to may have, such as a medium that varies over its surface.
+fn problems(path: &str, file: &Path, text: &str) -> Vec<ImportError> {
+    let name = file.to_string_lossy();
+    let mut loader = MemoryLoader::default();
+    loader.add(name.as_ref(), text);
+    let checked = check(&name, &mut loader);
+    let errors = checked.diagnostics.into_iter().filter(Diagnostic::is_error);
+    let told = errors.map(|problem| {
+        let line = problem.span.map(|span| {
+            let (line, _) = checked.sources.line_column(span);
+            let text = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
+            format!(" in `{}`", text.trim())
+        });
+        let message = format!(
+            "what the document becomes does not compile: {}: {}{}",
+            problem.code.id(),
+            problem.message,
+            line.unwrap_or_default()
+        );
+        let mut error = ImportError::new(path, message).maybe_hint(problem.hint);
+        error.expected = problem.expected;
+        error
+    });
+    told.take(MOST_ERRORS).collect()
 }
 
 /// The source of a document: its name, as other sources can import it.

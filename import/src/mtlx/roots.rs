@@ -185,7 +185,8 @@ pub(crate) fn written(
             .value_at(scope, id, None)
             .map_err(|error| vec![error])?,
     };
-    let Some(assignments) = value.and_then(|value| assignments(&value, &mut builder)) else {
+    let assignments = value.and_then(|value| assignments(&value, &mut builder));
+    let Some(assignments) = assignments.filter(|assignments| !assignments.is_empty()) else {
         let message = format!("`{name}` has no surface to show and is left out");
         let warning = document.warning(id, message);
         source.warn(warning);

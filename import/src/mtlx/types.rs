@@ -161,7 +161,9 @@ impl Literal {
                 let rows = numbers.chunks(3).map(|row| format!("vec3({})", list(row)));
                 format!("mat3({})", rows.collect::<Vec<_>>().join(", "))
             }
-            Self::Numbers(numbers) if numbers.len() == 1 => number(numbers[0]),
+            Self::Numbers(numbers) if numbers.len() <= 1 => {
+                number(numbers.first().copied().unwrap_or(0.0))
+            }
             Self::Numbers(numbers) => {
                 let name = if ty.impasto().is_empty() {
                     "vec4"

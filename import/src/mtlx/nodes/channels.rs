@@ -2,7 +2,7 @@
 
 use crate::error::ImportError;
 use crate::mtlx::call::Call;
-use crate::mtlx::nodes::Make::{Code, Each, Text};
+use crate::mtlx::nodes::Make::{Code, Text};
 use crate::mtlx::nodes::{Made, NodeRow, matrices, one, row};
 use crate::mtlx::text::{Level, bound, is_simple};
 use crate::mtlx::types::Literal;
@@ -19,10 +19,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     row(
         "combine2",
         "in1:any=0 in2:any=0",
-        Each(&[
-            (&[Color4], "vec4(vec3({in1}), {in2})"),
-            (&[], "$T({in1}, {in2})"),
-        ]),
+        Code(combine2),
         "a call of the type",
     ),
     row(
@@ -100,6 +97,15 @@ fn convert(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         Some(literal) => one(Value::of(call.ty, literal)),
         None => call.template(template),
     }
+}
+
+fn combine2(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
+    let given = call.given("in1")?.map(|value| value.ty);
+    call.template(match (call.ty, given) {
+        (Color4, None) => "vec4(vec3(0.0), {in2})",
+        (Color4, Some(_)) => "vec4(vec3({in1}), {in2})",
+        _ => "$T({in1}, {in2})",
+    })
 }
 
 /// The name of a component.
@@ -185,7 +191,7 @@ fn swizzle(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
             }
         }
     }
-    if parts.len() != call.ty.count() {
+    if parts.is_empty() || parts.len() != call.ty.count() {
         let message = format!("{} has {} channels", call.described(), parts.len());
         return Err(call.error(message).expected(format!("{}", call.ty.count())));
     }

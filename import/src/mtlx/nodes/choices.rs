@@ -42,23 +42,23 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "and",
-        "in1:boolean=false in2:boolean=false",
+        "->boolean in1:boolean=false in2:boolean=false",
         Text("{in1} && {in2}"),
         "",
     ),
     row(
         "or",
-        "in1:boolean=false in2:boolean=false",
+        "->boolean in1:boolean=false in2:boolean=false",
         Text("{in1} || {in2}"),
         "",
     ),
     row(
         "xor",
-        "in1:boolean=false in2:boolean=false",
+        "->boolean in1:boolean=false in2:boolean=false",
         Text("{in1} != {in2}"),
         "",
     ),
-    row("not", "in:boolean=false", Text("!{in}"), ""),
+    row("not", "->boolean in:boolean=false", Text("!{in}"), ""),
 ];
 
 /// Does the node give what it compares?

@@ -367,10 +367,13 @@ fn uniform(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 }
 
 fn conical(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
-    let frame = frame(call)?;
-    call.template(&format!(
-        "@edf::conical({{color}}, {{inner_angle}} * 1 deg, {{outer_angle}} * 1 deg{frame})"
-    ))
+    if call
+        .given("normal")?
+        .is_some_and(|value| value.text != "normal")
+    {
+        call.warn("the cone of `conical_edf` stands on the surface, whatever `normal` says");
+    }
+    call.template("@edf::conical({color}, {inner_angle} * 1 deg, {outer_angle} * 1 deg)")
 }
 
 fn schlick_edf(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {

@@ -76,7 +76,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "blackbody",
-        "temperature:float=5000",
+        "->color3 temperature:float=5000",
         Text("@color::blackbody({temperature})"),
         "`blackbody(temperature)`, of the luminance 1 as there",
     ),

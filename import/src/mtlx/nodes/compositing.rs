@@ -87,13 +87,13 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "premult",
-        "in:color4=0,0,0,1",
+        "->color4 in:color4=0,0,0,1",
         Text("vec4({in}.xyz * {in}.w, {in}.w)"),
         "",
     ),
     row(
         "unpremult",
-        "in:color4=0,0,0,1",
+        "->color4 in:color4=0,0,0,1",
         Text("vec4({in}.xyz / {in}.w, {in}.w)"),
         "`in / in.w`; 0 where alpha is 0",
     ),

@@ -12,25 +12,25 @@ use crate::mtlx::value::Value;
 pub(super) const ROWS: &[NodeRow] = &[
     row(
         "position",
-        "space:string=object",
+        "->vector3 space:string=object",
         Code(place),
         "`object_position`, or `position` in world space",
     ),
     row(
         "normal",
-        "space:string=object",
+        "->vector3 space:string=object",
         Code(place),
         "`object_normal`, or `normal` in world space",
     ),
     row(
         "tangent",
-        "space:string=object index:integer=0",
+        "->vector3 space:string=object index:integer=0",
         Code(place),
         "`tangent`; that of the first texture coordinates",
     ),
     row(
         "bitangent",
-        "space:string=object index:integer=0",
+        "->vector3 space:string=object index:integer=0",
         Code(place),
         "`cross(normal, tangent)`",
     ),
@@ -60,53 +60,53 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "viewdirection",
-        "space:string=world",
+        "->vector3 space:string=world",
         Code(place),
         "`-view`",
     ),
     row(
         "facingratio",
-        "viewdirection:vector3=@Vworld normal:vector3=@Nworld faceforward:boolean=true \
+        "->float viewdirection:vector3=@Vworld normal:vector3=@Nworld faceforward:boolean=true \
         invert:boolean=false",
         Code(facing),
         "`facing` by default",
     ),
-    row("frame", "", Text("frame"), ""),
-    row("time", "fps:float=24", Text("time"), ""),
+    row("frame", "->float", Text("frame"), ""),
+    row("time", "->float fps:float=24", Text("time"), ""),
     row(
         "transformpoint",
-        "in:vector3=0 fromspace:string= tospace:string=",
+        "->vector3 in:vector3=0 fromspace:string= tospace:string=",
         Code(transform),
         "`world_from_object(in)` or `object_from_world(in)`",
     ),
     row(
         "transformvector",
-        "in:vector3=0 fromspace:string= tospace:string=",
+        "->vector3 in:vector3=0 fromspace:string= tospace:string=",
         Code(transform),
         "the same of a vector",
     ),
     row(
         "transformnormal",
-        "in:vector3=0,0,1 fromspace:string= tospace:string=",
+        "->vector3 in:vector3=0,0,1 fromspace:string= tospace:string=",
         Code(transform),
         "the same of a normal",
     ),
     row(
         "normalmap",
-        "in:vector3=0.5,0.5,1 scale:any=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
+        "->vector3 in:vector3=0.5,0.5,1 scale:any=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
         bitangent:vector3=@Bworld space:string=tangent",
         Code(normal_map),
         "`normal_map(color(in), normal, tangent, scale)`; the bitangent is at right angles to both",
     ),
     row(
         "heighttonormal",
-        "in:float=0 scale:float=1 texcoord:vector2=@UV0",
+        "->vector3 in:float=0 scale:float=1 texcoord:vector2=@UV0",
         Code(height_to_normal),
         "by the gradient of the height along the surface",
     ),
     row(
         "bump",
-        "height:float=0 scale:float=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
+        "->vector3 height:float=0 scale:float=1 normal:vector3=@Nworld tangent:vector3=@Tworld \
         bitangent:vector3=@Bworld",
         Code(bump),
         "as `heighttonormal` and `normalmap`",

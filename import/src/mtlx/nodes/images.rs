@@ -46,7 +46,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "hextilednormalmap",
-        "file:filename default:vector3=0.5,0.5,1 texcoord:vector2=@UV0 tiling:vector2=1 \
+        "->vector3 file:filename default:vector3=0.5,0.5,1 texcoord:vector2=@UV0 tiling:vector2=1 \
         rotation:float=1 rotationrange:vector2=0,360 scale:float=1 scalerange:vector2=0.5,2 offset:float=1 \
         offsetrange:vector2=0,1 falloff:float=0.5 strength:float=1 flip_g:boolean=false normal:vector3=@Nworld \
         tangent:vector3=@Tworld bitangent:vector3=@Bworld",
@@ -55,7 +55,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "latlongimage",
-        "file:filename default:color3=0 viewdir:vector3=0,0,1 rotation:float=0",
+        "->color3 file:filename default:color3=0 viewdir:vector3=0,0,1 rotation:float=0",
         Code(latlong),
         "`latlong(file, viewdir, rotate: rotation)`",
     ),
@@ -81,7 +81,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "gltf_iridescence_thickness",
-        "file:filename default:vector3=0 texcoord:vector2=@UV0 pivot:vector2=0 \
+        "->float file:filename default:vector3=0 texcoord:vector2=@UV0 pivot:vector2=0 \
         scale:vector2=1 rotate:float=0 offset:vector2=0 uaddressmode:string=periodic vaddressmode:string=periodic \
         filtertype:string=linear thicknessMin:float=100 thicknessMax:float=400",
         Code(gltf_thickness),
@@ -96,7 +96,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "UsdTransform2d",
-        "in:vector2=0 rotation:float=0 scale:vector2=1 translation:vector2=0",
+        "->vector2 in:vector2=0 rotation:float=0 scale:vector2=1 translation:vector2=0",
         Text("@pattern::rotation({rotation} * 1 deg) * ({in} * {scale}) + {translation}"),
         "",
     ),

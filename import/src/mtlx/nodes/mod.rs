@@ -37,7 +37,7 @@ pub struct NodeRow {
     pub group: &'static str,
     /// Its inputs, with blanks between them: `NAME:KIND=DEFAULT`. A kind is the name of a type; `same` for the type of
     /// the node; `scalar` for that or a float; or `any`. A default is a value without blanks, one number for all
-    /// components, or `@` and a property of the geometry.
+    /// components, or `@` and a property of the geometry. `->TYPE` stands for the type that the node must have.
     pub inputs: &'static str,
     /// What it becomes, and what differs, for the page that lists them; nothing where the template says it all.
     pub note: &'static str,
@@ -134,7 +134,8 @@ pub(crate) enum Kind {
 impl NodeRow {
     /// The inputs.
     pub(crate) fn input_rows(&self) -> impl Iterator<Item = InputRow> {
-        self.inputs.split_whitespace().map(|text| {
+        let inputs = self.inputs.split_whitespace();
+        inputs.filter(|text| !text.starts_with("->")).map(|text| {
             let (name, rest) = text.split_once(':').unwrap_or((text, "any"));
             let (kind, default) = match rest.split_once('=') {
                 Some((kind, default)) => (kind, Some(default)),
@@ -151,6 +152,28 @@ impl NodeRow {
                 default,
             }
         })
+    }
+
+    /// The type that the node must have, if there is one alone.
+    pub(crate) fn result(&self) -> Option<Type> {
+        let mut tokens = self.inputs.split_whitespace();
+        tokens.find_map(|token| token.strip_prefix("->").and_then(Type::of))
+    }
+
+    /// May the node be of this type? Closures and shaders are for few.
+    pub(crate) fn takes(&self, ty: Type) -> bool {
+        let is_value =
+            !ty.impasto().is_empty() && !matches!(ty, Type::Bsdf | Type::Edf | Type::Vdf);
+        let is_known = matches!(ty, Type::Matrix44 | Type::Several | Type::Text);
+        let is_combined = matches!(
+            self.category,
+            "add" | "multiply" | "mix" | "dot" | "convert"
+        );
+        let is_closure = matches!(self.group, "Surfaces" | "Closures" | "Lama");
+        match self.result() {
+            Some(result) => ty == result,
+            None => is_value || is_known || is_combined || is_closure,
+        }
     }
 
     /// The input of a name.

@@ -37,13 +37,13 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "cellnoise2d",
-        "texcoord:vector2=@UV0 period:vector2=0",
+        "->float texcoord:vector2=@UV0 period:vector2=0",
         Text("@noise::cell_2d({texcoord})"),
         "",
     ),
     row(
         "cellnoise3d",
-        "position:vector3=@Pobject",
+        "->float position:vector3=@Pobject",
         Text("@noise::cell({~position})"),
         "",
     ),
@@ -61,7 +61,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "unifiednoise2d",
-        "texcoord:vector2=@UV0 freq:vector2=1 offset:vector2=0 jitter:float=1 outmin:float=0 \
+        "->float texcoord:vector2=@UV0 freq:vector2=1 offset:vector2=0 jitter:float=1 outmin:float=0 \
         outmax:float=1 clampoutput:boolean=true octaves:integer=3 lacunarity:float=2 diminish:float=0.5 \
         type:integer=0 style:integer=0",
         Code(unified),
@@ -69,7 +69,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "unifiednoise3d",
-        "position:vector3=@Pobject freq:vector3=1 offset:vector3=0 jitter:float=1 outmin:float=0 \
+        "->float position:vector3=@Pobject freq:vector3=1 offset:vector3=0 jitter:float=1 outmin:float=0 \
         outmax:float=1 clampoutput:boolean=true octaves:integer=3 lacunarity:float=2 diminish:float=0.5 \
         type:integer=0 style:integer=0",
         Code(unified),
@@ -77,13 +77,13 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "randomfloat",
-        "in:any=0 min:float=0 max:float=1 seed:integer=0",
+        "->float in:any=0 min:float=0 max:float=1 seed:integer=0",
         Text("@noise::random({in}, {min}, {max}, {seed})"),
         "",
     ),
     row(
         "randomcolor",
-        "in:any=0 huelow:float=0 huehigh:float=1 saturationlow:float=0.825 saturationhigh:float=1 \
+        "->color3 in:any=0 huelow:float=0 huehigh:float=1 saturationlow:float=0.825 saturationhigh:float=1 \
         brightnesslow:float=1 brightnesshigh:float=1 seed:integer=0",
         Text(
             "@color::from_hsv(vec3(@noise::random({in}, {huelow}, {huehigh}, {seed} + 413), \

@@ -44,7 +44,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "ramp",
-        "texcoord:vector2=@UV0 type:integer=0 interpolation:integer=1 num_intervals:integer=2 \
+        "->color4 texcoord:vector2=@UV0 type:integer=0 interpolation:integer=1 num_intervals:integer=2 \
         interval1:float=0 color1:color4=0,0,0,1 interval2:float=1 color2:color4=1 interval3:float=1 color3:color4=1 \
         interval4:float=1 color4:color4=1 interval5:float=1 color5:color4=1 interval6:float=1 color6:color4=1 \
         interval7:float=1 color7:color4=1 interval8:float=1 color8:color4=1 interval9:float=1 color9:color4=1 \
@@ -54,38 +54,38 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "checkerboard",
-        "color1:color3=1 color2:color3=0 uvtiling:vector2=8 uvoffset:vector2=0 \
+        "->color3 color1:color3=1 color2:color3=0 uvtiling:vector2=8 uvoffset:vector2=0 \
         texcoord:vector2=@UV0",
         Text("mix({color2}, {color1}, @pattern::checker({texcoord} * {uvtiling} - {uvoffset}))"),
         "",
     ),
     row(
         "circle",
-        "texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
+        "->float texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
         Text("@pattern::circle({texcoord}, {center}, {radius})"),
         "",
     ),
     row(
         "cloverleaf",
-        "texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
+        "->float texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
         Text("@pattern::cloverleaf({texcoord}, {center}, {radius})"),
         "",
     ),
     row(
         "hexagon",
-        "texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
+        "->float texcoord:vector2=@UV0 center:vector2=0 radius:float=0.5",
         Text("@pattern::hexagon({texcoord}, {center}, {radius})"),
         "",
     ),
     row(
         "line",
-        "texcoord:vector2=@UV0 center:vector2=0 radius:float=0.1 point1:vector2=0.25 point2:vector2=0.75",
+        "->float texcoord:vector2=@UV0 center:vector2=0 radius:float=0.1 point1:vector2=0.25 point2:vector2=0.75",
         Text("@pattern::line({texcoord} - {center}, {point1}, {point2}, {radius})"),
         "",
     ),
     row(
         "grid",
-        "texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 thickness:float=0.05 \
+        "->color3 texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 thickness:float=0.05 \
         staggered:boolean=false",
         Text(
             "color(@pattern::grid({texcoord} * {uvtiling} - {uvoffset}, {thickness}, {staggered}))",
@@ -94,7 +94,7 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "crosshatch",
-        "texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 thickness:float=0.05 \
+        "->color3 texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 thickness:float=0.05 \
         staggered:boolean=false",
         Text(
             "color(@pattern::crosshatch({texcoord} * {uvtiling} - {uvoffset}, {thickness}, {staggered}))",
@@ -127,26 +127,26 @@ pub(super) const ROWS: &[NodeRow] = &[
     ),
     row(
         "place2d",
-        "texcoord:vector2=0 pivot:vector2=0 scale:vector2=1 rotate:float=0 offset:vector2=0 \
+        "->vector2 texcoord:vector2=0 pivot:vector2=0 scale:vector2=1 rotate:float=0 offset:vector2=0 \
         operationorder:integer=0",
         Code(place2d),
         "`place2d` with the arguments that are given",
     ),
     row(
         "rotate2d",
-        "in:vector2=0 amount:float=0",
+        "->vector2 in:vector2=0 amount:float=0",
         Code(rotate2d),
         "`rotation(-amount) * in`",
     ),
     row(
         "rotate3d",
-        "in:vector3=0 amount:float=0 axis:vector3=0,1,0",
+        "->vector3 in:vector3=0 amount:float=0 axis:vector3=0,1,0",
         Code(rotate3d),
         "Rodrigues' formula, the same way round",
     ),
 ];
 
-const SHAPES: &str = "texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 size:float=0.5 staggered:boolean=false";
+const SHAPES: &str = "->color3 texcoord:vector2=@UV0 uvtiling:vector2=1 uvoffset:vector2=0 size:float=0.5 staggered:boolean=false";
 
 /// Degrees as an angle; `sign` turns it round.
 fn angle(value: &Value, sign: f64) -> String {
