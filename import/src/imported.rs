@@ -9,6 +9,8 @@ use crate::error::Warning;
 pub struct Options {
     /// May a document name files outside its own folder?
     pub allow_outside: bool,
+    /// Is it left to the caller to compile the sources? That takes most of the time, and the caller may have more cores.
+    pub unchecked: bool,
 }
 
 /// What a document became.

@@ -36,7 +36,7 @@ pub use mtlx::nodes::{MISSING, Missing, NodeRow, node_rows};
 ///
 /// # Errors
 /// All that keeps the document from being imported whole: what cannot be read, what contradicts itself, and nodes that
-/// have no counterpart in Impasto.
+/// have no counterpart in Impasto. What is imported compiles, unless the options leave that to the caller.
 pub fn import(
     path: &str,
     files: &mut dyn Files,

@@ -78,7 +78,7 @@ pub(super) const ROWS: &[NodeRow] = &[
         "blackbody",
         "->color3 temperature:float=5000",
         Text("@color::blackbody({temperature})"),
-        "`blackbody(temperature)`, of the luminance 1 as there",
+        "",
     ),
 ];
 
