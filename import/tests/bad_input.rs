@@ -105,6 +105,7 @@ fn files_that_include_each_other_count_once() {
     files.add("sub/b.mtlx", including("../a.mtlx", surface));
     let options = Options {
         allow_outside: true,
+        ..Options::default()
     };
     let imported = import("a.mtlx", &mut files, &options).expect("imported");
     assert!(compiled(&imported).contains("base_color: srgb(0.5, 0.5, 0.5)"));
