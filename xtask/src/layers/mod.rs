@@ -118,6 +118,11 @@ const CRATES: &[Crate] = &[
         ],
     },
     Crate {
+        name: "impasto-import",
+        folder: "import/src",
+        layers: &[&["error", "files"], &["imported"], &["mtlx"]],
+    },
+    Crate {
         name: "impasto",
         folder: "src",
         layers: &[

@@ -1,0 +1,8 @@
+//! Documents of MaterialX, good and bad, and what becomes of them.
+
+mod bad_input;
+mod common;
+mod documents;
+mod page;
+mod rows;
+mod values;
