@@ -112,7 +112,7 @@ enum Command {
     Check(check::CheckArgs),
     /// Make a material to start from
     New(new::NewArgs),
-    /// Make a folder of a glTF file: its scene, its materials as sources, its pictures
+    /// Make sources of MaterialX documents, and folders of glTF files with scene, sources and pictures
     Import(import::ImportArgs),
     /// Format sources, keeping every comment
     Fmt(fmt::FmtArgs),

@@ -114,7 +114,13 @@ fn a_file_is_rendered_checked_and_imported() {
         .says("0 errors, 0 warnings");
     assert_eq!(quarters(&scene, &temporary.path().join("b.png")), EXPECTED);
     // Nobody's work is written over.
-    import().exits(2).says("is not empty");
+    import().exits(0);
+    let source = out.join("four_colors.impasto");
+    std::fs::write(&source, "// mine").expect("an edit");
+    import()
+        .exits(2)
+        .says("four_colors.impasto` is there already");
+    assert_eq!(std::fs::read_to_string(source).expect("mine"), "// mine");
 }
 
 #[test]
@@ -139,4 +145,57 @@ fn what_is_wrong_is_said_of_the_file() {
     impasto(&["import", &other])
         .exits(2)
         .says("in no format that is imported");
+}
+
+const DOCUMENT: &str = r#"<?xml version="1.0"?>
+<materialx version="1.39">
+  <image name="map" type="color3"><input name="file" type="filename" value="map.png" colorspace="srgb_texture" /></image>
+  <standard_surface name="shader" type="surfaceshader">
+    <input name="base_color" type="color3" nodename="map" />
+    <input name="specular_roughness" type="float" value="0.4" />
+  </standard_surface>
+  <surfacematerial name="clay" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="shader" />
+  </surfacematerial>
+</materialx>"#;
+
+#[test]
+fn documents_of_materialx_become_sources() {
+    let temporary = folder();
+    let file = temporary.path().join("clay.mtlx");
+    std::fs::write(&file, DOCUMENT).expect("a document");
+    let texels = image::RgbImage::from_pixel(2, 2, image::Rgb([200, 80, 40]));
+    texels
+        .save(temporary.path().join("map.png"))
+        .expect("a picture");
+    let out = temporary.path().join("made");
+    let path = file.display().to_string();
+    let out_text = out.display().to_string();
+    impasto(&["import", &path, "--out", &out_text])
+        .exits(0)
+        .says("impasto render");
+    assert_eq!(names(&out), ["clay.impasto", "textures"]);
+    assert_eq!(names(&out.join("textures")), ["map.png"]);
+    let source = out.join("clay.impasto").display().to_string();
+    impasto(&["check", &source])
+        .exits(0)
+        .says("0 errors, 0 warnings");
+    impasto(&["fmt", "--check", &source]).exits(0);
+    let picture = temporary.path().join("clay.png").display().to_string();
+    let args = [
+        "--size", "32x24", "--spp", "2", "--device", "cpu", "--out", &picture,
+    ];
+    impasto(&[&["render", &source], &args[..]].concat()).exits(0);
+    let wrong = DOCUMENT
+        .replace("<image", "<hextiledtriplanar")
+        .replace("</image>", "</hextiledtriplanar>");
+    std::fs::write(&file, wrong).expect("a document");
+    let run = impasto(&["import", &path, "--out", &out_text, "--format", "json"]).exits(1);
+    let errors = &run.json()["errors"];
+    assert!(
+        errors[0]
+            .as_str()
+            .is_some_and(|e| e.contains("clay.mtlx:3:")),
+        "{errors}"
+    );
 }
