@@ -53,6 +53,23 @@ fn long_chains_take_time_by_their_length() {
 }
 
 #[test]
+fn wide_documents_are_refused() {
+    let nodes = (0..100_000).map(|i| format!("<noise2d name=\"n{i}\" type=\"float\"/>"));
+    let text = format!(
+        "<materialx version=\"1.39\">{}</materialx>",
+        nodes.collect::<String>()
+    );
+    let start = Instant::now();
+    let errors = of_text(&text).expect_err("too many materials");
+    assert!(
+        errors[0].message.contains("100000 materials"),
+        "{}",
+        errors[0]
+    );
+    assert!(start.elapsed() < Duration::from_secs(60));
+}
+
+#[test]
 fn definitions_that_multiply_are_refused() {
     let mut text = String::from("<materialx version=\"1.39\">");
     for i in 0..40 {

@@ -35,6 +35,9 @@ use crate::mtlx::source::SourceText;
 /// Most errors that are listed.
 const MOST_ERRORS: usize = 64;
 
+/// Most materials that a source may have (docs/language.md).
+const MOST_MATERIALS: usize = 1024;
+
 /// Imports the MaterialX document at `path`.
 pub(crate) fn import(
     path: &str,
@@ -46,6 +49,14 @@ pub(crate) fn import(
     let mut graphs = Graphs::new(&document);
     let mut source = SourceText::new();
     let roots = roots::find(&document, &mut source);
+    if roots.len() > MOST_MATERIALS {
+        let message = format!(
+            "the document has {} materials or nodes to show",
+            roots.len()
+        );
+        let error = ImportError::new(path, message);
+        return Err(vec![error.expected(format!("at most {MOST_MATERIALS}"))]);
+    }
     let mut errors: Vec<ImportError> = Vec::new();
     let mut materials: HashMap<Id, String> = HashMap::new();
     let mut names = Vec::new();
