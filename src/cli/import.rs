@@ -28,6 +28,8 @@ pub(super) struct ImportArgs {
 struct Made {
     /// Files with their contents.
     files: Vec<(PathBuf, Vec<u8>)>,
+    /// Which geometry has which material, as documents say.
+    looks: Vec<String>,
     warnings: Vec<String>,
     errors: Vec<String>,
     /// Commands to go on with.
@@ -106,6 +108,10 @@ impl Made {
         for texture in &imported.textures {
             self.take_texture(texture, folder);
         }
+        self.looks.extend(imported.assignments.iter().map(|a| {
+            let (look, geometry, material) = (&a.look, &a.geometry, &a.material);
+            format!("look `{look}`: `{geometry}` has the material `{material}`")
+        }));
         for (name, text) in imported.files {
             let path = folder.join(name);
             let shown = path.display();
@@ -168,13 +174,15 @@ impl Made {
                 .map(|(p, _)| p.display().to_string())
                 .collect();
             let (warnings, errors, next) = (&self.warnings, &self.errors, &self.next);
-            let result =
-                json!({ "written": written, "warnings": warnings, "errors": errors, "next": next });
+            let looks = &self.looks;
+            let result = json!({ "written": written, "looks": looks, "warnings": warnings,
+                                 "errors": errors, "next": next });
             print(&format!("{result:#}\n"))?;
         } else {
             for warning in &self.warnings {
                 global.note(&format!("warning: {warning}"));
             }
+            self.looks.iter().for_each(|look| global.note(look));
             let word = global.error_word();
             self.errors
                 .iter()
