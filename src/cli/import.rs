@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use impasto::files::{reason, write_whole};
 use impasto::runtime::input::{self, gltf};
 use impasto_import::{Files, Imported, Options, Texture};
@@ -16,7 +16,7 @@ pub(super) struct ImportArgs {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The folder to write to; of one file by default its name without extension
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: Option<PathBuf>,
     /// Let documents name files outside of their own folders
     #[arg(long)]

@@ -116,7 +116,8 @@ fn files_are_offered_where_files_are_taken() {
             "converge --out",
             "converge -o",
             "farm new --out",
-            "farm new -o"
+            "farm new -o",
+            "import --out"
         ]
     );
     assert_eq!(

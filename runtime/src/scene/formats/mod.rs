@@ -193,10 +193,13 @@ pub(super) fn of_extension<'f>(formats: &'f [Format], extension: &str) -> Option
     formats.iter().find(|f| f.extensions.contains(&extension))
 }
 
-/// The names of formats: `OBJ or PLY`.
+/// The names of formats: `OBJ, PLY or glTF`.
 pub(super) fn names(formats: &[Format]) -> String {
     let names: Vec<&str> = formats.iter().map(|f| f.name).collect();
-    names.join(" or ")
+    match &names[..] {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        names => names.concat(),
+    }
 }
 
 /// What geometry can be read, for hints: `OBJ (.obj), PLY (.ply)`.
