@@ -74,14 +74,8 @@ const CRATES: &[Crate] = &[
         name: "impasto-runtime",
         folder: "runtime/src",
         layers: &[
-            &[
-                "error",
-                "input",
-                "technique",
-                "parallel",
-                "fingerprint",
-                "wgsl",
-            ],
+            &["error", "technique", "parallel", "fingerprint", "wgsl"],
+            &["input"],
             &["image_file", "options"],
             &["film", "scene"],
             &["world"],

@@ -338,7 +338,8 @@ fn a_file_is_a_scene() {
 
 #[test]
 fn damage_is_told() {
-    let cases: [(&str, &dyn Fn(&mut Value)); 11] = [
+    type Change<'a> = &'a dyn Fn(&mut Value);
+    let cases: [(&str, Change); 11] = [
         ("glTF of 1.0", &|j| j["asset"]["version"] = "1.0".into()),
         ("`KHR_none`", &|j| {
             j["extensionsRequired"] = json!(["KHR_none"])

@@ -126,7 +126,10 @@ fn messages_say_what_the_table_holds() {
     // A name that is under `obj` need not say so.
     let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
     let empty = said("obj = 'a.txt'", &[("a.txt", flat)], FORMATS);
-    assert!(empty.contains("no face of its OBJ or PLY files"), "{empty}");
+    assert!(
+        empty.contains("no face of its OBJ, PLY or glTF files"),
+        "{empty}"
+    );
     let unnamed = "[[geometry]]\nfile = 'a.obj'\n[materials.m]\nfile = 'm'\nparams.p = '$colour'\n";
     let unnamed = scene(unnamed, &[], BOTH).expect_err("no such value");
     let expected = "no value of an MTL file or a list of triangles";
