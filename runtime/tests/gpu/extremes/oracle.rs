@@ -32,7 +32,9 @@ const BODY: &str = "
 
 /// What the interpreter gives for a texture, and the stand-in below as well.
 const TEXTURE: &str =
-    "fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32> { return vec4<f32>(0.5); }\n";
+    "fn texture_fetch(slot: u32, uv: vec2<f32>) -> vec4<f32> { return vec4<f32>(0.5); }
+    fn texture_fetch_as(slot: u32, uv: vec2<f32>, mode: i32) -> vec4<f32> { return vec4<f32>(0.5); }
+    ";
 
 /// Point, direction of view and of light; every fourth question is about transmission, every
 /// other about directions near mirroring, where lobes are.
