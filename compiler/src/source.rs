@@ -12,6 +12,13 @@ pub const MAX_SOURCE_BYTES: usize = 1 << 20;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FileId(pub u32);
 
+impl FileId {
+    /// Is it a file of the standard library? Those come first, in every compilation.
+    pub fn is_library(self) -> bool {
+        (self.0 as usize) < impasto_stdlib::files().len()
+    }
+}
+
 /// A half-open byte range in one file.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Span {

@@ -1,9 +1,9 @@
 //! One topology, one shader: what instances of a material share, and what differs between them.
 
 use impasto_compiler::abi::{self, Emission};
-use impasto_compiler::ir::interp::Interpreter;
-use impasto_compiler::ir::value::Value;
 use impasto_compiler::{MaterialRequest, MemoryLoader, Parameters, Program, compile, diag};
+
+use crate::common::answered;
 
 const PAINT: &str = "
 use std::bsdf::{blinn_phong, diffuse, mirror};
@@ -57,39 +57,7 @@ fn paints(params: &[&str]) -> Program {
 
 /// What an instance answers at a few points: every number of its samples.
 fn answers(program: &Program, instance: usize) -> Vec<f64> {
-    let instance = &program.instances()[instance];
-    let evaluate = &program.compiled()[instance.info.material].evaluate;
-    let mut run = Interpreter::<f64>::new(program.ir(), 1 << 30).with_table(&instance.values);
-    let mut out = Vec::new();
-    for i in 0..20 {
-        let t = f64::from(i);
-        let up = || Value::vector(&[0.0, 0.0, 1.0]);
-        let point = Value::Struct(vec![
-            Value::vector(&[0.37 * t, 0.2, -0.1 * t]),
-            up(),
-            up(),
-            Value::vector(&[1.0, 0.0, 0.0]),
-            Value::vector(&[0.1 * t, 0.3]),
-            Value::float(1.0),
-        ]);
-        let wo = [0.6, 0.0, 0.8];
-        let wl = [-0.48, 0.36, 0.8];
-        let u = [0.05 * t, 0.3, 0.7, 0.1];
-        let args = vec![
-            point,
-            Value::vector(&wo),
-            Value::vector(&wl),
-            Value::vector(&u),
-        ];
-        let sample = run.run(evaluate, args).expect("ends");
-        for field in 0.. {
-            match sample.field(field) {
-                Some(value) => out.extend(value.to_f64()),
-                None => break,
-            }
-        }
-    }
-    out
+    answered::samples(program, instance).concat()
 }
 
 #[test]

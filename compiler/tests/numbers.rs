@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use impasto_compiler::ir::interp::Interpreter;
-use impasto_compiler::ir::value::Value;
 use impasto_compiler::lexer;
 use impasto_compiler::source::FileId;
 use impasto_compiler::{
     Loader, MaterialRequest, ParameterValue, Parameters, Program, compile, diag, with_values,
 };
+
+use crate::common::answered;
 
 const PAINT: &str = "
 use std::bsdf::{blinn_phong, diffuse, mirror};
@@ -70,37 +70,7 @@ const LIGHT: Range<usize> = 8..11;
 
 /// What a material answers at a few points: every number of its samples.
 fn answers(program: &Program) -> Vec<f64> {
-    samples(program).concat()
-}
-
-/// The samples of a material at a few points, a list of numbers each.
-fn samples(program: &Program) -> Vec<Vec<f64>> {
-    let values = &program.instances()[0].values;
-    let mut run = Interpreter::<f64>::new(program.ir(), 1 << 30).with_table(values);
-    let asked = (0..12).map(|i| {
-        let t = f64::from(i);
-        let up = || Value::vector(&[0.0, 0.0, 1.0]);
-        let point = Value::Struct(vec![
-            Value::vector(&[0.37 * t, 0.2, -0.1 * t]),
-            up(),
-            up(),
-            Value::vector(&[1.0, 0.0, 0.0]),
-            Value::vector(&[0.1 * t, 0.3]),
-            Value::float(1.0),
-        ]);
-        let args = vec![
-            point,
-            Value::vector(&[0.6, 0.0, 0.8]),
-            Value::vector(&[-0.48, 0.36, 0.8]),
-            Value::vector(&[0.05 * t, 0.3, 0.7, 0.1]),
-        ];
-        let sample = run
-            .run(&program.compiled()[0].evaluate, args)
-            .expect("ends");
-        let fields = (0..).map_while(|field| sample.field(field).map(Value::to_f64));
-        fields.flatten().collect::<Vec<f64>>()
-    });
-    asked.collect()
+    answered::samples(program, 0).concat()
 }
 
 #[track_caller]
@@ -199,7 +169,7 @@ fn numbers_of_all_materials_are_data() {
         let open = |text: &str| compiled(&name, text, Parameters::Open);
         // Directions are drawn otherwise where a lobe without weight is not known to be one.
         let scattered = |program: &Program| {
-            let all = samples(program).into_iter();
+            let all = answered::samples(program, 0).into_iter();
             all.flat_map(|one| one[LIGHT].to_vec())
                 .collect::<Vec<f64>>()
         };

@@ -10,7 +10,6 @@ use crate::ir::{
     Const, Expr, ExprId, ExprKind, Function, FunctionId, Local, Material, MaterialParam, Module,
     Type,
 };
-use crate::source::Span;
 
 /// Functions of authors that take so many floats of theirs and of what they call keep them.
 const MOST_ARGUMENTS: usize = 64;
@@ -51,7 +50,7 @@ fn called(module: &Module, body: &Function) -> BTreeSet<FunctionId> {
     while let Some(id) = pending.pop() {
         let f = &module.functions[id.index()];
         // The library calls nothing of theirs.
-        if is_written(f.span) && found.insert(id) {
+        if !f.span.file.is_library() && found.insert(id) {
             pending.extend(f.calls());
         }
     }
@@ -65,7 +64,7 @@ fn written_floats(f: &Function) -> impl Iterator<Item = usize> {
         _ => false,
     };
     let exprs = f.exprs.iter().enumerate();
-    exprs.filter_map(move |(at, e)| (is_float(e) && is_written(e.span)).then_some(at))
+    exprs.filter_map(move |(at, e)| (is_float(e) && !e.span.file.is_library()).then_some(at))
 }
 
 /// Functions with their copies, and the parameters of the material that these take as further arguments.
@@ -156,9 +155,4 @@ fn parameter(index: u32, default: Const, of: &Expr) -> MaterialParam {
         is_input: false,
         span: of.span,
     }
-}
-
-/// Did an author write it, and not the library?
-fn is_written(span: Span) -> bool {
-    span.file.0 as usize >= impasto_stdlib::files().len()
 }

@@ -72,7 +72,7 @@ impl Functions {
                 passes::run_callee_of_many
             };
             let walked = run(&self.module, &mut f);
-            if f.span.file.0 as usize >= impasto_stdlib::files().len() {
+            if !f.span.file.is_library() {
                 self.in_callees += walked;
             }
             self.effort += walked;

@@ -78,7 +78,7 @@ impl Measured<'_> {
 
     fn line(&self, (file, line): Line, sums: &Sums, evaluations: u64, all: u64) -> LineCost {
         // Files of the library have the first ids.
-        let library = (file.0 as usize) < impasto_stdlib::files().len();
+        let library = file.is_library();
         let file = self.program.sources().file(file);
         let mean = |n: u64| n as f64 / evaluations as f64;
         let classes = Classes::mean(&sums.own, evaluations);

@@ -1,5 +1,6 @@
 //! Compiling texts in tests.
 
+pub mod answered;
 pub mod asked;
 pub mod kept;
 pub mod listed;
