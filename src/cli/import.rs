@@ -39,14 +39,13 @@ struct Made {
 pub(super) fn run(args: &ImportArgs, global: &Global) -> Outcome {
     let mut made = Made::default();
     for file in &args.files {
-        let is = |extensions: &[&str]| {
-            let own = file.extension().unwrap_or_default();
-            extensions.iter().any(|e| own.eq_ignore_ascii_case(e))
-        };
         let folder = folder(args, file)?;
-        if is(&["gltf", "glb"]) {
+        if gltf::is_named_so(file) {
             made.take_gltf(file, &folder);
-        } else if is(&["mtlx"]) {
+        } else if file
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mtlx"))
+        {
             made.take_document(file, &folder, args);
         } else {
             let hint = "glTF (.gltf, .glb) and MaterialX (.mtlx) are; scenes take OBJ and PLY files as they are";

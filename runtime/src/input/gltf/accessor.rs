@@ -1,12 +1,14 @@
 //! Numbers out of buffers: typed, strided, normalised and sparse, and never behind an end.
 
+use std::borrow::Cow;
+
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::accessor::ComponentType;
 
 /// Reads the numbers of accessors.
-pub(crate) struct Buffers(pub(super) Vec<Vec<u8>>);
+pub(crate) struct Buffers<'m>(pub(super) Vec<Cow<'m, [u8]>>);
 
-impl Buffers {
+impl Buffers<'_> {
     /// The elements of an accessor of `N` floats, or of integers that stand for floats where they are normalised or
     /// `quantized`.
     ///

@@ -10,7 +10,9 @@
 //! | `meshes.gltf` | all meshes where nodes put them |
 //! | `images/N` | a picture, as it is encoded |
 
+use std::borrow::Cow;
 use std::io;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use gltf::json::validation::{Error as Invalid, Validate};
@@ -60,15 +62,17 @@ const KNOWN: &[&str] = &[
 /// A file that was read and whose indices are within what it has.
 pub(crate) struct Model {
     path: PathBuf,
+    /// The file as it is.
+    bytes: Vec<u8>,
     pub(crate) document: gltf::Document,
     /// The same as it is written, for extensions.
     json: Value,
-    /// The binary part of a `.glb`.
-    binary: Option<Vec<u8>>,
+    /// Where the binary part of a `.glb` is.
+    binary: Option<Range<usize>>,
 }
 
 /// Does the extension say that it is a glTF file?
-pub(super) fn is_named_so(path: &Path) -> bool {
+pub fn is_named_so(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str());
     extension.is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
 }
@@ -113,17 +117,11 @@ pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
         let source = model.source(&name).unwrap_or_default();
         files.push((format!("{name}.impasto").into(), source.into_bytes()));
     }
-    let wrong = |why: std::io::Error| {
-        let why = file::reason(&why);
-        SceneError::in_file(path, format!("the glTF file cannot be copied: {why}"))
-    };
-    let own = path.file_name().unwrap_or_default();
-    files.push((own.into(), file::read(path).map_err(wrong)?));
     for buffer in model.document.buffers() {
         if let gltf::buffer::Source::Uri(uri) = buffer.source()
             && !uri.starts_with("data:")
         {
-            let bytes = model.buffer(&buffer)?;
+            let bytes = model.buffer(&buffer)?.into_owned();
             files.push((pictures::decoded(uri).into(), bytes));
         }
     }
@@ -135,6 +133,8 @@ pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
         })?;
         files.push((format!("images/{number}").into(), picture));
     }
+    let own = path.file_name().unwrap_or_default();
+    files.push((own.into(), model.bytes));
     Ok(files)
 }
 
@@ -169,8 +169,9 @@ impl Model {
         let (text, binary) = if bytes.starts_with(b"glTF") {
             parts(&bytes).map_err(wrong)?
         } else {
-            (&bytes[..], None)
+            (0..bytes.len(), None)
         };
+        let text = &bytes[text];
         let damaged = |e: serde_json::Error| {
             let place = SceneError::in_file(path, format!("the glTF file is damaged: {e}"));
             if binary.is_none() && e.line() > 0 {
@@ -195,9 +196,9 @@ impl Model {
         }
         let root: gltf::json::Root = serde_json::from_slice(text).map_err(damaged)?;
         check(path, &root)?;
-        let binary = binary.map(<[u8]>::to_vec);
         Ok(Self {
             path: path.to_owned(),
+            bytes,
             document: gltf::Document::from_json_without_validation(root),
             json,
             binary,
@@ -208,23 +209,29 @@ impl Model {
     ///
     /// # Errors
     /// One is not there, or is cut off.
-    pub(crate) fn buffers(&self) -> Result<Buffers, SceneError> {
+    pub(crate) fn buffers(&self) -> Result<Buffers<'_>, SceneError> {
         let buffers = self.document.buffers();
         let buffers: Result<_, SceneError> = buffers.map(|buffer| self.buffer(&buffer)).collect();
         Ok(Buffers(buffers?))
     }
 
-    fn buffer(&self, buffer: &gltf::Buffer<'_>) -> Result<Vec<u8>, SceneError> {
+    fn buffer(&self, buffer: &gltf::Buffer<'_>) -> Result<Cow<'_, [u8]>, SceneError> {
         let number = buffer.index();
         let wrong = |message: String| SceneError::in_file(&self.path, message);
         let bytes = match buffer.source() {
-            gltf::buffer::Source::Bin => self.binary.clone().ok_or_else(|| {
-                wrong(format!(
-                    "buffer {number} is the binary part of a .glb, which is missing"
-                ))
-            })?,
-            gltf::buffer::Source::Uri(uri) => pictures::resource(&self.path, uri)
-                .map_err(|why| wrong(format!("buffer {number} cannot be read: {why}")))?,
+            gltf::buffer::Source::Bin => {
+                let part = self.binary.clone().ok_or_else(|| {
+                    wrong(format!(
+                        "buffer {number} is the binary part of a .glb, which is missing"
+                    ))
+                })?;
+                Cow::Borrowed(&self.bytes[part])
+            }
+            gltf::buffer::Source::Uri(uri) => {
+                let read = pictures::resource(&self.path, uri);
+                read.map_err(|why| wrong(format!("buffer {number} cannot be read: {why}")))?
+                    .into()
+            }
         };
         if bytes.len() < buffer.length() {
             let (has, says) = (bytes.len(), buffer.length());
@@ -245,8 +252,8 @@ impl Model {
     }
 }
 
-/// The JSON and the binary part of a `.glb`.
-fn parts(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
+/// Where the JSON and the binary part of a `.glb` are.
+fn parts(bytes: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), String> {
     let word = |at: usize| {
         let four = bytes.get(at..at + 4)?;
         Some(u32::from_le_bytes(four.try_into().ok()?) as usize)
@@ -270,7 +277,10 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     while at + 8 <= length {
         let size = word(at).ok_or_else(cut)?;
         let kind = &bytes[at + 4..at + 8];
-        let content = bytes.get(at + 8..at + 8 + size).ok_or_else(cut)?;
+        let content = at + 8..at + 8 + size;
+        if content.end > bytes.len() {
+            return Err(cut());
+        }
         match kind {
             b"JSON" if text.is_none() => text = Some(content),
             b"BIN\0" if binary.is_none() => binary = Some(content),

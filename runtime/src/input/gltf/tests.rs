@@ -1,3 +1,5 @@
+//! What glTF files give, and that no byte of them is trusted.
+
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec2, Vec3};

@@ -85,7 +85,7 @@ fn geometry(path: &Path, mesh: Option<usize>) -> Result<Geometry, SceneError> {
 /// Geometry that grows.
 struct Reading<'m> {
     path: &'m Path,
-    buffers: Buffers,
+    buffers: Buffers<'m>,
     /// Of materials, by their number.
     names: Vec<String>,
     /// Indices into [`Geometry::materials`].
