@@ -68,6 +68,14 @@ v -0.3 0.6 0.5\nv 0.3 0.6 0.5\nv 0 1 0.5
 usemtl bulb
 f 5 7 6\n";
 
+const TRIANGLE: &str = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+"meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+"accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [-1, -1, 0], "max": [1, 1, 0] }],
+"bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+"buffers": [{ "byteLength": 36, "uri":
+    "data:application/octet-stream;base64,AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAAAAAAAAgD8AAAAA" }] }"#;
+
 /// How long anything may take where other work goes on.
 const LONG: Duration = Duration::from_secs(90);
 
@@ -279,6 +287,54 @@ fn what_is_left_alone_has_the_bits_of_a_render() {
 }
 
 #[test]
+fn the_processor_stands_in_while_a_driver_compiles() {
+    // Drivers keep kernels on disk: none may have seen this code.
+    let source = include_str!("../materials/car_paint.impasto");
+    let since = std::time::UNIX_EPOCH.elapsed().expect("a clock");
+    let unseen = format!("seed: {}", since.as_micros() % 1_000_000_000);
+    let edited = source.replace("seed: 1", &unseen);
+    assert_ne!(edited, source);
+
+    let room = Room::new("paint.impasto", options(Choice::Gpu));
+    room.rested();
+    let pictures: Arc<Mutex<Vec<Arc<Picture>>>> = Arc::default();
+    let (seen, own): (_, Weak<Live>) = (pictures.clone(), Arc::downgrade(&room.live));
+    room.live.on_news(Box::new(move || {
+        if let Some(picture) = own.upgrade().and_then(|live| live.news().picture) {
+            seen.lock().expect("pictures").push(picture);
+        }
+    }));
+    room.write("paint.impasto", &edited);
+    let stands_in = |news: &News| news.picture.as_ref().is_some_and(|p| p.stands_in);
+    let news = room.wait("picture of the processor", stands_in);
+    assert!(news.problems.is_empty(), "{:?}", news.problems);
+    room.wait("picture of the device", |news| !stands_in(news));
+    room.rested();
+
+    // Both show the same, but for what rounding does to a few paths.
+    let pictures = pictures.lock().expect("pictures").clone();
+    let first = |stands_in: bool| {
+        let of = |p: &&Arc<Picture>| p.stands_in == stands_in && p.counts.iter().all(|c| *c == 1);
+        pictures.iter().find(of).expect("a picture of one sample")
+    };
+    let (processor, device) = (first(true), first(false));
+    assert!(processor.number < device.number);
+    let is_close = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let channels = a.iter().zip(b);
+        let mut off = channels.map(|(a, b)| (a - b).abs() / (a + b).max(1e-3));
+        off.all(|off| off < 1e-3)
+    };
+    let pairs = processor.pixels.iter().zip(device.pixels.iter());
+    let close = pairs.filter(|pair| is_close(*pair)).count();
+    assert!(close * 100 >= 95 * processor.pixels.len(), "{close}");
+    let turns = pictures.iter().skip_while(|p| !p.stands_in);
+    let after: Vec<bool> = turns.map(|p| p.stands_in).collect();
+    assert!(after.is_sorted_by(|a, b| a >= b), "{after:?}");
+    let expected = rendered(&room.at("paint.impasto"), Choice::Gpu, None, &[]);
+    check(&room.film(), &expected);
+}
+
+#[test]
 fn a_camera_and_a_value_compile_nothing() {
     let room = Room::new("scene.toml", options(Choice::Cpu));
     let first = room.rested();
@@ -463,6 +519,18 @@ fn values_are_written_back_between_comments() {
     room.picture_after(0);
     let refused = room.answer(Order::WriteBack);
     assert!(matches!(refused, Answer::Saved(Err(why)) if why.contains("hint")));
+    // Nor is a glTF file written into.
+    std::fs::write(room.at("model.gltf"), TRIANGLE).expect("written");
+    let live = Live::new(&room.at("model.gltf"), options(Choice::Cpu)).expect("threads");
+    let room = Room {
+        live: Arc::new(live),
+        ..room
+    };
+    room.picture_after(0);
+    let refused = room.answer(Order::WriteBack);
+    assert!(matches!(refused, Answer::Saved(Err(why)) if why.contains("`impasto import ")));
+    let kept = std::fs::read_to_string(room.at("model.gltf")).expect("the file");
+    assert_eq!(kept, TRIANGLE);
 }
 
 #[test]

@@ -93,18 +93,21 @@ pub(crate) fn run(args: &LiveArgs) -> Result {
     };
     let first = engine.until(|news| news.picture.is_some())?;
     let opened = begun.elapsed();
-    let device = engine
-        .until(|news| !news.kernels.device.is_empty())?
-        .kernels
-        .device
-        .clone();
+    let own = |p: &Picture| !p.stands_in;
+    let device = engine.until(|news| has(news, own) && !news.kernels.device.is_empty())?;
+    let of_device = begun.elapsed();
+    let device = &device.kernels.device;
     eprintln!(
         "{device}, {}x{}, {}",
         size[0],
         size[1],
         args.material.display()
     );
-    eprintln!("first picture after opening: {}", milliseconds(opened));
+    eprintln!(
+        "first picture after opening: {}, of the device {}",
+        milliseconds(opened),
+        milliseconds(of_device)
+    );
     let camera = first.project.camera.ok_or("the set has no camera")?;
     // Final kernels are there by then, as they are when somebody has looked for a while.
     engine.until(|news| news.state == State::Rendering)?;
@@ -245,7 +248,7 @@ impl Watched {
             return Err(format!("the source has no `{edited}`"));
         }
         let before = edited.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
-        let mut times = Vec::new();
+        let (mut times, mut of_device) = (Vec::new(), Vec::new());
         self.spent.take();
         for round in 0..rounds.div_ceil(2) {
             // The kernels of a long look are there by then.
@@ -255,14 +258,18 @@ impl Watched {
             let text = source.replace(edited, &format!("{before}{}", number(round)));
             let begun = Instant::now();
             write(file, &text)?;
-            self.until(|now| {
+            let news = self.until(|now| {
                 !Arc::ptr_eq(&now.project, &news.project)
                     && has(now, |p| p.number > shown && p.samples == 1)
             })?;
             times.push(begun.elapsed());
+            let shown = news.picture.as_ref().map_or(0, |picture| picture.number);
+            self.until(|now| has(now, |p| p.number > shown && !p.stands_in))?;
+            of_device.push(begun.elapsed());
         }
         let all = times.len().max(1) as u32;
         print(what, times);
+        print("  of the device", of_device);
         for (state, time) in self.spent.take() {
             eprintln!("  {state}: {} on average", milliseconds(time / all));
         }

@@ -45,6 +45,10 @@ pub(super) enum Code {
 pub(super) struct Built<'d> {
     pub renderer: Renderer<'d>,
     pub code: Code,
+    /// The job that it was made for.
+    pub job: u64,
+    /// Whether the processor stands in for the device.
+    pub stands_in: bool,
     pub origin: Origin,
     pub scene: Arc<Scene>,
     pub program: Arc<Program>,
@@ -69,20 +73,19 @@ pub(super) struct Built<'d> {
 const LISTS: usize = 8;
 
 /// What kernels are built of.
+#[derive(Clone)]
 pub(super) struct Ingredients {
     pub code: Code,
+    pub job: u64,
     pub origin: Origin,
     pub scene: Arc<Scene>,
     pub program: Arc<Program>,
     pub requests: Vec<MaterialRequest>,
     pub values: Values,
-    pub described: Described,
-    pub reasons: Vec<String>,
+    pub described: Arc<Described>,
     pub trees: Arc<Trees>,
     pub technique: Technique,
     pub outputs: Vec<String>,
-    /// Whether a GPU of its own renders.
-    pub is_fast: bool,
 }
 
 /// Whether something could be taken over.
@@ -99,19 +102,26 @@ pub(super) enum Applied {
 
 impl<'d> Built<'d> {
     /// What a maker made.
-    pub(super) fn new(mut renderer: Renderer<'d>, of: Ingredients) -> Self {
-        renderer.answer_within(if of.is_fast { ANSWER } else { SLOW_ANSWER });
+    pub(super) fn new(
+        mut renderer: Renderer<'d>,
+        of: Ingredients,
+        reasons: Vec<String>,
+        [is_fast, stands_in]: [bool; 2],
+    ) -> Self {
+        renderer.answer_within(if is_fast { ANSWER } else { SLOW_ANSWER });
         Self {
             renderer,
             code: of.code,
+            job: of.job,
+            stands_in,
             camera: of.scene.camera,
             origin: of.origin,
             scene: of.scene,
             program: of.program,
             requests: of.requests,
             values: of.values,
-            described: Arc::new(of.described),
-            reasons: of.reasons,
+            described: of.described,
+            reasons,
             trees: of.trees,
             technique: of.technique,
             outputs: of.outputs,
@@ -123,6 +133,11 @@ impl<'d> Built<'d> {
     /// Columns and rows of the picture.
     pub(super) fn size(&self) -> [u32; 2] {
         [self.scene.film.width, self.scene.film.height]
+    }
+
+    /// Does it show the picture that another of the same job shows?
+    pub(super) fn shows_what(&self, other: &Self) -> bool {
+        (self.job, self.camera) == (other.job, other.camera) && self.values == other.values
     }
 
     /// The camera that the scene has.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use impasto_runtime::film::{Film, exr, output};
+use impasto_runtime::input;
 use impasto_viewer::engine::{Answer, Order, Picked, Picture, Traced};
 
 use super::shared::{Shared, Shown};
@@ -144,7 +145,15 @@ fn write_back(shared: &Shared) -> Result<PathBuf, String> {
                 .into(),
         );
     }
-    let path = project.path.clone();
+    let path = input::scene(&project.path);
+    let file = input::on_disk(&path);
+    if file != path {
+        return Err(format!(
+            "values are written into scene files, and `{0}` is a glTF file\n  hint: `impasto import {0} --out FOLDER` \
+             makes a scene of it",
+            file.display()
+        ));
+    }
     let text = std::fs::read_to_string(&path).map_err(|error| {
         format!(
             "cannot read `{}`: {}",

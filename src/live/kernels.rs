@@ -11,12 +11,7 @@ use super::survey::Survey;
 use crate::plan::OnProcessor;
 
 /// The kernels that render, since a sitting began, with what was found beside the picture.
-pub(super) fn of(
-    device: &Device,
-    built: &Built<'_>,
-    sitting: &Sitting,
-    survey: Option<&Survey>,
-) -> Kernels {
+pub(super) fn of(built: &Built<'_>, sitting: &Sitting, survey: Option<&Survey>) -> Kernels {
     let survey = survey.filter(|survey| survey.origin == Some(built.origin));
     let explained = survey.and_then(|survey| survey.explained.as_ref());
     let explained = explained.filter(|(plan, _)| plan == built.renderer.plan());
@@ -29,7 +24,7 @@ pub(super) fn of(
         materials: report.materials,
     };
     Kernels {
-        device: device.info().name,
+        device: built.renderer.maker().device,
         strategy: built.renderer.strategy().to_owned(),
         kernels: reports.into_iter().map(kernel).collect(),
         reasons: match explained {

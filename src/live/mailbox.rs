@@ -118,6 +118,15 @@ impl<'d> Mailbox<'d> {
         }
     }
 
+    /// Hands over what is made on the way, while the job goes on.
+    pub(super) fn put_before(&self, made: Made<'d>) {
+        let mut inside = lock(&self.inside);
+        let code = made.job.code;
+        if !self.is_cancelled(code) {
+            inside.lanes[code as usize].made = Some(made);
+        }
+    }
+
     /// Is the job under way for nothing?
     pub(super) fn is_cancelled(&self, code: Code) -> bool {
         self.cancelled[code as usize].load(Ordering::SeqCst)

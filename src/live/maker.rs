@@ -2,10 +2,12 @@
 //!
 //! One makes open kernels, and another final ones: drivers do not give up what they compile, and nobody who edits is to
 //! wait for kernels of before the edit. What jobs have in common is kept: files that did not change, programs, trees
-//! over geometry; and the device keeps kernels.
+//! over geometry; and the device keeps kernels. While a driver takes its time, kernels of the processor are made to stand
+//! in.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -58,6 +60,8 @@ pub(super) struct Made<'d> {
 pub(super) enum Outcome<'d> {
     /// Kernels, and what there is to say of the files.
     Built(Box<Built<'d>>, Vec<Problem>),
+    /// The same of the processor, while the job goes on for the device.
+    StandsIn(Box<Built<'d>>, Vec<Problem>),
     /// Final code is what is open, since nothing is left in tables.
     Same,
     /// The files have errors.
@@ -90,9 +94,27 @@ impl From<RuntimeError> for Stop {
     }
 }
 
+/// Drivers that have made kernels before this time are waited for.
+const DRIVER: Duration = Duration::from_millis(40);
+/// The processor stands in for a GPU in scenes of at most so many triangles: it has a copy of them.
+const MOST_TRIANGLES: u64 = 4_000_000;
+/// Why the processor renders.
+const STANDS_IN: &str = "the processor stands in until the GPU's driver has made its kernels";
+
+/// What kernels are built of.
+struct Making<'j> {
+    job: &'j Job,
+    world: World,
+    plan: Plan,
+    of: Ingredients,
+    problems: Vec<Problem>,
+}
+
 /// Makes kernels of one kind.
 pub(super) struct Maker<'d, 's> {
     pub device: &'d Device,
+    /// The processor, where it may stand in for the device.
+    pub stand_in: Option<&'d Device>,
     pub shared: &'s Shared,
     pub mailbox: &'s Mailbox<'d>,
     pub path: &'s PathBuf,
@@ -160,7 +182,7 @@ impl<'d> Maker<'d, '_> {
                 let print = Some(built.renderer.fingerprint_but_camera());
                 std::mem::replace(&mut lock(self.kept).last_print, print) != print
             }
-            Outcome::Failed(_) => true,
+            Outcome::StandsIn(..) | Outcome::Failed(_) => true,
             Outcome::Same | Outcome::Wrong(_) => false,
         }
     }
@@ -200,59 +222,125 @@ impl<'d> Maker<'d, '_> {
         problems.extend(scene.warnings.iter().map(|w| problems::warning(w)));
         self.tell(is_shown, State::Building);
         let scene = Arc::new(scene);
-        let strategy = wanted.strategy.unwrap_or_else(|| self.device.strategy());
-        // What is final renders for long enough to be worth a plan of its own.
-        let is_renewed = job.code == Code::Final
-            && is_fast(self.device)
-            && strategy.requires() == Requires::Workload
-            && program.materials().len() <= plan::MOST_RENEWED;
-        let options = RenderOptions {
-            count_hits: is_renewed,
-            ..self.render_options(&scene, wanted, job.code)
-        };
         let instances = MaterialSource::instances(&*program);
-        let (technique, outputs) = (&options.technique, &options.outputs);
+        let (technique, outputs) = (&self.options.technique, &wanted.outputs);
         let trees = lock(self.kept).trees.clone();
         let world = World::of_instances(&scene, &program, &instances, technique, outputs, &trees)?;
         described.project.bounds = Some(world.parts.bounds.map(|corner| corner.to_array()));
         self.check_cancelled()?;
+        let strategy = wanted.strategy.unwrap_or_else(|| self.device.strategy());
         let plan = planned(strategy, &scene, &program);
         let plan = plan.map_err(|why| Stop::Wrong(vec![problems::of_order(why)]))?;
+        let of = Ingredients {
+            code: job.code,
+            job: job.number,
+            origin: Origin {
+                reading,
+                frame: wanted.frame,
+                size: [scene.film.width, scene.film.height],
+            },
+            scene,
+            program,
+            requests,
+            values,
+            described: Arc::new(described),
+            trees,
+            technique: self.options.technique,
+            outputs: wanted.outputs.clone(),
+        };
+        let made = Making {
+            job,
+            world,
+            plan,
+            of,
+            problems,
+        };
+        let built = self.build_soon(&made)?;
+        Ok((built, made.problems))
+    }
+
+    /// Has kernels built. Where the driver takes long for them, the processor stands in meanwhile.
+    fn build_soon(&self, made: &Making<'_>) -> Result<Built<'d>, RuntimeError> {
+        let is_small = made.world.parts.counts.triangles <= MOST_TRIANGLES;
+        let Some(processor) = self.stand_in.filter(|_| is_small) else {
+            return self.build(self.device, made, &|| false);
+        };
+        let is_there = AtomicBool::new(false);
+        let is_over = || is_there.load(Ordering::SeqCst);
+        let stand_in = || {
+            // A wake-up without a reason only lets it begin early.
+            std::thread::park_timeout(DRIVER);
+            // Where it cannot be built, one waits for the driver.
+            if !is_over()
+                && let Ok(built) = self.build(processor, made, &is_over)
+                && !is_over()
+            {
+                let outcome = Outcome::StandsIn(Box::new(built), made.problems.clone());
+                self.mailbox.put_before(Made {
+                    job: made.job.clone(),
+                    outcome,
+                    is_other: true,
+                });
+                self.shared.ring();
+            }
+        };
+        std::thread::scope(|scope| {
+            let builder = std::thread::Builder::new()
+                .name("stand in".into())
+                .stack_size(super::STACK_BYTES);
+            let waiting = builder.spawn_scoped(scope, stand_in);
+            let built = self.build(self.device, made, &|| false);
+            is_there.store(true, Ordering::SeqCst);
+            // Without a thread nobody stands in.
+            if let Ok(waiting) = waiting {
+                waiting.thread().unpark();
+            }
+            built
+        })
+    }
+
+    /// Builds kernels on a device, until it is over.
+    fn build(
+        &self,
+        device: &'d Device,
+        made: &Making<'_>,
+        is_over: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Built<'d>, RuntimeError> {
+        let (of, plan, wanted) = (&made.of, &made.plan, &made.job.wanted);
+        let strategy = wanted.strategy.unwrap_or_else(|| device.strategy());
+        // What is final renders for long enough to be worth a plan of its own.
+        let is_renewed = of.code == Code::Final
+            && is_fast(device)
+            && strategy.requires() == Requires::Workload
+            && of.program.materials().len() <= plan::MOST_RENEWED;
+        let options = RenderOptions {
+            count_hits: is_renewed,
+            ..self.render_options(device, &of.scene, wanted)
+        };
         let watch = |_, _| {
-            if self.mailbox.is_cancelled(self.code) {
+            if self.mailbox.is_cancelled(self.code) || is_over() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
             }
         };
+        let (world, program) = (&made.world, &of.program);
         let mut renderer =
-            Renderer::from_world_beside(self.device, &world, &*program, &plan, &options, &watch)?;
+            Renderer::from_world_beside(device, world, &**program, plan, &options, &watch)?;
         if is_renewed {
-            self.renew(&mut renderer, strategy, &scene, &program);
+            self.renew(&mut renderer, strategy, &of.scene, program);
         }
-        let reasons = kernels::reasons(&plan, renderer.plan(), &program, self.device);
-        let built = Built::new(
-            renderer.named(&scene.name),
-            Ingredients {
-                code: job.code,
-                origin: Origin {
-                    reading,
-                    frame: wanted.frame,
-                    size: [scene.film.width, scene.film.height],
-                },
-                scene,
-                program,
-                requests,
-                values,
-                described,
-                reasons,
-                trees,
-                technique: options.technique,
-                outputs: options.outputs,
-                is_fast: is_fast(self.device),
-            },
-        );
-        Ok((built, problems))
+        let stands_in = !std::ptr::eq(device, self.device);
+        let mut reasons = kernels::reasons(plan, renderer.plan(), program, device);
+        if stands_in {
+            reasons.insert(0, STANDS_IN.into());
+        }
+        Ok(Built::new(
+            renderer.named(&of.scene.name),
+            of.clone(),
+            reasons,
+            [is_fast(device), stands_in],
+        ))
     }
 
     fn check_cancelled(&self) -> Result<(), Stop> {
@@ -366,12 +454,12 @@ impl<'d> Maker<'d, '_> {
         });
     }
 
-    fn render_options(&self, scene: &Scene, wanted: &Wanted, code: Code) -> RenderOptions {
+    fn render_options(&self, device: &Device, scene: &Scene, wanted: &Wanted) -> RenderOptions {
         let size = [scene.film.width, scene.film.height];
         RenderOptions {
             samples: wanted.most_samples(),
             seed: self.options.seed,
-            pool: self.options.pool.or_else(|| pool(self.device, code, size)),
+            pool: self.options.pool.or_else(|| pool(device, self.code, size)),
             technique: self.options.technique,
             outputs: wanted.outputs.clone(),
             // All of them, so that others can be chosen.

@@ -12,6 +12,8 @@
 //! | `errands` (`clerk`) | picks, replays paths, reads and writes files |
 //! | `survey` | finds what is said beside the picture once the hand rests: costs, reasons, what pixels see |
 //!
+//! While a GPU's driver makes kernels for other code, the processor renders the first picture.
+//!
 //! Cameras and values of parameters are data: an order that changes them begins the picture again and compiles
 //! nothing. The first picture after an order is coarse where all pixels would take long. What is left alone ends with
 //! the bits of `impasto render` (`session` says how). An error leaves the last good picture.

@@ -187,6 +187,8 @@ pub struct Picture {
     pub nonfinite: u64,
     /// Pixels of the picture that lost such a sample, as indices of `pixels`, as far as that is known.
     pub nonfinite_pixels: Arc<Vec<u32>>,
+    /// Whether the processor rendered it, until the kernels of the GPU are there.
+    pub stands_in: bool,
 }
 
 /// What is recorded beside the picture, or comes of it.

@@ -668,6 +668,7 @@ impl Inner {
             layers,
             nonfinite: 0,
             nonfinite_pixels: Arc::new(Vec::new()),
+            stands_in: false,
         }));
         if self.news.problems.is_empty() {
             self.news.state = match (self.is_paused, self.taken >= self.samples) {

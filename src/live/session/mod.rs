@@ -5,7 +5,11 @@
 //! the render, which are those of `impasto render`. They begin the picture again, without anybody noticing: the
 //! picture by open kernels stays until theirs has as many samples. So what is left alone has in the end the bits of
 //! `impasto render`, and no picture gets worse on the way.
+//!
+//! Drivers of GPUs take longer for new code than the processor does. While one makes open kernels, those of the
+//! processor stand in for them: they show the first picture, which the GPU then goes on from in the same way.
 
+mod sets;
 mod tell;
 
 use std::cell::Cell;
@@ -14,13 +18,13 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use impasto_runtime::device::Device;
+use impasto_runtime::device::{Choice, Device, DeviceOptions};
 use impasto_runtime::error::RuntimeError;
 use impasto_viewer::engine::{Picture, Problem};
 
 use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
-use super::course::{Asked, Course, Speed, Step, is_done};
+use super::course::{Asked, Course, Step, is_done};
 use super::mailbox::Mailbox;
 use super::maker::{self, Job, Maker, Outcome};
 use super::pixels::Pixels;
@@ -28,6 +32,7 @@ use super::problems;
 use super::shared::Shared;
 use super::survey::Survey;
 use super::wanted::Wanted;
+use sets::{Sets, Turn};
 
 /// A hand has rested when it has done nothing for so long; where the processor renders, making kernels takes its time,
 /// and the hand may soon move again.
@@ -50,6 +55,15 @@ pub(super) enum End {
 
 /// Renders until the end.
 pub(super) fn run(device: &Device, shared: &Shared, path: &PathBuf, options: &LiveOptions) -> End {
+    // Where the processor cannot render, one waits for the driver.
+    let processor = match device {
+        Device::Gpu(_) => Device::open(&DeviceOptions {
+            choice: Choice::Cpu,
+            ..options.device.clone()
+        })
+        .ok(),
+        Device::Cpu(_) => None,
+    };
     let (mailbox, kept) = (Mailbox::default(), Mutex::default());
     std::thread::scope(|scope| {
         for (code, name) in [(Code::Open, "make"), (Code::Final, "make final")] {
@@ -58,6 +72,7 @@ pub(super) fn run(device: &Device, shared: &Shared, path: &PathBuf, options: &Li
                 .stack_size(super::STACK_BYTES);
             let maker = Maker {
                 device,
+                stand_in: processor.as_ref().filter(|_| code == Code::Open),
                 shared,
                 mailbox: &mailbox,
                 path,
@@ -88,10 +103,7 @@ struct Session<'d, 's> {
     /// What is followed, and the number of the order that it came to be by.
     following: Wanted,
     pictures: u64,
-    open: Option<Built<'d>>,
-    last: Option<Built<'d>>,
-    /// Whether the final kernels render.
-    on_last: bool,
+    sets: Sets<'d>,
     /// Whether the open kernels are as good as final ones.
     open_is_final: bool,
     /// Counts jobs.
@@ -104,7 +116,6 @@ struct Session<'d, 's> {
     course: Option<Course>,
     /// Samples of the last picture that was handed out of what is shown now.
     handed: u32,
-    speed: Speed,
     /// Whether a GPU of its own renders.
     is_fast: bool,
     /// What is wrong with the files, and with values.
@@ -136,9 +147,7 @@ impl<'d, 's> Session<'d, 's> {
             options,
             following,
             pictures,
-            open: None,
-            last: None,
-            on_last: false,
+            sets: Sets::new(is_fast),
             open_is_final: false,
             jobs: 0,
             asked_at: Instant::now(),
@@ -146,7 +155,6 @@ impl<'d, 's> Session<'d, 's> {
             opened: Instant::now(),
             course: None,
             handed: 0,
-            speed: Speed::assumed(is_fast),
             is_fast,
             of_files: Vec::new(),
             of_values: Vec::new(),
@@ -201,15 +209,6 @@ impl<'d, 's> Session<'d, 's> {
         Ok(true)
     }
 
-    /// The kernels that render.
-    fn active(&mut self) -> Option<&mut Built<'d>> {
-        if self.on_last {
-            self.last.as_mut()
-        } else {
-            self.open.as_mut()
-        }
-    }
-
     /// Has kernels made for what is followed now.
     fn make(&mut self, code: Code) {
         self.jobs += 1;
@@ -254,13 +253,13 @@ impl<'d, 's> Session<'d, 's> {
     fn apply(&mut self) -> Result<(), RuntimeError> {
         let values = self.following.values.clone();
         let camera = self.following.camera;
-        if let (true, Some(last)) = (self.on_last, &self.last)
+        if let (Turn::Final, Some(last)) = (self.sets.turn, &self.sets.last)
             && settable(&values, &last.described) != last.values
         {
-            self.on_last = false;
+            self.sets.turn = Turn::Open;
             self.change();
         }
-        let Some(built) = self.active() else {
+        let Some(built) = self.sets.active_mut() else {
             return Ok(());
         };
         let applied = [built.set(&values)?, built.look(camera)];
@@ -274,7 +273,7 @@ impl<'d, 's> Session<'d, 's> {
         };
         if is_changed {
             self.change();
-            self.open_is_final &= self.on_last;
+            self.open_is_final &= self.sets.turn == Turn::Final;
         }
         if is_changed || was_wrong || !self.of_values.is_empty() {
             self.tell_project();
@@ -296,6 +295,11 @@ impl<'d, 's> Session<'d, 's> {
                 self.of_files = vec![problems::of_render(&error)];
             }
             (Code::Open, Outcome::Wrong(problems)) => self.of_files = problems,
+            (_, Outcome::StandsIn(built, problems)) => {
+                self.of_files = problems;
+                self.failed = None;
+                self.take_stand_in(*built)?;
+            }
             (Code::Open, Outcome::Built(built, problems)) => {
                 self.of_files = problems;
                 self.failed = None;
@@ -345,29 +349,49 @@ impl<'d, 's> Session<'d, 's> {
             .amend(|wanted| wanted.values.retain(|id, value| !is_same(id, value)));
     }
 
+    /// Goes on by kernels of the processor until those of the device are there.
+    fn take_stand_in(&mut self, mut built: Built<'d>) -> Result<(), RuntimeError> {
+        let wanted = (self.following.values.clone(), self.following.camera);
+        let applied = [built.set(&wanted.0)?, built.look(wanted.1)];
+        if applied.iter().all(|a| !matches!(a, Applied::OtherKernels)) {
+            self.sets.stand_in = Some(built);
+            self.sets.turn = Turn::StandIn;
+            self.change();
+        }
+        Ok(())
+    }
+
     /// Takes open kernels over, unless they show what is shown anyway.
     fn take_open(&mut self, mut built: Built<'d>) -> Result<(), RuntimeError> {
         let wanted = (self.following.values.clone(), self.following.camera);
         let applied = [built.set(&wanted.0)?, built.look(wanted.1)];
         let other = applied.iter().any(|a| matches!(a, Applied::OtherKernels));
-        let is_same = self.open.as_ref().is_some_and(|old| {
-            let same_camera = old.camera == built.camera || self.on_last;
+        let stood_in = self.sets.stand_in.take();
+        let sets = &mut self.sets;
+        let is_same = sets.open.as_ref().is_some_and(|old| {
+            let same_camera = old.camera == built.camera || sets.turn == Turn::Final;
             same_camera
+                && sets.turn != Turn::StandIn
                 && old.size() == built.size()
                 && old.renderer.fingerprint_but_camera() == built.renderer.fingerprint_but_camera()
         });
-        if is_same && let Some(old) = &mut self.open {
+        if is_same && let Some(old) = &mut sets.open {
             // The samples stay; what is said of them may be new.
             old.described = built.described;
             old.scene = built.scene;
-            if let Some(last) = &mut self.last {
+            if let Some(last) = &mut sets.last {
                 last.described = old.described.clone();
             }
         } else {
-            self.open = Some(built);
-            self.last = None;
-            self.on_last = false;
-            self.change();
+            let is_as_shown = stood_in.is_some_and(|shown| shown.shows_what(&built));
+            sets.open = Some(built);
+            sets.last = None;
+            sets.turn = Turn::Open;
+            if is_as_shown {
+                self.begin();
+            } else {
+                self.change();
+            }
         }
         self.open_is_final = false;
         if other {
@@ -393,16 +417,17 @@ impl<'d, 's> Session<'d, 's> {
             return Ok(());
         }
         self.of_files = problems;
-        self.last = Some(built);
-        self.on_last = true;
+        self.sets.last = Some(built);
+        self.sets.turn = Turn::Final;
         self.begin();
         Ok(())
     }
 
     /// Has final kernels made once the hand rests.
     fn finish(&mut self) {
-        let has_open = self.open.is_some() && self.failed.is_none();
-        let is_due = has_open && !self.on_last && !self.open_is_final && !self.following.paused;
+        let has_open = self.sets.open.is_some() && self.failed.is_none();
+        let is_turn = self.sets.turn == Turn::Open && !self.open_is_final;
+        let is_due = has_open && is_turn && !self.following.paused;
         let rested = if self.is_fast { RESTED } else { RESTED_LONG };
         let rests =
             !self.following.dragged && self.following.moved.max(self.opened).elapsed() >= rested;
@@ -413,14 +438,14 @@ impl<'d, 's> Session<'d, 's> {
         if is_due && rests && has_picture && self.mailbox.at_work().is_none() {
             // Perhaps those of before are.
             let values = self.following.values.clone();
-            if let Some(last) = &mut self.last
+            if let Some(last) = &mut self.sets.last
                 && settable(&values, &last.described) == last.values
                 && matches!(
                     last.look(self.following.camera),
                     Applied::Same | Applied::Changed
                 )
             {
-                self.on_last = true;
+                self.sets.turn = Turn::Final;
                 self.begin();
                 return;
             }
@@ -438,7 +463,7 @@ impl<'d, 's> Session<'d, 's> {
     /// but for its last bits.
     fn begin(&mut self) {
         let silent_below = self.handed.min(self.following.most_samples());
-        if let Some(built) = self.active() {
+        if let Some(built) = self.sets.active_mut() {
             let sitting = built.renderer.sit();
             let before = self.course.take();
             self.course = Some(Course::new(sitting, silent_below, before.as_ref()));
@@ -456,30 +481,38 @@ impl<'d, 's> Session<'d, 's> {
 
     /// Whether a picture rests that is about to be replaced: it would take the time of what is to replace it.
     fn holds(&self) -> bool {
-        let is_soon = self.asked_at.elapsed() < HELD;
+        let is_soon = self.asked_at.elapsed() < self.held();
         is_soon && self.handed > 0 && self.mailbox.at_work() == Some(Code::Open)
+    }
+
+    /// How long it rests at most. A driver of a GPU in software needs the processor that stands in.
+    fn held(&self) -> Duration {
+        if self.sets.turn == Turn::StandIn && !self.is_fast {
+            Duration::MAX
+        } else {
+            HELD
+        }
     }
 
     /// Takes a portion of samples, and hands out a picture of them. `false` if there is nothing to do.
     fn portion(&mut self) -> Result<bool, RuntimeError> {
-        let has_kernels = if self.on_last { &self.last } else { &self.open };
         let waits = self.following.paused || self.failed.is_some() || self.holds();
-        if has_kernels.is_none() || waits {
+        if self.sets.active().is_none() || waits {
             return Ok(false);
         }
         if self.course.is_none() {
             self.begin();
         }
-        let built = if self.on_last { &self.last } else { &self.open };
-        let (Some(built), Some(course)) = (built, &self.course) else {
+        let (Some(built), Some(course)) = (self.sets.active(), &self.course) else {
             return Ok(false);
         };
         let asked = self.asked(built);
-        let Some(step) = course.next(&asked, &self.speed) else {
+        let Some(step) = course.next(&asked, self.sets.speed()) else {
             return Ok(false);
         };
         if !self.take(&step, &asked)? {
-            self.course = None;
+            // What is known of the error stays, should it be the same picture by other kernels.
+            self.begin();
             return Ok(true);
         }
         let Some(course) = &mut self.course else {
@@ -489,7 +522,7 @@ impl<'d, 's> Session<'d, 's> {
         if has_picture || course.needs_look(&asked) {
             let begun = Instant::now();
             self.look(&step, &asked, has_picture)?;
-            self.speed.handed_out(begun.elapsed());
+            self.sets.speed_mut().handed_out(begun.elapsed());
         }
         let is_done = self
             .course
@@ -505,11 +538,8 @@ impl<'d, 's> Session<'d, 's> {
     /// not given up for the next order: a hand that moves all the time would see none.
     fn take(&mut self, step: &Step, asked: &Asked) -> Result<bool, RuntimeError> {
         let (shared, mailbox, pictures) = (self.shared, self.mailbox, self.pictures);
-        let (built, course) = match (self.on_last, &mut self.last, &mut self.open) {
-            (true, Some(built), _) | (false, _, Some(built)) => (built, &mut self.course),
-            _ => return Ok(false),
-        };
-        let Some(course) = course else {
+        let held_for = self.held();
+        let (Some(built), Some(course)) = (self.sets.active_mut(), &mut self.course) else {
             return Ok(false);
         };
         let is_first = course.pictures == 0 && course.silent_below == 0;
@@ -543,7 +573,7 @@ impl<'d, 's> Session<'d, 's> {
         };
         let has_shown = self.handed > 0;
         let holds = || {
-            let is_soon = asked_at.get().elapsed() < HELD;
+            let is_soon = asked_at.get().elapsed() < held_for;
             is_soon && has_shown && mailbox.at_work() == Some(Code::Open)
         };
         let mut held = Duration::ZERO;
@@ -567,8 +597,8 @@ impl<'d, 's> Session<'d, 's> {
             .take_portion(&mut course.sitting, &step.portion, &mut look)?;
         if taken {
             let paths = pixels * u64::from(step.portion.count);
-            self.speed
-                .took(step, paths, begun.elapsed().saturating_sub(held));
+            let time = begun.elapsed().saturating_sub(held);
+            self.sets.speed_mut().took(step, paths, time);
         }
         if reads.get() != self.following.reads {
             self.following.reads = reads.get();

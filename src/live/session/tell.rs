@@ -13,6 +13,7 @@ use super::super::course::{Asked, Course, Step, is_done};
 use super::super::shared::Shown;
 use super::super::survey::{self, Planned, Survey};
 use super::super::{kernels, picture, problems, project};
+use super::sets::Turn;
 use super::{KERNELS_EVERY, Session};
 
 impl Session<'_, '_> {
@@ -23,8 +24,7 @@ impl Session<'_, '_> {
         asked: &Asked,
         has_picture: bool,
     ) -> Result<(), RuntimeError> {
-        let built = if self.on_last { &self.last } else { &self.open };
-        let (Some(built), Some(course)) = (built, &mut self.course) else {
+        let (Some(built), Some(course)) = (self.sets.active(), &mut self.course) else {
             return Ok(());
         };
         let sums = built.renderer.sums_of(&course.sitting)?;
@@ -58,11 +58,10 @@ impl Session<'_, '_> {
             origin: built.origin,
             planned: planned(self.device, built, course),
         });
-        let due = self
-            .told_kernels
-            .is_none_or(|told| told.elapsed() >= KERNELS_EVERY);
+        let is_late = |told: Instant| told.elapsed() >= KERNELS_EVERY;
+        let due = course.pictures == 1 || self.told_kernels.is_none_or(is_late);
         let survey = self.survey.as_deref();
-        let kernels = || Arc::new(kernels::of(self.device, built, &course.sitting, survey));
+        let kernels = || Arc::new(kernels::of(built, &course.sitting, survey));
         let kernels = due.then(kernels);
         if due {
             self.told_kernels = Some(Instant::now());
@@ -85,12 +84,12 @@ impl Session<'_, '_> {
 
     /// Hands the last picture out again, with what was found beside it since.
     pub(super) fn show_again(&mut self) {
-        let built = if self.on_last { &self.last } else { &self.open };
+        let built = self.sets.active();
         let (Some(built), Some(course), Some(shown)) = (built, &self.course, &self.shown) else {
             return;
         };
         let survey = self.survey.as_deref();
-        let kernels = kernels::of(self.device, built, &course.sitting, survey);
+        let kernels = kernels::of(built, &course.sitting, survey);
         self.shared.tell(|news| {
             if *news.kernels != kernels {
                 news.kernels = Arc::new(kernels);
@@ -114,8 +113,7 @@ impl Session<'_, '_> {
 
     /// Says what is shown, with its values, and what is wrong.
     pub(super) fn tell_project(&mut self) {
-        let built = if self.on_last { &self.last } else { &self.open };
-        let project = built.as_ref().map(|built| {
+        let project = self.sets.active().map(|built| {
             let values = &built.values;
             Arc::new(project::with_values(
                 &built.described.project,
@@ -146,13 +144,12 @@ impl Session<'_, '_> {
             // The maker says what it is at.
             return;
         }
-        let built = if self.on_last { &self.last } else { &self.open };
-        let is_done = match (built, &self.course) {
+        let is_done = match (self.sets.active(), &self.course) {
             (Some(built), Some(course)) => is_done(course, &self.asked(built)),
             _ => false,
         };
         // What open kernels have done is done again by final ones.
-        let is_done = is_done && (self.on_last || self.open_is_final);
+        let is_done = is_done && (self.sets.turn == Turn::Final || self.open_is_final);
         let state = if let Some(why) = &self.failed {
             State::Failed(why.clone())
         } else if problems::has_errors(&self.of_files) {
@@ -199,6 +196,7 @@ fn picture(
         layers: picture::layers(sums),
         nonfinite,
         nonfinite_pixels: Arc::new(places),
+        stands_in: built.stands_in,
     }
 }
 

@@ -59,6 +59,10 @@ fn state(desk: &Desk) -> (String, Color32) {
     match &desk.news.state {
         State::Reading => ("Reading".to_owned(), theme::WARNING),
         State::Compiling => ("Compiling".to_owned(), theme::WARNING),
+        State::Building if desk.picture().is_some_and(|picture| picture.stands_in) => (
+            "Building kernels; the processor stands in".to_owned(),
+            theme::WARNING,
+        ),
         State::Building => ("Building kernels".to_owned(), theme::WARNING),
         State::Rendering => ("Rendering".to_owned(), theme::ACCENT),
         State::Done => ("Done".to_owned(), theme::GOOD),
