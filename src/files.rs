@@ -51,7 +51,7 @@ impl FileLoader {
         if path == STDIN {
             read_source(io::stdin().lock())
         } else {
-            read_source(input::open(&self.base.join(path))?)
+            input::source(&self.base.join(path), MAX_SOURCE_BYTES)
         }
     }
 }

@@ -28,6 +28,28 @@ pub struct Imported {
     pub assignments: Vec<Assignment>,
 }
 
+impl Imported {
+    /// The source for whoever reads it where the document at `path` is: it names pictures where they are. What was left
+    /// out is said in comments.
+    pub fn in_place(&self, path: &str) -> String {
+        let folder = path.rfind(['/', '\\']).map_or("", |end| &path[..=end]);
+        let mut text: String = self.files.iter().map(|(_, text)| text.as_str()).collect();
+        // By marks that no path has: one picture may lie where the copy of another would be.
+        let mark = |index: usize| format!("\"\0{index}\"");
+        for (index, texture) in self.textures.iter().enumerate() {
+            text = text.replace(&format!("\"{}\"", texture.written), &mark(index));
+        }
+        for (index, texture) in self.textures.iter().enumerate() {
+            let found = texture.found.strip_prefix(folder).unwrap_or(&texture.found);
+            text = text.replace(&mark(index), &format!("{found:?}"));
+        }
+        for warning in &self.warnings {
+            text.push_str(&format!("// {}\n", warning.to_string().replace('\n', " ")));
+        }
+        text
+    }
+}
+
 /// A picture that a source names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Texture {

@@ -266,7 +266,7 @@ impl Loader for Overlay {
         if let Some(text) = self.texts.get(&path) {
             return Ok(text.as_bytes().to_vec());
         }
-        read(Path::new(&path)).map_err(|error| input::reason(&error))
+        input::source(Path::new(&path), MAX_SOURCE_BYTES).map_err(|error| input::reason(&error))
     }
 
     fn beside(&mut self, path: &str) -> Vec<String> {
@@ -296,19 +296,9 @@ pub fn names(folder: &Path, extension: &str) -> Vec<String> {
     names
 }
 
-/// At most one byte more than a source may have.
-fn read(path: &Path) -> std::io::Result<Vec<u8>> {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    let file = input::open(path)?;
-    file.take(MAX_SOURCE_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
 /// The text of a file on the disk, if it is one and is text.
 pub fn text_at(path: &str) -> Option<String> {
-    String::from_utf8(read(Path::new(path)).ok()?).ok()
+    String::from_utf8(input::source(Path::new(path), MAX_SOURCE_BYTES).ok()?).ok()
 }
 
 /// What the compiler calls the file of a URI.

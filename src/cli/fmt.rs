@@ -12,6 +12,7 @@ use impasto::compiler::format::{self, Unformatted};
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{Loader, lexer};
 use impasto::files::{self, STDIN};
+use impasto::runtime::input::mtlx;
 use serde_json::{Value, json};
 use similar::TextDiff;
 
@@ -76,6 +77,12 @@ pub(super) fn run(args: &FmtArgs, global: &Global) -> Outcome {
 
 /// Formats one file.
 fn one(name: &str, args: &FmtArgs, global: &Global, done: &mut Done) -> Result<(), String> {
+    if mtlx::is_document(Path::new(name)) {
+        let hint = "`impasto import` makes a source of it";
+        return Err(format!(
+            "`{name}` is a MaterialX document, not a source\n  hint: {hint}"
+        ));
+    }
     let bytes = FileLoader::new("").load(name);
     let bytes = bytes.map_err(|why| format!("cannot read `{name}`: {why}"))?;
     let mut sources = SourceMap::default();

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 use impasto::files::{reason, write_whole};
+use impasto::runtime::input::mtlx::{self, Disk};
 use impasto::runtime::input::{self, gltf};
-use impasto_import::{Files, Imported, Options, Texture};
+use impasto_import::{Imported, Options, Texture};
 use serde_json::json;
 
 use super::{Failure, Global, Outcome, print, say};
@@ -42,10 +43,7 @@ pub(super) fn run(args: &ImportArgs, global: &Global) -> Outcome {
         let folder = folder(args, file)?;
         if gltf::is_named_so(file) {
             made.take_gltf(file, &folder);
-        } else if file
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("mtlx"))
-        {
+        } else if mtlx::is_document(file) {
             made.take_document(file, &folder, args);
         } else {
             let hint = "glTF (.gltf, .glb) and MaterialX (.mtlx) are; scenes take OBJ and PLY files as they are";
@@ -236,22 +234,4 @@ fn tiles_of(texture: &Texture) -> Vec<(PathBuf, PathBuf)> {
     tiles
         .map(|name| (folder.join(&name), into.join(&name)))
         .collect()
-}
-
-/// Files of the disk.
-struct Disk;
-
-impl Files for Disk {
-    fn read(&mut self, path: &str, most: usize) -> Result<Vec<u8>, String> {
-        use std::io::Read;
-        let file = input::open(Path::new(path)).map_err(|e| reason(&e))?;
-        let mut bytes = Vec::new();
-        let read = file.take(most as u64 + 1).read_to_end(&mut bytes);
-        read.map_err(|e| reason(&e))?;
-        Ok(bytes)
-    }
-
-    fn exists(&mut self, path: &str) -> bool {
-        Path::new(path).is_file()
-    }
 }

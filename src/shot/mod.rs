@@ -10,7 +10,7 @@ use impasto_compiler::partition::Plan;
 use impasto_compiler::{MaterialRequest, Parameters, Program};
 use impasto_runtime::device::Device;
 use impasto_runtime::error::{RuntimeError, SceneError};
-use impasto_runtime::input;
+use impasto_runtime::input::{self, mtlx};
 use impasto_runtime::multi::MultiRenderer;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::NOBODY;
@@ -36,10 +36,11 @@ pub enum Subject {
     Set(Box<OpenSet>),
 }
 
-/// Is this the name of a material file or of a module of the library, and not that of a scene?
+/// Is this the name of a material file, a MaterialX document or a module of the library, and not that of a scene?
 pub fn is_material(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("impasto") || is_library(&path.to_string_lossy())
+    let is_source = extension.eq_ignore_ascii_case("impasto") || mtlx::is_document(path);
+    is_source || is_library(&path.to_string_lossy())
 }
 
 pub(crate) fn is_library(file: &str) -> bool {

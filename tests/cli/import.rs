@@ -186,10 +186,7 @@ fn documents_of_materialx_become_sources() {
         "--size", "32x24", "--spp", "2", "--device", "cpu", "--out", &picture,
     ];
     impasto(&[&["render", &source], &args[..]].concat()).exits(0);
-    let wrong = DOCUMENT
-        .replace("<image", "<hextiledtriplanar")
-        .replace("</image>", "</hextiledtriplanar>");
-    std::fs::write(&file, wrong).expect("a document");
+    std::fs::write(&file, without_counterpart()).expect("a document");
     let run = impasto(&["import", &path, "--out", &out_text, "--format", "json"]).exits(1);
     let errors = &run.json()["errors"];
     assert!(
@@ -198,4 +195,66 @@ fn documents_of_materialx_become_sources() {
             .is_some_and(|e| e.contains("clay.mtlx:3:")),
         "{errors}"
     );
+}
+
+/// The document with a node that has no counterpart, in its third line.
+fn without_counterpart() -> String {
+    DOCUMENT
+        .replace("<image", "<hextiledtriplanar")
+        .replace("</image>", "</hextiledtriplanar>")
+}
+
+#[test]
+fn documents_are_sources_where_they_are() {
+    let temporary = folder();
+    let art = temporary.path().join("art");
+    std::fs::create_dir(&art).expect("a folder");
+    let file = art.join("clay.mtlx");
+    std::fs::write(&file, DOCUMENT).expect("a document");
+    let texels =
+        image::RgbImage::from_fn(2, 2, |x, y| image::Rgb([200, 80 * x as u8, 90 * y as u8]));
+    texels.save(art.join("map.png")).expect("a picture");
+    let path = file.display().to_string();
+    impasto(&["check", &path])
+        .exits(0)
+        .says("0 errors, 0 warnings");
+
+    // As it is, it looks as what is imported.
+    let made = temporary.path().join("made").display().to_string();
+    impasto(&["import", &path, "--out", &made]).exits(0);
+    let picture = |of: &str| {
+        let out = temporary.path().join("out.png");
+        let out_text = out.display().to_string();
+        let args = [
+            "--size", "32x24", "--spp", "2", "--device", "cpu", "--out", &out_text,
+        ];
+        impasto(&[&["render", of], &args[..]].concat()).exits(0);
+        image::open(out).expect("a picture").to_rgb8()
+    };
+    let own = picture(&path);
+    assert!(own == picture(&format!("{made}/clay.impasto")));
+
+    // Scenes take materials of it.
+    let obj = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nusemtl body\nf 1 2 3\n";
+    std::fs::write(temporary.path().join("one.obj"), obj).expect("a mesh");
+    let scene = temporary.path().join("scene.toml");
+    let text = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nfov = 40\n\
+        [film]\nwidth = 8\nheight = 8\n[[geometry]]\nfile = \"one.obj\"\n\
+        [materials.body]\nfile = \"art/clay.mtlx\"\n[environment]\ncolor = 1\n";
+    std::fs::write(&scene, text).expect("a scene");
+    let scene = scene.display().to_string();
+    impasto(&["check", &scene])
+        .exits(0)
+        .says("0 errors, 0 warnings");
+    let lit = picture(&scene);
+    let is_red = |p: &image::Rgb<u8>| p.0[0] > p.0[2].saturating_add(20);
+    assert!(lit.pixels().any(is_red));
+
+    // It is read only.
+    impasto(&["fmt", &path]).exits(1).says("impasto import");
+    assert_eq!(std::fs::read_to_string(&file).expect("it"), DOCUMENT);
+    std::fs::write(&file, without_counterpart()).expect("a document");
+    for wrong in [&path, &scene] {
+        impasto(&["check", wrong]).exits(1).says("clay.mtlx:3:");
+    }
 }

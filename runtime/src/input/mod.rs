@@ -1,7 +1,8 @@
 //! Opening files that are read to their end. A FIFO or a socket that nobody writes to, or a device, would never
 //! come to one: they are refused by their kind, before anything waits for them.
 //!
-//! A glTF file is a folder here: what it has within can be opened by paths that lead into it.
+//! A glTF file is a folder here: what it has within can be opened by paths that lead into it. A MaterialX document is a
+//! source to those who ask for one.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, Write};
@@ -9,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 mod file;
 pub mod gltf;
+pub mod mtlx;
 
 pub use file::{is_transient, reason};
 
@@ -45,6 +47,21 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     open(path)?.read_to_string(&mut text)?;
     Ok(text)
+}
+
+/// The text of the source at `path`, or of what the MaterialX document there becomes. It has one byte more than `most` at
+/// most, which is enough to see that it is too long.
+///
+/// # Errors
+/// As [`open`], or if it cannot be read or imported.
+pub fn source(path: &Path, most: usize) -> io::Result<Vec<u8>> {
+    if mtlx::is_document(path) {
+        return mtlx::source(path).map(String::into_bytes);
+    }
+    let mut bytes = Vec::new();
+    let file = open(path)?;
+    file.take(most as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// The file on disk that holds what `path` names: that itself, or the glTF file that it leads into.

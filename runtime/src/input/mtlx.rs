@@ -1,0 +1,48 @@
+//! MaterialX documents as sources: whoever reads a source may read a document, and has what an artist would have written
+//! in its place. Pictures stay where they are.
+
+use std::io::{self, Read};
+use std::path::Path;
+
+use impasto_import::{Files, Options};
+
+use super::reason;
+
+/// Does the extension say that it is a MaterialX document?
+pub fn is_document(path: &Path) -> bool {
+    let extension = path.extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("mtlx"))
+}
+
+/// The source that the document at `path` becomes.
+///
+/// # Errors
+/// What keeps it from being imported whole.
+pub(super) fn source(path: &Path) -> io::Result<String> {
+    let path = path.to_string_lossy();
+    match impasto_import::import(&path, &mut Disk, &Options::default()) {
+        Ok(imported) => Ok(imported.in_place(&path)),
+        Err(errors) => {
+            let all: Vec<String> = errors.iter().map(ToString::to_string).collect();
+            Err(io::Error::other(all.join("\n")))
+        }
+    }
+}
+
+/// Files of the disk, for importers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Disk;
+
+impl Files for Disk {
+    fn read(&mut self, path: &str, most: usize) -> Result<Vec<u8>, String> {
+        let file = super::open(Path::new(path)).map_err(|e| reason(&e))?;
+        let mut bytes = Vec::new();
+        let read = file.take(most as u64 + 1).read_to_end(&mut bytes);
+        read.map_err(|e| reason(&e))?;
+        Ok(bytes)
+    }
+
+    fn exists(&mut self, path: &str) -> bool {
+        Path::new(path).is_file()
+    }
+}
