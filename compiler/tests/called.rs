@@ -285,3 +285,30 @@ fn the_text_of_an_interior_with_a_condition_can_be_read() {
     let parsed = parse::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     assert_eq!(print::module(&parsed.module, &parsed.materials), text);
 }
+
+#[test]
+fn a_private_material_is_meant_by_its_name_or_alone() {
+    let names = |source: &str, name: Option<&str>| -> Result<Vec<String>, String> {
+        let mut loader = MemoryLoader::default();
+        loader.add("own.impasto", source);
+        let mut request = MaterialRequest::new("own", "own.impasto");
+        request.material = name.map(Into::into);
+        let compiled = compile(&[request], &mut loader);
+        let text = diag::render::text(&compiled.sources, &compiled.diagnostics, false);
+        let program = compiled.program.ok_or(text)?;
+        Ok(program.materials().map(|m| m.name.clone()).collect())
+    };
+    let part = "private material part { surface = diffuse(color(0.5)); }";
+    let head = "use std::bsdf::diffuse;\n";
+    let one = format!("{head}{part}\nmaterial whole {{ material = part(); }}");
+    assert_eq!(names(&one, None), Ok(vec!["whole".into()]));
+    assert_eq!(names(&one, Some("part")), Ok(vec!["part".into()]));
+    let alone = names(&format!("{head}{part}"), None);
+    assert_eq!(alone, Ok(vec!["part".into()]));
+    let two = format!("{one}\nmaterial other {{ material = part(); }}");
+    let refused = names(&two, None).expect_err("there are two");
+    assert!(
+        refused.contains("E0109") && refused.contains("one of `whole`, `other`"),
+        "{refused}"
+    );
+}

@@ -255,6 +255,9 @@ fn documents_are_sources_where_they_are() {
     assert_eq!(std::fs::read_to_string(&file).expect("it"), DOCUMENT);
     std::fs::write(&file, without_counterpart()).expect("a document");
     for wrong in [&path, &scene] {
-        impasto(&["check", wrong]).exits(1).says("clay.mtlx:3:");
+        impasto(&["check", wrong])
+            .exits(1)
+            .says("clay.mtlx")
+            .says("line 3:");
     }
 }

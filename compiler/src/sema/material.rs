@@ -11,16 +11,16 @@ use super::modules::{ItemRef, ModuleId, list};
 use super::{Checker, inputs};
 
 impl Checker<'_> {
-    /// The material called `name` in a file, or its only one.
+    /// The material called `name` in a file, or without a name its only one; beside others, one that is private is a part of
+    /// them.
     pub fn find_material(&mut self, module: ModuleId, name: Option<&str>) -> Option<usize> {
         let ast = self.ast(module);
         let is_material = |i: &&ast::Item| matches!(i.kind, ItemKind::Material(_));
-        let names: Vec<&str> = ast
-            .items
-            .iter()
-            .filter(is_material)
-            .map(|i| i.name.node.as_str())
-            .collect();
+        let materials: Vec<&ast::Item> = ast.items.iter().filter(is_material).collect();
+        let has_public = materials.iter().any(|i| !i.private);
+        let is_meant = |i: &&&ast::Item| name.is_some() || !i.private || !has_public;
+        let meant = materials.iter().filter(is_meant);
+        let names: Vec<&str> = meant.map(|i| i.name.node.as_str()).collect();
         let path = self.modules[module.0].path.clone();
         let own = path.rsplit_once("::").map(|(_, last)| last);
         let wanted = match (name, names.as_slice()) {

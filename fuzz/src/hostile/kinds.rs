@@ -6,7 +6,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::{films, pictures, scenes};
+use super::{films, foreign, pictures, scenes};
 use crate::Random;
 use crate::corpus::{Corpus, files, root, sources};
 use crate::geometry::SCENES;
@@ -30,6 +30,8 @@ pub const KINDS: &[Kind] = &[
     kind("scene", scene),
     kind("geometry", geometry),
     kind("ply", ply),
+    kind("gltf", foreign::gltf),
+    kind("document", foreign::document),
     kind("material", material),
     kind("placements", placements),
     kind("picture", picture),
@@ -56,6 +58,7 @@ struct Example {
 pub(super) struct Seeds {
     root: PathBuf,
     sources: Corpus,
+    pub(super) documents: Vec<Vec<u8>>,
     examples: Vec<Example>,
     scenes: Vec<Vec<u8>>,
     pictures: Vec<(&'static str, Vec<u8>)>,
@@ -105,6 +108,7 @@ impl Seeds {
         ];
         Ok(Self {
             sources: sources(),
+            documents: files("import/tests/documents", ".mtlx"),
             scenes: examples.iter().map(|e| e.scene.clone()).collect(),
             examples,
             pictures: pictures::good()?,
@@ -193,7 +197,7 @@ fn made(impasto: &Path, scene: &str, arguments: &str, out: &Path) -> Result<Vec<
     std::fs::read(out).map_err(|e| format!("{}: {e}", out.display()))
 }
 
-fn words(text: &str) -> Vec<String> {
+pub(super) fn words(text: &str) -> Vec<String> {
     text.split_whitespace().map(str::to_owned).collect()
 }
 
@@ -353,7 +357,7 @@ const MTL: &[&str] = &[
 ];
 
 /// Numbers that a text of geometry may have, and some that it may not.
-const NUMBERS: &[&str] = &[
+pub(super) const NUMBERS: &[&str] = &[
     "0",
     "-0",
     "1",

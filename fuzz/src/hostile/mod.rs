@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 mod films;
+mod foreign;
 mod kinds;
 mod pictures;
 mod process;

@@ -352,7 +352,7 @@ impl<'b, 'a> Builder<'b, 'a> {
             .texture(base, &format!("{prefix}{name}"), self.allow_outside);
         let texture = found.map_err(|message| {
             let error = document.error(at, message);
-            error.hint("allow it with `--allow-outside` if you trust the document")
+            error.hint("`impasto import --allow-outside` reads it, if you trust the document")
         })?;
         let message = format!("the picture `{}` is missing", texture.found);
         let warning = document.warning(at, message);

@@ -151,9 +151,8 @@ impl Reader<'_> {
         let (found, inside) = joined(path, href);
         if !inside && !self.allow_outside {
             let message = format!("`{href}` lies outside of the folder of the document");
-            return Err(
-                error(message).hint("allow it with `--allow-outside` if you trust the document")
-            );
+            return Err(error(message)
+                .hint("`impasto import --allow-outside` reads it, if you trust the document"));
         }
         Ok(found)
     }

@@ -4,7 +4,7 @@
 use std::io::{self, Read};
 use std::path::Path;
 
-use impasto_import::{Files, Options};
+use impasto_import::{Files, ImportError, Options};
 
 use super::reason;
 
@@ -20,13 +20,23 @@ pub fn is_document(path: &Path) -> bool {
 /// What keeps it from being imported whole.
 pub(super) fn source(path: &Path) -> io::Result<String> {
     let path = path.to_string_lossy();
-    match impasto_import::import(&path, &mut Disk, &Options::default()) {
-        Ok(imported) => Ok(imported.in_place(&path)),
-        Err(errors) => {
-            let all: Vec<String> = errors.iter().map(ToString::to_string).collect();
-            Err(io::Error::other(all.join("\n")))
-        }
-    }
+    let imported = impasto_import::import(&path, &mut Disk, &Options::default());
+    imported
+        .map(|imported| imported.in_place(&path))
+        .map_err(|errors| {
+            // Whoever reads it tells its name.
+            let own = format!("{path}:");
+            let said = |error: &ImportError| {
+                let text = error.to_string();
+                match text.strip_prefix(&own) {
+                    Some(rest) if error.line.is_some() => format!("line {rest}"),
+                    Some(rest) => rest.trim_start().to_owned(),
+                    None => text,
+                }
+            };
+            let all: Vec<String> = errors.iter().map(said).collect();
+            io::Error::other(all.join("\n"))
+        })
 }
 
 /// Files of the disk, for importers.
