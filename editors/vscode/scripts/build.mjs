@@ -44,3 +44,7 @@ fs.writeFileSync(path.join(dist, "THIRD-PARTY-LICENSES.txt"), notices.join(`\n${
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) {
   fs.copyFileSync(path.join(folder, "../..", name), path.join(folder, name));
 }
+
+// The package has the text of the README without its picture, which lies outside of it.
+const readme = fs.readFileSync(path.join(folder, "README.md"), "utf8");
+fs.writeFileSync(path.join(dist, "README.md"), readme.replaceAll(/^!\[.*\n\n/gm, ""));

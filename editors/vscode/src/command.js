@@ -1,5 +1,7 @@
-// Finds the command `impasto` as the setting names it. Nothing here needs Visual Studio Code, so that tests can try it.
+// Finds the command `impasto` as the setting names it, and reads what it says. Nothing here needs Visual Studio Code, so
+// that tests can try it.
 
+import { execFile } from "node:child_process";
 import * as fs from "node:fs";
 import * as os from "node:os";
 import * as path from "node:path";
@@ -33,6 +35,22 @@ function isProgram(file, platform) {
   } catch {
     return false;
   }
+}
+
+/** Why a program has no language server, or undefined: older builds of Impasto have none, and other programs. */
+export function whyNoServer(file) {
+  return new Promise((resolve) => {
+    execFile(file, ["lsp", "--help"], { timeout: 30_000 }, (error, stdout, stderr) => {
+      resolve(error ? problem(stderr || error.message) : undefined);
+    });
+  });
+}
+
+/** The problem in what the command printed: its first error, or else its last line. */
+export function problem(printed) {
+  const lines = printed.trim().split("\n");
+  const error = lines.find((line) => /^error\b/.test(line)) ?? lines.at(-1);
+  return error.replace(/^error: /, "").trim();
 }
 
 /** Is a TOML text a scene? Those have cameras and materials. */

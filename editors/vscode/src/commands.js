@@ -4,6 +4,8 @@ import { execFile, spawn } from "node:child_process";
 import * as path from "node:path";
 import * as vscode from "vscode";
 
+import { problem } from "./command.js";
+
 /** What a command prints of a file, as a document: its scheme is the command's. */
 const PRINTED = {
   "impasto-wgsl": { args: (file) => ["emit", file, "--what", "wgsl"], ending: ".wgsl", what: "WGSL" },
@@ -74,14 +76,15 @@ class Previews {
     child.stdout.on("data", log);
     child.stderr.on("data", log);
     child.on("error", (error) => this.#ended(file, error.message));
-    child.on("close", (code) => this.#ended(file, code === 0 || code === null ? "" : said || `exit code ${code}`));
+    child.on("close", (code) => this.#ended(file, code === 0 || code === null ? "" : problem(said) || `exit code ${code}`));
   }
 
-  #ended(file, problem) {
+  #ended(file, why) {
     const was = this.#running.delete(file);
-    if (!was || !problem) return;
+    if (!was || !why) return;
+    // Messages have no lines: hints and places are in the output.
     vscode.window
-      .showErrorMessage(`The preview of ${path.basename(file)} ended: ${problem.trim()}`, "Show Output")
+      .showErrorMessage(`The preview of ${path.basename(file)} ended: ${why}`, "Show Output")
       .then((choice) => choice && this.#output.show());
   }
 

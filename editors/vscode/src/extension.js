@@ -16,10 +16,10 @@ export async function activate(context) {
   registerLibrary(context, server);
   registerCommands(context, server, output);
   context.subscriptions.push(
+    // Trust in a folder changes settings, too: its own path is followed then.
     vscode.workspace.onDidChangeConfiguration((event) => {
       if (event.affectsConfiguration("impasto.path")) server.restart();
     }),
-    vscode.workspace.onDidGrantWorkspaceTrust(() => server.restart()),
   );
   await server.start();
 }

@@ -2,9 +2,9 @@
 
 import * as path from "node:path";
 import * as vscode from "vscode";
-import { LanguageClient, State, TransportKind } from "vscode-languageclient/node";
+import { CloseAction, LanguageClient, State, TransportKind } from "vscode-languageclient/node";
 
-import { expanded, findCommand, isScene } from "./command.js";
+import { expanded, findCommand, isScene, whyNoServer } from "./command.js";
 
 export const LIBRARY = "impasto-std";
 
@@ -13,6 +13,9 @@ export class Server {
   #client;
   #status;
   #missingShown = false;
+  /** Starts and stops follow each other: two changes of settings at once must not start two servers. */
+  #turn = Promise.resolve();
+  #isLeaving = false;
 
   constructor(output) {
     this.#output = output;
@@ -41,12 +44,39 @@ export class Server {
     const message =
       `The command \`${command}\` was not found. Build it in the repository of Impasto with ` +
       "`cargo install --path . --locked`, or say where it is in the setting `impasto.path`.";
-    const choice = await vscode.window.showErrorMessage(message, "Open Setting");
-    if (choice) await vscode.commands.executeCommand("workbench.action.openSettings", "impasto.path");
+    await this.#showProblem(message);
     return undefined;
   }
 
-  async start() {
+  async #showProblem(message) {
+    const choice = await vscode.window.showErrorMessage(message, "Open Setting", "Show Output");
+    if (choice === "Show Output") this.#output.show();
+    if (choice !== "Open Setting") return;
+    // The path is of the machine that the server runs on: its page, since that of the user does not have the setting.
+    const page = vscode.env.remoteName ? "openRemoteSettings" : "openSettings";
+    await vscode.commands.executeCommand(`workbench.action.${page}`, { query: "impasto.path" });
+  }
+
+  start() {
+    return this.#next(() => this.#start());
+  }
+
+  stop() {
+    this.#isLeaving = true;
+    return this.#next(() => this.#stop().finally(() => (this.#isLeaving = false)));
+  }
+
+  async restart() {
+    await this.stop();
+    await this.start();
+  }
+
+  #next(step) {
+    this.#turn = this.#turn.then(step).catch((error) => this.#output.error(error));
+    return this.#turn;
+  }
+
+  async #start() {
     const { command, file } = this.program();
     if (!file) {
       this.#state(vscode.LanguageStatusSeverity.Error, "not found", `The command \`${command}\` was not found.`);
@@ -56,36 +86,37 @@ export class Server {
       this.#missingShown = true;
       return;
     }
+    const why = await whyNoServer(file);
+    if (why) return this.#failed(file, why);
     this.#output.info(`Starting ${file} lsp`);
-    const client = new LanguageClient("impasto", "Impasto", serverOptions(file), this.#clientOptions());
+    const client = new Client("impasto", "Impasto", serverOptions(file), this.#clientOptions());
     client.onDidChangeState(({ newState }) => {
-      if (newState === State.Running) this.#state(vscode.LanguageStatusSeverity.Information, "running", file);
+      const version = client.initializeResult?.serverInfo?.version ?? "";
+      if (newState === State.Running) this.#state(vscode.LanguageStatusSeverity.Information, `${version} running`, file);
       if (newState === State.Stopped) this.#state(vscode.LanguageStatusSeverity.Warning, "stopped", file);
     });
     this.#client = client;
-    try {
-      await client.start();
-    } catch (error) {
-      this.#state(vscode.LanguageStatusSeverity.Error, "failed", String(error));
-      const message = `\`${file} lsp\` does not run: ${error.message ?? error}. Does this build of Impasto have a language server?`;
-      const choice = await vscode.window.showErrorMessage(message, "Show Output");
-      if (choice) this.#output.show();
-    }
+    await client.start().catch((error) => this.#failed(file, error.message ?? String(error)));
   }
 
-  async stop() {
+  /** Says that a program is no server. Nothing waits for the answer of a person. */
+  #failed(file, why) {
+    this.#state(vscode.LanguageStatusSeverity.Error, "failed", why);
+    this.#output.error(`${file} lsp: ${why}`);
+    this.#showProblem(`\`${file}\` does not start as a language server (${why}). Is it an older build of Impasto?`);
+  }
+
+  async #stop() {
     const client = this.#client;
     this.#client = undefined;
+    // One that starts again after a crash cannot be stopped until it runs.
+    if (client?.state === State.Starting) await client.start().catch(() => {});
     if (client?.isRunning()) await client.stop();
   }
 
-  async restart() {
-    await this.stop();
-    await this.start();
-  }
-
-  /** Asks the server; undefined if none runs. */
+  /** Asks the server, which may still start; undefined if none runs. */
   async request(method, params) {
+    await this.#turn;
     if (!this.#client?.isRunning()) return undefined;
     return this.#client.sendRequest(method, params);
   }
@@ -94,6 +125,16 @@ export class Server {
     this.#status.severity = severity;
     this.#status.text = `Impasto: ${text}`;
     this.#status.detail = detail;
+  }
+
+  /** Starts a server again that ended at its work, and not one that never came to work. */
+  #errorHandler() {
+    let usual;
+    const handler = () => (usual ??= this.#client.createDefaultErrorHandler());
+    return {
+      error: (...given) => handler().error(...given),
+      closed: () => (this.#client?.hasRun ? handler().closed() : { action: CloseAction.DoNotRestart }),
+    };
   }
 
   #clientOptions() {
@@ -115,15 +156,27 @@ export class Server {
         return { virtualDocuments: true, commands: true, scene, cost };
       },
       outputChannel: this.#output,
-      synchronize: {
-        configurationSection: "impasto",
-        fileEvents: [
-          vscode.workspace.createFileSystemWatcher("**/*.impasto"),
-          vscode.workspace.createFileSystemWatcher("**/*.toml"),
-        ],
+      // The server itself asks for the files that it watches.
+      synchronize: { configurationSection: "impasto" },
+      middleware: {
+        ...scenesOnly(opened),
+        // A change of the path is a change of the settings, too: a client that stops for it must not be sent that.
+        workspace: { didChangeConfiguration: async (sections, next) => this.#isLeaving || next(sections) },
       },
-      middleware: scenesOnly(opened),
+      errorHandler: this.#errorHandler(),
+      initializationFailedHandler: () => false,
     };
+  }
+}
+
+/** A client whose errors are only written down before its server runs: `Server` tells of those, once. */
+class Client extends LanguageClient {
+  get hasRun() {
+    return this.initializeResult !== undefined;
+  }
+
+  error(message, data, showNotification) {
+    super.error(message, data, this.hasRun && showNotification);
   }
 }
 

@@ -7,7 +7,7 @@ import * as path from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 
-import { expanded, findCommand, isScene } from "../src/command.js";
+import { expanded, findCommand, isScene, problem, whyNoServer } from "../src/command.js";
 
 const root = fileURLToPath(new URL("../../..", import.meta.url));
 
@@ -29,6 +29,26 @@ test("a program is found on PATH, by its path, and from the folder", { skip: pro
   assert.equal(findCommand("impasto", folder, { PATH: "/nowhere" }), undefined);
   assert.equal(findCommand(folder, "/", { PATH: "" }), undefined, "a folder is no program");
   fs.rmSync(folder, { recursive: true });
+});
+
+test("a program without a server says why", { skip: process.platform === "win32" }, async () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), "impasto-"));
+  const program = (name, script) => {
+    fs.writeFileSync(path.join(folder, name), `#!/bin/sh\n${script}\n`, { mode: 0o755 });
+    return path.join(folder, name);
+  };
+  assert.equal(await whyNoServer(program("new", "exit 0")), undefined);
+  const old = program("old", "echo \"error: unrecognized subcommand 'lsp'\" >&2; echo Usage: >&2; exit 2");
+  assert.equal(await whyNoServer(old), "unrecognized subcommand 'lsp'");
+  assert.match(await whyNoServer(program("silent", "exit 3")), /silent lsp --help/);
+  fs.rmSync(folder, { recursive: true });
+});
+
+test("the problem is the first error of what was printed", () => {
+  assert.equal(problem("reading\nerror: no window\nhint: lend one\n"), "no window");
+  assert.equal(problem("error[E0210]: no parameter\n --> a.impasto\n"), "error[E0210]: no parameter");
+  assert.equal(problem("Segmentation fault\n"), "Segmentation fault");
+  assert.equal(problem(""), "");
 });
 
 test("scenes are told from other TOML files", () => {
