@@ -258,12 +258,11 @@ impl Watched {
             let text = source.replace(edited, &format!("{before}{}", number(round)));
             let begun = Instant::now();
             write(file, &text)?;
-            let news = self.until(|now| {
+            self.until(|now| {
                 !Arc::ptr_eq(&now.project, &news.project)
                     && has(now, |p| p.number > shown && p.samples == 1)
             })?;
             times.push(begun.elapsed());
-            let shown = news.picture.as_ref().map_or(0, |picture| picture.number);
             self.until(|now| has(now, |p| p.number > shown && !p.stands_in))?;
             of_device.push(begun.elapsed());
         }

@@ -78,6 +78,19 @@ impl Client {
 
     /// One with a host and options of its own.
     pub fn with(host: Bare, options: Value) -> Self {
+        let markdown = json!(["markdown", "plaintext"]);
+        let text_document = json!({
+            "hover": { "contentFormat": markdown },
+            "completion": {
+                "completionItem": { "snippetSupport": true, "documentationFormat": markdown },
+            },
+            "signatureHelp": { "signatureInformation": { "documentationFormat": markdown } },
+        });
+        Self::that_can(host, options, &text_document)
+    }
+
+    /// One that can do no more with documents than is said.
+    pub fn that_can(host: Bare, options: Value, text_document: &Value) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let root = uri(folder.path());
         Self::start(
@@ -88,7 +101,7 @@ impl Client {
                 "rootUri": root,
                 "workspaceFolders": [{ "uri": root, "name": "test" }],
                 "capabilities": {
-                    "textDocument": { "completion": { "completionItem": { "snippetSupport": true } } },
+                    "textDocument": text_document,
                     "workspace": { "inlayHint": { "refreshSupport": true } },
                 },
                 "initializationOptions": options,

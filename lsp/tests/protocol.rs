@@ -325,3 +325,43 @@ fn what_one_file_costs_is_not_forgotten_for_another() {
         client.asked_for("workspace/inlayHint/refresh");
     }
 }
+
+#[test]
+fn costs_come_once_they_are_wanted() {
+    let none = json!({ "lens": false, "inlayHints": false });
+    let options = json!({ "virtualDocuments": true, "cost": none });
+    let mut client = Client::with(Bare::default(), options);
+    let uri = client.open("glaze.impasto", GLAZE);
+    client.diagnostics(&uri);
+    let has_cost = |client: &mut Client| {
+        let lenses = client.ask("textDocument/codeLens", of(&uri));
+        lenses.to_string().contains(" operations, ")
+    };
+    std::thread::sleep(std::time::Duration::from_millis(600));
+    assert!(!has_cost(&mut client));
+    let both = json!({ "settings": { "cost": { "lens": true, "inlayHints": true } } });
+    client.tell("workspace/didChangeConfiguration", both);
+    while !has_cost(&mut client) {
+        client.asked_for("workspace/inlayHint/refresh");
+    }
+}
+
+#[test]
+fn who_shows_no_markdown_gets_plain_text() {
+    let mut client = Client::that_can(Bare::default(), json!({}), &json!({}));
+    let uri = client.open("glaze.impasto", GLAZE);
+    let at = |text: &str| Client::at(&uri, GLAZE, GLAZE.find(text).expect("it") + 2);
+    let hover = client.ask("textDocument/hover", at("perlin(position"));
+    let proposals = client.ask("textDocument/completion", at("perlin(position"));
+    let help = client.ask("textDocument/signatureHelp", at("r(fresnel"));
+    let listed = proposals["items"].as_array().cloned().unwrap_or_default();
+    let documented = listed.iter().map(|item| &item["documentation"]);
+    let documented: Vec<&Value> = documented.filter(|d| !d.is_null()).collect();
+    assert!(!documented.is_empty(), "{proposals}");
+    let of_signature = &help["signatures"][0]["documentation"];
+    for text in [vec![&hover["contents"], of_signature], documented].concat() {
+        assert_eq!(text["kind"], "plaintext", "{text}");
+        let value = text["value"].as_str().unwrap_or_default();
+        assert!(!value.is_empty() && !value.contains('`'), "{value}");
+    }
+}

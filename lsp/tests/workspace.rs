@@ -209,3 +209,17 @@ fn folders_come_and_go() {
     assert_eq!(found(&folder, &json!([])), 1);
     assert_eq!(found(&json!([]), &folder), 0);
 }
+
+#[test]
+fn a_name_that_cannot_be_is_refused_in_the_name_of_no_file() {
+    let (mut client, _) = begin();
+    let uri = client.open("wall.impasto", WALL);
+    let mut params = at(&uri, WALL, "gloss");
+    params["newName"] = json!("let");
+    let refused = client.try_ask("textDocument/rename", params);
+    let why = refused.expect_err("a keyword");
+    assert!(
+        why.contains("keyword") && !why.contains(".impasto"),
+        "{why}"
+    );
+}

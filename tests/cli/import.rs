@@ -251,7 +251,7 @@ fn documents_are_sources_where_they_are() {
     assert!(lit.pixels().any(is_red));
 
     // It is read only.
-    impasto(&["fmt", &path]).exits(1).says("impasto import");
+    impasto(&["fmt", &path]).exits(2).says("impasto import");
     assert_eq!(std::fs::read_to_string(&file).expect("it"), DOCUMENT);
     std::fs::write(&file, without_counterpart()).expect("a document");
     for wrong in [&path, &scene] {

@@ -558,7 +558,7 @@ fn top(section: &str) -> Vec<Proposal> {
 fn key(key: &Key) -> Proposal {
     Proposal {
         docs: key_text(key),
-        detail: key.default.clone(),
+        detail: key.default.replace('`', ""),
         ..proposal(
             &key.name,
             ProposalKind::Field,

@@ -11,6 +11,8 @@ use crate::material::completion::{Proposal, ProposalKind};
 use crate::material::outline::{Entry, EntryKind};
 use crate::text::Text;
 
+use super::settings::Settings;
+
 /// The URI of a file as the compiler calls it; copies of the library lie below `copies`, for clients that need them.
 pub fn uri_of(path: &str, copies: Option<&Path>) -> Option<lsp::Uri> {
     match library::file_of(path) {
@@ -26,9 +28,14 @@ pub fn edit(text: &Text, range: Range<usize>, new: &str) -> Value {
     json!({ "range": text.range(range), "newText": new })
 }
 
-/// Markdown.
-pub fn markdown(text: &str) -> Value {
-    json!({ "kind": "markdown", "value": text })
+/// A text of Markdown for a client, or as plain text where that does not say that it shows Markdown.
+pub fn documentation(text: &str, markdown: bool) -> Value {
+    if markdown {
+        return json!({ "kind": "markdown", "value": text });
+    }
+    let lines = text.lines().filter(|line| !line.starts_with("```"));
+    let lines: Vec<String> = lines.map(|line| line.replace(['`', '*'], "")).collect();
+    json!({ "kind": "plaintext", "value": lines.join("\n") })
 }
 
 /// A proposal that takes the place of `word`, with the edits that it brings along.
@@ -38,8 +45,9 @@ pub fn completion(
     index: usize,
     proposal: &Proposal,
     more: Vec<Value>,
-    snippets: bool,
+    settings: &Settings,
 ) -> Value {
+    let snippets = settings.snippets;
     let new = if snippets {
         proposal.snippet.clone()
     } else {
@@ -56,7 +64,8 @@ pub fn completion(
         item["detail"] = json!(proposal.detail);
     }
     if !proposal.docs.is_empty() {
-        item["documentation"] = markdown(&proposal.docs);
+        let markdown = settings.markdown.completion;
+        item["documentation"] = documentation(&proposal.docs, markdown);
     }
     if !more.is_empty() {
         item["additionalTextEdits"] = json!(more);

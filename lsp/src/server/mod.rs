@@ -310,6 +310,9 @@ impl<'c> Server<'c> {
             "workspace/didChangeConfiguration" => {
                 let settings = params.get("settings").cloned().unwrap_or_default();
                 self.settings.change(settings);
+                self.rests_at = Some(Instant::now() + REST);
+                self.edited
+                    .extend(self.documents.all().map(|d| d.path.clone()));
                 self.plans.clear();
                 self.plan_scene();
                 self.refresh();

@@ -114,10 +114,10 @@ impl Server<'_> {
         };
         let (path, text) = (document.path.clone(), document.text.clone());
         let offset = text.offset(at.position);
-        let snippets = self.settings.snippets;
+        let settings = self.settings.clone();
         if document.language == Language::Scene {
             let (word, list) = self.with_scene(&path, |scene| scene.complete(offset));
-            let item = |(i, p)| convert::completion(&text, &word, i, p, Vec::new(), snippets);
+            let item = |(i, p)| convert::completion(&text, &word, i, p, Vec::new(), &settings);
             let items: Vec<Value> = list.iter().enumerate().map(item).collect();
             return Ok(json!({ "isIncomplete": false, "items": items }));
         }
@@ -149,7 +149,7 @@ impl Server<'_> {
             let import = import.and_then(|p| completion::import_edit(&now, text.as_str(), p));
             let more = import.map(|(range, new)| convert::edit(&text, range, &new));
             let more: Vec<Value> = more.into_iter().collect();
-            convert::completion(&text, &proposals.word, index, proposal, more, snippets)
+            convert::completion(&text, &proposals.word, index, proposal, more, &settings)
         };
         let items: Vec<Value> = proposals.list.iter().enumerate().map(item).collect();
         Ok(json!({ "isIncomplete": false, "items": items }))
@@ -169,7 +169,7 @@ impl Server<'_> {
         };
         Ok(match found {
             Some((markdown, range)) => json!({
-                "contents": convert::markdown(&markdown),
+                "contents": convert::documentation(&markdown, self.settings.markdown.hover),
                 "range": text.range(range),
             }),
             None => Value::Null,
@@ -189,6 +189,7 @@ impl Server<'_> {
         if found.is_empty() {
             return Ok(Value::Null);
         }
+        let shows_markdown = self.settings.markdown.signature;
         let signature = |s: &signature::Signature| {
             let params = s.params.iter().zip(&s.docs_of_params);
             let params: Vec<Value> = params
@@ -197,7 +198,7 @@ impl Server<'_> {
                     let units = |at: usize| s.label[..at].encode_utf16().count();
                     let mut param = json!({ "label": [units(range.start), units(range.end)] });
                     if !docs.is_empty() {
-                        param["documentation"] = convert::markdown(docs);
+                        param["documentation"] = convert::documentation(docs, shows_markdown);
                     }
                     param
                 })
@@ -207,7 +208,7 @@ impl Server<'_> {
                 value["activeParameter"] = json!(active);
             }
             if !s.docs.is_empty() {
-                value["documentation"] = convert::markdown(&s.docs);
+                value["documentation"] = convert::documentation(&s.docs, shows_markdown);
             }
             value
         };

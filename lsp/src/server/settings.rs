@@ -19,6 +19,8 @@ pub struct Settings {
     pub virtual_documents: bool,
     /// Does it fill in snippets?
     pub snippets: bool,
+    /// Where does it show Markdown?
+    pub markdown: Markdown,
     /// Can it be told that hints changed?
     pub refreshes_hints: bool,
     /// Can it be told that lenses changed?
@@ -29,6 +31,17 @@ pub struct Settings {
     pub has_commands: bool,
     /// What its user wants.
     pub wanted: Wanted,
+}
+
+/// Where a client shows Markdown.
+#[derive(Clone, Copy, Debug)]
+pub struct Markdown {
+    /// Below the hand.
+    pub hover: bool,
+    /// Beside proposals.
+    pub completion: bool,
+    /// Beside signatures.
+    pub signature: bool,
 }
 
 /// What a user wants, in the section `impasto` of the settings.
@@ -75,6 +88,11 @@ impl Settings {
     pub fn new(params: &lsp::InitializeParams) -> Self {
         let client = serde_json::to_value(&params.capabilities).unwrap_or_default();
         let can = |path: &str| client.pointer(path).and_then(|v| v.as_bool()) == Some(true);
+        let shows_markdown = |path: &str| {
+            let formats = client.pointer(&format!("/textDocument/{path}"));
+            let formats = formats.and_then(|f| f.as_array());
+            formats.is_some_and(|f| f.iter().any(|f| f == "markdown"))
+        };
         let encodings = client.pointer("/general/positionEncodings");
         let encodings = encodings
             .and_then(|e| e.as_array().cloned())
@@ -91,6 +109,11 @@ impl Settings {
             roots: roots(params),
             virtual_documents: options.virtual_documents,
             snippets: can("/textDocument/completion/completionItem/snippetSupport"),
+            markdown: Markdown {
+                hover: shows_markdown("hover/contentFormat"),
+                completion: shows_markdown("completion/completionItem/documentationFormat"),
+                signature: shows_markdown("signatureHelp/signatureInformation/documentationFormat"),
+            },
             refreshes_hints: can("/workspace/inlayHint/refreshSupport"),
             refreshes_lenses: can("/workspace/codeLens/refreshSupport"),
             watches: can("/workspace/didChangeWatchedFiles/dynamicRegistration"),

@@ -209,6 +209,7 @@ impl Server<'_> {
             return Ok(Value::Null);
         };
         let (path, text) = (document.path.clone(), document.text.clone());
+        let at_hand = path.clone();
         let Some(analysis) = self.documents.analysis(&path) else {
             return Ok(Value::Null);
         };
@@ -223,10 +224,18 @@ impl Server<'_> {
                 self.scenes_with(&definition),
             )
         };
-        for (path, _, analysis) in &sources {
+        // The file at hand first: what is wrong with the name itself is told of no other.
+        let is_other = |path: &String| *path != at_hand;
+        let mut checked: Vec<_> = sources.iter().collect();
+        checked.sort_by_key(|(path, ..)| is_other(path));
+        for (path, _, analysis) in checked {
             if let Some(why) = rename::refused(analysis, &definition, &new_name) {
                 let file = Path::new(path).file_name().unwrap_or_default();
-                return Err(failed(format!("{}: {why}", file.to_string_lossy())));
+                return Err(failed(if is_other(path) {
+                    format!("{}: {why}", file.to_string_lossy())
+                } else {
+                    why
+                }));
             }
         }
         for (path, text, analysis) in sources {
