@@ -1,5 +1,7 @@
 //! The nodes of a glTF file's scene, and where they are in the world.
 
+use std::collections::HashSet;
+
 use glam::DMat4;
 
 use super::Model;
@@ -25,7 +27,7 @@ impl Model {
             Some(scene) => scene.nodes().collect(),
             None => {
                 let children = document.nodes().flat_map(|node| node.children());
-                let children: Vec<usize> = children.map(|node| node.index()).collect();
+                let children: HashSet<usize> = children.map(|node| node.index()).collect();
                 let nodes = document.nodes();
                 nodes
                     .filter(|node| !children.contains(&node.index()))

@@ -60,7 +60,7 @@ impl Model {
                 }
             }
         }
-        for (name, source) in self.material_names().iter().zip(self.source_names()) {
+        for (name, source) in self.material_names.iter().zip(&self.source_names) {
             write(format!("[materials.{}]", quoted(name)));
             write(format!("file = \"{source}.impasto\"\n"));
         }

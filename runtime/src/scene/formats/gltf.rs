@@ -42,9 +42,9 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
 /// What is wrong with the file.
 fn geometry(path: &Path, mesh: Option<usize>) -> Result<Geometry, SceneError> {
     let model = Model::read(path)?;
-    let buffers = model.buffers()?;
+    let buffers = model.buffers();
     let mut reading = Reading {
-        names: model.material_names(),
+        names: &model.material_names,
         known: BTreeMap::new(),
         geometry: Geometry::default(),
         left_out: 0,
@@ -87,7 +87,7 @@ struct Reading<'m> {
     path: &'m Path,
     buffers: Buffers<'m>,
     /// Of materials, by their number.
-    names: Vec<String>,
+    names: &'m [String],
     /// Indices into [`Geometry::materials`].
     known: BTreeMap<Option<usize>, usize>,
     geometry: Geometry,
@@ -95,8 +95,8 @@ struct Reading<'m> {
     left_out: usize,
 }
 
-impl Reading<'_> {
-    fn mesh(&mut self, mesh: &Mesh<'_>, transform: &DMat4) -> Result<(), SceneError> {
+impl<'m> Reading<'m> {
+    fn mesh(&mut self, mesh: &Mesh<'m>, transform: &DMat4) -> Result<(), SceneError> {
         let first = self.geometry.triangles.len();
         let name = Model::named(mesh.name(), "mesh", mesh.index());
         for primitive in mesh.primitives() {
@@ -112,7 +112,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn primitive(&mut self, primitive: &Primitive<'_>, transform: &DMat4) -> Result<(), String> {
+    fn primitive(&mut self, primitive: &Primitive<'m>, transform: &DMat4) -> Result<(), String> {
         let positions = primitive.get(&Semantic::Positions);
         let positions = positions.ok_or("a primitive has no positions")?;
         let positions = self.buffers.floats::<3>(&positions)?;
