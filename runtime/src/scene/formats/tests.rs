@@ -122,7 +122,10 @@ fn messages_say_what_the_table_holds() {
         "{unknown}"
     );
     let both = said("file = 'a.obj'\nobj = 'a.obj'", &[], BOTH);
-    assert!(both.contains("either `file` or `obj`"), "{both}");
+    assert!(
+        both.contains("needs one of `file`, `obj` and `gltf`"),
+        "{both}"
+    );
     // A name that is under `obj` need not say so.
     let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
     let empty = said("obj = 'a.txt'", &[("a.txt", flat)], FORMATS);
