@@ -255,6 +255,8 @@ fn camera(root: &mut Table, moment: Moment) -> Result<(CameraSpec, Vec<MaterialN
     let turn = turntable(&mut table, moment, look_at)?;
     let (position, look_at) = (turn.place(position), turn.place(look_at));
     let up = optional(&mut table, "up", Value::vector, Vec3::Y)?;
+    let mix = |a: &Vec3, b: &Vec3, t: f64| a.lerp(*b, t as f32);
+    let up = moment.keyed(&mut keys, "up", Value::vector, mix, up)?;
     let fov = table.require("fov")?;
     let angle = |v: &Value| {
         let expected = "an angle in degrees between 0 and 180";

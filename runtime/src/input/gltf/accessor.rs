@@ -29,6 +29,34 @@ impl<'m> Buffers<'m> {
         self.elements(accessor, element, [0.0; N])
     }
 
+    /// As [`Buffers::floats`], of the accessor of that number.
+    ///
+    /// # Errors
+    /// As there, or there is no such accessor.
+    pub(super) fn floats_of<const N: usize>(&self, number: usize) -> Result<Vec<[f32; N]>, String> {
+        let accessor = self.model.document.accessors().nth(number);
+        let missing = || format!("there is no accessor {number}");
+        self.floats(&accessor.ok_or_else(missing)?)
+    }
+
+    /// The elements of an accessor of `N` unsigned integers of up to 16 bits.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub(super) fn whole<const N: usize>(
+        &self,
+        accessor: &gltf::Accessor<'m>,
+    ) -> Result<Vec<[u16; N]>, String> {
+        let kind = accessor.data_type();
+        let is_whole = matches!(kind, DataType::U8 | DataType::U16);
+        if !is_whole || components(accessor.dimensions()) != N {
+            let number = accessor.index();
+            return Err(format!("accessor {number} has not {N} integers"));
+        }
+        let element = |bytes: &[u8]| std::array::from_fn(|i| component(bytes, kind, i) as u16);
+        self.elements(accessor, element, [0; N])
+    }
+
     /// The elements of an accessor of unsigned integers.
     ///
     /// # Errors

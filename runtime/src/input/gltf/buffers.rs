@@ -48,7 +48,7 @@ impl Stamp {
 
 /// The buffers of a file, each opened when somebody first asks for some of it.
 pub(crate) struct Buffers<'m> {
-    model: &'m Model,
+    pub(super) model: &'m Model,
     opened: RefCell<BTreeMap<usize, Rc<Content<'m>>>>,
 }
 
@@ -77,6 +77,10 @@ impl<'m> Buffers<'m> {
         };
         let number = view.buffer().index();
         let content = self.content(&view.buffer())?;
+        let view_end = (view.offset() as u64).checked_add(view.length() as u64);
+        if view_end.is_none_or(|end| end > content.length()) {
+            return Ok(None);
+        }
         let read = content.read(start, length);
         read.map_err(|e| format!("buffer {number} cannot be read: {}", file::reason(&e)))
     }

@@ -94,11 +94,7 @@ mod tests {
         // What was saved just now may be saved again at once, with as many bytes.
         save(&path, &packed(&json, &binary), 0);
         assert!(!Arc::ptr_eq(&model(&path), &model(&path)));
-    }
-
-    #[test]
-    fn few_files_are_kept() {
-        let (json, binary) = square();
+        // Few are kept. It is in this test, since it drives out what other tests read.
         let folder = tempfile::tempdir().expect("a folder");
         let paths = (0..2 * KEPT).map(|i| folder.path().join(format!("{i}.glb")));
         let paths: Vec<_> = paths.collect();

@@ -7,7 +7,9 @@
 //! | `scene.toml` | the scene that the file shows |
 //! | `NAME.impasto` | the source of a material |
 //! | `meshes/N.gltf` | a mesh in coordinates of its own, as geometry |
-//! | `meshes.gltf` | all meshes where nodes put them |
+//! | `nodes/N.gltf` | the mesh of a node where that is, and as it is bent, at the scene's time |
+//! | `meshes.gltf` | all meshes where nodes put them, at the scene's time |
+//! | `placements/N.txt` | where nodes put a mesh, if they are many |
 //! | `images/N` | a picture, as it is encoded |
 
 use std::collections::BTreeSet;
@@ -18,6 +20,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use self::buffers::Stamp;
+use self::motion::Motion;
 use super::file;
 use crate::error::SceneError;
 
@@ -25,21 +28,27 @@ mod accessor;
 mod buffers;
 mod known;
 mod material;
+mod motion;
+#[cfg(test)]
+mod motion_tests;
 mod nodes;
 mod parse;
 mod scene;
+mod shape;
 #[cfg(test)]
 mod speed;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use buffers::Buffers;
+pub(crate) use nodes::Pose;
+pub(crate) use shape::Shape;
 
 /// Extensions of files that are folders to everyone.
 pub(crate) const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
 
 /// All meshes of a file, where nodes put them.
-pub(crate) const ALL: &str = "meshes.gltf";
+const ALL: &str = "meshes.gltf";
 
 /// The scene in a file.
 pub(crate) const SCENE: &str = "scene.toml";
@@ -61,6 +70,33 @@ pub(crate) struct Model {
     source_names: Vec<String>,
     /// The materials of primitives that have colors.
     colored: BTreeSet<usize>,
+    motion: Motion,
+}
+
+/// A member that is geometry.
+#[derive(Clone, Copy)]
+pub(crate) enum Member {
+    /// All nodes.
+    All,
+    /// A mesh in coordinates of its own.
+    Mesh(usize),
+    /// A node in the world.
+    Node(usize),
+}
+
+impl Member {
+    /// The member of that name; none if it is no geometry.
+    pub(crate) fn of_geometry(name: &Path) -> Option<Self> {
+        if name == Path::new(ALL) {
+            return Some(Self::All);
+        }
+        let number = |folder: &str| {
+            let within = name.strip_prefix(folder).ok()?.to_str()?;
+            within.strip_suffix(".gltf")?.parse().ok()
+        };
+        let node = || number("nodes").map(Self::Node);
+        number("meshes").map(Self::Mesh).or_else(node)
+    }
 }
 
 /// Does the extension say that it is a glTF file?
@@ -90,6 +126,11 @@ pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
     if let Some(source) = name.strip_suffix(".impasto") {
         let source = model.source(source);
         return source.map(String::into_bytes).ok_or_else(missing);
+    }
+    let mesh = name.strip_prefix("placements/");
+    let mesh = mesh.and_then(|n| n.strip_suffix(".txt")?.parse().ok());
+    if let Some(mesh) = mesh {
+        return Ok(model.placements(mesh).into_bytes());
     }
     let number = name.strip_prefix("images/").and_then(|n| n.parse().ok());
     model.picture(number.ok_or_else(missing)?)

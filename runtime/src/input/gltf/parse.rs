@@ -9,6 +9,7 @@ use gltf::json::validation::{Error as Invalid, Validate};
 use serde_json::Value;
 
 use super::buffers::Stamp;
+use super::motion::Motion;
 use super::{Model, material, unreadable};
 use crate::error::SceneError;
 
@@ -66,8 +67,13 @@ impl Model {
             return Err(wrong(format!("it is glTF of {found}"))
                 .hint("glTF 2.0 is read; converters and Blender write it"));
         }
-        let root: gltf::json::Root = serde_json::from_slice(&text).map_err(damaged)?;
+        let root: gltf::json::Root = if spell_out(&mut json) {
+            serde_json::from_value(json.clone()).map_err(damaged)?
+        } else {
+            serde_json::from_slice(&text).map_err(damaged)?
+        };
         check(path, &root)?;
+        let motion = Motion::of(&root).map_err(wrong)?;
         let materials = match json["materials"].take() {
             Value::Array(materials) => materials,
             _ => Vec::new(),
@@ -86,8 +92,39 @@ impl Model {
             material_names,
             source_names,
             colored,
+            motion,
         })
     }
+}
+
+/// Makes what glTF allows and the crate does not know what it knows: scenes without nodes have none, and channels that
+/// move no node, as extensions have them, are left out. Whether there was any.
+fn spell_out(json: &mut Value) -> bool {
+    let list = |json: &mut Value, key: &str| match json.get_mut(key) {
+        Some(Value::Array(items)) => std::mem::take(items),
+        _ => Vec::new(),
+    };
+    let mut changed = false;
+    let mut scenes = list(json, "scenes");
+    for scene in scenes.iter_mut().filter_map(Value::as_object_mut) {
+        changed |= !scene.contains_key("nodes");
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    let mut animations = list(json, "animations");
+    for animation in &mut animations {
+        if let Some(Value::Array(channels)) = animation.get_mut("channels") {
+            let count = channels.len();
+            let moves_nothing = |target: &Value| target.is_object() && target["node"].is_null();
+            channels.retain(|channel| !moves_nothing(&channel["target"]));
+            changed |= channels.len() < count;
+        }
+    }
+    for (key, items) in [("scenes", scenes), ("animations", animations)] {
+        if !items.is_empty() {
+            json[key] = items.into();
+        }
+    }
+    changed
 }
 
 /// The JSON of a file, and where its binary part is.

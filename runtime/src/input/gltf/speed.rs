@@ -93,7 +93,7 @@ fn beside_obj(folder: &Path) {
         let format = FORMATS.iter().find(|f| f.extensions.contains(&extension));
         let format = format.expect("a row");
         let mut runs: Vec<_> = (0..5)
-            .map(|_| seconds(|| (format.read)(folder, name).expect("it is read")))
+            .map(|_| seconds(|| (format.read)(folder, name, 0.0).expect("it is read")))
             .collect();
         runs.sort_by(|a, b| a.0.total_cmp(&b.0));
         runs.swap_remove(2)
@@ -143,7 +143,7 @@ fn grid(cells: usize) -> (Vec<[f32; 2]>, Vec<[u32; 3]>) {
 
 /// A file under way.
 #[derive(Default)]
-struct Parts {
+pub(super) struct Parts {
     views: Vec<Value>,
     accessors: Vec<Value>,
     binary: Vec<u8>,
@@ -159,7 +159,26 @@ impl Parts {
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, bytes: &[u8], component: usize, count: usize, kind: &str) -> usize {
+    /// An accessor of floats, so many an element.
+    pub(super) fn floats(&mut self, numbers: &[f32], width: usize) -> usize {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let kind = match width {
+            2 => "VEC2",
+            3 => "VEC3",
+            4 => "VEC4",
+            16 => "MAT4",
+            _ => "SCALAR",
+        };
+        self.accessor(&bytes, 5126, numbers.len() / width, kind)
+    }
+
+    pub(super) fn accessor(
+        &mut self,
+        bytes: &[u8],
+        component: usize,
+        count: usize,
+        kind: &str,
+    ) -> usize {
         let view = self.view(bytes);
         let mut accessor = json!({ "bufferView": view, "componentType": component, "count": count,
                                    "type": kind });
@@ -174,27 +193,23 @@ impl Parts {
     /// A primitive of a square of so many cells a side.
     fn grid(&mut self, cells: usize) -> Value {
         let (corners, triangles) = grid(cells);
-        let count = corners.len();
-        let floats = |list: &mut dyn Iterator<Item = f32>| -> Vec<u8> {
-            list.flat_map(f32::to_le_bytes).collect()
-        };
-        let places = floats(&mut corners.iter().flat_map(|[x, y]| [*x, *y, 0.5]));
-        let normals = floats(&mut corners.iter().flat_map(|_| [0.0, 0.0, 1.0]));
-        let uvs = floats(&mut corners.iter().flatten().copied());
+
+        let places: Vec<f32> = corners.iter().flat_map(|[x, y]| [*x, *y, 0.5]).collect();
+        let normals = [0.0, 0.0, 1.0].repeat(corners.len());
         let indices: Vec<u8> = triangles
             .iter()
             .flatten()
             .flat_map(|i| i.to_le_bytes())
             .collect();
         json!({ "attributes": {
-                "POSITION": self.accessor(&places, 5126, count, "VEC3"),
-                "NORMAL": self.accessor(&normals, 5126, count, "VEC3"),
-                "TEXCOORD_0": self.accessor(&uvs, 5126, count, "VEC2") },
+                "POSITION": self.floats(&places, 3),
+                "NORMAL": self.floats(&normals, 3),
+                "TEXCOORD_0": self.floats(corners.as_flattened(), 2) },
             "indices": self.accessor(&indices, 5125, 3 * triangles.len(), "SCALAR") })
     }
 
     /// The whole file, with what `json` has beside.
-    fn file(self, mut json: Value) -> Vec<u8> {
+    pub(super) fn file(self, mut json: Value) -> Vec<u8> {
         json["asset"] = json!({ "version": "2.0" });
         json["buffers"] = json!([{ "byteLength": self.binary.len() }]);
         json["bufferViews"] = self.views.into();

@@ -79,8 +79,12 @@ pub(super) fn file_of(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 pub(super) fn read(path: &Path) -> Result<Geometry, SceneError> {
+    read_at(path, 0.0)
+}
+
+pub(super) fn read_at(path: &Path, seconds: f64) -> Result<Geometry, SceneError> {
     let format = FORMATS.iter().find(|f| f.name == "glTF").expect("a row");
-    (format.read)(path.parent().expect("a folder"), "m.glb")
+    (format.read)(path.parent().expect("a folder"), "m.glb", seconds)
 }
 
 fn geometry_of(bytes: Vec<u8>) -> Result<Geometry, SceneError> {
@@ -295,6 +299,33 @@ fn transforms_scale_then_turn_then_move() {
     // In glTF: (u, v) = (0.25, 0.5) scales to (0.5, 1.5), turns to (1.5, -0.5), and moves to (2, -0.25).
     assert_eq!(transformed([0.25, 0.5]), [2.0, 1.25]);
     assert!(super::material::TRANSFORMED.contains("cos(turn) * p.x + sin(turn) * p.y"));
+}
+
+#[test]
+fn a_scene_may_have_no_nodes() {
+    let empty = |j: &mut Value| j["scenes"] = json!([{ "name": "empty" }]);
+    let error = of_json(empty).expect_err("nothing is there").to_string();
+    assert!(error.contains("has no triangles"), "{error}");
+    let beside = of_json(|j| j["scenes"] = json!([{ "nodes": [0] }, {}]));
+    assert_eq!(corners(&beside).len(), 2);
+}
+
+/// Places that are many are in a file of their own.
+#[test]
+fn many_nodes_are_as_many_places() {
+    let (mut json, binary) = square();
+    let count = 10_001;
+    let node = |i: usize| json!({ "mesh": 0, "translation": [i, 0, 0] });
+    json["nodes"] = (0..count).map(node).collect();
+    json["scenes"] = json!([{ "nodes": (0..count).collect::<Vec<_>>() }]);
+    let (_folder, path) = file_of(&packed(&json, &binary));
+    let text = member(&path, Path::new("scene.toml")).expect("a scene");
+    let text = String::from_utf8(text).expect("text");
+    assert!(text.contains("placements = \"placements/0.txt\""), "{text}");
+    let scene = world::load(&path).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(scene.mesh.len(), 2 * count);
+    let corner = scene.mesh.positions[2 * count - 1][0];
+    assert_eq!(corner, Vec3::new(10_000.0, 0.0, 0.0));
 }
 
 /// A folder with a file, and the scene in it.
