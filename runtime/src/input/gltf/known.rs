@@ -56,24 +56,20 @@ fn is_settled(stamp: Stamp) -> bool {
     let Some(modified) = stamp.modified else {
         return false;
     };
-    let now = SystemTime::now();
-    let between = now.duration_since(modified);
+    let between = now().duration_since(modified);
     between.unwrap_or_else(|e| e.duration()) > SETTLED
+}
+
+/// The time of day, by which saves are dated. If it jumps, a file is parsed once more.
+#[allow(clippy::disallowed_methods)]
+pub(super) fn now() -> SystemTime {
+    SystemTime::now()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{file_of, packed, square};
+    use super::super::tests::{file_of, packed, save, square};
     use super::*;
-
-    /// Saves the file, as if so many seconds ago.
-    fn save(path: &Path, bytes: &[u8], age: u64) {
-        std::fs::write(path, bytes).expect("it is written");
-        let file = std::fs::File::options().write(true).open(path);
-        let then = SystemTime::now() - Duration::from_secs(age);
-        let file = file.expect("it is there");
-        file.set_modified(then).expect("it has a time");
-    }
 
     fn model(path: &Path) -> Arc<Model> {
         Model::read(path).unwrap_or_else(|e| panic!("{e}"))

@@ -108,7 +108,9 @@ fn spell_out(json: &mut Value) -> bool {
     let mut scenes = list(json, "scenes");
     for scene in scenes.iter_mut().filter_map(Value::as_object_mut) {
         changed |= !scene.contains_key("nodes");
-        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+        scene
+            .entry("nodes")
+            .or_insert_with(|| Value::Array(Vec::new()));
     }
     let mut animations = list(json, "animations");
     for animation in &mut animations {

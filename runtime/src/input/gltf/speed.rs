@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::tests::packed;
+use super::tests::{packed, save};
 use crate::input;
 use crate::scene::formats::{FORMATS, Geometry};
 use crate::world;
@@ -20,15 +20,6 @@ fn speed() {
     beside_obj(folder);
     many_nodes(folder, 100_000);
     many_nodes(folder, 1_000_000);
-}
-
-/// Writes a file that nobody has saved just now.
-fn save(path: &Path, bytes: &[u8]) {
-    std::fs::write(path, bytes).expect("it is written");
-    let file = std::fs::File::options().write(true).open(path);
-    let before = SystemTime::now() - Duration::from_secs(60);
-    let file = file.expect("it is there");
-    file.set_modified(before).expect("it has a time");
 }
 
 fn seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
@@ -55,7 +46,7 @@ fn many_members(folder: &Path) {
     let nodes: Vec<Value> = (0..meshes).map(node).collect();
     let path = folder.join("many.glb");
     let file = parts.file(json!({ "meshes": all, "images": images, "nodes": nodes }));
-    save(&path, &file);
+    save(&path, &file, 60);
     let (scene, loaded) = seconds(|| world::load(&path));
     assert_eq!(loaded.expect("it loads").mesh.len(), 200 * meshes);
     let (looked_at, ()) = seconds(|| {
@@ -65,7 +56,7 @@ fn many_members(folder: &Path) {
         }
     });
     let megabytes = file.len() as f64 / 1e6;
-    println!(
+    eprintln!(
         "{megabytes:.0} MB of {meshes} meshes and {pictures} pictures: {scene:.3} s and {looked_at:.3} s"
     );
 }
@@ -77,7 +68,7 @@ fn beside_obj(folder: &Path) {
     let primitive = parts.grid(cells);
     let file =
         parts.file(json!({ "meshes": [{ "primitives": [primitive] }], "nodes": [{ "mesh": 0 }] }));
-    save(&folder.join("grid.glb"), &file);
+    save(&folder.join("grid.glb"), &file, 60);
     let mut text = String::new();
     let (corners, triangles) = grid(cells);
     for [x, y] in &corners {
@@ -87,7 +78,7 @@ fn beside_obj(folder: &Path) {
         let [a, b, c] = corners.map(|i| i + 1);
         let _ = writeln!(text, "f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}");
     }
-    save(&folder.join("grid.obj"), text.as_bytes());
+    save(&folder.join("grid.obj"), text.as_bytes(), 60);
     let read = |name: &str| -> (f64, Geometry) {
         let extension = name.rsplit('.').next().unwrap_or_default();
         let format = FORMATS.iter().find(|f| f.extensions.contains(&extension));
@@ -102,7 +93,7 @@ fn beside_obj(folder: &Path) {
     let (glb, of_glb) = read("grid.glb");
     assert_eq!(of_obj.triangles.len(), of_glb.triangles.len());
     let (count, share) = (of_glb.triangles.len(), glb / obj);
-    println!("{count} triangles: OBJ {obj:.3} s, glTF {glb:.3} s, {share:.3} of it");
+    eprintln!("{count} triangles: OBJ {obj:.3} s, glTF {glb:.3} s, {share:.3} of it");
 }
 
 /// Nodes that show one mesh, each hundred of them the children of one, in a file without scenes.
@@ -119,13 +110,13 @@ fn many_nodes(folder: &Path, count: usize) {
     let nodes: Vec<Value> = (0..count).map(node).collect();
     let path = folder.join("nodes.glb");
     let file = parts.file(json!({ "meshes": [{ "primitives": [primitive] }], "nodes": nodes }));
-    save(&path, &file);
+    save(&path, &file, 60);
     let (scene, text) = seconds(|| input::read(&path.join("scene.toml")));
     let length = text.expect("a scene").len();
     let (whole, loaded) = seconds(|| world::load(&path));
     let loaded = loaded.expect("it loads");
     assert!(loaded.mesh.len() == 2 * count || loaded.placements.len() == count);
-    println!("{count} nodes: text of {length} bytes {scene:.3} s, scene {whole:.3} s");
+    eprintln!("{count} nodes: text of {length} bytes {scene:.3} s, scene {whole:.3} s");
 }
 
 /// Corners and triangles of a square of so many cells a side.
