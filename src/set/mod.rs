@@ -52,7 +52,7 @@ pub(crate) const SOURCES: [(&str, &str); 2] = [
 static SHAPES: [Format; 1] = [Format {
     name: "built-in shapes",
     extensions: &["set"],
-    read: |_, name| shape(name),
+    read: |_, name, _| shape(name),
     without_material: "triangles without a material",
     values: &[],
     values_of: "a built-in shape",

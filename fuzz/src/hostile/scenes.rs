@@ -76,6 +76,7 @@ const WORDS: &[&str] = &[
     "height",
     "max_depth",
     "obj",
+    "gltf",
     "file",
     "material",
     "params",

@@ -286,7 +286,9 @@ impl Scene<'_> {
                     .map(|b| text(&b.name.value, ProposalKind::Material, ""))
                     .collect()
             }
-            ("geometry", "file" | "obj" | "uv1") => self.files(cursor, &["obj"], quoted),
+            ("geometry", "file" | "obj" | "gltf" | "uv1") => {
+                self.files(cursor, &["obj", "ply", "gltf", "glb"], quoted)
+            }
             ("environment", "file") => self.files(cursor, &["exr", "hdr", "png", "jpg"], quoted),
             ("lights", "kind") => ["quad", "distant"]
                 .map(|k| text(k, ProposalKind::Keyword, ""))

@@ -119,7 +119,10 @@ mod tests {
             ("camera", &["position", "look_at", "fov", "turntable"][..]),
             ("film", &["width", "height"]),
             ("integrator", &["max_depth", "roulette_start"]),
-            ("geometry", &["file", "obj", "placements", "material"]),
+            (
+                "geometry",
+                &["file", "obj", "gltf", "placements", "material"],
+            ),
             (
                 "materials",
                 &["file", "material", "params", "bake", "group"],

@@ -101,7 +101,7 @@ pub fn outline(text: &str) -> SceneOutline {
 impl SceneOutline {
     /// What an entry of geometry names.
     fn entry(&mut self, text: &str, table: &DeTable<'_>) {
-        for key in ["file", "obj", "uv1", "placements"] {
+        for key in ["file", "obj", "gltf", "uv1", "placements"] {
             self.files.extend(string(text, table, key));
         }
         self.asked.extend(string(text, table, "material"));

@@ -12,7 +12,7 @@ use super::bindings::Bindings;
 use super::description::{Description, GeometrySpec, SourceName};
 use super::duplicates::{self, Removed};
 use super::formats::{self, Format};
-use super::load::Source;
+use super::load::{Source, Sources};
 use super::mesh::{Repairs, check_reach};
 use super::origin::{self, Extent};
 use super::placements::{self, Places, PlacesSpec};
@@ -44,7 +44,7 @@ pub(super) fn assemble(
     path: &Path,
     formats: &[Format],
     description: &Description,
-    sources: &BTreeMap<SourceName, Source>,
+    sources: Sources<'_, '_>,
     warnings: &mut Vec<String>,
 ) -> Result<Assembled, SceneError> {
     let base = path.parent().unwrap_or(Path::new(""));
@@ -55,7 +55,7 @@ pub(super) fn assemble(
         .zip(&files)
         .map(|(spec, file)| Entry {
             spec,
-            source: &sources[&spec.source()],
+            source: sources.of(spec),
             places: match (&spec.places, file) {
                 (PlacesSpec::Listed(places), _) | (_, Some(places)) => places,
                 (PlacesSpec::File(..), None) => &NOWHERE,

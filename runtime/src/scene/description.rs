@@ -255,6 +255,8 @@ fn camera(root: &mut Table, moment: Moment) -> Result<(CameraSpec, Vec<MaterialN
     let turn = turntable(&mut table, moment, look_at)?;
     let (position, look_at) = (turn.place(position), turn.place(look_at));
     let up = optional(&mut table, "up", Value::vector, Vec3::Y)?;
+    let mix = |a: &Vec3, b: &Vec3, t: f64| a.lerp(*b, t as f32);
+    let up = moment.keyed(&mut keys, "up", Value::vector, mix, up)?;
     let fov = table.require("fov")?;
     let angle = |v: &Value| {
         let expected = "an angle in degrees between 0 and 180";
@@ -379,25 +381,43 @@ fn geometry<'f>(
     value.tables("geometry")?.into_iter().map(entry).collect()
 }
 
-/// The file that an entry names, where it does, and its format. `obj` says that an extension which tells no other
-/// format is that of an OBJ file.
+/// Keys beside `file` that name a geometry file. An extension that tells no other format is of the format of that
+/// extension.
+const FORMAT_KEYS: [&str; 2] = ["obj", "gltf"];
+
+/// The file that an entry names, where it does, and its format.
 fn geometry_file<'f>(
     table: &mut Table,
     formats: &'f [Format],
 ) -> Result<(String, Excerpt, &'f Format), SceneError> {
-    let file = table.get("file");
-    let (value, otherwise) = match file {
-        None => (table.require("obj")?, formats::of_extension(formats, "obj")),
-        Some(_) if table.get("obj").is_some() => {
-            return Err(table.error("[[geometry]] needs either `file` or `obj`"));
+    let file = table.get("file").map(|value| (value, None));
+    let named = FORMAT_KEYS.map(|key| {
+        let format = formats::of_extension(formats, key);
+        table.get(key).map(|value| (value, format))
+    });
+    let mut all = file.into_iter().chain(named.into_iter().flatten());
+    let (value, otherwise) = match (all.next(), all.next()) {
+        (Some(one), None) => one,
+        (None, _) => return Err(no_file(table)),
+        (Some(_), Some(_)) => {
+            let message = "[[geometry]] needs one of `file`, `obj` and `gltf`";
+            return Err(table.error(message));
         }
-        Some(file) => (file, None),
     };
     let name = value.string()?;
     match formats::of_file(formats, name).or(otherwise) {
         Some(format) => Ok((name.to_owned(), value.excerpt(), format)),
         None => Err(unreadable(&value, name, formats)),
     }
+}
+
+/// The error for an entry that names no file: one that says which key may be meant, if there is one.
+fn no_file(table: &mut Table) -> SceneError {
+    let keys = std::iter::once("file").chain(FORMAT_KEYS);
+    let errors = keys.filter_map(|key| table.require(key).err());
+    let mut errors: Vec<SceneError> = errors.collect();
+    let meant = errors.iter().position(|error| error.hint.is_some());
+    errors.swap_remove(meant.unwrap_or(0))
 }
 
 /// The file that an entry takes its second texture coordinates from.

@@ -124,7 +124,8 @@ impl<'f> SceneFile<'f> {
         let frame = Asked::default().frame;
         let description = Description::read(&Document::new(path, &text), formats, lights, frame)?;
         let base = path.parent().unwrap_or(Path::new(""));
-        let sources = load_sources(base, &description.geometry)?;
+        let entries: Vec<&GeometrySpec<'f>> = description.geometry.iter().collect();
+        let sources = load_sources(base, &entries, frame)?;
         let mut warnings = Vec::new();
         let environment = description.environment.as_ref();
         let environment = environment
@@ -167,6 +168,28 @@ impl<'f> SceneFile<'f> {
         self.assembled(asked, self.environment.clone())
     }
 
+    /// The geometry that is another at the frame than at the first one.
+    fn moved(
+        &self,
+        description: &Description<'f>,
+        frame: f64,
+    ) -> Result<BTreeMap<SourceName, Source<'f>>, SceneError> {
+        if frame == Asked::default().frame {
+            return Ok(BTreeMap::new());
+        }
+        let moves = |entry: &&GeometrySpec<'f>| {
+            let source = self.sources.get(&entry.source());
+            source.is_some_and(|source| source.geometry.moves)
+        };
+        let base = self.path.parent().unwrap_or(Path::new(""));
+        let entries: Vec<&GeometrySpec<'f>> = description.geometry.iter().filter(moves).collect();
+        load_sources(
+            base,
+            &entries,
+            frame / description.animation.frames_per_second,
+        )
+    }
+
     /// The scene as the file says, which nobody asks again.
     fn into_scene(mut self) -> Result<Scene, SceneError> {
         let environment = self.environment.take();
@@ -185,7 +208,12 @@ impl<'f> SceneFile<'f> {
         description.give(&asked.given)?;
         let mut warnings = Vec::new();
         let formats = self.formats;
-        let assembled = assemble(path, formats, &description, &self.sources, &mut warnings)?;
+        let moved = self.moved(&description, asked.frame)?;
+        let sources = Sources {
+            moved: &moved,
+            rest: &self.sources,
+        };
+        let assembled = assemble(path, formats, &description, sources, &mut warnings)?;
         warnings.extend(self.warnings.iter().cloned());
         Ok(Scene {
             name: description.name.unwrap_or_else(|| default_name(path)),
@@ -224,28 +252,45 @@ fn default_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// A geometry file.
+/// A geometry file at a time.
 pub(super) struct Source<'f> {
     pub(super) path: PathBuf,
     pub(super) format: &'f Format,
     pub(super) geometry: Geometry,
 }
 
-/// Every geometry file that entries name, read once, by the names they use.
+/// The geometry files of a scene at a frame.
+#[derive(Clone, Copy)]
+pub(super) struct Sources<'s, 'f> {
+    /// Those that are others than at the first frame.
+    moved: &'s BTreeMap<SourceName, Source<'f>>,
+    rest: &'s BTreeMap<SourceName, Source<'f>>,
+}
+
+impl<'s, 'f> Sources<'s, 'f> {
+    /// What an entry is read from.
+    pub(super) fn of(self, entry: &GeometrySpec<'_>) -> &'s Source<'f> {
+        let name = entry.source();
+        self.moved.get(&name).unwrap_or_else(|| &self.rest[&name])
+    }
+}
+
+/// Every geometry file that entries name, read once as it is after so many seconds, by the names they use.
 fn load_sources<'f>(
     base: &Path,
-    entries: &[GeometrySpec<'f>],
+    entries: &[&GeometrySpec<'f>],
+    seconds: f64,
 ) -> Result<BTreeMap<SourceName, Source<'f>>, SceneError> {
     // In reverse, so that the first entry of a file is the one that errors name.
-    let formats = entries.iter().rev().map(|entry| (entry.source(), entry));
+    let formats = entries.iter().rev().map(|entry| (entry.source(), *entry));
     let files: BTreeMap<SourceName, &GeometrySpec<'f>> = formats.collect();
     let files: Vec<(SourceName, &GeometrySpec<'f>)> = files.into_iter().collect();
     let load = |(name, entry): &(SourceName, &GeometrySpec<'f>)| {
-        let read = (entry.format.read)(base, &entry.file);
+        let read = (entry.format.read)(base, &entry.file, seconds);
         let mut geometry = read.map_err(|e| e.named_at(&entry.named))?;
         if let Some(second) = &entry.uv1 {
             let path = &base.join(&second.file);
-            let read = (second.format.read)(base, &second.file);
+            let read = (second.format.read)(base, &second.file, seconds);
             let taken = read.and_then(|other| geometry.take_second_uvs(other, &entry.file, path));
             taken.map_err(|e| e.named_at(&second.named))?;
         }

@@ -1,14 +1,11 @@
 //! Numbers out of buffers: typed, strided, normalised and sparse, and never behind an end.
 
-use std::borrow::Cow;
-
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::accessor::ComponentType;
 
-/// Reads the numbers of accessors.
-pub(crate) struct Buffers<'m>(pub(super) Vec<Cow<'m, [u8]>>);
+use super::Buffers;
 
-impl Buffers<'_> {
+impl<'m> Buffers<'m> {
     /// The elements of an accessor of `N` floats, or of integers that stand for floats where they are normalised or
     /// `quantized`.
     ///
@@ -16,7 +13,7 @@ impl Buffers<'_> {
     /// What is wrong with it, in words.
     pub(crate) fn floats<const N: usize>(
         &self,
-        accessor: &gltf::Accessor<'_>,
+        accessor: &gltf::Accessor<'m>,
     ) -> Result<Vec<[f32; N]>, String> {
         if components(accessor.dimensions()) != N {
             return Err(format!(
@@ -32,11 +29,39 @@ impl Buffers<'_> {
         self.elements(accessor, element, [0.0; N])
     }
 
+    /// As [`Buffers::floats`], of the accessor of that number.
+    ///
+    /// # Errors
+    /// As there, or there is no such accessor.
+    pub(super) fn floats_of<const N: usize>(&self, number: usize) -> Result<Vec<[f32; N]>, String> {
+        let accessor = self.model.document.accessors().nth(number);
+        let missing = || format!("there is no accessor {number}");
+        self.floats(&accessor.ok_or_else(missing)?)
+    }
+
+    /// The elements of an accessor of `N` unsigned integers of up to 16 bits.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub(super) fn whole<const N: usize>(
+        &self,
+        accessor: &gltf::Accessor<'m>,
+    ) -> Result<Vec<[u16; N]>, String> {
+        let kind = accessor.data_type();
+        let is_whole = matches!(kind, DataType::U8 | DataType::U16);
+        if !is_whole || components(accessor.dimensions()) != N {
+            let number = accessor.index();
+            return Err(format!("accessor {number} has not {N} integers"));
+        }
+        let element = |bytes: &[u8]| std::array::from_fn(|i| component(bytes, kind, i) as u16);
+        self.elements(accessor, element, [0; N])
+    }
+
     /// The elements of an accessor of unsigned integers.
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub(crate) fn indices(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, String> {
+    pub(crate) fn indices(&self, accessor: &gltf::Accessor<'m>) -> Result<Vec<u32>, String> {
         let kind = accessor.data_type();
         let is_index = matches!(kind, DataType::U8 | DataType::U16 | DataType::U32);
         if !is_index || accessor.dimensions() != Dimensions::Scalar {
@@ -47,7 +72,7 @@ impl Buffers<'_> {
 
     fn elements<T: Clone>(
         &self,
-        accessor: &gltf::Accessor<'_>,
+        accessor: &gltf::Accessor<'m>,
         element: impl Fn(&[u8]) -> T,
         zero: T,
     ) -> Result<Vec<T>, String> {
@@ -56,9 +81,9 @@ impl Buffers<'_> {
         let size = accessor.size();
         let mut all = match accessor.view() {
             Some(view) => {
-                let bytes = self.view(&view, accessor.offset()).ok_or_else(outside)?;
                 let stride = view.stride().unwrap_or(size).max(1);
-                each(bytes, stride, size, count, &element).ok_or_else(outside)?
+                self.each(&view, accessor.offset(), [stride, size, count], &element)?
+                    .ok_or_else(outside)?
             }
             // Zeros, which sparse values may replace; so many as there can be of these, and no more memory.
             None if count <= MOST_ZEROS => vec![zero; count],
@@ -78,48 +103,45 @@ impl Buffers<'_> {
             gltf::accessor::sparse::IndexType::U16 => DataType::U16,
             gltf::accessor::sparse::IndexType::U32 => DataType::U32,
         };
-        let bytes = self.view(&indices.view(), indices.offset());
         let place = |bytes: &[u8]| component(bytes, kind, 0) as usize;
-        let places = bytes.and_then(|bytes| each(bytes, kind.size(), kind.size(), count, &place));
+        let packed = [kind.size(), kind.size(), count];
+        let places = self.each(&indices.view(), indices.offset(), packed, place)?;
         let places = places.ok_or_else(outside)?;
         let values = sparse.values();
-        let bytes = self.view(&values.view(), values.offset());
-        let values = bytes.and_then(|bytes| each(bytes, size, size, count, &element));
+        let packed = [size, size, count];
+        let values = self.each(&values.view(), values.offset(), packed, &element)?;
         for (place, value) in places.into_iter().zip(values.ok_or_else(outside)?) {
             *all.get_mut(place).ok_or_else(outside)? = value;
         }
         Ok(all)
     }
 
-    /// The bytes of a view from an offset on.
-    fn view(&self, view: &gltf::buffer::View<'_>, offset: usize) -> Option<&[u8]> {
-        let buffer = self.0.get(view.buffer().index())?;
-        let end = view.offset().checked_add(view.length())?;
-        buffer.get(view.offset()..end)?.get(offset..)
+    /// `count` elements of `size` bytes, `stride` bytes apart, of a view from an offset on; none if there are fewer.
+    fn each<T>(
+        &self,
+        view: &gltf::buffer::View<'m>,
+        offset: usize,
+        [stride, size, count]: [usize; 3],
+        element: impl Fn(&[u8]) -> T,
+    ) -> Result<Option<Vec<T>>, String> {
+        let Some(last) = count.checked_sub(1) else {
+            return Ok(Some(Vec::new()));
+        };
+        let length = last.checked_mul(stride).and_then(|l| l.checked_add(size));
+        let Some(length) = length else {
+            return Ok(None);
+        };
+        let bytes = self.bytes(view, offset, length)?;
+        let elements = |bytes: Vec<u8>| {
+            let places = (0..count).map(|i| i * stride);
+            places.map(|at| element(&bytes[at..at + size])).collect()
+        };
+        Ok(bytes.map(elements))
     }
 }
 
 /// Most elements of an accessor that no buffer holds.
 const MOST_ZEROS: usize = 1 << 24;
-
-/// `count` elements of `size` bytes, `stride` bytes apart; none if there are fewer.
-fn each<T>(
-    bytes: &[u8],
-    stride: usize,
-    size: usize,
-    count: usize,
-    element: &dyn Fn(&[u8]) -> T,
-) -> Option<Vec<T>> {
-    let Some(last) = count.checked_sub(1) else {
-        return Some(Vec::new());
-    };
-    let needed = last.checked_mul(stride)?.checked_add(size)?;
-    if needed > bytes.len() {
-        return None;
-    }
-    let elements = (0..count).map(|i| element(&bytes[i * stride..i * stride + size]));
-    Some(elements.collect())
-}
 
 fn components(dimensions: Dimensions) -> usize {
     dimensions.multiplicity()

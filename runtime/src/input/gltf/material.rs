@@ -1,7 +1,7 @@
 //! Materials of a glTF file as sources: an instance of `std::surface::gltf_pbr`, whose numbers are parameters and whose
 //! pictures are looked up, with only what differs from its defaults.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use serde_json::Value;
@@ -121,57 +121,53 @@ fn transformed(place: vec2, offset: vec2, turn: float, scale: vec2) -> vec2 {
 ";
 
 impl Model {
-    /// What scenes call its materials, by their number: their names, none twice.
-    pub(crate) fn material_names(&self) -> Vec<String> {
-        let mut taken = BTreeSet::new();
-        let materials = self.document.materials();
-        let names = materials.filter_map(|m| Some((m.index()?, m.name().map(str::to_owned))));
-        let names = names.map(|(index, name)| Self::named(name.as_deref(), "material", index));
-        names.map(|name| unique(&mut taken, name)).collect()
-    }
-
-    /// The names of their sources, without extension, which are those of the materials within too.
-    pub(super) fn source_names(&self) -> Vec<String> {
-        let mut taken = BTreeSet::new();
-        let names = self.material_names().into_iter();
-        names
-            .map(|name| unique(&mut taken, identifier(&name)))
-            .collect()
-    }
-
     /// The source of the material of that name; none if there is none.
     pub(super) fn source(&self, name: &str) -> Option<String> {
-        let number = self.source_names().iter().position(|own| own == name)?;
-        let title = self.material_names().swap_remove(number);
+        let number = self.source_names.iter().position(|own| own == name)?;
+        let title = &self.material_names[number];
         let file = self.path.file_name().unwrap_or_default().to_string_lossy();
         let material = Written {
             model: self,
-            json: &self.json["materials"][number],
-            has_colors: self.has_colors(number),
+            json: self.materials.get(number)?,
+            has_colors: self.colored.contains(&number),
             params: String::new(),
             arguments: Vec::new(),
             maps: Vec::new(),
             transforms: false,
             bends: false,
         };
-        Some(material.source(name, &title, &file))
-    }
-
-    /// Does a mesh that has the material have colors?
-    fn has_colors(&self, material: usize) -> bool {
-        let mut primitives = self.document.meshes().flat_map(|mesh| mesh.primitives());
-        primitives.any(|p| {
-            let is_of = p.material().index() == Some(material);
-            is_of && p.get(&gltf::Semantic::Colors(0)).is_some()
-        })
+        Some(material.source(name, title, &file))
     }
 }
 
-fn unique(taken: &mut BTreeSet<String>, name: String) -> String {
-    let numbered = (2..).map(|n| format!("{name}_{n}"));
-    let mut names = std::iter::once(name.clone()).chain(numbered);
-    let free = names.find(|name| taken.insert(name.clone()));
-    free.unwrap_or(name)
+/// What scenes call the materials of a file, by their number, and the names of their sources.
+pub(super) fn names(document: &gltf::Document) -> (Vec<String>, Vec<String>) {
+    let materials = document.materials().enumerate();
+    let names = materials.map(|(index, m)| Model::named(m.name(), "material", index));
+    let names: Vec<String> = unique(names);
+    let sources = unique(names.iter().map(|name| identifier(name)));
+    (names, sources)
+}
+
+/// The names, with numbers after those that were there already.
+fn unique(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut taken = BTreeSet::new();
+    // Where to look on for a name that is free.
+    let mut next: BTreeMap<String, usize> = BTreeMap::new();
+    let free = |name: String| {
+        if taken.insert(name.clone()) {
+            return name;
+        }
+        let number = next.entry(name.clone()).or_insert(1);
+        loop {
+            *number += 1;
+            let numbered = format!("{name}_{number}");
+            if taken.insert(numbered.clone()) {
+                return numbered;
+            }
+        }
+    };
+    names.map(free).collect()
 }
 
 /// A name as the language has them.

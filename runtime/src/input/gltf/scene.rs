@@ -6,7 +6,7 @@ use std::fmt::Write;
 use glam::{DMat4, DVec3};
 use gltf::khr_lights_punctual::Kind;
 
-use super::{ALL, Model};
+use super::{ALL, Model, Pose};
 
 /// Lumens of a watt: of lights, glTF tells what eyes see, and a renderer counts energy. It is what Blender takes.
 const LUMENS_A_WATT: f64 = 683.0;
@@ -24,6 +24,13 @@ const FOV: f64 = 35.0;
 /// How much wider than everything the picture is.
 const MARGIN: f64 = 1.1;
 
+/// Frames of a second, in the keys of a camera that moves, and most of them.
+const RATE: f64 = 24.0;
+const MOST_FRAMES: usize = 10_000;
+
+/// More places of a mesh than this are in a file of their own, which is faster to read than a list.
+const LISTED: usize = 10_000;
+
 /// Columns and rows of the picture, the rows for a camera that does not say its shape.
 const COLUMNS: u32 = 1024;
 const ROWS: u32 = 768;
@@ -31,17 +38,18 @@ const ROWS: u32 = 768;
 impl Model {
     /// The text of a scene file, in which names of meshes begin with `prefix`.
     pub(super) fn scene(&self, prefix: &str) -> String {
+        let pose = Pose::new(self, 0.0);
         let mut seen = Seen::default();
         // What is wrong with nodes is told where the geometry is read, which the scene then names whole.
-        let visited = self.visit(&mut |node, transform| seen.node(node, transform));
+        let visited = pose.visit(&mut |node, transform| seen.node(&pose, node, transform));
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let mut text = format!("name = {}\n", quoted(&name));
-        seen.write_camera(&mut text);
+        seen.write_camera(self, &mut text);
         let mut write = |line: String| {
             text.push_str(&line);
             text.push('\n');
         };
-        if visited.is_err() || seen.meshes.is_empty() {
+        if visited.is_err() || seen.meshes.is_empty() && seen.nodes.is_empty() {
             let all = quoted(&format!("{prefix}{ALL}"));
             write(format!("[[geometry]]\nfile = {all}\n"));
         }
@@ -50,17 +58,25 @@ impl Model {
             let file = quoted(&format!("{prefix}meshes/{mesh}.gltf"));
             write(format!("[[geometry]]\nfile = {file}"));
             match &places[..] {
-                [one] => write(format!("matrix = {one}\n")),
+                [one] => write(format!("matrix = [{one}]\n")),
+                all if all.len() > LISTED => {
+                    let file = quoted(&format!("{prefix}placements/{mesh}.txt"));
+                    write(format!("placements = {file}\n"));
+                }
                 all => {
                     let all: Vec<String> = all
                         .iter()
-                        .map(|m| format!("  {{ matrix = {m} }},\n"))
+                        .map(|m| format!("  {{ matrix = [{m}] }},\n"))
                         .collect();
                     write(format!("placements = [\n{}]\n", all.concat()));
                 }
             }
         }
-        for (name, source) in self.material_names().iter().zip(self.source_names()) {
+        for node in &seen.nodes {
+            let file = quoted(&format!("{prefix}nodes/{node}.gltf"));
+            write(format!("[[geometry]]\nfile = {file}\n"));
+        }
+        for (name, source) in self.material_names.iter().zip(&self.source_names) {
             write(format!("[materials.{}]", quoted(name)));
             write(format!("file = \"{source}.impasto\"\n"));
         }
@@ -70,36 +86,68 @@ impl Model {
     }
 }
 
+impl Model {
+    /// Where nodes put the mesh of that number, as a file of places.
+    pub(super) fn placements(&self, mesh: usize) -> String {
+        let mut text = String::from("m00 m01 m02 m03 m10 m11 m12 m13 m20 m21 m22 m23\n");
+        // What is wrong with nodes is told where the geometry is read.
+        let _ = Pose::new(self, 0.0).visit(&mut |node, transform| {
+            let is_it = node.mesh().is_some_and(|own| own.index() == mesh);
+            if is_it && !self.has_shape_of_its_own(node) {
+                text.push_str(&matrix(transform));
+                text.push('\n');
+            }
+        });
+        text
+    }
+}
+
 /// What nodes show.
 #[derive(Default)]
 struct Seen {
     /// Where meshes are, by their number.
     meshes: BTreeMap<usize, Vec<DMat4>>,
+    /// Nodes whose meshes move or are bent.
+    nodes: Vec<usize>,
     bounds: Option<[DVec3; 2]>,
-    /// The first camera: where it is, its vertical field of view in degrees, and its shape.
-    camera: Option<(DMat4, f64, Option<f64>)>,
+    camera: Option<Seeing>,
     lights: Vec<(DMat4, Kind, f64, [f32; 3])>,
 }
 
+/// The first camera.
+struct Seeing {
+    node: usize,
+    transform: DMat4,
+    /// Its vertical field of view in degrees.
+    fov: f64,
+    /// Its width in heights.
+    shape: Option<f64>,
+}
+
 impl Seen {
-    fn node(&mut self, node: &gltf::Node<'_>, transform: &DMat4) {
+    fn node<'m>(&mut self, pose: &Pose<'m>, node: &gltf::Node<'m>, transform: &DMat4) {
         if let Some(mesh) = node.mesh() {
-            self.meshes
-                .entry(mesh.index())
-                .or_default()
-                .push(*transform);
-            for primitive in mesh.primitives() {
-                self.grow(&primitive, transform);
+            if pose.model.has_shape_of_its_own(node) {
+                self.nodes.push(node.index());
+                self.grow_bent(pose, node, &mesh, transform);
+            } else {
+                let places = self.meshes.entry(mesh.index()).or_default();
+                places.push(*transform);
+                for primitive in mesh.primitives() {
+                    self.grow(&primitive, transform);
+                }
             }
         }
-        if let (None, Some(camera)) = (self.camera, node.camera()) {
+        if let (None, Some(camera)) = (&self.camera, node.camera()) {
             let perspective = match camera.projection() {
                 gltf::camera::Projection::Perspective(perspective) => Some(perspective),
                 gltf::camera::Projection::Orthographic(_) => None,
             };
-            self.camera = perspective.map(|p| {
-                let shape = p.aspect_ratio().map(f64::from);
-                (*transform, f64::from(p.yfov()).to_degrees(), shape)
+            self.camera = perspective.map(|p| Seeing {
+                node: node.index(),
+                transform: *transform,
+                fov: f64::from(p.yfov()).to_degrees(),
+                shape: p.aspect_ratio().map(f64::from),
             });
         }
         if let Some(light) = node.light() {
@@ -129,11 +177,35 @@ impl Seen {
                 pick(1, low.y, high.y),
                 pick(2, low.z, high.z),
             );
-            let place = transform.transform_point3(corner);
-            if place.is_finite() {
-                let [a, b] = self.bounds.unwrap_or([place; 2]);
-                self.bounds = Some([a.min(place), b.max(place)]);
+            self.take_in(transform.transform_point3(corner));
+        }
+    }
+
+    /// Grows by the corners of a mesh that may be bent; of one that cannot be read, somebody else says why.
+    fn grow_bent<'m>(
+        &mut self,
+        pose: &Pose<'m>,
+        node: &gltf::Node<'m>,
+        mesh: &gltf::Mesh<'m>,
+        transform: &DMat4,
+    ) {
+        let Ok(shape) = pose.shape(node, mesh, transform) else {
+            return;
+        };
+        for primitive in mesh.primitives() {
+            if let Ok(corners) = shape.corners(&primitive, &pose.buffers) {
+                corners
+                    .places
+                    .into_iter()
+                    .for_each(|place| self.take_in(place));
             }
+        }
+    }
+
+    fn take_in(&mut self, place: DVec3) {
+        if place.is_finite() {
+            let [a, b] = self.bounds.unwrap_or([place; 2]);
+            self.bounds = Some([a.min(place), b.max(place)]);
         }
     }
 
@@ -145,34 +217,38 @@ impl Seen {
         (0.5 * (low + high), radius)
     }
 
-    fn write_camera(&self, text: &mut String) {
+    fn write_camera(&self, model: &Model, text: &mut String) {
         let (centre, radius) = self.extent();
-        let (position, look_at, up, fov, shape) = match self.camera {
-            Some((transform, fov, shape)) => {
-                let position = transform.w_axis.truncate();
-                let forward = -transform.z_axis.truncate().normalize_or(DVec3::Z);
-                let up = transform.y_axis.truncate().normalize_or(DVec3::Y);
+        let mut keys = None;
+        let (view, fov, shape) = match &self.camera {
+            Some(camera) => {
+                let position = camera.transform.w_axis.truncate();
+                let forward = -camera.transform.z_axis.truncate().normalize_or(DVec3::Z);
                 let distance = (centre - position).dot(forward);
                 let distance = if distance > 0.0 { distance } else { 1.0 };
-                (position, position + distance * forward, up, fov, shape)
+                keys = camera.keys(model, distance);
+                (view(&camera.transform, distance), camera.fov, camera.shape)
             }
             None => {
                 let direction = DVec3::new(0.55, 0.4, 1.0).normalize();
                 let distance = self.distance(direction, radius);
-                (centre + distance * direction, centre, DVec3::Y, FOV, None)
+                let view = [centre + distance * direction, centre, DVec3::Y];
+                (view, FOV, None)
             }
         };
+        let [position, look_at, up] = view.map(array);
         let rows = shape.filter(|s| (0.01..100.0).contains(s));
         let rows = rows.map_or(ROWS, |s| (f64::from(COLUMNS) / s).round().max(1.0) as u32);
+        if keys.is_some() {
+            let _ = write!(text, "\n[animation]\nframes_per_second = {RATE}\n");
+        }
         // Writing to a string cannot fail.
         let _ = write!(
             text,
-            "\n[camera]\nposition = {}\nlook_at = {}\nup = {}\nfov = {:?}\n\n\
+            "\n[camera]\nposition = {position}\nlook_at = {look_at}\nup = {up}\nfov = {:?}\n{}\n\
              [film]\nwidth = {COLUMNS}\nheight = {rows}\n\n",
-            array(position),
-            array(look_at),
-            array(up),
-            fov.clamp(0.1, 179.0)
+            fov.clamp(0.1, 179.0),
+            keys.unwrap_or_default(),
         );
     }
 
@@ -256,6 +332,39 @@ impl Seen {
     }
 }
 
+impl Seeing {
+    /// What it sees at each frame, as keys; none if it stays where it is, or nobody can tell.
+    fn keys(&self, model: &Model, distance: f64) -> Option<String> {
+        if !model.motion.moves(self.node) {
+            return None;
+        }
+        let last = model.motion.last(self.node, &model.buffers()).ok()?;
+        let frames = ((last * RATE).ceil() as usize).min(MOST_FRAMES - 1);
+        let names = ["position", "look_at", "up"];
+        let mut lists = [String::new(), String::new(), String::new()];
+        for frame in 0..=frames {
+            let pose = Pose::new(model, frame as f64 / RATE);
+            let world = pose.world(&model.node(self.node)?).ok()?;
+            for (list, at) in lists.iter_mut().zip(view(&world, distance)) {
+                let _ = write!(list, "[{frame}, {}], ", array(at));
+            }
+        }
+        let named = names.iter().zip(&lists);
+        let lines: String = named
+            .map(|(name, list)| format!("keys.{name} = [{}]\n", list.trim_end_matches(", ")))
+            .collect();
+        Some(lines)
+    }
+}
+
+/// Where a camera is, where it looks at so far away, and what is up.
+fn view(transform: &DMat4, distance: f64) -> [DVec3; 3] {
+    let position = transform.w_axis.truncate();
+    let forward = -transform.z_axis.truncate().normalize_or(DVec3::Z);
+    let up = transform.y_axis.truncate().normalize_or(DVec3::Y);
+    [position, position + distance * forward, up]
+}
+
 fn array(v: DVec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
 }
@@ -265,7 +374,7 @@ fn matrix(m: &DMat4) -> String {
     let rows = [m.row(0), m.row(1), m.row(2)];
     let numbers = rows.iter().flat_map(|row| row.to_array());
     let numbers: Vec<String> = numbers.map(|x| format!("{x:?}")).collect();
-    format!("[{}]", numbers.join(", "))
+    numbers.join(", ")
 }
 
 fn quoted(text: &str) -> String {

@@ -1,15 +1,15 @@
-//! glTF files: all nodes of their scene where they are, or one mesh of them.
+//! glTF files: all nodes of their scene where they are, one node of them, or one mesh in coordinates of its own.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use ::gltf::mesh::Mode;
 use ::gltf::{Mesh, Primitive, Semantic};
-use glam::{DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat4, Vec2, Vec3};
 
 use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning};
 use crate::error::SceneError;
-use crate::input::gltf::{self, Buffers, Model};
+use crate::input::gltf::{self, Member, Model, Pose, Shape};
 
 /// The row of glTF files.
 pub(super) const FORMAT: Format = Format {
@@ -21,46 +21,54 @@ pub(super) const FORMAT: Format = Format {
     values_of: "a glTF file",
 };
 
-fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
+fn read(base: &Path, name: &str, seconds: f64) -> Result<Geometry, SceneError> {
     let path = base.join(name);
-    let (file, mesh) = match gltf::inside(&path) {
-        Some((file, member)) if member == Path::new(gltf::ALL) => (file, None),
+    match gltf::inside(&path) {
         Some((file, member)) => {
-            let number = member.strip_prefix("meshes").ok().and_then(Path::file_stem);
-            let number = number.and_then(|n| n.to_str()?.parse().ok());
             let missing = || SceneError::in_file(file, "the glTF file has no such mesh");
-            (file, Some(number.ok_or_else(missing)?))
+            let member = Member::of_geometry(member).ok_or_else(missing)?;
+            geometry(file, member, seconds)
         }
-        None => (&*path, None),
-    };
-    geometry(file, mesh)
+        None => geometry(&path, Member::All, seconds),
+    }
 }
 
-/// The geometry of the file at `path`: of one mesh in its own coordinates, or of all nodes of the scene where they are.
+/// The geometry of the file at `path`.
 ///
 /// # Errors
 /// What is wrong with the file.
-fn geometry(path: &Path, mesh: Option<usize>) -> Result<Geometry, SceneError> {
+fn geometry(path: &Path, member: Member, seconds: f64) -> Result<Geometry, SceneError> {
     let model = Model::read(path)?;
-    let buffers = model.buffers()?;
+    let pose = Pose::new(&model, seconds);
+    let wrong = |message: String| SceneError::in_file(path, message);
     let mut reading = Reading {
-        names: model.material_names(),
+        pose: &pose,
         known: BTreeMap::new(),
         geometry: Geometry::default(),
         left_out: 0,
         path,
-        buffers,
     };
-    match mesh {
-        Some(number) => {
-            let mesh = model.document.meshes().nth(number).ok_or_else(|| {
-                SceneError::in_file(path, format!("the file has no mesh {number}"))
-            })?;
-            reading.mesh(&mesh, &DMat4::IDENTITY)?;
+    match member {
+        Member::Mesh(number) => {
+            let mesh = model.document.meshes().nth(number);
+            let mesh = mesh.ok_or_else(|| wrong(format!("the file has no mesh {number}")))?;
+            reading.mesh(&mesh, &Shape::of_mesh(&mesh, &DMat4::IDENTITY))?;
         }
-        None => {
-            for placed in model.placed()? {
-                reading.mesh(&placed.mesh, &placed.transform)?;
+        Member::Node(number) => {
+            let node = model.node(number);
+            let node = node.ok_or_else(|| wrong(format!("the file has no node {number}")))?;
+            let transform = pose.world(&node).map_err(wrong)?;
+            reading.node(&node, &transform)?;
+        }
+        Member::All => {
+            let mut all = Vec::new();
+            pose.visit(&mut |node, transform| {
+                if node.mesh().is_some() {
+                    all.push((node.clone(), *transform));
+                }
+            })?;
+            for (node, transform) in all {
+                reading.node(&node, &transform)?;
             }
         }
     }
@@ -85,9 +93,7 @@ fn geometry(path: &Path, mesh: Option<usize>) -> Result<Geometry, SceneError> {
 /// Geometry that grows.
 struct Reading<'m> {
     path: &'m Path,
-    buffers: Buffers<'m>,
-    /// Of materials, by their number.
-    names: Vec<String>,
+    pose: &'m Pose<'m>,
     /// Indices into [`Geometry::materials`].
     known: BTreeMap<Option<usize>, usize>,
     geometry: Geometry,
@@ -95,12 +101,23 @@ struct Reading<'m> {
     left_out: usize,
 }
 
-impl Reading<'_> {
-    fn mesh(&mut self, mesh: &Mesh<'_>, transform: &DMat4) -> Result<(), SceneError> {
+impl<'m> Reading<'m> {
+    /// The mesh of a node that is at `transform`.
+    fn node(&mut self, node: &::gltf::Node<'m>, transform: &DMat4) -> Result<(), SceneError> {
+        let Some(mesh) = node.mesh() else {
+            return Ok(());
+        };
+        let shape = self.pose.shape(node, &mesh, transform);
+        let shape = shape.map_err(|why| SceneError::in_file(self.path, why))?;
+        self.geometry.moves |= self.pose.model.moves(node);
+        self.mesh(&mesh, &shape)
+    }
+
+    fn mesh(&mut self, mesh: &Mesh<'m>, shape: &Shape) -> Result<(), SceneError> {
         let first = self.geometry.triangles.len();
         let name = Model::named(mesh.name(), "mesh", mesh.index());
         for primitive in mesh.primitives() {
-            self.primitive(&primitive, transform).map_err(|why| {
+            self.primitive(&primitive, shape).map_err(|why| {
                 let message = format!("mesh `{name}` cannot be read: {why}");
                 SceneError::in_file(self.path, message)
             })?;
@@ -112,79 +129,51 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn primitive(&mut self, primitive: &Primitive<'_>, transform: &DMat4) -> Result<(), String> {
-        let positions = primitive.get(&Semantic::Positions);
-        let positions = positions.ok_or("a primitive has no positions")?;
-        let positions = self.buffers.floats::<3>(&positions)?;
-        let corners = match primitive.indices() {
-            Some(indices) => self.buffers.indices(&indices)?,
-            None => (0..positions.len() as u32).collect(),
+    fn primitive(&mut self, primitive: &Primitive<'m>, shape: &Shape) -> Result<(), String> {
+        let buffers = &self.pose.buffers;
+        let corners = shape.corners(primitive, buffers)?;
+        let order = match primitive.indices() {
+            Some(indices) => buffers.indices(&indices)?,
+            None => (0..corners.places.len() as u32).collect(),
         };
-        let Some(triangles) = triangles(primitive.mode(), &corners) else {
+        let Some(triangles) = triangles(primitive.mode(), &order) else {
             self.left_out += 1;
             return Ok(());
         };
-        let vectors = |semantic| {
-            let accessor = primitive.get(&semantic);
-            accessor.map(|a| self.buffers.floats::<3>(&a)).transpose()
-        };
-        let normals = vectors(Semantic::Normals)?;
         let uvs = |set| {
             let accessor = primitive.get(&Semantic::TexCoords(set));
-            accessor.map(|a| self.buffers.floats::<2>(&a)).transpose()
+            accessor.map(|a| buffers.floats::<2>(&a)).transpose()
         };
         let (uvs, uvs1) = (uvs(0)?, uvs(1)?);
-        let colors = match primitive.get(&Semantic::Colors(0)) {
+        let colors: Option<Vec<Vec3>> = match primitive.get(&Semantic::Colors(0)) {
             Some(a) if a.dimensions().multiplicity() == 4 => {
-                let colors = self.buffers.floats::<4>(&a)?;
-                Some(colors.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
+                let colors = buffers.floats::<4>(&a)?.into_iter();
+                Some(colors.map(|[r, g, b, _]| Vec3::new(r, g, b)).collect())
             }
-            Some(a) => Some(self.buffers.floats::<3>(&a)?),
+            Some(a) => Some(
+                buffers
+                    .floats::<3>(&a)?
+                    .into_iter()
+                    .map(Vec3::from)
+                    .collect(),
+            ),
             None => None,
         };
-        let mirrors = transform.determinant() < 0.0;
-        let to_normal = transform.inverse().transpose();
-        let place = |[x, y, z]: [f32; 3]| {
-            transform.transform_point3(DVec3::new(x.into(), y.into(), z.into()))
-        };
-        let places: Vec<DVec3> = positions.iter().map(|p| place(*p)).collect();
-        if let Some(odd) = positions
-            .iter()
-            .position(|p| p.iter().any(|x| !x.is_finite()))
-        {
-            return Err(format!(
-                "corner {odd} is at no place: a coordinate is no number"
-            ));
-        }
-        let turn = |n: [f32; 3]| {
-            let turned = to_normal.transform_vector3(Vec3::from(n).as_dvec3());
-            turned.normalize_or_zero().as_vec3()
-        };
         let material = self.material(primitive.material().index());
+        self.geometry.triangles.reserve(triangles.len());
         for [a, b, c] in triangles {
-            let corners = if mirrors { [a, c, b] } else { [a, b, c] };
-            let of = |list: &Option<Vec<[f32; 3]>>| -> Option<[Vec3; 3]> {
-                let list = list.as_ref()?;
-                let get = |i: u32| list.get(i as usize).map(|v| Vec3::from(*v));
-                Some([get(corners[0])?, get(corners[1])?, get(corners[2])?])
-            };
-            let flat = |list: &Option<Vec<[f32; 2]>>| -> Option<[Vec2; 3]> {
-                let list = list.as_ref()?;
-                // v goes down in glTF.
-                let get = |i: u32| list.get(i as usize).map(|[u, v]| Vec2::new(*u, 1.0 - v));
-                Some([get(corners[0])?, get(corners[1])?, get(corners[2])?])
-            };
+            let is_mirrored = corners.is_mirrored(a);
+            let three = if is_mirrored { [a, c, b] } else { [a, b, c] };
             let outside = || {
-                let (most, count) = (corners.iter().max().copied(), places.len());
+                let (most, count) = (three.iter().max().copied(), corners.places.len());
                 format!("corner {} of {count}", most.unwrap_or_default())
             };
-            let get = |i: u32| places.get(i as usize).copied().ok_or_else(outside);
             self.geometry.triangles.push(Triangle {
-                positions: [get(corners[0])?, get(corners[1])?, get(corners[2])?],
-                normals: of(&normals).map(|n| n.map(|n| turn(n.to_array()))),
-                uvs: flat(&uvs),
-                uvs1: flat(&uvs1),
-                colors: of(&colors),
+                positions: of_three(&corners.places, three).ok_or_else(outside)?,
+                normals: corners.normals.as_ref().and_then(|n| of_three(n, three)),
+                uvs: flat(uvs.as_ref(), three),
+                uvs1: flat(uvs1.as_ref(), three),
+                colors: colors.as_ref().and_then(|c| of_three(c, three)),
                 material,
             });
         }
@@ -195,7 +184,8 @@ impl Reading<'_> {
         let next = self.geometry.materials.len();
         let index = *self.known.entry(number).or_insert(next);
         if index == next {
-            let name = number.and_then(|n| self.names.get(n)).cloned();
+            let names = &self.pose.model.material_names;
+            let name = number.and_then(|n| names.get(n)).cloned();
             self.geometry.materials.push(FileMaterial {
                 name: name.unwrap_or_default(),
                 values: Vec::new(),
@@ -203,6 +193,18 @@ impl Reading<'_> {
         }
         index
     }
+}
+
+/// What three corners have; none if one of them is not there.
+fn of_three<T: Copy>(list: &[T], corners: [u32; 3]) -> Option<[T; 3]> {
+    let get = |i: u32| list.get(i as usize).copied();
+    Some([get(corners[0])?, get(corners[1])?, get(corners[2])?])
+}
+
+/// Texture coordinates of three corners: v goes down in glTF.
+fn flat(list: Option<&Vec<[f32; 2]>>, corners: [u32; 3]) -> Option<[Vec2; 3]> {
+    let three = of_three(list?, corners)?;
+    Some(three.map(|[u, v]| Vec2::new(u, 1.0 - v)))
 }
 
 /// The corners of triangles; none of what is not made of them.

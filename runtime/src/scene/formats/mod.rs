@@ -40,11 +40,12 @@ pub struct Format {
 }
 
 /// Reads the file of this name, which is relative to the folder `base` of the scene; so are the
-/// names of pictures in what it returns.
+/// names of pictures in what it returns. A file whose geometry moves is read as it is after so many
+/// seconds.
 ///
 /// # Errors
 /// The first thing that keeps the file from being read, with its line.
-pub type Reader = fn(base: &Path, name: &str) -> Result<Geometry, SceneError>;
+pub type Reader = fn(base: &Path, name: &str, seconds: f64) -> Result<Geometry, SceneError>;
 
 /// A value that files of a format give materials.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +73,8 @@ pub struct Geometry {
     pub warnings: Vec<Warning>,
     /// Files of materials that belong to it, whether they are there or not.
     pub libraries: Vec<PathBuf>,
+    /// Is it another at other times?
+    pub moves: bool,
 }
 
 /// A triangle as a file has it.

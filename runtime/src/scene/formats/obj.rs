@@ -28,7 +28,7 @@ pub(super) const FORMAT: Format = Format {
 };
 
 /// Reads an OBJ file and cuts its faces into triangles.
-fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
+fn read(base: &Path, name: &str, _: f64) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     if let Some(other) = other_format(name) {
         let error = SceneError::in_file(path, format!("{other} files are not read"));
@@ -68,6 +68,7 @@ fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
         parts: scan.parts,
         missing: library.missing,
         libraries: library.files,
+        moves: false,
         warnings: [
             counted(
                 "faces of fewer than three corners, left out",

@@ -56,7 +56,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 const CORNER_UVS: [&str; 1] = ["texcoord"];
 
 /// Reads a PLY file and cuts its faces into triangles.
-fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
+fn read(base: &Path, name: &str, _: f64) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     let bytes = input::read(path).map_err(|e| {
         let message = format!("cannot read the PLY file: {}", input::reason(&e));

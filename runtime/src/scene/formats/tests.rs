@@ -25,7 +25,7 @@ const TRIANGLES: Format = Format {
     values_of: "a list of triangles",
 };
 
-fn read(base: &Path, name: &str) -> Result<Geometry, SceneError> {
+fn read(base: &Path, name: &str, _: f64) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     let text = std::fs::read_to_string(path)
         .map_err(|e| SceneError::in_file(path, format!("cannot read the triangles: {e}")))?;
@@ -122,7 +122,10 @@ fn messages_say_what_the_table_holds() {
         "{unknown}"
     );
     let both = said("file = 'a.obj'\nobj = 'a.obj'", &[], BOTH);
-    assert!(both.contains("either `file` or `obj`"), "{both}");
+    assert!(
+        both.contains("needs one of `file`, `obj` and `gltf`"),
+        "{both}"
+    );
     // A name that is under `obj` need not say so.
     let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
     let empty = said("obj = 'a.txt'", &[("a.txt", flat)], FORMATS);
@@ -142,7 +145,7 @@ fn objects_and_groups_have_their_triangles() {
     let text = "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 2 2 0\nf 1 2 3\no lid\ng empty\ng rim of it\nf 1 2 4 3\n\
                 usemtl a\nf 1 2 3\no foot\nf 1 2 3\ng last\n";
     std::fs::write(folder.path().join("a.obj"), text).expect("it is written");
-    let geometry = (obj::FORMAT.read)(folder.path(), "a.obj").expect("it is read");
+    let geometry = (obj::FORMAT.read)(folder.path(), "a.obj", 0.0).expect("it is read");
     let parts: Vec<(&str, Range<usize>)> = geometry
         .parts
         .iter()

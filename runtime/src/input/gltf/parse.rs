@@ -1,0 +1,233 @@
+//! From a file to a [`Model`]: its JSON is read and checked, and where its binary part is is found.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::Path;
+
+use gltf::json::validation::{Error as Invalid, Validate};
+use serde_json::Value;
+
+use super::buffers::Stamp;
+use super::motion::Motion;
+use super::{Model, material, unreadable};
+use crate::error::SceneError;
+
+/// Extensions that a file may require: what they ask for is done.
+const KNOWN: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+impl Model {
+    /// Parses the file at `path`, of which this is the content.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn parse(path: &Path, mut file: File, stamp: Stamp) -> Result<Self, SceneError> {
+        let wrong = |message: String| SceneError::in_file(path, message);
+        let parts = parts(&mut file, stamp.length).map_err(|e| unreadable(path, &e))?;
+        let Parts {
+            text,
+            binary,
+            is_whole,
+        } = parts.map_err(wrong)?;
+        let damaged = |e: serde_json::Error| {
+            let place = SceneError::in_file(path, format!("the glTF file is damaged: {e}"));
+            if is_whole && e.line() > 0 {
+                place.line(e.line())
+            } else {
+                place
+            }
+        };
+        if text.iter().all(u8::is_ascii_whitespace) {
+            return Err(wrong("the glTF file is empty".into()));
+        }
+        let mut json: Value = serde_json::from_slice(&text).map_err(damaged)?;
+        let version = json["asset"]["version"].as_str().unwrap_or_default();
+        if !version.starts_with("2.") {
+            let found = if version.is_empty() {
+                "no version"
+            } else {
+                version
+            };
+            return Err(wrong(format!("it is glTF of {found}"))
+                .hint("glTF 2.0 is read; converters and Blender write it"));
+        }
+        let root: gltf::json::Root = if spell_out(&mut json) {
+            serde_json::from_value(json.clone()).map_err(damaged)?
+        } else {
+            serde_json::from_slice(&text).map_err(damaged)?
+        };
+        check(path, &root)?;
+        let motion = Motion::of(&root).map_err(wrong)?;
+        let materials = match json["materials"].take() {
+            Value::Array(materials) => materials,
+            _ => Vec::new(),
+        };
+        let document = gltf::Document::from_json_without_validation(root);
+        let (material_names, source_names) = material::names(&document);
+        let primitives = document.meshes().flat_map(|mesh| mesh.primitives());
+        let colored = primitives.filter(|p| p.get(&gltf::Semantic::Colors(0)).is_some());
+        let colored = colored.filter_map(|p| p.material().index()).collect();
+        Ok(Self {
+            path: path.to_owned(),
+            stamp,
+            document,
+            materials,
+            binary,
+            material_names,
+            source_names,
+            colored,
+            motion,
+        })
+    }
+}
+
+/// Makes what glTF allows and the crate does not know what it knows: scenes without nodes have none, and channels that
+/// move no node, as extensions have them, are left out. Whether there was any.
+fn spell_out(json: &mut Value) -> bool {
+    let list = |json: &mut Value, key: &str| match json.get_mut(key) {
+        Some(Value::Array(items)) => std::mem::take(items),
+        _ => Vec::new(),
+    };
+    let mut changed = false;
+    let mut scenes = list(json, "scenes");
+    for scene in scenes.iter_mut().filter_map(Value::as_object_mut) {
+        changed |= !scene.contains_key("nodes");
+        scene
+            .entry("nodes")
+            .or_insert_with(|| Value::Array(Vec::new()));
+    }
+    let mut animations = list(json, "animations");
+    for animation in &mut animations {
+        if let Some(Value::Array(channels)) = animation.get_mut("channels") {
+            let count = channels.len();
+            let moves_nothing = |target: &Value| target.is_object() && target["node"].is_null();
+            channels.retain(|channel| !moves_nothing(&channel["target"]));
+            changed |= channels.len() < count;
+        }
+    }
+    for (key, items) in [("scenes", scenes), ("animations", animations)] {
+        if !items.is_empty() {
+            json[key] = items.into();
+        }
+    }
+    changed
+}
+
+/// The JSON of a file, and where its binary part is.
+struct Parts {
+    text: Vec<u8>,
+    binary: Option<Range<u64>>,
+    /// Is the JSON the whole file?
+    is_whole: bool,
+}
+
+/// Reads the JSON of a file of so many bytes; what is wrong with a `.glb`, in words.
+fn parts(file: &mut File, has: u64) -> io::Result<Result<Parts, String>> {
+    let mut head = Vec::new();
+    file.by_ref().take(HEAD).read_to_end(&mut head)?;
+    if !head.starts_with(b"glTF") {
+        file.read_to_end(&mut head)?;
+        return Ok(Ok(Parts {
+            text: head,
+            binary: None,
+            is_whole: true,
+        }));
+    }
+    let cut = || Ok(Err("the .glb file is cut off".to_owned()));
+    let (Some(version), Some(length)) = (word(&head, 4), word(&head, 8)) else {
+        return cut();
+    };
+    if version != 2 {
+        return Ok(Err(format!("it is glTF {version}, and 2 is read")));
+    }
+    if length > has {
+        return Ok(Err(format!(
+            "the .glb file is cut off: it has {has} of {length} bytes"
+        )));
+    }
+    let (mut text, mut binary) = (None, None);
+    let mut at = HEAD;
+    while at + CHUNK <= length {
+        let mut head = [0; CHUNK as usize];
+        file.seek(SeekFrom::Start(at))?;
+        file.read_exact(&mut head)?;
+        let size = word(&head, 0).unwrap_or(0);
+        let content = at + CHUNK..at + CHUNK + size;
+        if content.end > has {
+            return cut();
+        }
+        match &head[4..] {
+            b"JSON" if text.is_none() => {
+                let mut bytes = Vec::new();
+                file.by_ref().take(size).read_to_end(&mut bytes)?;
+                text = Some(bytes);
+            }
+            b"BIN\0" if binary.is_none() => binary = Some(content.clone()),
+            _ => {}
+        }
+        at = content.end;
+    }
+    let missing = || "the .glb file has no JSON part".to_owned();
+    Ok(text.ok_or_else(missing).map(|text| Parts {
+        text,
+        binary,
+        is_whole: false,
+    }))
+}
+
+/// Bytes of the head of a `.glb`, and of that of one of its parts.
+const HEAD: u64 = 12;
+const CHUNK: u64 = 8;
+
+fn word(bytes: &[u8], at: usize) -> Option<u64> {
+    let four = bytes.get(at..at + 4)?;
+    Some(u32::from_le_bytes(four.try_into().ok()?).into())
+}
+
+/// Fails where an index leads nowhere, something is missing, or an extension is required that nobody here knows.
+fn check(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
+    let unknown = |name: &&String| !KNOWN.contains(&name.as_str());
+    if let Some(name) = root.extensions_required.iter().find(unknown) {
+        return Err(SceneError::in_file(
+            path,
+            format!("the file requires the extension `{name}`, which is not read"),
+        )
+        .hint(format!("export it without; there are {}", KNOWN.join(", "))));
+    }
+    let mut first = None;
+    let mut report = |place: &dyn Fn() -> gltf::json::Path, what: Invalid| {
+        if first.is_none() && what != Invalid::Unsupported {
+            first = Some((place().to_string(), what));
+        }
+    };
+    root.validate(root, gltf::json::Path::new, &mut report);
+    let Some((place, what)) = first else {
+        return Ok(());
+    };
+    let what = match what {
+        Invalid::IndexOutOfBounds => "leads to something that is not there",
+        Invalid::Missing => "is missing",
+        Invalid::Oversize => "is too large",
+        Invalid::Invalid | Invalid::Unsupported => "has no legal value",
+    };
+    Err(SceneError::in_file(
+        path,
+        format!("the glTF file is damaged: `{place}` {what}"),
+    ))
+}
