@@ -208,6 +208,14 @@ fn normal_maps_are_found_through_functions_and_materials() {
 }
 
 #[test]
+fn a_normal_map_that_is_turned_over_here_and_there_is_refused() {
+    let text = "material a { param map: texture = \"n.png\";
+        material = open_pbr(geometry_normal: normal_map(color(image_data(map, uv).xyz), normal, tangent,
+            flip_green: uv.x > 0.5)); }";
+    assert_eq!(refused(text).len(), 1);
+}
+
+#[test]
 fn the_color_of_corners_multiplies() {
     let text = "material a { param map: texture = \"a.png\";
         material = open_pbr(base_color: image(map, uv) * vertex_color, coat_color: 0.5 * vertex_color); }";

@@ -10,6 +10,8 @@ use impasto_compiler::interface::{ParamInterface, interface};
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader};
 use impasto_import::{MemoryFiles, Options, import, to_materialx};
 
+use crate::common::{Disk, documents};
+
 /// Models that MaterialX has, too.
 const MODELS: [&str; 4] = [
     "standard_surface",
@@ -17,6 +19,9 @@ const MODELS: [&str; 4] = [
     "gltf_pbr",
     "disney_principled",
 ];
+
+/// Parameters that no node of MaterialX 1.39 has.
+const LACKING: [&str; 4] = ["diffTrans", "flatness", "scatterDistance", "thin"];
 
 /// The instance that a material of a source is.
 fn of(text: &str, name: &str) -> Result<Instance, (Vec<Code>, String)> {
@@ -186,7 +191,14 @@ fn answers_the_same(text: &str, name: &str) {
     }
 }
 
+/// The parameters of a model that its node has.
 fn params(model: &str) -> Vec<ParamInterface> {
+    let mut params = all_params(model);
+    params.retain(|param| model != "disney_principled" || !LACKING.contains(&&*param.name));
+    params
+}
+
+fn all_params(model: &str) -> Vec<ParamInterface> {
     let found = interface(
         &format!("std::surface::{model}"),
         &mut MemoryLoader::default(),
@@ -358,6 +370,98 @@ fn materials_of_the_folder_come_back_where_they_are_instances() {
     assert_eq!(exported, ["open_pbr_carpaint", "principled"]);
 }
 
+#[test]
+fn documents_come_back_where_they_are_instances() {
+    let (mut count, mut refused) = (0, 0);
+    for path in documents("documents") {
+        let path = path.display().to_string();
+        let imported = import(&path, &mut Disk, &Options::default());
+        let Ok(imported) = imported else { continue };
+        let text = &imported.files[0].1;
+        for (name, _) in &imported.materials {
+            match of(text, name) {
+                Ok(_) => {
+                    round(text, name);
+                    count += 1;
+                }
+                Err((codes, problem)) => {
+                    let is_known = |code: &Code| *code == Code::NotExported;
+                    assert!(codes.iter().all(is_known), "{path}: {problem}");
+                    refused += 1;
+                }
+            }
+        }
+    }
+    // The documents are there for nodes of all kinds, most of which are no pictures.
+    assert!(
+        count >= 3 && refused >= 3,
+        "{count} came back, {refused} did not"
+    );
+}
+
+/// Pictures as other programs write them.
+const PICTURES: &str = r#"<materialx version="1.39" colorspace="lin_rec709">
+  <gltf_colorimage name="base" type="multioutput">
+    <input name="file" type="filename" value="a.png" colorspace="srgb_texture"/>
+    <input name="color" type="color4" value="0.5, 0.25, 1, 0.75"/>
+    <output name="outcolor" type="color3"/><output name="outa" type="float"/>
+  </gltf_colorimage>
+  <gltf_image name="rough" type="float">
+    <input name="file" type="filename" value="b.png"/>
+    <input name="factor" type="float" value="0.5"/>
+    <input name="scale" type="vector2" value="0.5, 0.25"/>
+    <input name="rotate" type="float" value="30"/>
+  </gltf_image>
+  <gltf_normalmap name="bent" type="vector3"><input name="file" type="filename" value="n.png"/></gltf_normalmap>
+  <gltf_iridescence_thickness name="film" type="float">
+    <input name="file" type="filename" value="b.png"/>
+    <input name="thicknessMin" type="float" value="120"/>
+  </gltf_iridescence_thickness>
+  <place2d name="placed" type="vector2">
+    <input name="texcoord" type="vector2" nodename="st"/>
+    <input name="scale" type="vector2" value="2, 0.5"/><input name="rotate" type="float" value="15"/>
+  </place2d>
+  <texcoord name="st" type="vector2"/>
+  <image name="orm" type="vector3">
+    <input name="file" type="filename" value="orm.png"/>
+    <input name="texcoord" type="vector2" nodename="placed"/>
+    <input name="uaddressmode" type="string" value="mirror"/>
+  </image>
+  <extract name="metal" type="float">
+    <input name="in" type="vector3" nodename="orm"/><input name="index" type="integer" value="2"/>
+  </extract>
+  <UsdUVTexture name="usd" type="multioutput">
+    <input name="file" type="filename" value="c.png"/><input name="scale" type="color4" value="0.5, 0.5, 0.5, 1"/>
+  </UsdUVTexture>
+  <tiledimage name="sheen" type="color3">
+    <input name="file" type="filename" value="d.png" colorspace="lin_rec709"/>
+    <input name="uvtiling" type="vector2" value="3, 2"/><input name="uvoffset" type="vector2" value="0.5, 0"/>
+  </tiledimage>
+  <gltf_pbr name="shader" type="surfaceshader">
+    <input name="base_color" type="color3" nodename="base" output="outcolor"/>
+    <input name="alpha" type="float" nodename="base" output="outa"/>
+    <input name="alpha_mode" type="integer" value="2"/>
+    <input name="metallic" type="float" nodename="metal"/>
+    <input name="roughness" type="float" nodename="rough"/>
+    <input name="normal" type="vector3" nodename="bent"/>
+    <input name="iridescence" type="float" value="1"/>
+    <input name="iridescence_thickness" type="float" nodename="film"/>
+    <input name="clearcoat" type="float" nodename="usd" output="g"/>
+    <input name="sheen_color" type="color3" nodename="sheen"/>
+  </gltf_pbr>
+  <surfacematerial name="glaze" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="shader"/>
+  </surfacematerial>
+</materialx>"#;
+
+#[test]
+fn pictures_of_other_programs_come_back() {
+    let text = imported(PICTURES, false);
+    let instance = of(&text, "glaze").unwrap_or_else(|(_, problem)| panic!("{text}\n{problem}"));
+    assert_eq!(instance.arguments.len(), 10, "{text}");
+    answers_the_same(&text, "glaze");
+}
+
 /// A document as it is exported, to be read.
 #[test]
 fn a_document_is_as_a_person_would_write_it() {
@@ -390,6 +494,24 @@ fn a_model_that_materialx_lacks_is_refused() {
         expected.contains("`open_pbr`") && !expected.contains("usd"),
         "{expected}"
     );
+}
+
+#[test]
+fn what_disneys_node_lacks_is_refused() {
+    let mut refused = Vec::new();
+    for param in all_params("disney_principled") {
+        let Some(value) = constant(&param) else {
+            continue;
+        };
+        let text = source("disney_principled", &format!("{}: {value}", param.name));
+        let instance = of(&text, "glaze").unwrap_or_else(|(_, problem)| panic!("{problem}"));
+        if let Err(problems) = to_materialx(&instance, &[]) {
+            assert!(problems[0].message.contains("has no input of this name"));
+            refused.push(param.name);
+        }
+    }
+    refused.sort();
+    assert_eq!(refused, LACKING);
 }
 
 #[test]

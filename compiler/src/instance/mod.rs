@@ -15,9 +15,11 @@ mod evaluate;
 mod operate;
 mod shape;
 mod sum;
+mod value;
 
-use evaluate::{Evaluator, Frame, Sym};
+use evaluate::{Evaluator, Frame};
 use shape::Shapes;
+use value::Sym;
 
 /// The folder of the library that has the models.
 const MODELS: &str = "surface";

@@ -1,7 +1,7 @@
 //! Operations on sums of products.
 
-use super::evaluate::Sym;
 use super::sum::{Part, Sum, Why};
+use super::value::Sym;
 use crate::ir::Type;
 use crate::ir::ops::{self, Op, Shape};
 use crate::ir::value::Value;
@@ -93,9 +93,9 @@ fn arithmetic(op: Op, args: &[Sym], ty: Type, why: &impl Fn() -> Why) -> Option<
             too_large(x.plus(&y))
         }),
         Op::Dot => {
-            let products = wide[0].iter().zip(&wide[1]);
-            let total = products.fold(Ok(Sum::default()), |total: Part, (a, b)| {
-                too_large(total?.plus(&product(a, b, why)?))
+            let mut products = wide[0].iter().zip(&wide[1]);
+            let total = products.try_fold(Sum::default(), |total, (a, b)| {
+                too_large(total.plus(&product(a, b, why)?))
             });
             Some(Sym::Floats(vec![total]))
         }
@@ -162,10 +162,10 @@ fn transformed(args: &[Sym], why: &impl Fn() -> Why) -> Option<Sym> {
         return None;
     };
     let row = |r: usize| {
-        let terms = columns.iter().zip(vector);
-        terms.fold(Ok(Sum::default()), |total: Part, (column, x)| {
+        let mut terms = columns.iter().zip(vector);
+        terms.try_fold(Sum::default(), |total, (column, x)| {
             let term = product(&column[r], x, why)?;
-            total?.plus(&term).ok_or_else(why)
+            total.plus(&term).ok_or_else(why)
         })
     };
     Some(Sym::Floats((0..3).map(row).collect()))

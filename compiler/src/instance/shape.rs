@@ -1,7 +1,8 @@
 //! What sums of products are as a value that other formats have: numbers, a picture with a factor, or a normal map.
 
-use super::evaluate::{Bent, Evaluator, Looked, Sym};
+use super::evaluate::{Bent, Evaluator, Looked};
 use super::sum::{Atom, COLOR, Sum, Why};
+use super::value::Sym;
 use super::{Channels, Lookup, NormalMap, Place, Texel, Value, Varying};
 use crate::ir::Type;
 use crate::source::Span;

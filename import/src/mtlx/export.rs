@@ -13,7 +13,7 @@ use impasto_compiler::instance::{
     Channels, Exported, Instance, Lookup, NormalMap, Place, Texel, Value, Varying,
 };
 
-use crate::mtlx::nodes::surfaces::{MODELS, Parameter, parameters};
+use crate::mtlx::nodes::surfaces::{LACKING, MODELS, Parameter, parameters};
 
 /// An instance as a document with one material; `pictures` says what its pictures are called there.
 ///
@@ -40,10 +40,17 @@ pub fn to_materialx(instance: &Instance, pictures: &[String]) -> Result<Exported
         taken: [instance.name.clone(), shader.clone()].into(),
     };
     let known = parameters(model);
+    let lacks = |name: &str| {
+        let mut lacking = LACKING.iter().filter(|(own, _)| *own == model);
+        lacking.any(|(_, names)| names.contains(&name))
+    };
     let mut inputs = String::new();
     let mut refused = Vec::new();
     for argument in &instance.arguments {
-        let Some(parameter) = known.iter().find(|p| p.name == argument.name) else {
+        let Some(parameter) = known
+            .iter()
+            .find(|p| p.name == argument.name && !lacks(p.name))
+        else {
             let why = format!("the node `{category}` has no input of this name");
             refused.push(argument.refused(model, &why));
             continue;

@@ -104,6 +104,12 @@ pub(in crate::mtlx) const MODELS: &[(&str, &str)] = &[
     ("UsdPreviewSurface", "usd_preview_surface"),
 ];
 
+/// Parameters of materials that their nodes in MaterialX 1.39 lack. Documents of others that have them are read.
+pub(in crate::mtlx) const LACKING: &[(&str, &[&str])] = &[(
+    "disney_principled",
+    &["diffTrans", "flatness", "scatterDistance", "thin"],
+)];
+
 /// The parameters of a model, as its source declares them.
 pub(in crate::mtlx) fn parameters(material: &str) -> &'static [Parameter] {
     static ALL: OnceLock<HashMap<&'static str, Vec<Parameter>>> = OnceLock::new();

@@ -22,14 +22,17 @@ use super::file;
 use crate::error::SceneError;
 
 mod accessor;
+mod export;
 mod material;
 mod nodes;
 mod pictures;
+mod rows;
 mod scene;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use accessor::Buffers;
+pub use export::to_gltf;
 
 /// Extensions of files that are folders to everyone.
 pub(crate) const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
