@@ -14,8 +14,9 @@ use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest};
 
 /// Codes that no source can provoke, and why.
-const INTERNAL: [Code; 1] = [
+const INTERNAL: [Code; 2] = [
     Code::InvalidWgsl, // a defect of the compiler itself
+    Code::NotExported, // of the command `export`, whose tests provoke it
 ];
 
 #[test]

@@ -141,6 +141,9 @@ codes! {
         "The medium inside an object is uniform: `interior` may depend on parameters and constants only, not on the point of the surface or on textures.";
     Metadata = "E0317", Error, "contradictory metadata",
         "The block after a parameter gives user interfaces its `label` and `group` (texts), its `soft` range (of a slider, within the range of the parameter, around the default) and its `unit` (of a length or an angle). Bools and textures have no ranges.";
+    // E04xx: export
+    NotExported = "E0401", Error, "cannot be exported",
+        "`impasto export` writes materials that are one call of a surface model, as in `material = open_pbr(..);`. Each argument is a constant, a picture, a constant times a picture, or a normal map; the format that is written to may have further limits.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";

@@ -30,6 +30,7 @@ pub mod diag;
 mod driver;
 pub mod format;
 pub mod inspect;
+pub mod instance;
 pub mod interface;
 pub mod ir;
 pub mod lexer;

@@ -4,6 +4,7 @@
 use impasto_compiler::diag::examples::{Example, FILE};
 use impasto_compiler::diag::{Code, Diagnostic, render};
 use impasto_compiler::format::format;
+use impasto_compiler::instance::instance;
 use impasto_compiler::source::SourceMap;
 use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile};
 
@@ -23,6 +24,10 @@ fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
             .collect(),
         ..MaterialRequest::new("example", FILE)
     };
+    if code == Code::NotExported {
+        let found = instance(&request, &mut files);
+        return (found.sources, found.diagnostics);
+    }
     if code != Code::NoMaterial && example.params.is_empty() {
         return (checked.sources, checked.diagnostics);
     }

@@ -2,6 +2,7 @@
 //! prepared the next one finds.
 
 mod analysis;
+mod arguments;
 mod bad_input;
 mod called;
 mod closures;

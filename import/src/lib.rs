@@ -1,4 +1,5 @@
-//! Turns materials of other languages into Impasto sources, as an artist would have written them.
+//! Turns materials of other languages into Impasto sources, as an artist would have written them, and instances of surface
+//! models into documents of MaterialX.
 //!
 //! The crate does no I/O: a [`Files`] of its caller reads what a document includes. Data runs one way:
 //!
@@ -30,6 +31,7 @@ mod mtlx;
 pub use error::{ImportError, Warning};
 pub use files::{Files, MemoryFiles};
 pub use imported::{Assignment, Imported, Options, Texture};
+pub use mtlx::export::to_materialx;
 pub use mtlx::nodes::{MISSING, Missing, NodeRow, node_rows};
 
 /// Imports the document at `path`, whose format follows from its extension: `mtlx`.

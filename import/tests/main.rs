@@ -3,6 +3,7 @@
 mod bad_input;
 mod common;
 mod documents;
+mod export;
 mod page;
 mod rows;
 mod values;

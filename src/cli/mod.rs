@@ -28,12 +28,14 @@ mod emit;
 mod eval;
 mod exhaustive;
 mod explain;
+mod export;
 mod farm;
 mod fmt;
 mod import;
 mod info;
 mod interrupt;
 mod lsp;
+mod made;
 mod merge;
 mod needs;
 mod new;
@@ -114,6 +116,8 @@ enum Command {
     New(new::NewArgs),
     /// Make sources of MaterialX documents, and folders of glTF files with scene, sources and pictures
     Import(import::ImportArgs),
+    /// Write a material that is an instance of a surface model as MaterialX or glTF, with its pictures
+    Export(export::ExportArgs),
     /// Format sources, keeping every comment
     Fmt(fmt::FmtArgs),
     /// Print a stage of the compilation of a material file
@@ -248,6 +252,7 @@ pub(crate) fn main(jobs: Option<&Sender<Job>>) -> ExitCode {
         Command::New(args) => new::run(&args, &global),
         Command::Fmt(args) => fmt::run(&args, &global),
         Command::Import(args) => import::run(&args, &global),
+        Command::Export(args) => export::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Converge(args) => converge::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),

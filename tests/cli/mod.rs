@@ -13,6 +13,7 @@ mod devices;
 mod emit_check;
 mod eval;
 mod explain;
+mod export;
 mod farm;
 #[cfg(unix)]
 mod faults;

@@ -7,6 +7,7 @@ use crate::ir::{self, ClosureId, Const, ExprId, FunctionId, LocalId};
 use crate::source::Span;
 
 use super::any_count::takes_any_count;
+use super::called::Whole;
 use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::outputs::OUTPUTS;
@@ -114,6 +115,10 @@ pub struct Body<'c, 'l> {
     pub outputs: Vec<(&'static str, Operand, Span)>,
     /// What called materials assign, in the order of [`OUTPUTS`].
     pub called: Vec<[Option<Operand>; OUTPUTS.len()]>,
+    /// The calls that these come from; none where a condition chooses.
+    pub origins: Vec<Option<Whole>>,
+    /// The call that all outputs were assigned from, if they were.
+    pub whole: Option<Whole>,
     /// The ranges of a material's parameters, by their numbers.
     pub ranges: Vec<Option<(f64, f64)>>,
     /// How many expressions were added to evaluate slopes.
@@ -143,6 +148,8 @@ impl<'c, 'l> Body<'c, 'l> {
             media: Vec::new(),
             outputs: Vec::new(),
             called: Vec::new(),
+            origins: Vec::new(),
+            whole: None,
             ranges: Vec::new(),
             slopes: 0,
             moment: [None; 2],

@@ -45,6 +45,28 @@ pub enum Origin {
     Input(String),
 }
 
+/// The call that a material is, whole: `material = callee(..);`.
+#[derive(Clone, Debug)]
+pub struct Whole {
+    /// The material that is called.
+    pub callee: ItemRef,
+    /// What is given for each of its parameters, in their order; nothing for those that keep their defaults.
+    pub arguments: Vec<Option<WholeArgument>>,
+    /// Where the call stands.
+    pub span: Span,
+}
+
+/// An argument of such a call: expressions of the material's body.
+#[derive(Clone, Copy, Debug)]
+pub struct WholeArgument {
+    /// As it is written.
+    pub written: ExprId,
+    /// Held to the range of its parameter.
+    pub held: ExprId,
+    /// Where it is written.
+    pub span: Span,
+}
+
 /// The parameters of a material in order; nothing for those that do not check.
 pub type MaterialSignature = Arc<Vec<Option<Declared>>>;
 
@@ -128,23 +150,28 @@ impl Body<'_, '_> {
             // What is wrong with it is reported; check the arguments all the same.
             return self.discard(args);
         };
-        let operands = self.material_arguments(callee, args, &declared)?;
+        let (operands, arguments) = self.material_arguments(callee, args, &declared)?;
         if !self.cx.expanding.contains(&item) && !self.cx.called_checks(item) {
             return None;
         }
         self.cx.enter_material(item, Some(callee.span))?;
-        let value = self.material_body(item, &operands, span);
+        let call = Whole {
+            callee: item,
+            arguments,
+            span,
+        };
+        let value = self.material_body(call, &operands);
         self.cx.leave_material();
         value
     }
 
-    /// An operand for every parameter: arguments, held to their ranges, and defaults.
+    /// An operand for every parameter: arguments, held to their ranges, and defaults. Then those that are given.
     fn material_arguments(
         &mut self,
         callee: &Name,
         args: &[Arg],
         declared: &[&Declared],
-    ) -> Option<Vec<Operand>> {
+    ) -> Option<(Vec<Operand>, Vec<Option<WholeArgument>>)> {
         let params: Vec<Param> = declared.iter().map(|d| d.param()).collect();
         let given = self.given_arguments(callee, args, &params);
         let mut operands = Vec::with_capacity(params.len());
@@ -156,7 +183,17 @@ impl Body<'_, '_> {
             });
         }
         let operands: Option<Vec<Operand>> = operands.into_iter().collect();
-        operands.filter(|_| given.ok)
+        let operands = operands.filter(|_| given.ok)?;
+        let argument = |(index, held): (usize, &Operand)| match (given.operands[index], held) {
+            (Some(Operand::Value(written, _)), Operand::Value(held, _)) => Some(WholeArgument {
+                written,
+                held: *held,
+                span: given_at(args, index, &params[index].name).unwrap_or(callee.span),
+            }),
+            _ => None,
+        };
+        let arguments = operands.iter().enumerate().map(argument).collect();
+        Some((operands, arguments))
     }
 
     /// The default of a parameter in a call at `span`.
@@ -244,7 +281,8 @@ impl Body<'_, '_> {
     }
 
     /// The statements of a called material, and what they assign.
-    fn material_body(&mut self, item: ItemRef, args: &[Operand], span: Span) -> Option<Operand> {
+    fn material_body(&mut self, call: Whole, args: &[Operand]) -> Option<Operand> {
+        let (item, span) = (call.callee, call.span);
         let ast = self.cx.ast(item.module);
         let ItemKind::Material(material) = &ast.items[item.index].kind else {
             return None;
@@ -252,6 +290,7 @@ impl Body<'_, '_> {
         self.may_expand(span)?;
         let known = self.cx.diagnostics.len();
         let outputs = std::mem::take(&mut self.outputs);
+        let whole = self.whole.take();
         let caller = self.enter(item.module, Place::Material, span);
         for (param, arg) in material.params.iter().zip(args) {
             if let Operand::Value(id, _) = arg {
@@ -261,11 +300,16 @@ impl Body<'_, '_> {
         }
         let ok = self.scoped(|cx| cx.statements(&material.body));
         let assigned = std::mem::replace(&mut self.outputs, outputs);
+        let within = std::mem::replace(&mut self.whole, whole);
         self.leave(caller);
         self.drop_warnings(known);
         self.found_in_call(known, span);
         let find = |name: &str| assigned.iter().find(|o| o.0 == name).map(|o| o.1);
         self.called.push(OUTPUTS.map(|(name, _)| find(name)));
+        // An author's material that is a call whole stands for that call.
+        let from_library = self.cx.modules[item.module.0].is_std;
+        let origin = within.filter(|_| !from_library).unwrap_or(call);
+        self.origins.push(Some(origin));
         ok.then_some(Operand::Material(self.called.len() - 1))
     }
 
@@ -322,8 +366,19 @@ impl Body<'_, '_> {
             });
         }
         self.called.push(chosen);
+        self.origins.push(None);
         Some(Operand::Material(self.called.len() - 1))
     }
+}
+
+/// Where a call gives its parameter `index`, which is called `name`, a value.
+fn given_at(args: &[Arg], index: usize, name: &str) -> Option<Span> {
+    let mut args = args.iter().enumerate();
+    let found = args.find(|(position, arg)| match &arg.name {
+        Some(own) => own.node == name,
+        None => *position == index,
+    });
+    found.map(|(_, arg)| arg.value.span)
 }
 
 /// The parameters of a material that scenes set; nothing if one does not check.

@@ -93,6 +93,9 @@ impl Checker<'_> {
             return None;
         }
         let outputs = body.take_outputs(&item.name)?;
+        if let Some(whole) = body.whole.take() {
+            body.cx.wholes.insert(ItemRef { module, index }, whole);
+        }
         let closures = std::mem::take(&mut body.closures);
         let inputs = std::mem::take(&mut body.inputs);
         let value = body.builder.float(0.0, item.span);

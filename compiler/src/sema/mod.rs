@@ -51,7 +51,7 @@ mod varying;
 pub mod words;
 
 use called::MaterialSignature;
-pub use called::{Declared, Origin};
+pub use called::{Declared, Origin, Whole, WholeArgument};
 pub use metadata::Metadata;
 pub use modules::{ItemRef, ModuleId, std_path};
 use modules::{Loading, ModuleData};
@@ -77,6 +77,8 @@ pub struct Checker<'a> {
     checked: BTreeMap<ItemRef, Checked>,
     /// Materials that were checked on their own.
     materials: BTreeMap<ItemRef, Option<ir::Material>>,
+    /// Of those that are a call of another material, whole, that call.
+    wholes: BTreeMap<ItemRef, Whole>,
     /// Materials being checked, each called by the one before it.
     expanding: Vec<ItemRef>,
     /// Files that are being loaded, each imported by the one before it.
@@ -166,6 +168,7 @@ impl<'a> Checker<'a> {
             core: BTreeMap::new(),
             checked: BTreeMap::new(),
             materials: BTreeMap::new(),
+            wholes: BTreeMap::new(),
             expanding: Vec::new(),
             importing: Vec::new(),
             used: BTreeSet::new(),
@@ -236,6 +239,19 @@ impl<'a> Checker<'a> {
                 .replaced(name.span, Some(&name.node), &format!("_{}", name.node));
             self.report(unused);
         }
+    }
+
+    /// The call that a checked material is, if it is one whole.
+    pub fn whole(&self, item: ItemRef) -> Option<&Whole> {
+        self.wholes.get(&item)
+    }
+
+    /// What a definition is called, and the folder of the library that has it.
+    pub fn named(&self, item: ItemRef) -> (Option<&'static str>, String) {
+        let name = self.item(item).name.node.clone();
+        let file = self.modules[item.module.0].file;
+        let own = impasto_stdlib::files().get(file.0 as usize);
+        (own.map(|own| own.folder), name)
     }
 
     /// The struct of `std::core` called `name`.

@@ -89,6 +89,7 @@ impl Body<'_, '_> {
             let operand = self.called[called][index].unwrap_or(Operand::Nothing(*ty));
             self.outputs.push((name, operand, at));
         }
+        self.whole = self.origins[called].clone();
         Some(())
     }
 

@@ -3,6 +3,7 @@
 mod call;
 mod color_spaces;
 mod document;
+pub(crate) mod export;
 mod graph;
 mod helpers;
 mod material;

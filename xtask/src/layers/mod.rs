@@ -53,7 +53,7 @@ const CRATES: &[Crate] = &[
             &["codegen", "format", "oracle", "sema"],
             &["analysis", "build", "interface"],
             &["driver"],
-            &["inspect", "values"],
+            &["inspect", "instance", "values"],
             &["cost"],
             &["partition"],
         ],

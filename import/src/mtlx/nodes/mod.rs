@@ -16,7 +16,7 @@ pub(crate) mod matrices;
 mod missing;
 mod noise;
 mod patterns;
-mod surfaces;
+pub(in crate::mtlx) mod surfaces;
 
 use std::collections::HashMap;
 use std::sync::OnceLock;

@@ -64,16 +64,39 @@ pub(super) const ROWS: &[NodeRow] = &[
 
 /// A parameter of a model.
 #[derive(Clone, Debug)]
-struct Parameter {
-    name: &'static str,
-    ty: &'static str,
+pub(in crate::mtlx) struct Parameter {
+    pub name: &'static str,
+    /// Its type in Impasto.
+    pub ty: &'static str,
     default: &'static str,
     /// What it may be, if numbers say so.
     range: Option<(f64, f64)>,
 }
 
+impl Parameter {
+    /// The unit that documents have its values in, of a length or an angle.
+    pub fn unit(&self) -> &'static str {
+        match self.default.split_once(' ') {
+            _ if self.name == "anisotropy_rotation" => "rad",
+            Some((_, unit)) => unit,
+            None => "m",
+        }
+    }
+
+    /// The type of its values in documents.
+    pub fn input_type(&self) -> Type {
+        match self.ty {
+            "int" => Integer,
+            "bool" => Boolean,
+            "color" => Color3,
+            "normal" | "vector" => Vector3,
+            _ => Float,
+        }
+    }
+}
+
 /// Nodes, and the materials that they are.
-const MODELS: &[(&str, &str)] = &[
+pub(in crate::mtlx) const MODELS: &[(&str, &str)] = &[
     ("standard_surface", "standard_surface"),
     ("open_pbr_surface", "open_pbr"),
     ("gltf_pbr", "gltf_pbr"),
@@ -81,8 +104,14 @@ const MODELS: &[(&str, &str)] = &[
     ("UsdPreviewSurface", "usd_preview_surface"),
 ];
 
+/// Parameters of materials that their nodes in MaterialX 1.39 lack. Documents of others that have them are read.
+pub(in crate::mtlx) const LACKING: &[(&str, &[&str])] = &[(
+    "disney_principled",
+    &["diffTrans", "flatness", "scatterDistance", "thin"],
+)];
+
 /// The parameters of a model, as its source declares them.
-fn parameters(material: &str) -> &'static [Parameter] {
+pub(in crate::mtlx) fn parameters(material: &str) -> &'static [Parameter] {
     static ALL: OnceLock<HashMap<&'static str, Vec<Parameter>>> = OnceLock::new();
     let all = ALL.get_or_init(|| {
         let read = |(_, material): &(&str, &'static str)| {
@@ -192,16 +221,9 @@ fn argument(
             call.described(),
             value.ty.name()
         );
-        let expected = match parameter.ty {
-            "length" | "angle" | "float" => "`float`",
-            "int" => "`integer`",
-            "bool" => "`boolean`",
-            "color" => "`color3`",
-            _ => "`vector3`",
-        };
         return Err(call
             .error(message)
-            .expected(expected)
+            .expected(format!("`{}`", parameter.input_type().name()))
             .hint("put a `convert` between them"));
     }
     Ok(Some(match parameter.ty {
@@ -216,11 +238,7 @@ fn argument(
             format!("{map}(color(0.5 * {texel} + 0.5), normal, tangent)")
         }
         "length" | "angle" => {
-            let unit = match parameter.default.split_once(' ') {
-                _ if parameter.name == "anisotropy_rotation" => "rad",
-                Some((_, unit)) => unit,
-                None => "m",
-            };
+            let unit = parameter.unit();
             match value.single() {
                 Some(single) => length(single, unit),
                 None => format!("{} * 1 {unit}", bound(&value.text, Level::Product)),

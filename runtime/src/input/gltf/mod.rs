@@ -26,6 +26,7 @@ use crate::error::SceneError;
 
 mod accessor;
 mod buffers;
+mod export;
 mod known;
 mod material;
 mod motion;
@@ -33,6 +34,7 @@ mod motion;
 mod motion_tests;
 mod nodes;
 mod parse;
+mod rows;
 mod scene;
 mod shape;
 #[cfg(test)]
@@ -41,6 +43,7 @@ mod speed;
 mod tests;
 
 pub(crate) use buffers::Buffers;
+pub use export::to_gltf;
 pub(crate) use nodes::Pose;
 pub(crate) use shape::Shape;
 
