@@ -3,9 +3,44 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-use super::built::Code;
-use super::maker::{Job, Made};
+use impasto_runtime::error::RuntimeError;
+use impasto_viewer::engine::Problem;
+
+use super::built::{Built, Code};
 use super::shared::lock;
+use super::wanted::Wanted;
+
+/// Kernels to be made.
+#[derive(Clone)]
+pub(super) struct Job {
+    pub wanted: Wanted,
+    pub code: Code,
+    /// The job that it follows: kernels of final code are made for what another job read.
+    pub of: u64,
+    pub number: u64,
+}
+
+/// What became of a job.
+pub(super) struct Made<'d> {
+    pub job: Job,
+    pub outcome: Outcome<'d>,
+    /// Is the picture another one than that of what was made before?
+    pub is_other: bool,
+}
+
+/// The end of a job.
+pub(super) enum Outcome<'d> {
+    /// Kernels, and what there is to say of the files.
+    Built(Box<Built<'d>>, Vec<Problem>),
+    /// The same of the processor, while the job goes on for the device.
+    StandsIn(Box<Built<'d>>, Vec<Problem>),
+    /// Final code is what is open, since nothing is left in tables.
+    Same,
+    /// The files have errors.
+    Wrong(Vec<Problem>),
+    /// The device fails.
+    Failed(RuntimeError),
+}
 
 /// Jobs on their way to makers, and what these made.
 #[derive(Default)]

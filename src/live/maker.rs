@@ -27,7 +27,7 @@ use impasto_viewer::engine::{Problem, State};
 use super::LiveOptions;
 use super::built::{Built, Code, Ingredients, requests, settable};
 use super::kernels;
-use super::mailbox::Mailbox;
+use super::mailbox::{Job, Made, Mailbox, Outcome};
 use super::pixels::{Pixels, Some as SomePixels};
 use super::problems;
 use super::project::describe;
@@ -37,38 +37,6 @@ use crate::files::FileLoader;
 use crate::plan::{self, POINTS, SceneMaterials};
 use crate::set::Sample;
 use crate::shot::{self, Subject};
-
-/// Kernels to be made.
-#[derive(Clone)]
-pub(super) struct Job {
-    pub wanted: Wanted,
-    pub code: Code,
-    /// The job that it follows: kernels of final code are made for what another job read.
-    pub of: u64,
-    pub number: u64,
-}
-
-/// What became of a job.
-pub(super) struct Made<'d> {
-    pub job: Job,
-    pub outcome: Outcome<'d>,
-    /// Is the picture another one than that of what was made before?
-    pub is_other: bool,
-}
-
-/// The end of a job.
-pub(super) enum Outcome<'d> {
-    /// Kernels, and what there is to say of the files.
-    Built(Box<Built<'d>>, Vec<Problem>),
-    /// The same of the processor, while the job goes on for the device.
-    StandsIn(Box<Built<'d>>, Vec<Problem>),
-    /// Final code is what is open, since nothing is left in tables.
-    Same,
-    /// The files have errors.
-    Wrong(Vec<Problem>),
-    /// The device fails.
-    Failed(RuntimeError),
-}
 
 /// A job that came to no kernels.
 enum Stop {
