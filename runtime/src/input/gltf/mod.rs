@@ -30,15 +30,11 @@ mod export;
 mod known;
 mod material;
 mod motion;
-#[cfg(test)]
-mod motion_tests;
 mod nodes;
 mod parse;
 mod rows;
 mod scene;
 mod shape;
-#[cfg(test)]
-mod speed;
 #[cfg(test)]
 mod tests;
 

@@ -11,6 +11,9 @@ use gltf::json::validation::Checked;
 
 use super::Buffers;
 
+#[cfg(test)]
+mod tests;
+
 /// The motion of a file's nodes.
 #[derive(Default)]
 pub(super) struct Motion {

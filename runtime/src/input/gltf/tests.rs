@@ -10,6 +10,8 @@ use crate::error::SceneError;
 use crate::scene::formats::{FORMATS, Geometry};
 use crate::world;
 
+pub(super) mod speed;
+
 /// Two triangles of a square in the plane of x and y, with texture coordinates, and a mirrored and moved copy.
 pub(super) fn square() -> (Value, Vec<u8>) {
     let mut bytes = Vec::new();

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::tests::{packed, save};
+use super::{packed, save};
 use crate::input;
 use crate::scene::formats::{FORMATS, Geometry};
 use crate::world;
@@ -134,7 +134,7 @@ fn grid(cells: usize) -> (Vec<[f32; 2]>, Vec<[u32; 3]>) {
 
 /// A file under way.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(in crate::input::gltf) struct Parts {
     views: Vec<Value>,
     accessors: Vec<Value>,
     binary: Vec<u8>,
@@ -151,7 +151,7 @@ impl Parts {
     }
 
     /// An accessor of floats, so many an element.
-    pub(super) fn floats(&mut self, numbers: &[f32], width: usize) -> usize {
+    pub(in crate::input::gltf) fn floats(&mut self, numbers: &[f32], width: usize) -> usize {
         let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
         let kind = match width {
             2 => "VEC2",
@@ -163,7 +163,7 @@ impl Parts {
         self.accessor(&bytes, 5126, numbers.len() / width, kind)
     }
 
-    pub(super) fn accessor(
+    pub(in crate::input::gltf) fn accessor(
         &mut self,
         bytes: &[u8],
         component: usize,
@@ -200,7 +200,7 @@ impl Parts {
     }
 
     /// The whole file, with what `json` has beside.
-    pub(super) fn file(self, mut json: Value) -> Vec<u8> {
+    pub(in crate::input::gltf) fn file(self, mut json: Value) -> Vec<u8> {
         json["asset"] = json!({ "version": "2.0" });
         json["buffers"] = json!([{ "byteLength": self.binary.len() }]);
         json["bufferViews"] = self.views.into();

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::speed::Parts;
-use super::tests::{file_of, read_at};
+use super::super::tests::speed::Parts;
+use super::super::tests::{file_of, read_at};
 use crate::error::SceneError;
 use crate::scene::formats::Geometry;
 use crate::scene::{Asked, Scene};
