@@ -131,6 +131,8 @@ fn files_are_offered_where_files_are_taken() {
             "converge --reference",
             "emit --out",
             "emit -o",
+            "export --out",
+            "export -o",
             "farm new --commands",
             "merge --out",
             "merge -o",

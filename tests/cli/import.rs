@@ -254,9 +254,9 @@ fn documents_are_sources_where_they_are() {
     impasto(&["fmt", &path]).exits(2).says("impasto import");
     assert_eq!(std::fs::read_to_string(&file).expect("it"), DOCUMENT);
     std::fs::write(&file, without_counterpart()).expect("a document");
-    for wrong in [&path, &scene] {
+    for (wrong, code) in [(&path, 2), (&scene, 1)] {
         impasto(&["check", wrong])
-            .exits(1)
+            .exits(code)
             .says("clay.mtlx")
             .says("line 3:");
     }
