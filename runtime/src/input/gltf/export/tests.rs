@@ -52,7 +52,7 @@ fn read_again(text: &str) -> String {
     std::fs::write(&path, text).expect("a file");
     let model = Model::read(&path).unwrap_or_else(|e| panic!("{text}\n{e}"));
     let name = &model.source_names[0];
-    let mut source = model.source(&name).expect("a source");
+    let mut source = model.source(name).expect("a source");
     let json: Json = serde_json::from_str(text).expect("JSON");
     for (number, image) in json["images"].as_array().into_iter().flatten().enumerate() {
         let uri = image["uri"].as_str().unwrap_or_default();
