@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use impasto_compiler::source::MAX_SOURCE_BYTES;
@@ -49,7 +49,7 @@ impl FileLoader {
 
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         if path == STDIN {
-            read_source(io::stdin().lock())
+            input::at_most(io::stdin().lock(), MAX_SOURCE_BYTES)
         } else {
             input::source(&self.base.join(path), MAX_SOURCE_BYTES)
         }
@@ -87,15 +87,6 @@ impl Loader for FileLoader {
         paths.sort();
         paths
     }
-}
-
-/// Reads at most one byte more than a source may have, which is enough to see that it is too large.
-fn read_source(reader: impl Read) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    reader
-        .take(MAX_SOURCE_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// Checks that there is a file at `path` that can be read.
@@ -257,6 +248,8 @@ fn is_at(_: &File, _: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+
     use super::*;
 
     #[test]
@@ -366,7 +359,8 @@ mod tests {
 
     #[test]
     fn reading_stops_when_a_source_is_too_large() {
-        let bytes = read_source(io::repeat(b' ')).expect("endless input is read");
+        let bytes =
+            input::at_most(io::repeat(b' '), MAX_SOURCE_BYTES).expect("endless input is read");
         assert_eq!(bytes.len(), MAX_SOURCE_BYTES + 1);
     }
 }

@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Duration;
 
 use impasto_compiler::abi::InstanceInfo;
 use impasto_compiler::source::SourceMap;
@@ -23,10 +22,6 @@ use super::problems;
 use super::project::Described;
 use super::shared::Origin;
 use crate::shot::is_library;
-
-/// A submission takes about so long at most, so that orders are heard soon: on a GPU of its own, and elsewhere.
-const ANSWER: Duration = Duration::from_millis(4);
-const SLOW_ANSWER: Duration = Duration::from_millis(10);
 
 /// Values of parameters, by what they are of.
 pub(super) type Values = BTreeMap<ParamId, ParameterValue>;
@@ -103,12 +98,11 @@ pub(super) enum Applied {
 impl<'d> Built<'d> {
     /// What a maker made.
     pub(super) fn new(
-        mut renderer: Renderer<'d>,
+        renderer: Renderer<'d>,
         of: Ingredients,
         reasons: Vec<String>,
-        [is_fast, stands_in]: [bool; 2],
+        stands_in: bool,
     ) -> Self {
-        renderer.answer_within(if is_fast { ANSWER } else { SLOW_ANSWER });
         Self {
             renderer,
             code: of.code,

@@ -62,6 +62,9 @@ impl From<RuntimeError> for Stop {
     }
 }
 
+/// A submission takes about so long at most, so that orders are heard soon: on a GPU of its own, and elsewhere.
+const ANSWER: Duration = Duration::from_millis(4);
+const SLOW_ANSWER: Duration = Duration::from_millis(10);
 /// Drivers that have made kernels before this time are waited for.
 const DRIVER: Duration = Duration::from_millis(40);
 /// The processor stands in for a GPU in scenes of at most so many triangles: it has a copy of them.
@@ -298,6 +301,7 @@ impl<'d> Maker<'d, '_> {
         if is_renewed {
             self.renew(&mut renderer, strategy, &of.scene, program);
         }
+        renderer.answer_within(if is_fast(device) { ANSWER } else { SLOW_ANSWER });
         let stands_in = !std::ptr::eq(device, self.device);
         let mut reasons = kernels::reasons(plan, renderer.plan(), program, device);
         if stands_in {
@@ -307,7 +311,7 @@ impl<'d> Maker<'d, '_> {
             renderer.named(&of.scene.name),
             of.clone(),
             reasons,
-            [is_fast(device), stands_in],
+            stands_in,
         ))
     }
 

@@ -302,17 +302,13 @@ impl<'c> Server<'c> {
                 self.documents.outdate_all();
                 self.dirty
                     .extend(self.documents.all().map(|d| d.path.clone()));
-                self.rests_at = Some(Instant::now() + REST);
-                self.edited
-                    .extend(self.documents.all().map(|d| d.path.clone()));
+                self.measure_all();
                 self.plan_scene();
             }
             "workspace/didChangeConfiguration" => {
                 let settings = params.get("settings").cloned().unwrap_or_default();
                 self.settings.change(settings);
-                self.rests_at = Some(Instant::now() + REST);
-                self.edited
-                    .extend(self.documents.all().map(|d| d.path.clone()));
+                self.measure_all();
                 self.plans.clear();
                 self.plan_scene();
                 self.refresh();
@@ -320,6 +316,13 @@ impl<'c> Server<'c> {
             "workspace/didChangeWorkspaceFolders" => self.settings.change_roots(&params),
             _ => {}
         }
+    }
+
+    /// All open files are to be measured once typing rests.
+    fn measure_all(&mut self) {
+        self.rests_at = Some(Instant::now() + REST);
+        let open = self.documents.all();
+        self.edited.extend(open.map(|d| d.path.clone()));
     }
 
     /// Notes that a file is another one now.

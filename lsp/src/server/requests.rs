@@ -114,10 +114,10 @@ impl Server<'_> {
         };
         let (path, text) = (document.path.clone(), document.text.clone());
         let offset = text.offset(at.position);
-        let settings = self.settings.clone();
         if document.language == Language::Scene {
             let (word, list) = self.with_scene(&path, |scene| scene.complete(offset));
-            let item = |(i, p)| convert::completion(&text, &word, i, p, Vec::new(), &settings);
+            let settings = &self.settings;
+            let item = |(i, p)| convert::completion(&text, &word, i, p, Vec::new(), settings);
             let items: Vec<Value> = list.iter().enumerate().map(item).collect();
             return Ok(json!({ "isIncomplete": false, "items": items }));
         }
@@ -144,12 +144,13 @@ impl Server<'_> {
             analyse: &mut patched,
         };
         let proposals = completion::complete(&mut known, offset);
+        let settings = &self.settings;
         let item = |(index, proposal): (usize, &completion::Proposal)| {
             let import = proposal.import.as_ref();
             let import = import.and_then(|p| completion::import_edit(&now, text.as_str(), p));
             let more = import.map(|(range, new)| convert::edit(&text, range, &new));
             let more: Vec<Value> = more.into_iter().collect();
-            convert::completion(&text, &proposals.word, index, proposal, more, &settings)
+            convert::completion(&text, &proposals.word, index, proposal, more, settings)
         };
         let items: Vec<Value> = proposals.list.iter().enumerate().map(item).collect();
         Ok(json!({ "isIncomplete": false, "items": items }))

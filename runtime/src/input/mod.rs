@@ -49,8 +49,7 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// The text of the source at `path`, or of what the MaterialX document there becomes. It has one byte more than `most` at
-/// most, which is enough to see that it is too long.
+/// The text of the source at `path`, as [`at_most`] reads it, or of what the MaterialX document there becomes.
 ///
 /// # Errors
 /// As [`open`], or if it cannot be read or imported.
@@ -58,9 +57,16 @@ pub fn source(path: &Path, most: usize) -> io::Result<Vec<u8>> {
     if mtlx::is_document(path) {
         return mtlx::source(path).map(String::into_bytes);
     }
+    at_most(open(path)?, most)
+}
+
+/// What can be read, but for what is more than one byte beyond `most`: so one sees that it is too long.
+///
+/// # Errors
+/// It cannot be read.
+pub fn at_most(from: impl Read, most: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let file = open(path)?;
-    file.take(most as u64 + 1).read_to_end(&mut bytes)?;
+    from.take(most as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

@@ -1,7 +1,7 @@
 //! MaterialX documents as sources: whoever reads a source may read a document, and has what an artist would have written
 //! in its place. Pictures stay where they are.
 
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use impasto_import::{Files, ImportError, Options};
@@ -45,11 +45,8 @@ pub struct Disk;
 
 impl Files for Disk {
     fn read(&mut self, path: &str, most: usize) -> Result<Vec<u8>, String> {
-        let file = super::open(Path::new(path)).map_err(|e| reason(&e))?;
-        let mut bytes = Vec::new();
-        let read = file.take(most as u64 + 1).read_to_end(&mut bytes);
-        read.map_err(|e| reason(&e))?;
-        Ok(bytes)
+        let read = super::open(Path::new(path)).and_then(|file| super::at_most(file, most));
+        read.map_err(|e| reason(&e))
     }
 
     fn exists(&mut self, path: &str) -> bool {
