@@ -1,8 +1,8 @@
 //! The pairs: what a row brings, and two scenes of which one needs it.
 
 use super::scenes::{
-    Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY,
-    TWO_SIDED, Text,
+    Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY, SPHERE,
+    SPOT, TWO_SIDED, Text,
 };
 use impasto::runtime::technique::{RayData, RayOrder, Technique};
 
@@ -104,6 +104,9 @@ pairs! {
         Text { thing: Some("surface = diffuse(color(0.3)); emission = uniform(color(4.0));"), ..lit(&[]) }
         => Text { thing: Some("surface = diffuse(color(0.3)); emission = uniform(color(4.0));"), ..lit(&[QUAD]) };
     "two-sided quads", also &[], "functions +is_two_sided", lit(&[QUAD]) => lit(&[TWO_SIDED]);
+    "sphere lights", also &[], "bindings +sphere_lights; functions +sample_sphere_light +sphere_light_hit",
+        lit(&[QUAD, SECOND_QUAD]) => lit(&[QUAD, SPHERE]);
+    "spots", also &[], "functions +spot_share", lit(&[SPHERE]) => lit(&[SPOT]);
     "distant lights in one direction", also &["sampled light from infinity"], "functions +distant_light +sample_distant_light",
         lit(&[QUAD, SECOND_QUAD]) => lit(&[QUAD, DIRECTION]);
     "distant lights with an angle", also &[], "functions +distant_light +distant_light_escape +sample_distant_light",

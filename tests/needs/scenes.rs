@@ -42,6 +42,10 @@ pub const SECOND_QUAD: &str = "kind = \"quad\"\ncorner = [-1, 1.5, 0]\nu = [0.3,
                                radiance = [3, 8, 9]";
 pub const TWO_SIDED: &str = "kind = \"quad\"\ncorner = [-0.5, 1.9, -0.5]\nu = [1, 0, 0]\nv = [0, 0, 1]\n\
                              radiance = [9, 8, 7]\ntwo_sided = true";
+pub const SPHERE: &str =
+    "kind = \"sphere\"\ncenter = [-0.8, 1.5, 0.2]\nradius = 0.1\nradiance = [3, 8, 9]";
+pub const SPOT: &str = "kind = \"sphere\"\ncenter = [-0.8, 1.5, 0.2]\nradius = 0.1\nradiance = [3, 8, 9]\n\
+                        axis = [0.4, -1, 0]\ncone = 50\ninner = 20";
 pub const QUAD_BY_CHANCE: &str = "kind = \"quad\"\ncorner = [-0.5, 1.9, -0.5]\nu = [1, 0, 0]\nv = [0, 0, 1]\n\
                                   radiance = [9, 8, 7]\nsample = false";
 pub const DIRECTION: &str = "kind = \"distant\"\nto_light = [-0.2, 1, 0.3]\nirradiance = [2, 2, 1]";

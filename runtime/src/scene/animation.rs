@@ -79,6 +79,29 @@ impl Moment {
             .transpose()
     }
 
+    /// Has the `keys` of a table, which errors call `title`, say what its numbers are at this moment.
+    pub(super) fn hold(self, table: &mut Table<'_>, title: &str) -> Result<(), SceneError> {
+        let Some(keys) = Self::keys(table, title)? else {
+            return Ok(());
+        };
+        let read = |value: &Value| {
+            let expected = "a finite number, or a list of such";
+            value.numbers().ok_or_else(|| value.mismatch(expected))
+        };
+        for (name, value) in keys.named() {
+            let mix = |a: &Vec<f64>, b: &Vec<f64>, t: f64| {
+                if a.len() != b.len() {
+                    return Err(value.error("its values have not as many numbers as each other"));
+                }
+                let each = a.iter().zip(b).map(|(a, b)| a + t * (b - a));
+                Ok(each.collect())
+            };
+            let numbers = self.of_keys(&value, read, mix)?;
+            table.hold(name, value.holding(numbers));
+        }
+        Ok(())
+    }
+
     /// What the keys `name`, if there are any, say at this moment; else `otherwise`.
     pub(super) fn keyed<'d, T>(
         self,

@@ -184,7 +184,7 @@ impl<'f> Description<'f> {
             integrator: integrator(&mut root)?,
             geometry: geometry(&mut root, formats, moment)?,
             materials: materials(&mut root, formats, moment)?,
-            lights: lights(&mut root, readers)?,
+            lights: lights(&mut root, readers, moment)?,
             environment: environment(&mut root)?,
             animation,
         };
@@ -600,11 +600,16 @@ fn file_value(
     })
 }
 
-fn lights(root: &mut Table, readers: &[LightReader]) -> Result<Vec<LightSpec>, SceneError> {
+fn lights(
+    root: &mut Table,
+    readers: &[LightReader],
+    moment: Moment,
+) -> Result<Vec<LightSpec>, SceneError> {
     let Some(value) = root.get("lights") else {
         return Ok(Vec::new());
     };
     let light = |mut table: Table| {
+        moment.hold(&mut table, "[[lights]]")?;
         let kind = table.require("kind")?;
         let group = group(&mut table)?;
         let name = kind.string()?;

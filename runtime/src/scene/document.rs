@@ -49,6 +49,8 @@ pub(crate) struct Table<'d> {
     name: String,
     place: Range<usize>,
     entries: &'d DeTable<'d>,
+    /// Values that take the place of those of the same key.
+    held: Vec<(&'d str, Value<'d>)>,
     asked: Vec<&'static str>,
 }
 
@@ -72,8 +74,14 @@ impl<'d> Table<'d> {
             name: name.into(),
             place,
             entries,
+            held: Vec::new(),
             asked: Vec::new(),
         }
+    }
+
+    /// Takes `value` for that of a key from now on.
+    pub(super) fn hold(&mut self, key: &'d str, value: Value<'d>) {
+        self.held.push((key, value));
     }
 
     /// An error about the table as a whole.
@@ -84,6 +92,9 @@ impl<'d> Table<'d> {
     /// The value of an optional key.
     pub(crate) fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
         self.asked.push(key);
+        if let Some((_, value)) = self.held.iter().find(|(name, _)| *name == key) {
+            return Some(value.clone());
+        }
         let item = self.entries.get(key)?;
         Some(self.value(key, item))
     }
@@ -95,7 +106,7 @@ impl<'d> Table<'d> {
         }
         let meant = |k: &&Spanned<Cow<str>>| nearest(k.get_ref(), [key]).is_some();
         Err(match self.unknown().find(meant) {
-            Some(misspelled) => self.no_such_key(misspelled),
+            Some(misspelled) => self.no_such_key(misspelled.get_ref(), misspelled.span()),
             None => self.error(format!("{} needs `{key}`", self.name)),
         })
     }
@@ -119,7 +130,14 @@ impl<'d> Table<'d> {
     /// Refuses the first key that was not asked for.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let first = self.unknown().min_by_key(|k| k.span().start);
-        first.map_or(Ok(()), |key| Err(self.no_such_key(key)))
+        if let Some(key) = first {
+            return Err(self.no_such_key(key.get_ref(), key.span()));
+        }
+        let mut held = self.held.iter();
+        let unknown = held.find(|(key, _)| !self.asked.contains(key));
+        unknown.map_or(Ok(()), |(key, value)| {
+            Err(self.no_such_key(key, value.key.clone().unwrap_or_else(|| value.range())))
+        })
     }
 
     /// Keys that were not asked for (yet).
@@ -128,11 +146,11 @@ impl<'d> Table<'d> {
         keys.filter(|key| !self.asked.contains(&key.get_ref().as_ref()))
     }
 
-    fn no_such_key(&self, key: &Spanned<Cow<str>>) -> SceneError {
-        let message = format!("{} has no key `{}`", self.name, key.get_ref());
-        let error = self.document.error(key.span(), message);
+    fn no_such_key(&self, key: &str, place: Range<usize>) -> SceneError {
+        let message = format!("{} has no key `{key}`", self.name);
+        let error = self.document.error(place, message);
         let known = self.asked.iter().copied();
-        match nearest(key.get_ref(), known.clone()) {
+        match nearest(key, known.clone()) {
             Some(best) => error.hint(format!("did you mean `{best}`?")),
             None => error.hint(format!("its keys are {}", list(known))),
         }
@@ -144,11 +162,13 @@ impl<'d> Table<'d> {
             name: format!("`{key}` of {}", self.name),
             item,
             key: None,
+            held: None,
         }
     }
 }
 
 /// One value with its place.
+#[derive(Clone)]
 pub(crate) struct Value<'d> {
     document: &'d Document<'d>,
     /// The value in words, such as `` `fov` of [camera] ``.
@@ -156,9 +176,34 @@ pub(crate) struct Value<'d> {
     item: &'d Spanned<DeValue<'d>>,
     /// The place of its key, if the key is a name of the scene's own.
     key: Option<Range<usize>>,
+    /// The number, or the numbers of a list, that it stands for instead of what is written.
+    held: Option<Vec<f64>>,
 }
 
 impl<'d> Value<'d> {
+    /// A value of these numbers which errors show as this one.
+    pub(super) fn holding(self, numbers: Vec<f64>) -> Self {
+        Self {
+            held: Some(numbers),
+            ..self
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        match self.held.as_deref() {
+            Some([one]) => Some(*one),
+            Some(_) => None,
+            None => number(self.item()),
+        }
+    }
+
+    /// A finite number, or a list of such.
+    pub(super) fn numbers(&self) -> Option<Vec<f64>> {
+        let held = self.held.clone();
+        let one = || number(self.item()).map(|x| vec![x]);
+        held.or_else(one).or_else(|| numbers(self.item()))
+    }
+
     /// An error at the value.
     pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.item.span(), message)
@@ -213,6 +258,7 @@ impl<'d> Value<'d> {
             name: format!("a part of {whole}"),
             item,
             key: None,
+            held: None,
         };
         Some(self.item().as_array()?.iter().map(item).collect())
     }
@@ -239,7 +285,7 @@ impl<'d> Value<'d> {
 
     /// A finite number.
     pub(crate) fn float(&self) -> Result<f32, SceneError> {
-        let value = number(self.item()).map(|v| v as f32);
+        let value = self.number().map(|v| v as f32);
         value.ok_or_else(|| self.mismatch("a finite number"))
     }
 
@@ -249,7 +295,7 @@ impl<'d> Value<'d> {
         expected: &str,
         holds: impl Fn(f32) -> bool,
     ) -> Result<f32, SceneError> {
-        let value = number(self.item()).map(|v| v as f32);
+        let value = self.number().map(|v| v as f32);
         value
             .filter(|&v| holds(v))
             .ok_or_else(|| self.mismatch(expected))
@@ -276,9 +322,9 @@ impl<'d> Value<'d> {
 
     /// Linear RGB, not negative: three numbers, or one for a grey.
     pub(crate) fn rgb(&self) -> Result<Vec3, SceneError> {
-        let rgb = match number(self.item()) {
+        let rgb = match self.number() {
             Some(grey) => Some([grey; 3]),
-            None => numbers(self.item()).and_then(|v| v.try_into().ok()),
+            None => self.numbers().and_then(|v| v.try_into().ok()),
         };
         let rgb = rgb.filter(|rgb| rgb.iter().all(|&c| c >= 0.0));
         let expected = "a number or [r, g, b], finite and not negative";
@@ -317,7 +363,8 @@ impl<'d> Value<'d> {
 
     /// `N` finite numbers.
     pub(super) fn array<const N: usize>(&self, expected: &str) -> Result<[f64; N], SceneError> {
-        let array = numbers(self.item()).and_then(|v| v.try_into().ok());
+        let array = self.numbers().filter(|_| self.number().is_none());
+        let array = array.and_then(|v| v.try_into().ok());
         array.ok_or_else(|| self.mismatch(expected))
     }
 }

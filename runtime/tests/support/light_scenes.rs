@@ -5,12 +5,13 @@ use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::{
     Camera, Environment, EnvironmentMap, EnvironmentSource, FilmSettings, Integrator, Light, Mesh,
-    NO_MATERIAL, Scene,
+    NO_MATERIAL, Scene, SceneLight,
 };
 use impasto_runtime::technique::Technique;
 use impasto_runtime::world::KernelParts;
 use impasto_runtime::world::lights::distant::DistantLight;
 use impasto_runtime::world::lights::quad::QuadLight;
+use impasto_runtime::world::lights::sphere::{Cone, SphereLight};
 
 use super::worlds::kernel_parts;
 use super::{Random, Row, floats, row, run};
@@ -65,17 +66,18 @@ pub(crate) fn push_triangle(scene: &mut Scene, corners: [Vec3; 3], material: u32
 }
 
 pub(crate) fn push_quad(scene: &mut Scene, quad: QuadLight) {
-    let QuadLight { corner, u, v, .. } = quad;
+    push_light(scene, quad);
+}
+
+/// Adds a light with its surface.
+pub(crate) fn push_light(scene: &mut Scene, light: impl SceneLight) {
     let index = scene.lights.len() as u32;
-    for corners in [
-        [corner, corner + u, corner + u + v],
-        [corner, corner + u + v, corner + v],
-    ] {
+    for corners in light.triangles() {
         push_triangle(scene, corners, NO_MATERIAL);
         scene.mesh.lights.pop();
         scene.mesh.lights.push(Some(index));
     }
-    scene.lights.push(Light::new(quad));
+    scene.lights.push(Light::new(light));
 }
 
 pub(crate) fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3], radiance: f32) -> QuadLight {
@@ -85,6 +87,26 @@ pub(crate) fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3], radiance: f32) ->
         v: v.into(),
         radiance: Vec3::new(radiance, 0.5 * radiance, 0.25 * radiance),
         two_sided: false,
+        sample: true,
+    }
+}
+
+/// A sphere that shines into a cone of that outer angle with a soft edge, or everywhere.
+pub(crate) fn sphere(
+    center: [f32; 3],
+    radius: f32,
+    radiance: f32,
+    outer: Option<f32>,
+) -> SphereLight {
+    SphereLight {
+        center: center.into(),
+        radius,
+        radiance: Vec3::new(radiance, 0.5 * radiance, 0.25 * radiance),
+        cone: outer.map(|outer| Cone {
+            axis: -Vec3::from(center).normalize(),
+            outer,
+            inner: 0.5 * outer,
+        }),
         sample: true,
     }
 }
@@ -176,6 +198,14 @@ pub(crate) fn scenes() -> Vec<(&'static str, Scene, Vec<InstanceInfo>)> {
     );
     scenes.push(("two-sided quad", both_sides, vec![]));
 
+    let mut lamp = dark_scene();
+    push_light(&mut lamp, sphere([0.5, 2.6, -0.3], 0.5, 4.0, None));
+    scenes.push(("sphere", lamp, vec![]));
+    let mut spots = dark_scene();
+    push_light(&mut spots, sphere([-1.0, 2.5, 0.4], 0.3, 4.0, Some(40.0)));
+    push_light(&mut spots, sphere([1.5, 2.0, 0.4], 0.2, 3.0, None));
+    scenes.push(("a spot and a sphere", spots, vec![]));
+
     let cone = Scene {
         lights: vec![distant([0.3, 1.0, -0.2], 2.0, 30.0)],
         ..dark_scene()
@@ -241,6 +271,7 @@ pub(crate) fn mixed_scene() -> (Scene, Vec<InstanceInfo>) {
         &mut scene,
         quad([-1.0, 1.5, -1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 4.0),
     );
+    push_light(&mut scene, sphere([1.5, 1.0, 1.5], 0.3, 2.0, Some(70.0)));
     push_quad(
         &mut scene,
         quad([-3.0, 3.0, -3.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0], 4.0),

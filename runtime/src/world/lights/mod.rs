@@ -21,6 +21,7 @@ mod environment;
 pub(crate) mod groups;
 mod mesh;
 pub mod quad;
+pub mod sphere;
 pub(crate) mod table;
 #[cfg(test)]
 mod tests;

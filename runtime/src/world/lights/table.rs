@@ -30,6 +30,14 @@ macro_rules! light_kinds {
                         "a quad shines on both sides",
                         on &[QuadLights], Whole;
                 }
+                sphere {
+                    SphereLights, "sphere lights", "sphere_lights",
+                        "`[[lights]]` has a sphere that shines",
+                        on &[HitLights], Whole;
+                    SpotLights, "spots", "spot_lights",
+                        "a sphere shines into a cone",
+                        on &[SphereLights], Whole;
+                }
                 distant {
                     DirectionalLights, "distant lights in one direction", "directional_lights",
                         "a distant light has no angle",

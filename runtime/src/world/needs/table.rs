@@ -122,7 +122,7 @@ rows! {
             sampled.then(|| f.material("scatters light that is sampled", |m| !m.delta_only))?
         };
     LightChoice, "choice of a light", "light_choice",
-        "lights are sampled, and there is more than one to choose from or a map to choose in",
+        "lights are sampled, and there is more than one to choose from or a map or a sphere to choose in",
         on &[ShadowRays], draws "the choice of a light", Whole, |f, n| {
             let choice = n.has(ShadowRays) && f.lights.choice;
             choice.then(|| "there is more than one light to choose from, or a map".into())

@@ -106,9 +106,21 @@ fn a_kind_that_a_scene_lacks_is_there_if_its_row_asks_for_it_alone() {
 fn entries_are_read_by_the_table() {
     let light = |entry: &str| format!("[[lights]]\n{entry}\n");
     let refused = |entry: &str| scene(&light(entry)).expect_err(entry).to_string();
-    let unknown = refused("kind = 'sphere'");
-    let expected = "`kind` of [[lights]] must be \"quad\" or \"distant\" or \"point\", not";
+    let unknown = refused("kind = 'torus'");
+    let expected =
+        "`kind` of [[lights]] must be \"quad\" or \"sphere\" or \"distant\" or \"point\", not";
     assert!(unknown.contains(expected), "{unknown}");
+    let half = refused("kind = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nradiance = 1\ncone = 20");
+    assert!(
+        half.contains("needs the direction that it shines in"),
+        "{half}"
+    );
+    let wide = refused(
+        "kind = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nradiance = 1\naxis = [0, 1, 0]\ncone = 20\ninner = 21",
+    );
+    assert!(wide.contains("degrees from 0 to `cone`"), "{wide}");
+    let flat = refused("kind = 'sphere'\ncenter = [0, 0, 0]\nradius = 0\nradiance = 1");
+    assert!(flat.contains("a radius above 0"), "{flat}");
     let lacking = refused("kind = 'point'\nposition = [0, 0, 0]");
     assert!(lacking.contains("needs `intensity`"), "{lacking}");
     let odd = refused("kind = 'point'\nposition = [0, 0, 0]\nintensity = 1\nsample = true");
