@@ -38,10 +38,10 @@ impl Picture {
     }
 }
 
-/// Reads a PNG, JPEG, Radiance HDR or OpenEXR file, which its contents tell and not its name; `what`
+/// Reads a PNG, JPEG, WebP, Radiance HDR or OpenEXR file, which its contents tell and not its name; `what`
 /// names its use in errors.
 ///
-/// Integer colors of PNG and JPEG files are sRGB and become linear if `is_color`; everything else
+/// Integer colors of PNG, JPEG and WebP files are sRGB and become linear if `is_color`; everything else
 /// is used as it is. Grey fills red, green and blue, and alpha is 1 where there is none.
 ///
 /// # Errors
@@ -165,15 +165,16 @@ fn jpeg_is_whole(path: &Path) -> std::io::Result<bool> {
 }
 
 /// The formats that are read.
-const READ: [ImageFormat; 4] = [
+const READ: [ImageFormat; 5] = [
     ImageFormat::Png,
     ImageFormat::Jpeg,
     ImageFormat::Hdr,
     ImageFormat::OpenExr,
+    ImageFormat::WebP,
 ];
 
 /// The same, as hints say them.
-const FORMATS: &str = "expected PNG, JPEG, Radiance HDR (.hdr) or OpenEXR (.exr)";
+const FORMATS: &str = "expected PNG, JPEG, WebP, Radiance HDR (.hdr) or OpenEXR (.exr)";
 
 fn unknown_format(path: &Path, what: &str, format: Option<ImageFormat>) -> SceneError {
     let message = match format {
@@ -278,6 +279,26 @@ mod tests {
             assert_eq!(picture.texels[1][..3], [0.0, 0.0, 2.0]);
             std::fs::write(&path, start).expect("it is written");
             assert!(load(&path, "picture", true).is_err(), "{start} alone");
+        }
+    }
+
+    #[test]
+    fn a_webp_picture_has_the_texels_of_a_png_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let texel =
+            |x: u32, y: u32| image::Rgba([(20 * x) as u8, (40 * y) as u8, 7, 255 - x as u8]);
+        let image = image::RgbaImage::from_fn(5, 3, texel);
+        let loaded = |name: &str| {
+            let path = folder.path().join(name);
+            image.save(&path).expect("it is written");
+            load(&path, "picture", true).expect(name).texels
+        };
+        assert_eq!(loaded("p.webp"), loaded("p.png"));
+        let path = folder.path().join("p.webp");
+        let bytes = std::fs::read(&path).expect("it is there");
+        for length in 0..bytes.len() {
+            std::fs::write(&path, &bytes[..length]).expect("it is written");
+            assert!(load(&path, "picture", true).is_err(), "{length} bytes");
         }
     }
 }

@@ -139,8 +139,8 @@ fn what_is_wrong_is_said_of_the_file() {
     wrong(&|j| j["images"][0] = json!({ "uri": "../secret.png" }))
         .says("`../secret.png` is not in the file's folder");
     wrong(&|j| j["images"][0] = json!({ "uri": "lost.png" })).says("`lost.png`: no such file");
-    wrong(&|j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]))
-        .says("requires the extension `KHR_draco_mesh_compression`, which is not read");
+    wrong(&|j| j["extensionsRequired"] = json!(["KHR_texture_basisu"]))
+        .says("requires the extension `KHR_texture_basisu`, which is not read");
     let other = temporary.path().join("a.fbx").display().to_string();
     impasto(&["import", &other])
         .exits(2)

@@ -77,7 +77,7 @@ pub fn on_disk(path: &Path) -> &Path {
 
 /// Where the scene is that `path` names: a scene file, or the scene in a glTF file.
 pub fn scene(path: &Path) -> PathBuf {
-    if gltf::is_named_so(path) {
+    if gltf::is_folder(path) {
         path.join(gltf::SCENE)
     } else {
         path.to_owned()

@@ -79,7 +79,12 @@ impl<'m> Buffers<'m> {
         let (number, count) = (accessor.index(), accessor.count());
         let outside = || format!("accessor {number} reaches behind its buffer");
         let size = accessor.size();
+        let packed = self.model.packed.accessor(number);
         let mut all = match accessor.view() {
+            _ if let Some(packed) = packed => {
+                let bytes = self.drawn(accessor, packed)?;
+                bytes.chunks_exact(size).map(&element).collect()
+            }
             Some(view) => {
                 let stride = view.stride().unwrap_or(size).max(1);
                 self.each(&view, accessor.offset(), [stride, size, count], &element)?

@@ -50,6 +50,10 @@ impl Stamp {
 pub(crate) struct Buffers<'m> {
     pub(super) model: &'m Model,
     opened: RefCell<BTreeMap<usize, Rc<Content<'m>>>>,
+    /// Views that were decompressed.
+    pub(super) views: RefCell<BTreeMap<usize, Rc<Vec<u8>>>>,
+    /// The mesh that was last decompressed, and its view.
+    pub(super) mesh: RefCell<Option<(usize, Rc<draco_core::Mesh>)>>,
 }
 
 impl<'m> Buffers<'m> {
@@ -57,6 +61,8 @@ impl<'m> Buffers<'m> {
         Self {
             model,
             opened: RefCell::default(),
+            views: RefCell::default(),
+            mesh: RefCell::default(),
         }
     }
 
@@ -72,16 +78,35 @@ impl<'m> Buffers<'m> {
     ) -> Result<Option<Vec<u8>>, String> {
         let end = offset.checked_add(length);
         let is_within = end.is_some_and(|end| end <= view.length());
-        let Some(start) = view.offset().checked_add(offset).filter(|_| is_within) else {
+        let (Some(end), true) = (end, is_within) else {
             return Ok(None);
         };
-        let number = view.buffer().index();
+        if let Some(whole) = self.unpacked(view.index())? {
+            return Ok(whole.get(offset..end).map(<[u8]>::to_vec));
+        }
+        let Some(start) = view.offset().checked_add(offset) else {
+            return Ok(None);
+        };
         let content = self.content(&view.buffer())?;
         let view_end = (view.offset() as u64).checked_add(view.length() as u64);
         if view_end.is_none_or(|end| end > content.length()) {
             return Ok(None);
         }
-        let read = content.read(start, length);
+        self.range(&view.buffer(), start, length)
+    }
+
+    /// So many bytes of a buffer from an offset on; none if it ends before.
+    ///
+    /// # Errors
+    /// As [`Buffers::bytes`].
+    pub(super) fn range(
+        &self,
+        buffer: &gltf::Buffer<'m>,
+        offset: usize,
+        length: usize,
+    ) -> Result<Option<Vec<u8>>, String> {
+        let number = buffer.index();
+        let read = self.content(buffer)?.read(offset, length);
         read.map_err(|e| format!("buffer {number} cannot be read: {}", file::reason(&e)))
     }
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use super::buffers::Stamp;
-use super::{Model, file, unreadable};
+use super::{Choice, Model, file, unreadable};
 use crate::error::SceneError;
 
 /// How many files are kept.
@@ -20,11 +20,11 @@ const SETTLED: Duration = Duration::from_secs(2);
 static KNOWN: Mutex<Vec<Arc<Model>>> = Mutex::new(Vec::new());
 
 impl Model {
-    /// The file at `path`, which is parsed unless it is known.
+    /// The file at `path`, which is parsed unless it is known, with what is chosen of it.
     ///
     /// # Errors
     /// What is wrong with it.
-    pub(crate) fn read(path: &Path) -> Result<Arc<Self>, SceneError> {
+    pub(crate) fn read(path: &Path, choice: &Choice) -> Result<Arc<Self>, SceneError> {
         let open = || {
             let file = file::open(path)?;
             let stamp = Stamp::of(&file.metadata()?);
@@ -33,7 +33,8 @@ impl Model {
         let (file, stamp) = open().map_err(|e| unreadable(path, &e))?;
         // Who asks meanwhile waits, and finds it known.
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = known.iter().position(|m| m.path == path);
+        let mut found = known.iter();
+        let found = found.position(|m| m.path == path && m.choice == *choice);
         if let Some(model) = found.map(|at| known.remove(at))
             && model.stamp == stamp
         {
@@ -41,7 +42,7 @@ impl Model {
             return Ok(model);
         }
         let is_settled = is_settled(stamp);
-        let model = Arc::new(Self::parse(path, file, stamp)?);
+        let model = Arc::new(Self::parse(path, file, stamp, choice)?);
         if is_settled {
             known.push(Arc::clone(&model));
             let more = known.len().saturating_sub(KEPT);
@@ -72,7 +73,7 @@ mod tests {
     use super::*;
 
     fn model(path: &Path) -> Arc<Model> {
-        Model::read(path).unwrap_or_else(|e| panic!("{e}"))
+        Model::read(path, &Choice::default()).unwrap_or_else(|e| panic!("{e}"))
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! | `meshes.gltf` | all meshes where nodes put them, at the scene's time |
 //! | `placements/N.txt` | where nodes put a mesh, if they are many |
 //! | `images/N` | a picture, as it is encoded |
+//! | `animations/NAME/MEMBER`, `variants/NAME/MEMBER` | the same with another animation or variant than the first |
 
 use std::collections::BTreeSet;
 use std::io;
@@ -21,6 +22,7 @@ use serde_json::Value;
 
 use self::buffers::Stamp;
 use self::motion::Motion;
+use self::packed::Packed;
 use super::file;
 use crate::error::SceneError;
 
@@ -28,9 +30,11 @@ mod accessor;
 mod buffers;
 mod export;
 mod known;
+mod lights;
 mod material;
 mod motion;
 mod nodes;
+mod packed;
 mod parse;
 mod rows;
 mod scene;
@@ -58,6 +62,7 @@ pub(crate) struct Model {
     path: PathBuf,
     /// Which save of the file it is.
     stamp: Stamp,
+    choice: Choice,
     pub(crate) document: gltf::Document,
     /// Its materials as they are written, for extensions.
     materials: Vec<Value>,
@@ -70,6 +75,38 @@ pub(crate) struct Model {
     /// The materials of primitives that have colors.
     colored: BTreeSet<usize>,
     motion: Motion,
+    packed: Packed,
+}
+
+/// Which of the things that a file has several of are shown, by name or number; none: the first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Choice {
+    /// The animation that moves nodes.
+    animation: Option<String>,
+    /// The variant of materials (KHR_materials_variants).
+    variant: Option<String>,
+}
+
+impl Choice {
+    /// The choice that the path of a member begins with, and the rest of the path.
+    fn of(member: &Path) -> (Self, &Path) {
+        let mut choice = Self::default();
+        let mut rest = member;
+        loop {
+            let mut parts = rest.components();
+            let (kind, name) = (parts.next(), parts.next());
+            let chosen = match kind.and_then(|k| k.as_os_str().to_str()) {
+                Some("animations") => &mut choice.animation,
+                Some("variants") => &mut choice.variant,
+                _ => return (choice, rest),
+            };
+            let Some(name) = name.and_then(|n| n.as_os_str().to_str()) else {
+                return (choice, rest);
+            };
+            *chosen = Some(name.to_owned());
+            rest = parts.as_path();
+        }
+    }
 }
 
 /// A member that is geometry.
@@ -84,17 +121,19 @@ pub(crate) enum Member {
 }
 
 impl Member {
-    /// The member of that name; none if it is no geometry.
-    pub(crate) fn of_geometry(name: &Path) -> Option<Self> {
+    /// The member of that name, and what is chosen; none if it is no geometry.
+    pub(crate) fn of_geometry(name: &Path) -> Option<(Choice, Self)> {
+        let (choice, name) = Choice::of(name);
         if name == Path::new(ALL) {
-            return Some(Self::All);
+            return Some((choice, Self::All));
         }
         let number = |folder: &str| {
             let within = name.strip_prefix(folder).ok()?.to_str()?;
             within.strip_suffix(".gltf")?.parse().ok()
         };
         let node = || number("nodes").map(Self::Node);
-        number("meshes").map(Self::Mesh).or_else(node)
+        let member = number("meshes").map(Self::Mesh).or_else(node);
+        member.map(|member| (choice, member))
     }
 }
 
@@ -111,12 +150,19 @@ pub(crate) fn inside(path: &Path) -> Option<(&Path, &Path)> {
     Some((file, path.strip_prefix(file).ok()?))
 }
 
+/// Does `path` name a file, or a choice in one, and no member?
+pub(crate) fn is_folder(path: &Path) -> bool {
+    let is_choice = |(_, member): (_, &Path)| Choice::of(member).1.as_os_str().is_empty();
+    is_named_so(path) || inside(path).is_some_and(is_choice)
+}
+
 /// A member of the file at `path`, as bytes.
 ///
 /// # Errors
 /// There is no such member, or the file is damaged.
 pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
-    let model = Model::read(path).map_err(|e| io::Error::other(said(e)))?;
+    let (choice, name) = Choice::of(name);
+    let model = Model::read(path, &choice).map_err(|e| io::Error::other(said(e)))?;
     let missing = || io::Error::from(io::ErrorKind::NotFound);
     let name = name.to_str().ok_or_else(missing)?;
     if name == SCENE {
@@ -141,7 +187,7 @@ pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
 /// # Errors
 /// What is wrong with the file.
 pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
-    let model = Model::read(path)?;
+    let model = Model::read(path, &Choice::default())?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let scene = model.scene(&format!("{file}/"));
     let mut files = vec![(SCENE.into(), scene.into_bytes())];

@@ -10,11 +10,15 @@ use serde_json::Value;
 
 use super::buffers::Stamp;
 use super::motion::Motion;
-use super::{Model, material, unreadable};
+use super::packed::{DRACO, MESHOPT, Packed};
+use super::{Choice, Model, material, unreadable};
 use crate::error::SceneError;
 
 /// Extensions that a file may require: what they ask for is done.
 const KNOWN: &[&str] = &[
+    MESHOPT,
+    "EXT_texture_webp",
+    DRACO,
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -26,18 +30,25 @@ const KNOWN: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
-    "KHR_materials_variants",
+    VARIANTS,
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
 
+const VARIANTS: &str = "KHR_materials_variants";
+
 impl Model {
-    /// Parses the file at `path`, of which this is the content.
+    /// Parses the file at `path`, of which this is the content, with what is chosen of it.
     ///
     /// # Errors
-    /// What is wrong with it.
-    pub(super) fn parse(path: &Path, mut file: File, stamp: Stamp) -> Result<Self, SceneError> {
+    /// What is wrong with it, or there is nothing of the name that is chosen.
+    pub(super) fn parse(
+        path: &Path,
+        mut file: File,
+        stamp: Stamp,
+        choice: &Choice,
+    ) -> Result<Self, SceneError> {
         let wrong = |message: String| SceneError::in_file(path, message);
         let parts = parts(&mut file, stamp.length).map_err(|e| unreadable(path, &e))?;
         let Parts {
@@ -67,13 +78,16 @@ impl Model {
             return Err(wrong(format!("it is glTF of {found}"))
                 .hint("glTF 2.0 is read; converters and Blender write it"));
         }
-        let root: gltf::json::Root = if spell_out(&mut json) {
+        let is_chosen =
+            choose(&mut json, choice).map_err(|(message, hint)| wrong(message).hint(hint))?;
+        let root: gltf::json::Root = if spell_out(&mut json) || is_chosen {
             serde_json::from_value(json.clone()).map_err(damaged)?
         } else {
             serde_json::from_slice(&text).map_err(damaged)?
         };
         check(path, &root)?;
         let motion = Motion::of(&root).map_err(wrong)?;
+        let packed = Packed::of(&json).map_err(wrong)?;
         let materials = match json["materials"].take() {
             Value::Array(materials) => materials,
             _ => Vec::new(),
@@ -86,6 +100,7 @@ impl Model {
         Ok(Self {
             path: path.to_owned(),
             stamp,
+            choice: choice.clone(),
             document,
             materials,
             binary,
@@ -93,12 +108,66 @@ impl Model {
             source_names,
             colored,
             motion,
+            packed,
         })
     }
 }
 
-/// Makes what glTF allows and the crate does not know what it knows: scenes without nodes have none, and channels that
-/// move no node, as extensions have them, are left out. Whether there was any.
+/// Puts the animation that is chosen before all others, and gives primitives the materials of the variant that is.
+/// Whether there was a choice; else an error and a hint.
+fn choose(json: &mut Value, choice: &Choice) -> Result<bool, (String, String)> {
+    if let Some(name) = &choice.animation {
+        let number = chosen(&json["animations"], name, "animation")?;
+        if let Some(Value::Array(animations)) = json.get_mut("animations") {
+            animations[..=number].rotate_right(1);
+        }
+    }
+    if let Some(name) = &choice.variant {
+        let variants = &json["extensions"][VARIANTS]["variants"];
+        let number = chosen(variants, name, "variant")?;
+        let meshes = json.get_mut("meshes").and_then(Value::as_array_mut);
+        let meshes = meshes.into_iter().flatten();
+        let primitives = meshes.filter_map(|mesh| mesh.get_mut("primitives")?.as_array_mut());
+        for primitive in primitives.flatten() {
+            let mappings = primitive["extensions"][VARIANTS]["mappings"].as_array();
+            let holds = |mapping: &&Value| {
+                let variants = mapping["variants"].as_array();
+                variants.is_some_and(|v| v.iter().any(|v| v.as_u64() == Some(number as u64)))
+            };
+            let own = mappings.into_iter().flatten().find(holds);
+            if let Some(material) = own.map(|mapping| mapping["material"].clone()) {
+                primitive["material"] = material;
+            }
+        }
+    }
+    Ok(*choice != Choice::default())
+}
+
+/// The number of what has that name or number in a list; else an error and a hint.
+fn chosen(list: &Value, name: &str, what: &str) -> Result<usize, (String, String)> {
+    let named = |item: &Value| item["name"].as_str().map(str::to_owned);
+    let names: Vec<Option<String>> = list.as_array().into_iter().flatten().map(named).collect();
+    let by_name = names.iter().position(|own| own.as_deref() == Some(name));
+    let by_number = || name.parse().ok().filter(|number| *number < names.len());
+    by_name.or_else(by_number).ok_or_else(|| {
+        let shown = names.iter().enumerate();
+        let shown = shown.map(|(number, name)| match name {
+            Some(name) => format!("`{name}`"),
+            None => number.to_string(),
+        });
+        let shown: Vec<String> = shown.collect();
+        let hint = if shown.is_empty() {
+            format!("it has no {what}s")
+        } else {
+            format!("there are {}", shown.join(", "))
+        };
+        (format!("the file has no {what} `{name}`"), hint)
+    })
+}
+
+/// Makes what glTF allows and the crate does not know what it knows: scenes without nodes have none, channels that
+/// move no node, as extensions have them, are left out, and textures that are WebP alone have that as their picture.
+/// Whether there was any.
 fn spell_out(json: &mut Value) -> bool {
     let list = |json: &mut Value, key: &str| match json.get_mut(key) {
         Some(Value::Array(items)) => std::mem::take(items),
@@ -121,7 +190,24 @@ fn spell_out(json: &mut Value) -> bool {
             changed |= channels.len() < count;
         }
     }
-    for (key, items) in [("scenes", scenes), ("animations", animations)] {
+    let mut textures = list(json, "textures");
+    for texture in &mut textures {
+        let webp = texture
+            .pointer("/extensions/EXT_texture_webp/source")
+            .cloned();
+        if let (Some(texture), Some(webp)) = (texture.as_object_mut(), webp)
+            && !texture.contains_key("source")
+        {
+            texture.insert("source".into(), webp);
+            changed = true;
+        }
+    }
+    let all = [
+        ("scenes", scenes),
+        ("animations", animations),
+        ("textures", textures),
+    ];
+    for (key, items) in all {
         if !items.is_empty() {
             json[key] = items.into();
         }
@@ -212,8 +298,14 @@ fn check(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
     }
     let mut first = None;
     let mut report = |place: &dyn Fn() -> gltf::json::Path, what: Invalid| {
-        if first.is_none() && what != Invalid::Unsupported {
-            first = Some((place().to_string(), what));
+        if first.is_some() || what == Invalid::Unsupported {
+            return;
+        }
+        let place = place().to_string();
+        // An accessor without a view is zeros, or compressed, which the crate does not know.
+        let is_zeros = place.starts_with("accessors[") && place.ends_with("].bufferView");
+        if !(is_zeros && what == Invalid::Missing) {
+            first = Some((place, what));
         }
     };
     root.validate(root, gltf::json::Path::new, &mut report);

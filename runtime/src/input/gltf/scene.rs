@@ -4,19 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use glam::{DMat4, DVec3};
-use gltf::khr_lights_punctual::Kind;
 
+use super::lights::Light;
 use super::{ALL, Model, Pose};
-
-/// Lumens of a watt: of lights, glTF tells what eyes see, and a renderer counts energy. It is what Blender takes.
-const LUMENS_A_WATT: f64 = 683.0;
-
-/// Angular diameter of a distant light, in degrees: of the sun.
-const SUN: f64 = 0.53;
-
-/// Edge of the square that stands for a light at a point, in metres, or by the size of the scene if that is small.
-const LAMP: f64 = 0.05;
-const LAMP_SHARE: f64 = 0.01;
 
 /// Vertical field of view of a camera that the file does not have, in degrees.
 const FOV: f64 = 35.0;
@@ -24,7 +14,7 @@ const FOV: f64 = 35.0;
 /// How much wider than everything the picture is.
 const MARGIN: f64 = 1.1;
 
-/// Frames of a second, in the keys of a camera that moves, and most of them.
+/// Frames of a second, in the keys of cameras and lights that move, and most of them.
 const RATE: f64 = 24.0;
 const MOST_FRAMES: usize = 10_000;
 
@@ -81,7 +71,7 @@ impl Model {
             write(format!("file = \"{source}.impasto\"\n"));
         }
         write("[materials.\"*\"]\nfile = \"std::surface::gltf_pbr\"\n".into());
-        seen.write_lights(&mut text);
+        seen.write_lights(self, &mut text);
         text
     }
 }
@@ -111,7 +101,7 @@ struct Seen {
     nodes: Vec<usize>,
     bounds: Option<[DVec3; 2]>,
     camera: Option<Seeing>,
-    lights: Vec<(DMat4, Kind, f64, [f32; 3])>,
+    lights: Vec<Light>,
 }
 
 /// The first camera.
@@ -151,9 +141,8 @@ impl Seen {
             });
         }
         if let Some(light) = node.light() {
-            let intensity = f64::from(light.intensity());
-            let light = (*transform, light.kind(), intensity, light.color());
-            self.lights.push(light);
+            self.lights
+                .push(Light::new(node.index(), transform, &light));
         }
     }
 
@@ -219,14 +208,16 @@ impl Seen {
 
     fn write_camera(&self, model: &Model, text: &mut String) {
         let (centre, radius) = self.extent();
-        let mut keys = None;
+        let mut moving = None;
         let (view, fov, shape) = match &self.camera {
             Some(camera) => {
                 let position = camera.transform.w_axis.truncate();
                 let forward = -camera.transform.z_axis.truncate().normalize_or(DVec3::Z);
                 let distance = (centre - position).dot(forward);
                 let distance = if distance > 0.0 { distance } else { 1.0 };
-                keys = camera.keys(model, distance);
+                let part = |i: usize| move |m: &DMat4| view(m, distance)[i];
+                let places = [("position", part(0)), ("look_at", part(1)), ("up", part(2))];
+                moving = keys(model, camera.node, &places);
                 (view(&camera.transform, distance), camera.fov, camera.shape)
             }
             None => {
@@ -239,7 +230,7 @@ impl Seen {
         let [position, look_at, up] = view.map(array);
         let rows = shape.filter(|s| (0.01..100.0).contains(s));
         let rows = rows.map_or(ROWS, |s| (f64::from(COLUMNS) / s).round().max(1.0) as u32);
-        if keys.is_some() {
+        if moving.is_some() || self.lights.iter().any(|light| light.moves(model)) {
             let _ = write!(text, "\n[animation]\nframes_per_second = {RATE}\n");
         }
         // Writing to a string cannot fail.
@@ -248,7 +239,7 @@ impl Seen {
             "\n[camera]\nposition = {position}\nlook_at = {look_at}\nup = {up}\nfov = {:?}\n{}\n\
              [film]\nwidth = {COLUMNS}\nheight = {rows}\n\n",
             fov.clamp(0.1, 179.0),
-            keys.unwrap_or_default(),
+            moving.unwrap_or_default(),
         );
     }
 
@@ -269,7 +260,7 @@ impl Seen {
         corners.fold(radius, f64::max)
     }
 
-    fn write_lights(&self, text: &mut String) {
+    fn write_lights(&self, model: &Model, text: &mut String) {
         if self.lights.is_empty() {
             // Like a photographer's: a soft light from above and behind the camera, and a bright room.
             text.push_str(
@@ -279,82 +270,37 @@ impl Seen {
             return;
         }
         let (_, radius) = self.extent();
-        let edge = LAMP.min(LAMP_SHARE * radius);
-        for (transform, kind, intensity, color) in &self.lights {
-            let place = transform.w_axis.truncate();
-            let back = transform.z_axis.truncate().normalize_or(DVec3::Z);
-            let power = color.map(|c| f64::from(c) * intensity / LUMENS_A_WATT);
-            let power = DVec3::from(power).max(DVec3::ZERO);
-            match kind {
-                Kind::Directional => {
-                    let _ = write!(
-                        text,
-                        "[[lights]]\nkind = \"distant\"\nto_light = {}\nirradiance = {}\nangle = {SUN}\n\n",
-                        array(back),
-                        array(power)
-                    );
-                }
-                // A cube's six faces shine into all directions; of a spot only that in front does.
-                Kind::Point | Kind::Spot { .. } => {
-                    let is_spot = matches!(kind, Kind::Spot { .. });
-                    let sides: &[DVec3] = if is_spot {
-                        &[-back]
-                    } else {
-                        &[
-                            DVec3::X,
-                            DVec3::NEG_X,
-                            DVec3::Y,
-                            DVec3::NEG_Y,
-                            DVec3::Z,
-                            DVec3::NEG_Z,
-                        ]
-                    };
-                    // Of a convex body a direction sees a quarter of the surface on average; of a square that one looks
-                    // at, all.
-                    let area = edge * edge * if is_spot { 1.0 } else { 6.0 / 4.0 };
-                    for side in sides {
-                        let u = edge * side.any_orthonormal_vector();
-                        let v = edge * side.cross(u / edge);
-                        let depth = if is_spot { 0.0 } else { 0.5 * edge };
-                        let corner = place + depth * *side - 0.5 * (u + v);
-                        let _ = write!(
-                            text,
-                            "[[lights]]\nkind = \"quad\"\ncorner = {}\nu = {}\nv = {}\nradiance = {}\n\n",
-                            array(corner),
-                            array(u),
-                            array(v),
-                            array(power / area)
-                        );
-                    }
-                }
-            }
+        for light in &self.lights {
+            light.write(model, radius, text);
         }
     }
 }
 
-impl Seeing {
-    /// What it sees at each frame, as keys; none if it stays where it is, or nobody can tell.
-    fn keys(&self, model: &Model, distance: f64) -> Option<String> {
-        if !model.motion.moves(self.node) {
-            return None;
-        }
-        let last = model.motion.last(self.node, &model.buffers()).ok()?;
-        let frames = ((last * RATE).ceil() as usize).min(MOST_FRAMES - 1);
-        let names = ["position", "look_at", "up"];
-        let mut lists = [String::new(), String::new(), String::new()];
-        for frame in 0..=frames {
-            let pose = Pose::new(model, frame as f64 / RATE);
-            let world = pose.world(&model.node(self.node)?).ok()?;
-            for (list, at) in lists.iter_mut().zip(view(&world, distance)) {
-                let _ = write!(list, "[{frame}, {}], ", array(at));
-            }
-        }
-        let named = names.iter().zip(&lists);
-        let lines: String = named
-            .map(|(name, list)| format!("keys.{name} = [{}]\n", list.trim_end_matches(", ")))
-            .collect();
-        Some(lines)
+/// The lines with what is said of a node at each frame; none if it stays where it is, or nobody can tell.
+pub(super) fn keys<F: Fn(&DMat4) -> DVec3>(
+    model: &Model,
+    node: usize,
+    places: &[(&str, F)],
+) -> Option<String> {
+    if !model.motion.moves(node) {
+        return None;
     }
+    let last = model.motion.last(node, &model.buffers()).ok()?;
+    let frames = ((last * RATE).ceil() as usize).min(MOST_FRAMES - 1);
+    let mut lists = vec![String::new(); places.len()];
+    for frame in 0..=frames {
+        let pose = Pose::new(model, frame as f64 / RATE);
+        let world = pose.world(&model.node(node)?).ok()?;
+        for (list, (_, place)) in lists.iter_mut().zip(places) {
+            let _ = write!(list, "[{frame}, {}], ", array(place(&world)));
+        }
+    }
+    let named = places.iter().zip(&lists);
+    let lines = named.map(|((name, _), list)| {
+        let list = list.trim_end_matches(", ");
+        format!("keys.{name} = [{list}]\n")
+    });
+    Some(lines.collect())
 }
 
 /// Where a camera is, where it looks at so far away, and what is up.
@@ -365,7 +311,7 @@ fn view(transform: &DMat4, distance: f64) -> [DVec3; 3] {
     [position, position + distance * forward, up]
 }
 
-fn array(v: DVec3) -> String {
+pub(super) fn array(v: DVec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
 }
 

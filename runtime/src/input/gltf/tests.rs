@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::{Value, json};
 
-use super::{Model, member};
+use super::{Choice, Model, member};
 use crate::error::SceneError;
 use crate::scene::formats::{FORMATS, Geometry};
 use crate::world;
+use crate::world::lights::distant::DistantLight;
+use crate::world::lights::sphere::SphereLight;
 
+mod compressed;
 pub(super) mod speed;
 
 /// Two triangles of a square in the plane of x and y, with texture coordinates, and a mirrored and moved copy.
@@ -116,7 +119,7 @@ fn source_of(material: Value) -> String {
     json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
     json["textures"] = json!([{ "source": 0 }, { "source": 1, "sampler": 0 }]);
     let (_folder, path) = file_of(&packed(&json, &binary));
-    let model = Model::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    let model = Model::read(&path, &Choice::default()).unwrap_or_else(|e| panic!("{e}"));
     model.source(&model.source_names[0]).expect("a source")
 }
 
@@ -291,7 +294,7 @@ fn names_are_there_once() {
     let named = ["a", "a_2", "a", "A", "", "a"].map(|name| json!({ "name": name }));
     json["materials"] = named.to_vec().into();
     let (_folder, path) = file_of(&packed(&json, &binary));
-    let model = Model::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    let model = Model::read(&path, &Choice::default()).unwrap_or_else(|e| panic!("{e}"));
     let names = ["a", "a_2", "a_3", "A", "material_4", "a_4"];
     assert_eq!(model.material_names, names);
     let sources = ["a", "a_2", "a_3", "a_4", "material_4", "a_4_2"];
@@ -389,7 +392,152 @@ fn a_file_is_a_scene() {
     assert_eq!([scene.film.width, scene.film.height], [1024, 512]);
     assert!((scene.camera.fov - 0.5f32.to_degrees()).abs() < 1e-4);
     assert!(scene.environment.is_none());
-    assert_eq!(scene.lights.len(), 7, "a sun, and the six sides of a cube");
+    let [sun, lamp] = &scene.lights[..] else {
+        panic!("{:?}", scene.lights)
+    };
+    let sun: &DistantLight = sun.get().expect("a sun");
+    assert_eq!(
+        [sun.to_light, sun.irradiance],
+        [Vec3::Z, Vec3::new(1.0, 0.5, 0.0)]
+    );
+    let lamp: &SphereLight = lamp.get().expect("a lamp");
+    assert_eq!(lamp.cone, None);
+    // Into every direction goes a candela by 683, as of a disc of the sphere's radius.
+    let intensity = lamp.radiance.x * std::f32::consts::PI * lamp.radius * lamp.radius;
+    assert!((intensity - 1.0).abs() < 1e-5, "{intensity}");
+}
+
+#[test]
+fn spots_have_cones_and_go_where_their_nodes_go() {
+    let (mut json, binary) = square();
+    let turned = std::f32::consts::FRAC_1_SQRT_2;
+    json["nodes"] = json!([
+        { "mesh": 0 },
+        { "translation": [0.0, 0.0, 7.0], "rotation": [turned, 0.0, 0.0, turned],
+          "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+    ]);
+    json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": 683.0, "spot": { "innerConeAngle": 0.2, "outerConeAngle": 0.5 } },
+    ] } });
+    let mut bytes = binary.clone();
+    for number in [0.0f32, 2.0, 0.0, 0.0, 7.0, 4.0, 0.0, 7.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    json["buffers"][0]["byteLength"] = bytes.len().into();
+    let views = json["bufferViews"].as_array_mut().expect("a list");
+    views.push(json!({ "buffer": 0, "byteOffset": 92, "byteLength": 8 }));
+    views.push(json!({ "buffer": 0, "byteOffset": 100, "byteLength": 24 }));
+    let accessors = json["accessors"].as_array_mut().expect("a list");
+    accessors.push(
+        json!({ "bufferView": 3, "componentType": 5126, "count": 2, "type": "SCALAR",
+        "min": [0.0], "max": [2.0] }),
+    );
+    accessors.push(json!({ "bufferView": 4, "componentType": 5126, "count": 2, "type": "VEC3" }));
+    json["animations"] = json!([{
+        "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } }],
+        "samplers": [{ "input": 3, "output": 4 }],
+    }]);
+    let (_folder, path) = scene_of(&json, &bytes);
+    let file = world::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    for (frame, x) in [(0.0, 0.0), (12.0, 1.0), (48.0, 4.0), (60.0, 4.0)] {
+        let asked = crate::scene::Asked {
+            frame,
+            ..Default::default()
+        };
+        let scene = file.scene(&asked).unwrap_or_else(|e| panic!("{e}"));
+        let [spot] = &scene.lights[..] else {
+            panic!("{:?}", scene.lights)
+        };
+        let spot: &SphereLight = spot.get().expect("a spot");
+        let place = (spot.center.as_dvec3() + scene.origin).as_vec3();
+        assert!(
+            place.distance(Vec3::new(x, 0.0, 7.0)) < 1e-4,
+            "{frame}: {place}"
+        );
+        let cone = spot.cone.expect("a cone");
+        // A quarter turn about x has it shine up.
+        assert!(cone.axis.distance(Vec3::Y) < 1e-5, "{cone:?}");
+        let angles = [cone.outer, cone.inner].map(f32::to_radians);
+        assert!(
+            (angles[0] - 0.5).abs() < 1e-5 && (angles[1] - 0.2).abs() < 1e-5,
+            "{cone:?}"
+        );
+    }
+}
+
+#[test]
+fn variants_and_animations_are_folders() {
+    let (mut json, binary) = square();
+    json["materials"] = json!([{ "name": "Red" }, { "name": "Blue" }]);
+    json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    json["extensions"] = json!({ "KHR_materials_variants": { "variants": [{ "name": "day" }, { "name": "night" }] } });
+    json["meshes"][0]["primitives"][0]["extensions"] = json!({ "KHR_materials_variants": {
+        "mappings": [{ "material": 0, "variants": [0] }, { "material": 1, "variants": [1] }],
+    } });
+    let (_folder, path) = scene_of(&json, &binary);
+    for (folder, material) in [
+        ("", "red.impasto"),
+        ("variants/day", "red.impasto"),
+        ("variants/night", "blue.impasto"),
+        ("variants/1", "blue.impasto"),
+    ] {
+        let scene = world::load(&path.join(folder)).unwrap_or_else(|e| panic!("{folder}: {e}"));
+        let shown = &scene.materials[scene.mesh.materials[0] as usize].file;
+        assert_eq!(shown, material, "{folder}");
+    }
+    for (folder, expected) in [
+        ("variants/dusk", "the file has no variant `dusk`"),
+        ("variants/2", "there are `day`, `night`"),
+        ("animations/walk", "it has no animations"),
+        ("variants", "no such file"),
+        ("other/scene.toml", "no such file"),
+    ] {
+        let error = world::load(&path.join(folder))
+            .expect_err(folder)
+            .to_string();
+        assert!(error.contains(expected), "{folder}: {error}");
+    }
+}
+
+/// Nothing but what is in the list of the parser's own, whatever it is.
+#[test]
+fn odd_kinds_of_values_are_no_panic() {
+    let odd = [
+        json!(7),
+        json!("x"),
+        json!([1]),
+        json!({ "a": 1 }),
+        json!(null),
+    ];
+    let places = [
+        "/textures",
+        "/meshes",
+        "/animations",
+        "/extensions",
+        "/bufferViews",
+        "/scenes",
+    ];
+    for value in odd {
+        for place in places {
+            let (mut json, binary) = square();
+            json[&place[1..]] = value.clone();
+            let (_folder, path) = file_of(&packed(&json, &binary));
+            for choice in [
+                Choice::default(),
+                Choice {
+                    animation: Some("0".into()),
+                    variant: None,
+                },
+                Choice {
+                    animation: None,
+                    variant: Some("0".into()),
+                },
+            ] {
+                let _ = Model::read(&path, &choice);
+            }
+        }
+    }
 }
 
 #[test]

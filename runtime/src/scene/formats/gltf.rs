@@ -9,7 +9,7 @@ use glam::{DMat4, Vec2, Vec3};
 
 use super::{FileMaterial, Format, Geometry, Part, Triangle, Warning};
 use crate::error::SceneError;
-use crate::input::gltf::{self, Member, Model, Pose, Shape};
+use crate::input::gltf::{self, Choice, Member, Model, Pose, Shape};
 
 /// The row of glTF files.
 pub(super) const FORMAT: Format = Format {
@@ -26,10 +26,10 @@ fn read(base: &Path, name: &str, seconds: f64) -> Result<Geometry, SceneError> {
     match gltf::inside(&path) {
         Some((file, member)) => {
             let missing = || SceneError::in_file(file, "the glTF file has no such mesh");
-            let member = Member::of_geometry(member).ok_or_else(missing)?;
-            geometry(file, member, seconds)
+            let (choice, member) = Member::of_geometry(member).ok_or_else(missing)?;
+            geometry(file, &choice, member, seconds)
         }
-        None => geometry(&path, Member::All, seconds),
+        None => geometry(&path, &Choice::default(), Member::All, seconds),
     }
 }
 
@@ -37,8 +37,13 @@ fn read(base: &Path, name: &str, seconds: f64) -> Result<Geometry, SceneError> {
 ///
 /// # Errors
 /// What is wrong with the file.
-fn geometry(path: &Path, member: Member, seconds: f64) -> Result<Geometry, SceneError> {
-    let model = Model::read(path)?;
+fn geometry(
+    path: &Path,
+    choice: &Choice,
+    member: Member,
+    seconds: f64,
+) -> Result<Geometry, SceneError> {
+    let model = Model::read(path, choice)?;
     let pose = Pose::new(&model, seconds);
     let wrong = |message: String| SceneError::in_file(path, message);
     let mut reading = Reading {

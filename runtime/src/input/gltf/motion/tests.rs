@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::super::tests::speed::Parts;
 use super::super::tests::{file_of, read_at};
 use crate::error::SceneError;
-use crate::scene::formats::Geometry;
+use crate::scene::formats::{FORMATS, Geometry};
 use crate::scene::{Asked, Scene};
 use crate::world;
 
@@ -84,6 +84,34 @@ fn assert_near(found: DVec3, expected: [f64; 3]) {
 }
 
 const HALF: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
+#[test]
+fn another_animation_is_shown_from_its_folder() {
+    let mut file = File::new();
+    let mut animations = Vec::new();
+    for (name, end) in [("walk", [1., 0., 0.]), ("run", [0., 3., 0.])] {
+        file.json["animations"] = Value::Null;
+        let [x, y, z] = end;
+        let keys = [0., 0., 0., x, y, z];
+        file.moved(0, "translation", "LINEAR", &[0.0, 1.0], [3, 0], &keys);
+        let mut own = file.json["animations"][0].take();
+        own["name"] = name.into();
+        animations.push(own);
+    }
+    file.json["animations"] = animations.into();
+    let (folder, _path) = file_of(&file.parts.file(file.json));
+    let format = FORMATS.iter().find(|f| f.name == "glTF").expect("a row");
+    for (member, expected) in [
+        ("meshes.gltf", [1.0, 0.0, 0.0]),
+        ("animations/walk/meshes.gltf", [1.0, 0.0, 0.0]),
+        ("animations/run/nodes/0.gltf", [0.0, 3.0, 0.0]),
+        ("animations/1/meshes.gltf", [0.0, 3.0, 0.0]),
+    ] {
+        let read = (format.read)(folder.path(), &format!("m.glb/{member}"), 1.0);
+        let read = read.unwrap_or_else(|e| panic!("{member}: {e}"));
+        assert_near(read.triangles[0].positions[0], expected);
+    }
+}
 
 #[test]
 fn nodes_move_as_their_keys_say() {
