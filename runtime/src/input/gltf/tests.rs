@@ -439,7 +439,7 @@ fn spots_have_cones_and_go_where_their_nodes_go() {
         "samplers": [{ "input": 3, "output": 4 }],
     }]);
     let (_folder, path) = scene_of(&json, &bytes);
-    let file = world::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    let file = world::open(&path).unwrap_or_else(|e| panic!("{e}"));
     for (frame, x) in [(0.0, 0.0), (12.0, 1.0), (48.0, 4.0), (60.0, 4.0)] {
         let asked = crate::scene::Asked {
             frame,

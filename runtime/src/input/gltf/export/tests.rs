@@ -9,8 +9,8 @@ use impasto_compiler::{MaterialRequest, MemoryLoader};
 use serde_json::Value as Json;
 
 use super::to_gltf;
-use crate::input::gltf::Model;
 use crate::input::gltf::rows::{Channel, Kind, OTHERS, ROWS};
+use crate::input::gltf::{Choice, Model};
 
 /// The instance that a material is.
 #[track_caller]
@@ -50,7 +50,7 @@ fn read_again(text: &str) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("m.gltf");
     std::fs::write(&path, text).expect("a file");
-    let model = Model::read(&path).unwrap_or_else(|e| panic!("{text}\n{e}"));
+    let model = Model::read(&path, &Choice::default()).unwrap_or_else(|e| panic!("{text}\n{e}"));
     let name = &model.source_names[0];
     let mut source = model.source(name).expect("a source");
     let json: Json = serde_json::from_str(text).expect("JSON");

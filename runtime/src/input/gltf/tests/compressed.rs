@@ -96,7 +96,13 @@ fn triangles(json: &Value, binary: &[u8]) -> Vec<String> {
         .map(|triangle| {
             // Either may begin with another corner.
             let mut corners: Vec<String> = (0..3)
-                .map(|i| format!("{:?} {:?}", triangle.positions[i], triangle.uvs[i]))
+                .map(|i| {
+                    format!(
+                        "{:?} {:?}",
+                        triangle.positions[i],
+                        triangle.uvs.map(|uvs| uvs[i])
+                    )
+                })
                 .collect();
             let first = (0..3).min_by_key(|i| corners[*i].clone()).unwrap_or(0);
             corners.rotate_left(first);
