@@ -94,7 +94,7 @@ fn is_checked(path: &Path) -> bool {
 /// Checks one file, reporting as text at once and collecting what JSON output needs.
 fn check(file: &str, global: &Global, found: &mut Findings) {
     let path = Path::new(file);
-    // A glTF file is the scene in it.
+    // A glTF or USD file is the scene in it.
     if input::scene(path).extension().is_some_and(|e| e == "toml") {
         return check_scene(path, global, found);
     }

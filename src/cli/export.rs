@@ -144,7 +144,7 @@ impl Placed {
     /// What a picture is called in the file: where it is, if that is below the file's folder, or else where its copy is.
     fn place(&mut self, picture: &str) -> String {
         let path = Path::new(picture);
-        // Other programs know a picture by its extension, which those out of glTF files lack.
+        // Other programs know a picture by its extension, which those out of glTF and USD files lack.
         if input::on_disk(path) == path
             && path.extension().is_some()
             && let Some(within) = below(path, &self.folder)
@@ -158,7 +158,7 @@ impl Placed {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let name = match path.extension() {
             Some(_) => name.into_owned(),
-            // A picture in a glTF file is known by its bytes.
+            // A picture in such a file is known by its bytes.
             None => format!("{name}{}", extension_of(path)),
         };
         let mut numbered = (2..).map(|n| format!("{n}_{name}"));

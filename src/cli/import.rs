@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
-use impasto::runtime::input::gltf;
+use impasto::runtime::error::SceneError;
 use impasto::runtime::input::mtlx::{self, Disk};
+use impasto::runtime::input::{gltf, usd};
 use impasto_import::{Imported, Options, Texture};
 use serde_json::json;
 
@@ -13,7 +14,7 @@ use super::{Failure, Global, Outcome, print, say};
 
 #[derive(Args)]
 pub(super) struct ImportArgs {
-    /// glTF files (.gltf, .glb) and MaterialX documents (.mtlx)
+    /// glTF files (.gltf, .glb), USD files (.usd, .usda, .usdc, .usdz) and MaterialX documents (.mtlx)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The folder to write to; of one file by default its name without extension
@@ -41,11 +42,13 @@ pub(super) fn run(args: &ImportArgs, global: &Global) -> Outcome {
     for file in &args.files {
         let folder = folder(args, file)?;
         if gltf::is_named_so(file) {
-            came.take_gltf(file, &folder);
+            came.take_folder(gltf::unpacked(file), &folder);
+        } else if usd::is_named_so(file) {
+            came.take_folder(usd::unpacked(file), &folder);
         } else if mtlx::is_document(file) {
             came.take_document(file, &folder, args);
         } else {
-            let hint = "glTF (.gltf, .glb) and MaterialX (.mtlx) are; scenes take OBJ and PLY files as they are";
+            let hint = "glTF (.gltf, .glb), USD (.usd, .usda, .usdc, .usdz) and MaterialX (.mtlx) are; scenes take OBJ and PLY files as they are";
             let file = file.display();
             return Err(Failure::Error(format!(
                 "`{file}` is in no format that is imported\n  hint: {hint}"
@@ -71,8 +74,12 @@ fn folder(args: &ImportArgs, file: &Path) -> Result<PathBuf, Failure> {
 
 impl Came {
     /// A folder of the scene, its sources and its pictures.
-    fn take_gltf(&mut self, file: &Path, folder: &Path) {
-        match gltf::unpacked(file) {
+    fn take_folder(
+        &mut self,
+        unpacked: Result<Vec<(PathBuf, Vec<u8>)>, SceneError>,
+        folder: &Path,
+    ) {
+        match unpacked {
             Ok(files) => {
                 for (name, bytes) in files {
                     self.made.add(folder.join(name), bytes);

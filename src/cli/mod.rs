@@ -114,7 +114,7 @@ enum Command {
     Check(check::CheckArgs),
     /// Make a material to start from
     New(new::NewArgs),
-    /// Make sources of MaterialX documents, and folders of glTF files with scene, sources and pictures
+    /// Make sources of MaterialX documents, and folders of glTF and USD files with scene, sources and pictures
     Import(import::ImportArgs),
     /// Write a material that is an instance of a surface model as MaterialX or glTF, with its pictures
     Export(export::ExportArgs),

@@ -112,7 +112,7 @@ impl RenderArgs {
                     return error;
                 }
                 error.hint(
-                    "scenes are `.toml` and glTF files (`.gltf`, `.glb`), and materials `.impasto` files",
+                    "scenes are `.toml`, glTF (`.gltf`, `.glb`) and USD files (`.usd`, `.usda`, `.usdc`, `.usdz`), and materials `.impasto` files",
                 )
             });
         }

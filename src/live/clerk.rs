@@ -149,7 +149,7 @@ fn write_back(shared: &Shared) -> Result<PathBuf, String> {
     let file = input::on_disk(&path);
     if file != path {
         return Err(format!(
-            "values are written into scene files, and `{0}` is a glTF file\n  hint: `impasto import {0} --out FOLDER` \
+            "values are written into scene files, and `{0}` is no such file\n  hint: `impasto import {0} --out FOLDER` \
              makes a scene of it",
             file.display()
         ));

@@ -86,6 +86,6 @@ fn scenes_without_light_and_without_area() {
     for (head, material) in [(sky, "dull"), ("", "glowing")] {
         triangle(LINE, head, material)
             .exits(2)
-            .says("no face of its OBJ, PLY or glTF files has an area");
+            .says("no face of its OBJ, PLY, glTF or USD files has an area");
     }
 }

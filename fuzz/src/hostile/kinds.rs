@@ -6,7 +6,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::{films, foreign, pictures, scenes};
+use super::{films, foreign, pictures, scenes, usd};
 use crate::Random;
 use crate::corpus::{Corpus, files, root, sources};
 use crate::geometry::SCENES;
@@ -31,6 +31,7 @@ pub const KINDS: &[Kind] = &[
     kind("geometry", geometry),
     kind("ply", ply),
     kind("gltf", foreign::gltf),
+    kind("usd", usd::usd),
     kind("document", foreign::document),
     kind("material", material),
     kind("placements", placements),

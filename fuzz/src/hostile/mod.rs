@@ -18,6 +18,7 @@ mod kinds;
 mod pictures;
 mod process;
 mod scenes;
+mod usd;
 
 pub use kinds::{KINDS, Kind};
 use process::{Ending, run_limited};

@@ -287,7 +287,9 @@ impl Scene<'_> {
                     .collect()
             }
             ("geometry", "file" | "obj" | "gltf" | "uv1") => {
-                self.files(cursor, &["obj", "ply", "gltf", "glb"], quoted)
+                const GEOMETRY: [&str; 8] =
+                    ["obj", "ply", "gltf", "glb", "usd", "usda", "usdc", "usdz"];
+                self.files(cursor, &GEOMETRY, quoted)
             }
             ("environment", "file") => self.files(cursor, &["exr", "hdr", "png", "jpg"], quoted),
             ("lights", "kind") => ["quad", "distant"]

@@ -1,16 +1,22 @@
 //! Opening files that are read to their end. A FIFO or a socket that nobody writes to, or a device, would never
 //! come to one: they are refused by their kind, before anything waits for them.
 //!
-//! A glTF file is a folder here: what it has within can be opened by paths that lead into it. A MaterialX document is a
-//! source to those who ask for one.
+//! glTF and USD files are folders here: what they have within can be opened by paths that lead into them. A MaterialX
+//! document is a source to those who ask for one.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use crate::error::SceneError;
+
 mod file;
 pub mod gltf;
 pub mod mtlx;
+mod names;
+mod shown;
+mod stamp;
+pub mod usd;
 
 pub use file::{is_transient, reason};
 
@@ -19,11 +25,11 @@ pub use file::{is_transient, reason};
 /// # Errors
 /// If it cannot be opened, or is neither a file nor standard input.
 pub fn open(path: &Path) -> io::Result<File> {
-    let Some((file, member)) = gltf::inside(path) else {
+    let Some(bytes) = member(path) else {
         return file::open(path);
     };
     let mut copy = tempfile::tempfile()?;
-    copy.write_all(&gltf::member(file, member)?)?;
+    copy.write_all(&bytes?)?;
     copy.rewind()?;
     Ok(copy)
 }
@@ -33,10 +39,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// As [`open`], or if it cannot be read.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
-    match gltf::inside(path) {
-        Some((file, member)) => gltf::member(file, member),
-        None => file::read(path),
-    }
+    member(path).unwrap_or_else(|| file::read(path))
 }
 
 /// The text of the file at `path`.
@@ -70,16 +73,54 @@ pub fn at_most(from: impl Read, most: usize) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The file on disk that holds what `path` names: that itself, or the glTF file that it leads into.
+/// The file on disk that holds what `path` names: that itself, or the glTF or USD file that it leads into.
 pub fn on_disk(path: &Path) -> &Path {
-    gltf::inside(path).map_or(path, |(file, _)| file)
+    inside(path, is_folder).map_or(path, |(file, _)| file)
 }
 
-/// Where the scene is that `path` names: a scene file, or the scene in a glTF file.
+/// Where the scene is that `path` names: a scene file, or the scene in a glTF or USD file.
 pub fn scene(path: &Path) -> PathBuf {
-    if gltf::is_folder(path) {
-        path.join(gltf::SCENE)
+    if gltf::is_folder(path) || usd::is_named_so(path) {
+        path.join(SCENE)
     } else {
         path.to_owned()
     }
+}
+
+/// The scene in a file that is a folder.
+const SCENE: &str = "scene.toml";
+
+/// Does the extension say that the file is a folder here?
+pub fn is_folder(path: &Path) -> bool {
+    gltf::is_named_so(path) || usd::is_named_so(path)
+}
+
+/// The file that `path` leads into, which is named so, and the name of the member there; none if it leads into no such
+/// file.
+pub(crate) fn inside(path: &Path, is_named_so: fn(&Path) -> bool) -> Option<(&Path, &Path)> {
+    let mut parents = path.ancestors().skip(1).filter(|file| is_named_so(file));
+    let file = parents.find(|file| file.is_file())?;
+    Some((file, path.strip_prefix(file).ok()?))
+}
+
+/// What `path` names within a file that is a folder; none if it leads into none.
+fn member(path: &Path) -> Option<io::Result<Vec<u8>>> {
+    let (file, name) = inside(path, is_folder)?;
+    Some(if gltf::is_named_so(file) {
+        gltf::member(file, name)
+    } else {
+        usd::member(file, name)
+    })
+}
+
+/// What is wrong with a file, for whoever tells its name.
+fn said(error: SceneError) -> String {
+    let line = error.line.map(|line| format!("line {line}: "));
+    let hint = error.hint.map(|hint| format!("\n  hint: {hint}"));
+    format!(
+        "{}{}{}",
+        line.unwrap_or_default(),
+        error.message,
+        hint.unwrap_or_default()
+    )
 }

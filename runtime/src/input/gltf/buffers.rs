@@ -3,48 +3,23 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
-use std::time::SystemTime;
 
 use base64::Engine;
 use base64::engine::general_purpose::GeneralPurpose;
 use base64::engine::{DecodePaddingMode, GeneralPurposeConfig};
 
 use super::{Model, file};
+use crate::input::stamp::Stamp;
 
 /// Base 64 with padding or without.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &base64::alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
-
-/// What tells a file from the same file after a save.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stamp {
-    pub(super) modified: Option<SystemTime>,
-    pub(super) length: u64,
-}
-
-impl Stamp {
-    pub(super) fn of(metadata: &Metadata) -> Self {
-        Self {
-            modified: metadata.modified().ok(),
-            length: metadata.len(),
-        }
-    }
-
-    /// Fails if the open file has another stamp.
-    fn check(self, file: &File) -> io::Result<()> {
-        if Self::of(&file.metadata()?) == self {
-            return Ok(());
-        }
-        let message = "it was saved while it was read; try again";
-        Err(io::Error::other(message))
-    }
-}
 
 /// The buffers of a file, each opened when somebody first asks for some of it.
 pub(crate) struct Buffers<'m> {

@@ -3,18 +3,13 @@
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, SystemTime};
 
-use super::buffers::Stamp;
 use super::{Choice, Model, file, unreadable};
 use crate::error::SceneError;
+use crate::input::stamp::Stamp;
 
 /// How many files are kept.
 const KEPT: usize = 8;
-
-/// A file that was saved within this time before it was read may be saved again without another time of its save: file
-/// systems count by up to two seconds.
-const SETTLED: Duration = Duration::from_secs(2);
 
 /// The files, the last one asked for at the end.
 static KNOWN: Mutex<Vec<Arc<Model>>> = Mutex::new(Vec::new());
@@ -41,7 +36,7 @@ impl Model {
             known.push(Arc::clone(&model));
             return Ok(model);
         }
-        let is_settled = is_settled(stamp);
+        let is_settled = stamp.is_settled();
         let model = Arc::new(Self::parse(path, file, stamp, choice)?);
         if is_settled {
             known.push(Arc::clone(&model));
@@ -50,21 +45,6 @@ impl Model {
         }
         Ok(model)
     }
-}
-
-/// Was the file saved some time ago, or by a clock that is quite another?
-fn is_settled(stamp: Stamp) -> bool {
-    let Some(modified) = stamp.modified else {
-        return false;
-    };
-    let between = now().duration_since(modified);
-    between.unwrap_or_else(|e| e.duration()) > SETTLED
-}
-
-/// The time of day, by which saves are dated. If it jumps, a file is parsed once more.
-#[allow(clippy::disallowed_methods)]
-pub(super) fn now() -> SystemTime {
-    SystemTime::now()
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use glam::{DMat4, DVec3};
 use gltf::khr_lights_punctual::Kind;
 
 use super::Model;
-use super::scene::{array, keys};
+use super::scene::keys;
+use crate::input::shown::array;
 
 /// Lumens of a watt: of lights, glTF tells what eyes see, and a renderer counts energy. It is what Blender takes.
 const LUMENS_A_WATT: f64 = 683.0;

@@ -1,13 +1,13 @@
 //! Materials of a glTF file as sources: an instance of `std::surface::gltf_pbr`, whose numbers are parameters and whose
 //! pictures are looked up, with only what differs from its defaults.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use serde_json::Value;
 
 use super::Model;
 use super::rows::{Channel, Kind, Of, ROWS, Row};
+use crate::input::names;
 
 /// Where a picture is looked up that is moved, turned and scaled.
 pub(super) const TRANSFORMED: &str = "
@@ -50,55 +50,15 @@ pub(super) fn names(document: &gltf::Document) -> (Vec<String>, Vec<String>) {
 }
 
 /// The names, with numbers after those that were there already.
-fn unique(names: impl Iterator<Item = String>) -> Vec<String> {
-    let mut taken = BTreeSet::new();
-    // Where to look on for a name that is free.
-    let mut next: BTreeMap<String, usize> = BTreeMap::new();
-    let free = |name: String| {
-        if taken.insert(name.clone()) {
-            return name;
-        }
-        let number = next.entry(name.clone()).or_insert(1);
-        loop {
-            *number += 1;
-            let numbered = format!("{name}_{number}");
-            if taken.insert(numbered.clone()) {
-                return numbered;
-            }
-        }
-    };
-    names.map(free).collect()
+fn unique(all: impl Iterator<Item = String>) -> Vec<String> {
+    let mut unique = names::Unique::default();
+    all.map(|name| unique.name(name)).collect()
 }
 
-/// A name as the language has them.
+/// A name as the language has them, and none that sources of materials use.
 fn identifier(name: &str) -> String {
-    let legal = |c: char| {
-        if c.is_ascii_alphanumeric() {
-            c.to_ascii_lowercase()
-        } else {
-            '_'
-        }
-    };
-    let legal: String = name.chars().map(legal).collect();
-    let trimmed = legal.trim_matches('_');
-    if trimmed.is_empty() || trimmed.starts_with(|c: char| c.is_ascii_digit()) || !is_free(trimmed)
-    {
-        format!("material_{trimmed}")
-            .trim_end_matches('_')
-            .to_owned()
-    } else {
-        trimmed.to_owned()
-    }
-}
-
-/// Is it no word of the language or of the library that a material would hide?
-fn is_free(name: &str) -> bool {
-    let (tokens, problems) =
-        impasto_compiler::lexer::lex(impasto_compiler::source::FileId(0), name);
-    let is_name = matches!(&tokens[..], [(token, _), ..] if token.kind_name() == "name");
-    is_name
-        && problems.is_empty()
-        && !["gltf_pbr", "normal_map", "uniform", "transformed"].contains(&name)
+    let used = ["gltf_pbr", "normal_map", "uniform", "transformed"];
+    names::identifier(name, &used)
 }
 
 /// A source under way.

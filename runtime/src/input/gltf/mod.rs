@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use self::buffers::Stamp;
 use self::motion::Motion;
 use self::packed::Packed;
-use super::file;
+use super::stamp::Stamp;
+use super::{SCENE, file};
 use crate::error::SceneError;
 
 mod accessor;
@@ -52,9 +52,6 @@ pub(crate) const EXTENSIONS: [&str; 2] = ["gltf", "glb"];
 
 /// All meshes of a file, where nodes put them.
 const ALL: &str = "meshes.gltf";
-
-/// The scene in a file.
-pub(crate) const SCENE: &str = "scene.toml";
 
 /// A file that was parsed and whose indices are within what it has. Its numbers and pictures stay on disk until somebody
 /// asks for them.
@@ -145,9 +142,7 @@ pub fn is_named_so(path: &Path) -> bool {
 
 /// The glTF file that `path` leads into, and the name of the member there; none if it leads into no such file.
 pub(crate) fn inside(path: &Path) -> Option<(&Path, &Path)> {
-    let mut parents = path.ancestors().skip(1).filter(|file| is_named_so(file));
-    let file = parents.find(|file| file.is_file())?;
-    Some((file, path.strip_prefix(file).ok()?))
+    super::inside(path, is_named_so)
 }
 
 /// Does `path` name a file, or a choice in one, and no member?
@@ -162,7 +157,7 @@ pub(crate) fn is_folder(path: &Path) -> bool {
 /// There is no such member, or the file is damaged.
 pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
     let (choice, name) = Choice::of(name);
-    let model = Model::read(path, &choice).map_err(|e| io::Error::other(said(e)))?;
+    let model = Model::read(path, &choice).map_err(|e| io::Error::other(super::said(e)))?;
     let missing = || io::Error::from(io::ErrorKind::NotFound);
     let name = name.to_str().ok_or_else(missing)?;
     if name == SCENE {
@@ -217,18 +212,6 @@ pub fn unpacked(path: &Path) -> Result<Vec<(PathBuf, Vec<u8>)>, SceneError> {
     let whole = file::read(path).map_err(|e| unreadable(path, &e))?;
     files.push((path.file_name().unwrap_or_default().into(), whole));
     Ok(files)
-}
-
-/// What is wrong with a file, for whoever tells its name.
-fn said(error: SceneError) -> String {
-    let line = error.line.map(|line| format!("line {line}: "));
-    let hint = error.hint.map(|hint| format!("\n  hint: {hint}"));
-    format!(
-        "{}{}{}",
-        line.unwrap_or_default(),
-        error.message,
-        hint.unwrap_or_default()
-    )
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> SceneError {

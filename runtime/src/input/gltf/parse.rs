@@ -8,11 +8,11 @@ use std::path::Path;
 use gltf::json::validation::{Error as Invalid, Validate};
 use serde_json::Value;
 
-use super::buffers::Stamp;
 use super::motion::Motion;
 use super::packed::{DRACO, MESHOPT, Packed};
 use super::{Choice, Model, material, unreadable};
 use crate::error::SceneError;
+use crate::input::stamp::Stamp;
 
 /// Extensions that a file may require: what they ask for is done.
 const KNOWN: &[&str] = &[

@@ -7,23 +7,11 @@ use glam::{DMat4, DVec3};
 
 use super::lights::Light;
 use super::{ALL, Model, Pose};
-
-/// Vertical field of view of a camera that the file does not have, in degrees.
-const FOV: f64 = 35.0;
-
-/// How much wider than everything the picture is.
-const MARGIN: f64 = 1.1;
+use crate::input::shown::{self, COLUMNS, Extent, FOV, array, matrix, quoted, view};
 
 /// Frames of a second, in the keys of cameras and lights that move, and most of them.
 const RATE: f64 = 24.0;
 const MOST_FRAMES: usize = 10_000;
-
-/// More places of a mesh than this are in a file of their own, which is faster to read than a list.
-const LISTED: usize = 10_000;
-
-/// Columns and rows of the picture, the rows for a camera that does not say its shape.
-const COLUMNS: u32 = 1024;
-const ROWS: u32 = 768;
 
 impl Model {
     /// The text of a scene file, in which names of meshes begin with `prefix`.
@@ -44,23 +32,14 @@ impl Model {
             write(format!("[[geometry]]\nfile = {all}\n"));
         }
         for (mesh, places) in &seen.meshes {
-            let places: Vec<String> = places.iter().map(matrix).collect();
-            let file = quoted(&format!("{prefix}meshes/{mesh}.gltf"));
-            write(format!("[[geometry]]\nfile = {file}"));
-            match &places[..] {
-                [one] => write(format!("matrix = [{one}]\n")),
-                all if all.len() > LISTED => {
-                    let file = quoted(&format!("{prefix}placements/{mesh}.txt"));
-                    write(format!("placements = {file}\n"));
-                }
-                all => {
-                    let all: Vec<String> = all
-                        .iter()
-                        .map(|m| format!("  {{ matrix = [{m}] }},\n"))
-                        .collect();
-                    write(format!("placements = [\n{}]\n", all.concat()));
-                }
-            }
+            let listed = format!("{prefix}placements/{mesh}.txt");
+            let file = format!("{prefix}meshes/{mesh}.gltf");
+            write(
+                shown::geometry(&file, places, &listed)
+                    .trim_end()
+                    .to_owned()
+                    + "\n",
+            );
         }
         for node in &seen.nodes {
             let file = quoted(&format!("{prefix}nodes/{node}.gltf"));
@@ -79,7 +58,7 @@ impl Model {
 impl Model {
     /// Where nodes put the mesh of that number, as a file of places.
     pub(super) fn placements(&self, mesh: usize) -> String {
-        let mut text = String::from("m00 m01 m02 m03 m10 m11 m12 m13 m20 m21 m22 m23\n");
+        let mut text = String::from(shown::PLACES);
         // What is wrong with nodes is told where the geometry is read.
         let _ = Pose::new(self, 0.0).visit(&mut |node, transform| {
             let is_it = node.mesh().is_some_and(|own| own.index() == mesh);
@@ -99,7 +78,7 @@ struct Seen {
     meshes: BTreeMap<usize, Vec<DMat4>>,
     /// Nodes whose meshes move or are bent.
     nodes: Vec<usize>,
-    bounds: Option<[DVec3; 2]>,
+    extent: Extent,
     camera: Option<Seeing>,
     lights: Vec<Light>,
 }
@@ -159,14 +138,11 @@ impl Seen {
         let (Some(low), Some(high)) = (corner(positions.min()), corner(positions.max())) else {
             return;
         };
-        for i in 0..8 {
-            let pick = |bit: u32, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
-            let corner = DVec3::new(
-                pick(0, low.x, high.x),
-                pick(1, low.y, high.y),
-                pick(2, low.z, high.z),
-            );
-            self.take_in(transform.transform_point3(corner));
+        let mut within = Extent::default();
+        within.take_in(low);
+        within.take_in(high);
+        for corner in within.corners() {
+            self.extent.take_in(transform.transform_point3(corner));
         }
     }
 
@@ -186,28 +162,13 @@ impl Seen {
                 corners
                     .places
                     .into_iter()
-                    .for_each(|place| self.take_in(place));
+                    .for_each(|place| self.extent.take_in(place));
             }
         }
     }
 
-    fn take_in(&mut self, place: DVec3) {
-        if place.is_finite() {
-            let [a, b] = self.bounds.unwrap_or([place; 2]);
-            self.bounds = Some([a.min(place), b.max(place)]);
-        }
-    }
-
-    /// The centre of everything, and how far it reaches from there.
-    fn extent(&self) -> (DVec3, f64) {
-        let [low, high] = self.bounds.unwrap_or([-DVec3::ONE, DVec3::ONE]);
-        let radius = 0.5 * low.distance(high);
-        let radius = if radius > 0.0 { radius } else { 1.0 };
-        (0.5 * (low + high), radius)
-    }
-
     fn write_camera(&self, model: &Model, text: &mut String) {
-        let (centre, radius) = self.extent();
+        let (centre, _) = self.extent.reach();
         let mut moving = None;
         let (view, fov, shape) = match &self.camera {
             Some(camera) => {
@@ -220,16 +181,10 @@ impl Seen {
                 moving = keys(model, camera.node, &places);
                 (view(&camera.transform, distance), camera.fov, camera.shape)
             }
-            None => {
-                let direction = DVec3::new(0.55, 0.4, 1.0).normalize();
-                let distance = self.distance(direction, radius);
-                let view = [centre + distance * direction, centre, DVec3::Y];
-                (view, FOV, None)
-            }
+            None => (self.extent.view(), FOV, None),
         };
         let [position, look_at, up] = view.map(array);
-        let rows = shape.filter(|s| (0.01..100.0).contains(s));
-        let rows = rows.map_or(ROWS, |s| (f64::from(COLUMNS) / s).round().max(1.0) as u32);
+        let rows = shown::rows(shape);
         if moving.is_some() || self.lights.iter().any(|light| light.moves(model)) {
             let _ = write!(text, "\n[animation]\nframes_per_second = {RATE}\n");
         }
@@ -243,33 +198,12 @@ impl Seen {
         );
     }
 
-    /// How far from the centre, in this direction, one sees everything in a square picture with a margin.
-    fn distance(&self, direction: DVec3, radius: f64) -> f64 {
-        let right = DVec3::Y.cross(direction).normalize();
-        let up = direction.cross(right);
-        let slope = (0.5 * FOV).to_radians().tan();
-        let half = self
-            .bounds
-            .map_or(DVec3::splat(radius), |[low, high]| 0.5 * (high - low));
-        let corners = (0..8).map(|i| {
-            let sign = |bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let corner = half * DVec3::new(sign(0), sign(1), sign(2));
-            let across = corner.dot(right).abs().max(corner.dot(up).abs());
-            corner.dot(direction) + MARGIN * across / slope
-        });
-        corners.fold(radius, f64::max)
-    }
-
     fn write_lights(&self, model: &Model, text: &mut String) {
         if self.lights.is_empty() {
-            // Like a photographer's: a soft light from above and behind the camera, and a bright room.
-            text.push_str(
-                "[environment]\ncolor = 0.4\n\n\
-                 [[lights]]\nkind = \"distant\"\nto_light = [0.4, 0.9, 0.6]\nirradiance = 1.5\nangle = 20\n",
-            );
+            text.push_str(shown::LIGHT);
             return;
         }
-        let (_, radius) = self.extent();
+        let (_, radius) = self.extent.reach();
         for light in &self.lights {
             light.write(model, radius, text);
         }
@@ -301,28 +235,4 @@ pub(super) fn keys<F: Fn(&DMat4) -> DVec3>(
         format!("keys.{name} = [{list}]\n")
     });
     Some(lines.collect())
-}
-
-/// Where a camera is, where it looks at so far away, and what is up.
-fn view(transform: &DMat4, distance: f64) -> [DVec3; 3] {
-    let position = transform.w_axis.truncate();
-    let forward = -transform.z_axis.truncate().normalize_or(DVec3::Z);
-    let up = transform.y_axis.truncate().normalize_or(DVec3::Y);
-    [position, position + distance * forward, up]
-}
-
-pub(super) fn array(v: DVec3) -> String {
-    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
-}
-
-/// The upper three rows of a matrix.
-fn matrix(m: &DMat4) -> String {
-    let rows = [m.row(0), m.row(1), m.row(2)];
-    let numbers = rows.iter().flat_map(|row| row.to_array());
-    let numbers: Vec<String> = numbers.map(|x| format!("{x:?}")).collect();
-    numbers.join(", ")
-}
-
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
 }

@@ -87,7 +87,7 @@ pub(super) fn file_of(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 pub(super) fn save(path: &Path, bytes: &[u8], age: u64) {
     std::fs::write(path, bytes).expect("it is written");
     let file = std::fs::File::options().write(true).open(path);
-    let then = super::known::now() - std::time::Duration::from_secs(age);
+    let then = crate::input::stamp::now() - std::time::Duration::from_secs(age);
     let file = file.expect("it is there");
     file.set_modified(then).expect("it has a time");
 }

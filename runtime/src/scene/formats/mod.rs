@@ -17,9 +17,10 @@ mod ply;
 mod polygon;
 #[cfg(test)]
 mod tests;
+mod usd;
 
 /// The formats of geometry that can be read.
-pub const FORMATS: &[Format] = &[obj::FORMAT, ply::FORMAT, gltf::FORMAT];
+pub const FORMATS: &[Format] = &[obj::FORMAT, ply::FORMAT, gltf::FORMAT, usd::FORMAT];
 
 /// A format of geometry files.
 #[derive(Clone, Copy, Debug)]
@@ -196,7 +197,7 @@ pub(super) fn of_extension<'f>(formats: &'f [Format], extension: &str) -> Option
     formats.iter().find(|f| f.extensions.contains(&extension))
 }
 
-/// The names of formats: `OBJ, PLY or glTF`.
+/// The names of formats: `OBJ, PLY, glTF or USD`.
 pub(super) fn names(formats: &[Format]) -> String {
     let names: Vec<&str> = formats.iter().map(|f| f.name).collect();
     match &names[..] {

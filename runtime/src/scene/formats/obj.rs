@@ -32,7 +32,7 @@ fn read(base: &Path, name: &str, _: f64) -> Result<Geometry, SceneError> {
     let path = &base.join(name);
     if let Some(other) = other_format(name) {
         let error = SceneError::in_file(path, format!("{other} files are not read"));
-        return Err(error.hint("export the geometry as OBJ, PLY or glTF"));
+        return Err(error.hint("export the geometry as OBJ, PLY, glTF or USD"));
     }
     let bytes = input::read(path).map_err(|e| {
         SceneError::in_file(

@@ -130,7 +130,7 @@ fn messages_say_what_the_table_holds() {
     let flat = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
     let empty = said("obj = 'a.txt'", &[("a.txt", flat)], FORMATS);
     assert!(
-        empty.contains("no face of its OBJ, PLY or glTF files"),
+        empty.contains("no face of its OBJ, PLY, glTF or USD files"),
         "{empty}"
     );
     let unnamed = "[[geometry]]\nfile = 'a.obj'\n[materials.m]\nfile = 'm'\nparams.p = '$colour'\n";
