@@ -17,12 +17,13 @@ const LOCAL_LENGTH: usize = 30;
 /// The files of an archive: their names and where their bytes are, in its order.
 pub(super) fn files(bytes: &[u8]) -> Result<Vec<(String, Range<usize>)>, String> {
     let damaged = || "the archive is damaged".to_owned();
-    let last = bytes.len().checked_sub(END_LENGTH).ok_or_else(damaged)?;
+    let none = "it is no zip archive, or is cut off";
+    let last = bytes.len().checked_sub(END_LENGTH).ok_or(none)?;
     let first = last.saturating_sub(LONGEST_COMMENT);
     let end = (first..=last)
         .rev()
         .find(|at| bytes[*at..].starts_with(&END));
-    let end = end.ok_or("it is no zip archive, or is cut off")?;
+    let end = end.ok_or(none)?;
     let count = number(bytes, end + 10, 2).ok_or_else(damaged)?;
     let mut at = number(bytes, end + 16, 4).ok_or_else(damaged)?;
     let mut files = Vec::new();

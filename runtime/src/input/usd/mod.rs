@@ -26,6 +26,7 @@ use crate::error::SceneError;
 mod archive;
 mod arcs;
 mod binary;
+mod instances;
 mod lights;
 mod mesh;
 mod model;
