@@ -33,3 +33,4 @@ mod shot;
 mod streams;
 mod trace;
 mod until;
+mod usd;

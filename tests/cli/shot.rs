@@ -108,7 +108,7 @@ fn files_that_are_no_materials_are_refused() {
     let shader = write(folder.path(), "a.osl", "shader a() { }");
     render(&shader, &out, &[])
         .exits(2)
-        .says("scenes are `.toml` and glTF files");
+        .says("scenes are `.toml`, glTF (`.gltf`, `.glb`) and USD files");
     std::fs::remove_file(&shader).expect("removed");
     for option in [["--on", "ball"], ["--material", "m"], ["--turntable", "3"]] {
         render(SCENE, &out, &option)
