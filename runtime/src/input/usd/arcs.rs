@@ -213,11 +213,8 @@ fn own(
             let layer = (!asset.is_empty()).then(|| anchored(asset));
             arcs.push((at.as_str().to_owned(), layer, target.as_str().to_owned()));
         };
-        match field(data, &path, "references")? {
-            Some(Value::ReferenceListOp(list)) => {
-                items(&list).for_each(|r: &Reference| add(&r.asset_path, &r.prim_path));
-            }
-            _ => {}
+        if let Some(Value::ReferenceListOp(list)) = field(data, &path, "references")? {
+            items(&list).for_each(|r: &Reference| add(&r.asset_path, &r.prim_path));
         }
         match field(data, &path, "payload")? {
             Some(Value::PayloadListOp(list)) => {

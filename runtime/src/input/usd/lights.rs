@@ -93,7 +93,7 @@ impl Walk<'_> {
                     DVec3::Y * input("height", 1.0)?,
                 );
                 let area = area_of(u, v);
-                if !(area > 0.0) {
+                if area <= 0.0 || !area.is_finite() {
                     return Ok(());
                 }
                 if reader.value(path, "inputs:texture:file")?.is_some() {
@@ -162,7 +162,7 @@ impl Walk<'_> {
                     "disk" => PI * r * r,
                     _ => 2.0 * PI * r * l,
                 };
-                if !(area > 0.0 && whole > 0.0 && area.is_finite()) {
+                if area <= 0.0 || whole <= 0.0 || !area.is_finite() || !whole.is_finite() {
                     return Ok(());
                 }
                 let power = if is_normalized {

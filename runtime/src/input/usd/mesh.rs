@@ -72,10 +72,10 @@ impl Walk<'_> {
     }
 
     fn normals(&mut self, path: &Path, mesh: &mut Mesh) -> Checked {
-        let normals = self.primvar(path, "primvars:normals", |value| values::vectors(value))?;
+        let normals = self.primvar(path, "primvars:normals", values::vectors)?;
         mesh.normals = match normals {
             Some(normals) => Some(normals),
-            None => self.primvar(path, "normals", |value| values::vectors(value))?,
+            None => self.primvar(path, "normals", values::vectors)?,
         };
         let scheme = self.reader.token(path, "subdivisionScheme")?;
         let is_smooth = scheme.is_none_or(|scheme| scheme != "none");

@@ -43,12 +43,12 @@ pub(super) struct Above {
     pub(super) moves: bool,
     pub(super) is_visible: bool,
     /// Is it of a purpose that is rendered? None until somebody says.
-    purpose: Option<bool>,
+    pub(super) purpose: Option<bool>,
     /// Its material, and whether that is stronger than those below.
-    material: Option<(Path, bool)>,
+    pub(super) material: Option<(Path, bool)>,
     pub(super) skeleton: Option<Path>,
     pub(super) animation: Option<Path>,
-    depth: usize,
+    pub(super) depth: usize,
 }
 
 /// A model that grows.
@@ -211,16 +211,14 @@ impl<'s> Walk<'s> {
             | "Capsule_1" | "Plane" => {
                 self.surface(path, &kind, &here)?;
             }
-            "Camera" => {
-                if self.model.camera.is_none() && self.takes_camera {
-                    self.camera(path, &here)?;
-                }
+            "Camera" if self.model.camera.is_none() && self.takes_camera => {
+                self.camera(path, &here)?;
             }
             "DistantLight" | "SphereLight" | "RectLight" | "DiskLight" | "CylinderLight"
-            | "DomeLight" | "DomeLight_1" => {
-                if here.is_visible {
-                    self.light(path, &kind, &here)?;
-                }
+            | "DomeLight" | "DomeLight_1"
+                if here.is_visible =>
+            {
+                self.light(path, &kind, &here)?;
             }
             kind if NOT_READ.contains(&kind) => {
                 *self.not_read.entry(kind.to_owned()).or_default() += 1;

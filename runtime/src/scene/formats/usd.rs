@@ -66,7 +66,7 @@ fn geometry(path: &Path, member: Member, seconds: f64) -> Result<Geometry, Scene
                 reading
                     .geometry
                     .warnings
-                    .extend(model.warnings.iter().map(said));
+                    .extend(model.warnings.iter().map(|w| said(w)));
             }
         }
         Member::Prim(number) => {
@@ -98,7 +98,7 @@ fn geometry(path: &Path, member: Member, seconds: f64) -> Result<Geometry, Scene
             reading
                 .geometry
                 .warnings
-                .extend(model.warnings.iter().map(said));
+                .extend(model.warnings.iter().map(|w| said(w)));
         }
     }
     let Reading {
@@ -120,10 +120,10 @@ fn geometry(path: &Path, member: Member, seconds: f64) -> Result<Geometry, Scene
     Ok(geometry)
 }
 
-fn said(message: &String) -> Warning {
+fn said(message: &str) -> Warning {
     Warning {
         line: None,
-        message: message.clone(),
+        message: message.to_owned(),
     }
 }
 
