@@ -16,8 +16,8 @@ use super::walk::{Above, Walk};
 /// Frames of keys, at most.
 const MOST_FRAMES: u32 = 10_000;
 
-/// The radius of lamps that are points, in units of the stage times a metre.
-const POINT: f64 = 0.01;
+/// The radius of lamps that are points, in metres.
+const POINT: f64 = 0.005;
 
 /// Blender writes the radius of its sun for the diameter, and a quarter of its irradiance, as its own renderer and Karma
 /// take it back; seen in what Blender 5.0.1 writes.
@@ -49,16 +49,19 @@ impl Walk<'_> {
         if !(radiance.is_finite() && radiance.max_element() > 0.0) {
             return Ok(());
         }
-        for name in [
-            "inputs:shaping:cone:angle",
-            "inputs:shaping:ies:file",
-            "inputs:shaping:focus",
-        ] {
-            let is_wide = name.ends_with("angle") && reader.number(path, name, 180.0)? >= 90.0;
-            let is_even = name.ends_with("focus") && reader.number(path, name, 0.0)? == 0.0;
-            if reader.value(path, name)?.is_some() && !is_wide && !is_even {
+        let is_ball = kind == "SphereLight" && is_even(&DMat3::from_mat4(here.world));
+        for name in ["cone:angle", "ies:file", "focus"] {
+            let name = format!("inputs:shaping:{name}");
+            let changes = match reader.value(path, &name)? {
+                None => false,
+                Some(value) if name.ends_with("angle") => {
+                    !is_ball && values::number(&value).is_some_and(|angle| angle < 90.0)
+                }
+                Some(value) => values::number(&value) != Some(0.0),
+            };
+            if changes {
                 self.warn(format!(
-                    "lights shine as if they were not shaped: `{path}.{name}` is left out"
+                    "`{path}.{name}` is left out: the light shines evenly"
                 ));
             }
         }
@@ -124,9 +127,32 @@ impl Walk<'_> {
                 let mut radius = input("radius", 0.5)?;
                 let length = input("length", 1.0)?;
                 let is_point = reader.flag(path, "treatAsPoint", false)? || radius == 0.0;
-                let least = POINT * 0.01 / unit.max(1e-6);
+                let least = POINT / unit;
                 let said = radius;
                 radius = if is_point { least } else { radius };
+                if is_ball {
+                    let world_radius = radius * axes.x_axis.length();
+                    let area = 4.0 * PI * (world_radius / unit).powi(2);
+                    let said = 4.0 * PI * (said * axes.x_axis.length() / unit).powi(2);
+                    // A point has the power of the sphere that it stands for.
+                    let radiance = if is_normalized {
+                        radiance / area
+                    } else if is_point && said > 0.0 {
+                        radiance * said / area
+                    } else {
+                        radiance
+                    };
+                    if world_radius.is_finite() && world_radius > 0.0 && radiance.is_finite() {
+                        let cone = self.cone(path, &axes)?;
+                        self.model.lights.push(Light::Ball {
+                            center: world.w_axis.truncate(),
+                            radius: world_radius,
+                            radiance,
+                            cone,
+                        });
+                    }
+                    return Ok(());
+                }
                 let shape = match kind {
                     "SphereLight" => "sphere",
                     "DiskLight" => "disk",
@@ -180,6 +206,24 @@ impl Walk<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The cone of a spot; none if it shines all around.
+    fn cone(&self, path: &Path, axes: &DMat3) -> Checked<Option<(DVec3, [f64; 2])>> {
+        let number = |name: &str, default| self.reader.number(path, name, default);
+        let outer = number("inputs:shaping:cone:angle", 180.0)?;
+        if !(0.0..90.0).contains(&outer)
+            || self
+                .reader
+                .value(path, "inputs:shaping:cone:angle")?
+                .is_none()
+        {
+            return Ok(None);
+        }
+        let soft = number("inputs:shaping:cone:softness", 0.0)?.clamp(0.0, 1.0);
+        let outer = outer.max(0.01);
+        let axis = (axes * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y);
+        Ok(Some((axis, [outer * (1.0 - soft), outer])))
     }
 
     fn dome(&mut self, path: &Path, kind: &str, here: &Above, radiance: DVec3) -> Checked {
@@ -290,6 +334,19 @@ impl Walk<'_> {
         };
         Ok((lens, width / height))
     }
+}
+
+/// Is it a matrix that leaves spheres what they are?
+fn is_even(axes: &DMat3) -> bool {
+    let length = axes.x_axis.length();
+    let other = |axis: DVec3| (axis.length() - length).abs() <= 1e-3 * length;
+    let is_square = |a: DVec3, b: DVec3| a.dot(b).abs() <= 1e-3 * length * length;
+    length > 0.0
+        && other(axes.y_axis)
+        && other(axes.z_axis)
+        && is_square(axes.x_axis, axes.y_axis)
+        && is_square(axes.x_axis, axes.z_axis)
+        && is_square(axes.y_axis, axes.z_axis)
 }
 
 /// The color of a glowing body at a temperature in kelvin, of luminance 1: Planck's spectrum by the formula of Krystek

@@ -146,6 +146,13 @@ pub(super) enum Light {
         v: DVec3,
         radiance: DVec3,
     },
+    Ball {
+        center: DVec3,
+        radius: f64,
+        radiance: DVec3,
+        /// Of a spot: its direction, and the angles in degrees up to which it has all its light, and none from.
+        cone: Option<(DVec3, [f64; 2])>,
+    },
     /// A mesh that shines, its name, and the places of its corners.
     Mesh {
         name: String,

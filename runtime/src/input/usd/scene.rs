@@ -232,6 +232,26 @@ impl Model {
                     array(*v),
                     array(*radiance),
                 ),
+                Light::Ball {
+                    center,
+                    radius,
+                    radiance,
+                    cone,
+                } => {
+                    let spot = cone.map(|(axis, [inner, outer])| {
+                        format!(
+                            "axis = {}\ninner = {inner:?}\ncone = {outer:?}\n",
+                            array(axis)
+                        )
+                    });
+                    write!(
+                        text,
+                        "[[lights]]\nkind = \"sphere\"\ncenter = {}\nradius = {radius:?}\nradiance = {}\n{}\n",
+                        array(*center),
+                        array(*radiance),
+                        spot.unwrap_or_default(),
+                    )
+                }
                 Light::Mesh { name, radiance, .. } => {
                     let name = quoted(name);
                     let file = quoted(&format!("{prefix}lights/{number}.usd"));

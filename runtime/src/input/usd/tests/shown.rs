@@ -221,9 +221,8 @@ fn a_lamp_that_is_a_mesh_has_the_power_of_the_whole_shape() {
     };
     let pi = std::f64::consts::PI;
     let cases = [
-        ("SphereLight \"l\" {\nfloat inputs:radius = 2\n}", 16.0 * pi),
         (
-            "SphereLight \"l\" {\nfloat inputs:radius = 2\nbool inputs:normalize = 1\n}",
+            "DiskLight \"l\" {\nfloat inputs:radius = 3\nbool inputs:normalize = 1\n}",
             1.0,
         ),
         ("DiskLight \"l\" {\nfloat inputs:radius = 3\n}", 9.0 * pi),
@@ -239,4 +238,38 @@ fn a_lamp_that_is_a_mesh_has_the_power_of_the_whole_shape() {
             "{text}: {found} {expected}"
         );
     }
+}
+
+#[test]
+fn a_sphere_light_is_a_sphere_or_a_spot() {
+    let light = |text: &str| {
+        let room = Room::of(&format!(
+            "def Mesh \"m\" {{ {SQUARE} }}\ndef SphereLight \"l\" {{\nfloat inputs:radius = 2\n{text}\n}}"
+        ));
+        room.member("scene.toml")
+    };
+    let whole = light("float inputs:intensity = 3");
+    assert!(
+        whole.contains("kind = \"sphere\"\ncenter = [0.0, 0.0, 0.0]\nradius = 2.0"),
+        "{whole}"
+    );
+    assert!(!whole.contains("cone"), "{whole}");
+    assert_eq!(numbers(&whole, "radiance"), [3.0; 3]);
+    let area = 16.0 * std::f64::consts::PI;
+    let normalized = light("bool inputs:normalize = 1");
+    assert!((numbers(&normalized, "radiance")[0] * area - 1.0).abs() < 1e-6);
+    let spot =
+        light("float inputs:shaping:cone:angle = 40\nfloat inputs:shaping:cone:softness = 0.25");
+    assert!(
+        spot.contains("axis = [0.0, 0.0, -1.0]\ninner = 30.0\ncone = 40.0"),
+        "{spot}"
+    );
+    // One that is no sphere in the world is a mesh.
+    let flat = light(
+        "float3 xformOp:scale = (1, 1, 0.5)\nuniform token[] xformOpOrder = [\"xformOp:scale\"]",
+    );
+    assert!(
+        flat.contains("lights/0.usd") && !flat.contains("kind = \"sphere\""),
+        "{flat}"
+    );
 }
