@@ -7,12 +7,13 @@ use std::fmt;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use impasto_compiler::source::MAX_SOURCE_BYTES;
+use impasto_compiler::source::{MAX_SOURCE_BYTES, Origin};
 use impasto_compiler::{Loader, library_text};
 use impasto_runtime::film::output;
 pub use impasto_runtime::film::output::Unwritten;
-use impasto_runtime::input;
+use impasto_runtime::input::{self, Source};
 pub use impasto_runtime::input::reason;
 
 use crate::set;
@@ -29,7 +30,7 @@ const MAX_BESIDE: usize = 4096;
 #[derive(Debug, Default)]
 pub struct FileLoader {
     base: PathBuf,
-    loaded: BTreeMap<String, Result<Vec<u8>, String>>,
+    loaded: BTreeMap<String, Result<Source, String>>,
 }
 
 impl FileLoader {
@@ -47,9 +48,9 @@ impl FileLoader {
         paths.map(|path| input::on_disk(&path).to_owned())
     }
 
-    fn read(&self, path: &str) -> io::Result<Vec<u8>> {
+    fn read(&self, path: &str) -> io::Result<Source> {
         if path == STDIN {
-            input::at_most(io::stdin().lock(), MAX_SOURCE_BYTES)
+            Ok(input::at_most(io::stdin().lock(), MAX_SOURCE_BYTES)?.into())
         } else {
             input::source(&self.base.join(path), MAX_SOURCE_BYTES)
         }
@@ -68,7 +69,15 @@ impl Loader for FileLoader {
             let bytes = self.read(path).map_err(|error| reason(&error));
             self.loaded.insert(path.to_owned(), bytes);
         }
-        self.loaded[path].clone()
+        self.loaded[path]
+            .as_ref()
+            .map(|source| source.bytes.clone())
+            .map_err(String::clone)
+    }
+
+    fn origin(&mut self, path: &str) -> Option<Arc<Origin>> {
+        let source = self.loaded.get(path)?.as_ref().ok()?;
+        source.origin.clone()
     }
 
     fn beside(&mut self, path: &str) -> Vec<String> {

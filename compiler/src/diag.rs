@@ -11,6 +11,8 @@ pub mod examples;
 pub mod foreign;
 pub mod render;
 
+mod origin;
+
 macro_rules! codes {
     ($($name:ident = $code:literal, $severity:ident, $title:literal, $explanation:literal;)*) => {
         /// A diagnostic's stable identity, such as `E0201`.
@@ -213,6 +215,8 @@ pub struct Diagnostic {
     pub labels: Vec<Label>,
     /// Changes that may repair it, the likeliest first.
     pub fixes: Vec<Fix>,
+    /// What else to know of the place: where it comes from.
+    pub notes: Vec<String>,
 }
 
 impl Diagnostic {
@@ -235,6 +239,7 @@ impl Diagnostic {
             hint: None,
             labels: Vec::new(),
             fixes: Vec::new(),
+            notes: Vec::new(),
         }
     }
 

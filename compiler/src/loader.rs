@@ -2,8 +2,10 @@
 //! of the program.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::diag;
+use crate::source::Origin;
 
 /// Reads files for the compiler.
 pub trait Loader {
@@ -12,6 +14,12 @@ pub trait Loader {
     /// # Errors
     /// Why the file cannot be read, in words for people.
     fn load(&mut self, path: &str) -> Result<Vec<u8>, String>;
+
+    /// What the text that [`Loader::load`] gave of `path` was made from; nothing for what was written as it is.
+    fn origin(&mut self, path: &str) -> Option<Arc<Origin>> {
+        let _ = path;
+        None
+    }
 
     /// Paths of the sources in the folder of `path`, in the order of their names: for hints at what
     /// a missing file may be. None where that is not known.

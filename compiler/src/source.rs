@@ -4,6 +4,11 @@
 //! a WGSL comment or a cost can name the line it comes from.
 
 use std::ops::Range;
+use std::sync::Arc;
+
+mod origin;
+
+pub use origin::{IMPORTED, Origin, Part, Place};
 
 /// Longest source text that is read, in bytes; a longer one is an error, not a wait.
 pub const MAX_SOURCE_BYTES: usize = 1 << 20;
@@ -85,6 +90,17 @@ pub struct SourceFile {
     /// The text.
     pub text: String,
     line_starts: Vec<u32>,
+    /// What it was made from, and the id of the first document of that.
+    made_from: Option<(Arc<Origin>, FileId)>,
+}
+
+/// Where in a document a place of a source comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Written<'s> {
+    /// The element.
+    pub span: Span,
+    /// What it is, in words.
+    pub what: &'s str,
 }
 
 impl SourceFile {
@@ -122,8 +138,61 @@ impl SourceMap {
             name: name.into(),
             text,
             line_starts,
+            made_from: None,
         });
         FileId(self.files.len() as u32 - 1)
+    }
+
+    /// Adds a text that was made from documents, and these behind it.
+    pub fn add_made(
+        &mut self,
+        name: impl Into<String>,
+        text: impl Into<String>,
+        origin: Arc<Origin>,
+    ) -> FileId {
+        let name = name.into();
+        let id = self.add(name.as_str(), text);
+        // The path of the source may be relative; those of documents are told as it is.
+        let own = origin.documents().first().map_or("", |(path, _)| path);
+        let base = own.strip_suffix(name.as_str()).unwrap_or_default();
+        for (path, text) in origin.documents() {
+            let path = path.strip_prefix(base).unwrap_or(path);
+            self.add(path, &**text);
+        }
+        self.files[id.0 as usize].made_from = Some((origin, FileId(id.0 + 1)));
+        id
+    }
+
+    /// The document that a source was made from; the source itself if it was written as it is.
+    pub fn document(&self, id: FileId) -> FileId {
+        let made_from = &self.file(id).made_from;
+        made_from.as_ref().map_or(id, |(_, first)| *first)
+    }
+
+    /// Where in a document a place comes from, and the user of that if it is a definition; nothing for what was written
+    /// as it is.
+    pub fn written(&self, span: Span) -> Option<(Written<'_>, Option<Written<'_>>)> {
+        let (origin, first) = self.file(span.file).made_from.as_ref()?;
+        let part = origin.part(span.range())?;
+        fn told(first: FileId, place: &Place) -> Written<'_> {
+            let file = FileId(first.0 + place.document as u32);
+            Written {
+                span: Span::new(file, place.range.clone()),
+                what: &place.what,
+            }
+        }
+        let user = part.user.as_ref();
+        Some((told(*first, &part.place), user.map(|place| told(*first, place))))
+    }
+
+    /// The place in a document, `marble.mtlx:12`, that a comment names as the origin of what is at `span`.
+    pub fn noted(&self, span: Span) -> Option<&str> {
+        origin::noted(&self.file(span.file).text, span.start as usize)
+    }
+
+    /// The place that people know: in a document, if the source was made from one.
+    pub fn known(&self, span: Span) -> Span {
+        self.written(span).map_or(span, |(place, _)| place.span)
     }
 
     /// The file of `id`.
@@ -152,8 +221,9 @@ impl SourceMap {
         (line, column)
     }
 
-    /// `name:line` of a span, as written in WGSL comments.
+    /// `name:line` of a span, as written in WGSL comments; of a document, where the source was made from one.
     pub fn file_line(&self, span: Span) -> String {
+        let span = self.known(span);
         let file = self.file(span.file);
         format!("{}:{}", file.name, file.line_index(span.start as usize) + 1)
     }

@@ -132,9 +132,9 @@ fn json_has_the_documented_keys() {
 #[test]
 fn the_summary_counts_each_once() {
     let (_, file) = sources();
-    assert_eq!(render::summary(&some(file)), "3 errors, 1 warning");
-    assert_eq!(render::summary(&some(file)[..1]), "1 error");
-    assert_eq!(render::summary(&[]), "");
+    assert_eq!(render::summary(&sources, &some(file)), "3 errors, 1 warning");
+    assert_eq!(render::summary(&sources, &some(file)[..1]), "1 error");
+    assert_eq!(render::summary(&sources, &[]), "");
 }
 
 /// A generated source may be one line of a megabyte: its diagnostics are still readable.

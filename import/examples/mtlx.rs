@@ -38,6 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         allow_outside: true,
         // Compiled below, and not counted.
         unchecked: true,
+        ..Options::default()
     };
     let mut time = Duration::ZERO;
     let (mut whole, mut wrong, mut refused) = (0, 0, 0);

@@ -2,15 +2,23 @@
 
 use std::path::PathBuf;
 
+use impasto_compiler::source::Origin;
+
 use crate::error::Warning;
 
 /// What may be read.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// May a document name files outside its own folder?
     pub allow_outside: bool,
+    /// How many metres a unit of lengths is where the document does not say it. Otherwise materials with such lengths have
+    /// a parameter for it.
+    pub metres_per_unit: Option<f64>,
     /// Is it left to the caller to compile the sources? That takes most of the time, and the caller may have more cores.
     pub unchecked: bool,
+    /// Is the source read where the document is, and written nowhere? Then it names pictures where they are, and no
+    /// comments say where its statements come from, since the [`Origin`] does.
+    pub in_place: bool,
 }
 
 /// What a document became.
@@ -20,6 +28,8 @@ pub struct Imported {
     pub files: Vec<(PathBuf, String)>,
     /// The pictures that the sources name.
     pub textures: Vec<Texture>,
+    /// Where the parts of the source come from, where it is read in place.
+    pub origin: Origin,
     /// What was left out or differs.
     pub warnings: Vec<Warning>,
     /// Materials, in the order of the document: the name, and the file of `files` that defines it.
@@ -29,20 +39,9 @@ pub struct Imported {
 }
 
 impl Imported {
-    /// The source for whoever reads it where the document at `path` is: it names pictures where they are. What was left
-    /// out is said in comments.
-    pub fn in_place(&self, path: &str) -> String {
-        let folder = path.rfind(['/', '\\']).map_or("", |end| &path[..=end]);
+    /// The source for whoever reads it where the document is. What was left out is said in comments.
+    pub fn in_place(&self) -> String {
         let mut text: String = self.files.iter().map(|(_, text)| text.as_str()).collect();
-        // By marks that no path has: one picture may lie where the copy of another would be.
-        let mark = |index: usize| format!("\"\0{index}\"");
-        for (index, texture) in self.textures.iter().enumerate() {
-            text = text.replace(&format!("\"{}\"", texture.written), &mark(index));
-        }
-        for (index, texture) in self.textures.iter().enumerate() {
-            let found = texture.found.strip_prefix(folder).unwrap_or(&texture.found);
-            text = text.replace(&mark(index), &format!("{found:?}"));
-        }
         for warning in &self.warnings {
             text.push_str(&format!("// {}\n", warning.to_string().replace('\n', " ")));
         }

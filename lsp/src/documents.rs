@@ -1,14 +1,16 @@
 //! The files that a client has open, and what is known of them.
 
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use gen_lsp_types as lsp;
 use impasto_compiler::Loader;
 use impasto_compiler::analysis::{self, Analysis};
-use impasto_compiler::source::MAX_SOURCE_BYTES;
-use impasto_runtime::input;
+use impasto_compiler::source::{MAX_SOURCE_BYTES, Origin};
+use impasto_runtime::input::mtlx::{self, Disk, Files, ImportError};
+use impasto_runtime::input::{self, Source};
 
 use crate::library;
 use crate::margin::Margin;
@@ -43,6 +45,8 @@ pub enum Language {
     Material,
     /// A scene file.
     Scene,
+    /// MaterialX: a document that others read as a source.
+    MaterialX,
     /// TOML that is no scene.
     Other,
 }
@@ -111,7 +115,7 @@ impl Documents {
             }
         }
         document.version = version;
-        if document.language != Language::Material {
+        if matches!(document.language, Language::Scene | Language::Other) {
             document.language = language_of(&path, document.text.as_str());
         }
         self.outdate(&path);
@@ -195,6 +199,20 @@ impl Documents {
         Some(analysis)
     }
 
+    /// What an open document of MaterialX means as a source, or what keeps it from being one.
+    pub fn imported(&mut self, path: &str) -> Result<Analysis, Vec<ImportError>> {
+        let mut loader = Overlay::new(self.texts());
+        let imported = loader.imported(path);
+        let analysis = imported.map(|source| {
+            loader.given = Some((path.to_owned(), source));
+            analysis::analyse(path, &mut loader)
+        });
+        if let Some(document) = self.open.get_mut(path) {
+            document.asked = loader.asked;
+        }
+        analysis
+    }
+
     /// What an open source means now, and what it meant when it last had no syntax errors.
     pub fn both(&mut self, path: &str) -> Option<(Arc<Analysis>, Option<Arc<Analysis>>)> {
         let now = self.analysis(path)?;
@@ -238,6 +256,10 @@ pub struct Overlay {
     base: PathBuf,
     /// The paths that were asked for.
     pub asked: Vec<String>,
+    /// A source that is at hand, and its path.
+    given: Option<(String, Source)>,
+    /// What texts were made from, by path.
+    origins: HashMap<String, Arc<Origin>>,
 }
 
 impl Overlay {
@@ -252,7 +274,47 @@ impl Overlay {
             texts,
             base,
             asked: Vec::new(),
+            given: None,
+            origins: HashMap::new(),
         }
+    }
+
+    /// The source at a normal path.
+    fn source(&mut self, path: &str) -> io::Result<Source> {
+        if let Some((_, source)) = self.given.take_if(|(given, _)| given == path) {
+            return Ok(source);
+        }
+        if mtlx::is_document(Path::new(path)) {
+            return mtlx::source(Path::new(path), &mut Edited(self));
+        }
+        if let Some(text) = self.texts.get(path) {
+            return Ok(text.as_bytes().to_vec().into());
+        }
+        input::source(Path::new(path), MAX_SOURCE_BYTES)
+    }
+
+    /// The source that a document at a normal path becomes.
+    fn imported(&mut self, path: &str) -> Result<Source, Vec<ImportError>> {
+        mtlx::imported(Path::new(path), &mut Edited(self))
+    }
+}
+
+/// Files that documents include, as they are in the editor, and else from the disk.
+struct Edited<'o>(&'o mut Overlay);
+
+impl Files for Edited<'_> {
+    fn read(&mut self, path: &str, most: usize) -> Result<Vec<u8>, String> {
+        let path = normal(Path::new(path));
+        let read = match self.0.texts.get(&path) {
+            Some(text) => Ok(text.as_bytes().to_vec()),
+            None => Disk.read(&path, most),
+        };
+        self.0.asked.push(path);
+        read
+    }
+
+    fn exists(&mut self, path: &str) -> bool {
+        Disk.exists(path)
     }
 }
 
@@ -263,10 +325,17 @@ impl Loader for Overlay {
         }
         let path = normal(&self.base.join(path));
         self.asked.push(path.clone());
-        if let Some(text) = self.texts.get(&path) {
-            return Ok(text.as_bytes().to_vec());
+        let source = self.source(&path);
+        let source = source.map_err(|error| input::reason(&error))?;
+        if let Some(origin) = source.origin {
+            self.origins.insert(path, origin);
         }
-        input::source(Path::new(&path), MAX_SOURCE_BYTES).map_err(|error| input::reason(&error))
+        Ok(source.bytes)
+    }
+
+    fn origin(&mut self, path: &str) -> Option<Arc<Origin>> {
+        let path = normal(&self.base.join(path));
+        self.origins.get(&path).cloned()
     }
 
     fn beside(&mut self, path: &str) -> Vec<String> {
@@ -298,7 +367,10 @@ pub fn names(folder: &Path, extension: &str) -> Vec<String> {
 
 /// The text of a file on the disk, if it is one and is text.
 pub fn text_at(path: &str) -> Option<String> {
-    String::from_utf8(input::source(Path::new(path), MAX_SOURCE_BYTES).ok()?).ok()
+    /// Documents of MaterialX may be longer than sources.
+    const MOST: usize = 16 << 20;
+    let file = input::open(Path::new(path)).ok()?;
+    String::from_utf8(input::at_most(file, MOST).ok()?).ok()
 }
 
 /// What the compiler calls the file of a URI.
@@ -331,6 +403,9 @@ pub fn normal(path: &Path) -> String {
 }
 
 fn language_of(path: &str, text: &str) -> Language {
+    if mtlx::is_document(Path::new(path)) {
+        return Language::MaterialX;
+    }
     if !path.ends_with(".toml") {
         return Language::Material;
     }

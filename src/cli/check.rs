@@ -141,7 +141,7 @@ impl Findings {
     }
 
     fn report(&mut self, sources: &SourceMap, diagnostics: &[Diagnostic], global: &Global) {
-        let shown = diag::render::ordered(diagnostics);
+        let shown = diag::render::ordered(sources, diagnostics);
         let errors = shown.iter().filter(|d| d.is_error()).count();
         self.errors += errors;
         self.warnings += shown.len() - errors;

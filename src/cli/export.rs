@@ -20,7 +20,8 @@ const TEXTURES: &str = "textures";
 
 #[derive(Args)]
 pub(super) struct ExportArgs {
-    /// A material file whose material is one call of a surface model, as in `material = open_pbr(..);`
+    /// A material file whose material is one call of a surface model, as in `material = open_pbr(..);`, or a model of the
+    /// library, as `std::surface::open_pbr`
     #[arg(value_hint = ValueHint::FilePath)]
     file: String,
     /// What to write

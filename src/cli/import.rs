@@ -23,6 +23,19 @@ pub(super) struct ImportArgs {
     /// Let documents name files outside of their own folders
     #[arg(long)]
     allow_outside: bool,
+    /// How many metres a unit of lengths is where a document says no unit; else materials have a parameter for it
+    #[arg(long, value_name = "METRES", value_parser = metres)]
+    metres_per_unit: Option<f64>,
+}
+
+/// A length that a unit may have.
+fn metres(text: &str) -> Result<f64, String> {
+    let metres: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    if (1e-6..=1e3).contains(&metres) {
+        Ok(metres)
+    } else {
+        Err("a unit is 0.000001 to 1000 metres long".into())
+    }
 }
 
 /// What files came to.
@@ -97,6 +110,7 @@ impl Came {
     fn take_document(&mut self, file: &Path, folder: &Path, args: &ImportArgs) {
         let options = Options {
             allow_outside: args.allow_outside,
+            metres_per_unit: args.metres_per_unit,
             ..Options::default()
         };
         match impasto_import::import(&file.to_string_lossy(), &mut Disk, &options) {

@@ -18,8 +18,8 @@ pub(super) fn of_sources(sources: &SourceMap, diagnostics: &[Diagnostic]) -> Vec
         }),
         text: diag::render::text(sources, std::slice::from_ref(d), false),
     };
-    let ordered = diag::render::ordered(diagnostics).into_iter();
-    ordered.map(problem).collect()
+    let ordered = diag::render::ordered(sources, diagnostics);
+    ordered.iter().map(problem).collect()
 }
 
 /// What is wrong with a scene.

@@ -58,8 +58,7 @@ pub fn analyse(path: &str, loader: &mut dyn Loader) -> Analysis {
 impl Analysis {
     fn new(mut checker: Checker<'_>, module: Option<ModuleId>) -> Self {
         let notes = checker.notes.take();
-        let sorted = diag::render::ordered(&checker.diagnostics);
-        let diagnostics = sorted.into_iter().cloned().collect();
+        let diagnostics = diag::render::ordered(&checker.sources, &checker.diagnostics);
         let mut analysis = Self {
             diagnostics,
             modules: checker.all_modules(),

@@ -155,7 +155,9 @@ impl<'m> Lines<'m> {
     }
 
     fn line(&self, span: Span) -> Line {
-        let file = self.measured.program.sources().file(span.file);
+        let sources = self.measured.program.sources();
+        let span = sources.known(span);
+        let file = sources.file(span.file);
         (span.file, file.line_index(span.start as usize))
     }
 }

@@ -12,11 +12,12 @@
 //! | `end_line`, `end_column` | one past the last character |
 //! | `start`, `end` | the same as byte offsets in the file |
 //! | `expected`, `hint` | text or null |
+//! | `notes` | what else to know of the place: texts |
 //! | `labels` | further places: objects with `message`, `file` and the six position keys |
 //! | `fixes` | changes that may repair it: objects with `title`, `text` (what takes the place), `imports` (paths to import) and the place as in `labels` |
 //!
 //! Both forms are sorted by file and place and leave out repetitions, so that they depend on
-//! the source only.
+//! the source only. Of a source that was made from a document, places are those of the document.
 
 use codespan_reporting::diagnostic as codespan;
 use codespan_reporting::files::{Error, Files};
@@ -34,7 +35,7 @@ const MAX_SHOWN_LINE: usize = 400;
 pub fn text(sources: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> String {
     let files = View(sources);
     let mut out = String::new();
-    for diagnostic in ordered(diagnostics) {
+    for diagnostic in &ordered(sources, diagnostics) {
         let display_style = style(sources, diagnostic);
         let short = matches!(display_style, DisplayStyle::Medium);
         let config = Config {
@@ -52,10 +53,10 @@ pub fn text(sources: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> Str
 }
 
 /// `2 errors, 1 warning`; empty if there is nothing to count.
-pub fn summary(diagnostics: &[Diagnostic]) -> String {
+pub fn summary(sources: &SourceMap, diagnostics: &[Diagnostic]) -> String {
+    let shown = ordered(sources, diagnostics);
     let count = |severity| {
-        let same = ordered(diagnostics).into_iter();
-        same.filter(|d| d.code.severity() == severity).count()
+        shown.iter().filter(|d| d.code.severity() == severity).count()
     };
     let words = |count: usize, word: &str| match count {
         0 => None,
@@ -70,18 +71,18 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
 
 /// All of `diagnostics` as a JSON array; the module's documentation describes it.
 pub fn json(sources: &SourceMap, diagnostics: &[Diagnostic]) -> String {
-    let list: Vec<JsonDiagnostic<'_>> = ordered(diagnostics)
-        .into_iter()
-        .map(|d| to_json(sources, d))
-        .collect();
+    let shown = ordered(sources, diagnostics);
+    let list: Vec<JsonDiagnostic<'_>> = shown.iter().map(|d| to_json(sources, d)).collect();
     // Strings and numbers always have a JSON form.
     serde_json::to_string_pretty(&list).unwrap_or_default()
 }
 
-/// Sorted by file and place, problems without a place first, without repetitions.
-pub fn ordered(diagnostics: &[Diagnostic]) -> Vec<&Diagnostic> {
-    let mut list: Vec<&Diagnostic> = Vec::with_capacity(diagnostics.len());
-    let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
+/// As people are told them: with places of documents in the place of those of sources that were made from them, sorted by
+/// file and place, problems without a place first, without repetitions.
+pub fn ordered(sources: &SourceMap, diagnostics: &[Diagnostic]) -> Vec<Diagnostic> {
+    let mut list: Vec<Diagnostic> = Vec::with_capacity(diagnostics.len());
+    let told = diagnostics.iter().map(|d| super::origin::told(sources, d));
+    let mut sorted: Vec<Diagnostic> = told.collect();
     sorted.sort_by_key(|d| (d.span.map(|s| (s.file, s.start, s.end)), d.code));
     for diagnostic in sorted {
         let same_place = list.iter().rev().take_while(|d| d.span == diagnostic.span);
@@ -157,11 +158,12 @@ fn to_codespan(sources: &SourceMap, diagnostic: &Diagnostic) -> codespan::Diagno
     });
     let expected = diagnostic.expected.iter().map(|e| format!("expected: {e}"));
     let hint = diagnostic.hint.iter().map(|h| format!("hint: {h}"));
+    let notes = diagnostic.notes.iter();
     codespan::Diagnostic::new(severity)
         .with_code(diagnostic.code.id())
         .with_message(&diagnostic.message)
         .with_labels(primary.into_iter().chain(secondary).collect())
-        .with_notes(expected.chain(hint).collect())
+        .with_notes(notes.cloned().chain(expected).chain(hint).collect())
 }
 
 /// The span as a byte range that is inside the text and starts and ends between characters.
@@ -206,6 +208,7 @@ struct JsonDiagnostic<'a> {
     place: Place<'a>,
     expected: Option<&'a str>,
     hint: Option<&'a str>,
+    notes: &'a [String],
     labels: Vec<JsonLabel<'a>>,
     fixes: Vec<JsonFix<'a>>,
 }
@@ -262,6 +265,7 @@ fn to_json<'a>(sources: &'a SourceMap, diagnostic: &'a Diagnostic) -> JsonDiagno
             .map_or_else(Place::default, |span| place(sources, span)),
         expected: diagnostic.expected.as_deref(),
         hint: diagnostic.hint.as_deref(),
+        notes: &diagnostic.notes,
         labels: labels.collect(),
         fixes: fixes.collect(),
     }

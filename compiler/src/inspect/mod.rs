@@ -4,6 +4,8 @@
 //! and how many operations that takes; for a closure the same as if it were a material, and for a
 //! function its value. In both precisions it also tells how far they are apart.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use crate::diag::{self, Code, Diagnostic};
@@ -13,7 +15,7 @@ use crate::ir::ops::Counts;
 use crate::loader::{Loader, MemoryLoader, library_text};
 use crate::moment::Moment;
 use crate::passes;
-use crate::source::{FileId, SourceMap};
+use crate::source::{FileId, Origin, SourceMap};
 use crate::{lexer, parser};
 
 mod at;
@@ -247,6 +249,10 @@ impl Loader for Source<'_> {
             return self.inner.load(path);
         }
         Ok(format!("{}{}", self.text, self.appended).into_bytes())
+    }
+
+    fn origin(&mut self, path: &str) -> Option<Arc<Origin>> {
+        self.inner.origin(path)
     }
 }
 

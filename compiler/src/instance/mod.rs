@@ -195,7 +195,11 @@ fn found(checker: &mut Checker, request: &MaterialRequest) -> Option<Instance> {
     let written = request.written.as_deref();
     let values = checker.parameter_values(module, &material, params, &origin, written)?;
     let values = checker.values_at(&material, values, request.moment.unwrap_or_default())?;
-    let Some(whole) = checker.whole(ItemRef { module, index }).cloned() else {
+    let item = ItemRef { module, index };
+    let Some(whole) = checker.whole(item).cloned() else {
+        if let (Some(MODELS), model) = checker.named(item) {
+            return Some(itself(model, &material, &values));
+        }
         checker.diagnostics.push(no_instance(&material));
         return None;
     };
@@ -247,6 +251,32 @@ fn found(checker: &mut Checker, request: &MaterialRequest) -> Option<Instance> {
         pictures: pictures(checker, &textures),
         span: whole.span,
     })
+}
+
+/// A model as an instance of itself: what it is given are values of parameters.
+fn itself(model: String, material: &crate::ir::Material, values: &[Const]) -> Instance {
+    let given = material.params.iter().zip(values);
+    let given = given.filter(|(param, value)| !param.is_input && **value != param.default);
+    let arguments = given.map(|(param, value)| {
+        let value = match value {
+            Const::Bool(b) => Value::Bool(*b),
+            Const::Int(i) => Value::Int(*i),
+            Const::Float(numbers) => Value::Numbers(numbers.clone()),
+        };
+        Argument {
+            name: param.name.clone(),
+            value,
+            span: param.span,
+        }
+    });
+    Instance {
+        name: material.name.clone(),
+        model,
+        arguments: arguments.collect(),
+        lookups: Vec::new(),
+        pictures: Vec::new(),
+        span: material.span,
+    }
 }
 
 /// The value of an argument: as it is written, since other formats hold what they are given to the same range; where it

@@ -92,16 +92,16 @@ impl Checker<'_> {
         if !ok {
             return None;
         }
-        let outputs = body.take_outputs(&item.name)?;
+        let mut outputs = body.take_outputs(&item.name)?;
         if let Some(whole) = body.whole.take() {
             body.cx.wholes.insert(ItemRef { module, index }, whole);
         }
         let closures = std::mem::take(&mut body.closures);
         let inputs = std::mem::take(&mut body.inputs);
         let value = body.builder.float(0.0, item.span);
-        let function = body.builder.finish(value);
-        if let Some(interior) = &outputs.interior {
-            self.check_interior(&function, interior)?;
+        let mut function = body.builder.finish(value);
+        if let Some(interior) = &mut outputs.interior {
+            self.check_interior(&mut function, interior)?;
         }
         Some(Material {
             name: item.name.node.clone(),

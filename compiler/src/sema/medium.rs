@@ -6,12 +6,12 @@
 use crate::ast::{Arg, Name};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::ops::Op;
-use crate::ir::{Const, ExprId, Function, Interior, Type};
+use crate::ir::{Const, Expr, ExprId, ExprKind, Function, Interior, Stmt, Type};
 use crate::source::Span;
 
 use super::body::{Body, Operand, Place};
 use super::types::Ty;
-use super::varying::{self, Cause};
+use super::varying::{self, Cause, Causes};
 use super::{Checker, Param};
 
 /// Greatest priority.
@@ -168,12 +168,24 @@ impl Body<'_, '_> {
 
 impl Checker<'_> {
     /// Reports what of the interior of a material with this `body` differs from point to point.
-    pub(super) fn check_interior(&mut self, body: &Function, interior: &Interior) -> Option<()> {
+    ///
+    /// A weight may: where `weight > 0.0` decides whether there is an interior, there is one if the weight varies. Where it
+    /// is zero no light gets in, and does not see what is within.
+    pub(super) fn check_interior(
+        &mut self,
+        body: &mut Function,
+        interior: &mut Interior,
+    ) -> Option<()> {
+        let causes = varying::causes(&self.ir, body);
+        let when = interior.when.filter(|when| causes.of(*when).is_some());
+        if let Some(when) = when {
+            interior.when = somewhere(body, &causes, when);
+        }
+        let (body, interior) = (&*body, &*interior);
         let values = interior.named();
         let values = values.map(|(name, _, id)| (format!("the {name} of the interior"), id));
         let when = interior.when.into_iter();
         let when = when.map(|id| ("whether there is an interior".to_owned(), id));
-        let causes = varying::causes(&self.ir, body);
         let mut ok = Some(());
         for (name, id) in values.chain(when) {
             let Some(cause) = causes.of(id) else { continue };
@@ -197,4 +209,41 @@ impl Checker<'_> {
         }
         ok
     }
+}
+
+/// What is left of a condition where `weight > 0.0` holds for weights that vary; nothing if it always holds.
+fn somewhere(body: &mut Function, causes: &Causes, id: ExprId) -> Option<ExprId> {
+    if causes.of(id).is_none() {
+        return Some(id);
+    }
+    let Expr { kind, span, via, .. } = body.expr(id).clone();
+    match kind {
+        ExprKind::Op(Op::Greater, args) if is_zero(body, args[1]) => None,
+        ExprKind::Op(Op::And, args) => {
+            let left = somewhere(body, causes, args[0]);
+            let right = somewhere(body, causes, args[1]);
+            let (Some(left), Some(right)) = (left, right) else {
+                return left.or(right);
+            };
+            if [left, right] == args[..] {
+                return Some(id);
+            }
+            let both = ExprId(body.exprs.len() as u32);
+            body.exprs.push(Expr {
+                kind: ExprKind::Op(Op::And, vec![left, right]),
+                ty: Type::Bool,
+                span,
+                via,
+                name: None,
+            });
+            body.body.push(Stmt::Eval(both));
+            Some(both)
+        }
+        _ => Some(id),
+    }
+}
+
+fn is_zero(body: &Function, id: ExprId) -> bool {
+    let constant = body.constant(id);
+    matches!(constant, Some(Const::Float(x)) if x.iter().all(|x| *x == 0.0))
 }

@@ -162,7 +162,10 @@ impl Checker<'_> {
 
     /// Parses a text and resolves its imports.
     fn add_module(&mut self, path: &str, text: &str) -> ModuleId {
-        let file = self.sources.add(path, text);
+        let file = match self.loader.origin(path) {
+            Some(origin) => self.sources.add_made(path, text, origin),
+            None => self.sources.add(path, text),
+        };
         let before = self.progress.enter(Stage::Parse);
         let (ast, diagnostics) = parser::parse(file, text);
         self.progress.enter(before);

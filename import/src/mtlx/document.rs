@@ -3,6 +3,7 @@
 //! Nothing here knows what an element means. Elements lie in one list and name each other by index.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::error::{ImportError, Warning};
 
@@ -25,6 +26,8 @@ pub(crate) struct Element {
     pub file: u32,
     /// The line, from 1.
     pub line: u32,
+    /// The bytes of its start tag in the file: the first, and one past the last.
+    pub tag: (u32, u32),
 }
 
 /// All elements of a document and of what it includes.
@@ -33,6 +36,8 @@ pub(crate) struct Document {
     pub elements: Vec<Element>,
     /// The paths of the files that it is made of; the first is the document's own.
     pub files: Vec<String>,
+    /// Their texts.
+    pub texts: Vec<Arc<str>>,
     names: HashMap<Id, HashMap<String, Id>>,
     inputs: HashMap<Id, HashMap<String, Id>>,
 }

@@ -124,15 +124,15 @@ impl<'a> Graphs<'a> {
     }
 
     /// The nodes whose definitions a scope is in, outermost first.
-    pub fn instance_names(&self, scope: ScopeId) -> Vec<&'a str> {
-        let mut names = Vec::new();
+    pub fn instances(&self, scope: ScopeId) -> Vec<Id> {
+        let mut nodes = Vec::new();
         let mut at = scope;
         while let Some((key, _)) = self.scopes[at as usize].instance {
-            names.push(self.document.name(key.node));
+            nodes.push(key.node);
             at = key.scope;
         }
-        names.reverse();
-        names
+        nodes.reverse();
+        nodes
     }
 
     /// The definition of a node in this document, if it has one.

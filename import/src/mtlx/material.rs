@@ -5,17 +5,19 @@ use std::collections::{HashMap, HashSet};
 use impasto_compiler::diag::nearest;
 
 use crate::error::ImportError;
+use crate::imported::Options;
 use crate::mtlx::call::Call;
 use crate::mtlx::document::Id;
-use crate::mtlx::graph::{Graphs, Key, ScopeId, Source};
+use crate::mtlx::graph::{Graphs, Key, ScopeId, Source, TOP};
 use crate::mtlx::names::{Names, is_given};
 use crate::mtlx::nodes::{self, Made};
+use crate::mtlx::origin::{Mark, Traced};
 use crate::mtlx::source::{SourceText, words};
 use crate::mtlx::text;
 use crate::mtlx::types::{Literal, Type};
 use crate::mtlx::upgrade;
 use crate::mtlx::value::Value;
-use crate::mtlx::{color_spaces, parameters};
+use crate::mtlx::{color_spaces, parameters, units};
 
 /// Longer expressions get a name.
 const MOST_INLINE: usize = 72;
@@ -26,33 +28,47 @@ const MOST_EXPRESSION: usize = 1 << 16;
 pub(crate) struct Builder<'b, 'a> {
     pub graphs: &'b mut Graphs<'a>,
     pub source: &'b mut SourceText,
-    pub allow_outside: bool,
+    pub options: &'b Options,
+    /// The parameter that says how long a unit of the scene is, if there is need of one.
+    pub scene_unit: Option<String>,
     names: Names,
     /// By element: the order of the document.
     params: Vec<(Id, String)>,
-    statements: Vec<(String, String)>,
+    statements: Vec<Statement>,
     values: HashMap<Key, Made>,
     parameters: HashMap<Id, Value>,
     uses: HashMap<Key, u32>,
+    /// The node that is being written.
+    current: Option<Key>,
+}
+
+/// A value with a name.
+struct Statement {
+    name: String,
+    text: String,
+    /// The node that it is of.
+    key: Option<Key>,
 }
 
 impl<'b, 'a> Builder<'b, 'a> {
     pub fn new(
         graphs: &'b mut Graphs<'a>,
         source: &'b mut SourceText,
-        allow_outside: bool,
+        options: &'b Options,
     ) -> Self {
         let names = source.names.clone();
         Self {
             graphs,
             source,
-            allow_outside,
+            options,
+            scene_unit: None,
             names,
             params: Vec::new(),
             statements: Vec::new(),
             values: HashMap::new(),
             parameters: HashMap::new(),
             uses: HashMap::new(),
+            current: None,
         }
     }
 
@@ -69,6 +85,7 @@ impl<'b, 'a> Builder<'b, 'a> {
             return Err(missing);
         }
         for key in order.nodes {
+            self.current = Some(key);
             let made = self.made(key).map_err(|error| vec![error])?;
             let made = self.settled(key, made);
             if let Some(long) = made.iter().find(|(_, v)| v.text.len() > MOST_EXPRESSION) {
@@ -167,15 +184,26 @@ impl<'b, 'a> Builder<'b, 'a> {
 
     /// The name of a node, behind those of the nodes whose definitions it is in.
     pub fn node_name(&self, key: Key) -> String {
-        let mut names = self.graphs.instance_names(key.scope);
-        names.push(self.graphs.document.name(key.node));
-        names.join("_")
+        let nodes = self.graphs.instances(key.scope).into_iter();
+        let names = nodes
+            .chain([key.node])
+            .map(|node| self.graphs.document.name(node));
+        names.collect::<Vec<_>>().join("_")
+    }
+
+    /// A name like this one that nothing of the material has.
+    pub fn unique(&mut self, name: &str) -> String {
+        self.names.unique(name, "value")
     }
 
     /// Names an expression by a statement.
     pub fn bind(&mut self, name: &str, text: &str) -> String {
-        let name = self.names.unique(name, "value");
-        self.statements.push((name.clone(), text.to_owned()));
+        let name = self.unique(name);
+        self.statements.push(Statement {
+            name: name.clone(),
+            text: text.to_owned(),
+            key: self.current,
+        });
         name
     }
 
@@ -223,7 +251,7 @@ impl<'b, 'a> Builder<'b, 'a> {
 
     fn output(&self, at: Id, key: Key, output: Option<&str>) -> Result<Value, ImportError> {
         let document = self.graphs.document;
-        let made = self.values.get(&key).map(Vec::as_slice).unwrap_or_default();
+        let made = self.made_of(key);
         let found = match output {
             None => made.first(),
             Some(name) => made
@@ -243,10 +271,14 @@ impl<'b, 'a> Builder<'b, 'a> {
         Err(document.error(at, message).expected(names.join(", ")))
     }
 
+    /// The outputs of a node that is written.
+    pub fn made_of(&self, key: Key) -> &[(&'static str, Value)] {
+        self.values.get(&key).map(Vec::as_slice).unwrap_or_default()
+    }
+
     /// The first output of a node that is written.
     pub fn first_output(&self, key: Key) -> Option<Value> {
-        let made = self.values.get(&key).and_then(|made| made.first());
-        made.map(|(_, value)| value.clone())
+        self.made_of(key).first().map(|(_, value)| value.clone())
     }
 
     /// A value that is written at an element.
@@ -262,7 +294,7 @@ impl<'b, 'a> Builder<'b, 'a> {
                 .error(at, message)
                 .expected(format!("{expected}, for the type `{}`", ty.name()))
         })?;
-        if let (Literal::Numbers(numbers), Some(size)) = (&mut literal, self.unit(at)?) {
+        if let (Literal::Numbers(numbers), Some(size)) = (&mut literal, units::stated(document, at)?) {
             numbers.iter_mut().for_each(|number| *number *= size);
         }
         if !matches!(ty, Type::Color3 | Type::Color4) {
@@ -279,34 +311,6 @@ impl<'b, 'a> Builder<'b, 'a> {
         Ok(Value {
             text: self.source.names_in(&value.text),
             ..value
-        })
-    }
-
-    /// What the unit of a value is in metres or degrees.
-    fn unit(&self, at: Id) -> Result<Option<f64>, ImportError> {
-        const UNITS: &[(&str, f64)] = &[
-            ("nanometer", 1e-9),
-            ("micron", 1e-6),
-            ("millimeter", 1e-3),
-            ("centimeter", 1e-2),
-            ("inch", 0.0254),
-            ("foot", 0.3048),
-            ("yard", 0.9144),
-            ("meter", 1.0),
-            ("kilometer", 1e3),
-            ("mile", 1609.344),
-            ("degree", 1.0),
-            ("radian", 180.0 / std::f64::consts::PI),
-        ];
-        let document = self.graphs.document;
-        let Some(unit) = document.attribute(at, "unit") else {
-            return Ok(None);
-        };
-        let found = UNITS.iter().find(|(name, _)| *name == unit);
-        found.map(|(_, size)| Some(*size)).ok_or_else(|| {
-            let names: Vec<&str> = UNITS.iter().map(|(name, _)| *name).collect();
-            let error = document.error(at, format!("the unit `{unit}` is not known"));
-            error.expected(names.join(", "))
         })
     }
 
@@ -349,7 +353,7 @@ impl<'b, 'a> Builder<'b, 'a> {
         let base = &document.files[document.element(at).file as usize];
         let found = self
             .source
-            .texture(base, &format!("{prefix}{name}"), self.allow_outside);
+            .texture(base, &format!("{prefix}{name}"), self.options.allow_outside);
         let texture = found.map_err(|message| {
             let error = document.error(at, message);
             error.hint("`impasto import --allow-outside` reads it, if you trust the document")
@@ -427,17 +431,29 @@ impl<'b, 'a> Builder<'b, 'a> {
         })
     }
 
-    /// The material, which ends with these assignments.
-    pub fn finished(mut self, name: &str, docs: &str, assignments: &[String]) -> String {
-        let mut used: HashSet<String> = assignments.iter().flat_map(|text| words(text)).collect();
+    /// The material of an element, which ends with assignments: outputs and their values, of a node.
+    pub fn finished(
+        mut self,
+        (name, docs): (&str, &str),
+        element: Id,
+        assignments: &[(&str, String)],
+        shown: Option<Key>,
+    ) -> Traced {
+        let values = assignments.iter().flat_map(|(_, text)| words(text));
+        let mut used: HashSet<String> = values.collect();
         let mut lets = Vec::new();
-        for (name, text) in self.statements.iter().rev() {
-            if used.contains(name) {
-                used.extend(words(text));
-                lets.push(format!("let {name} = {text};\n"));
+        for Statement { name, text, key } in std::mem::take(&mut self.statements).into_iter().rev()
+        {
+            if used.contains(&name) {
+                used.extend(words(&text));
+                lets.push(self.statement(&format!("let {name} = "), &text, key));
             }
         }
         lets.reverse();
+        let outputs = assignments.iter();
+        let outputs = outputs.map(|(name, text)| self.statement(&format!("{name} = "), text, shown));
+        let outputs: Vec<Traced> = outputs.collect();
+        let mark = self.mark(TOP, element);
         self.params.sort_by_key(|(at, _)| *at);
         let names: HashMap<Id, &str> = self
             .parameters
@@ -446,20 +462,28 @@ impl<'b, 'a> Builder<'b, 'a> {
             .collect();
         let params = self.params.iter();
         let params = params.filter(|(at, _)| names.get(at).is_some_and(|n| used.contains(*n)));
-        let params: Vec<&str> = params.map(|(_, text)| text.as_str()).collect();
-        let mut text = String::new();
+        let params = params.map(|(at, text)| {
+            Traced::new(text.as_str()).mark(Mark {
+                is_statement: true,
+                ..self.mark(TOP, *at)
+            })
+        });
+        let mut params: Vec<Traced> = params.collect();
+        if let Some(unit) = self.scene_unit.filter(|unit| used.contains(unit)) {
+            params.push(Traced::new(units::declaration(&unit)));
+        }
+        let mut whole = Traced::default();
         for line in docs.lines() {
-            text.push_str(&format!("/// {}\n", line.trim()));
+            whole.text.push_str(&format!("/// {}\n", line.trim()));
         }
-        text.push_str(&format!("material {name} {{\n{}", params.concat()));
-        let blocks = [lets.concat(), assignments.concat()];
-        for block in blocks.iter().filter(|block| !block.is_empty()) {
-            if !text.ends_with("{\n") {
-                text.push('\n');
+        whole.text.push_str(&format!("material {name} {{\n"));
+        for block in [params, lets, outputs].iter().filter(|b| !b.is_empty()) {
+            if !whole.text.ends_with("{\n") {
+                whole.text.push('\n');
             }
-            text.push_str(block);
+            block.iter().for_each(|statement| whole.push(statement));
         }
-        text.push_str("}\n");
-        text
+        whole.text.push_str("}\n");
+        whole.mark(mark)
     }
 }

@@ -9,20 +9,25 @@ mod helpers;
 mod material;
 mod names;
 pub(crate) mod nodes;
+mod origin;
 mod parameters;
 mod roots;
 mod source;
 mod text;
 mod types;
+mod units;
 mod upgrade;
 mod value;
 mod xml;
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use impasto_compiler::diag::Diagnostic;
-use impasto_compiler::{MemoryLoader, check};
+use impasto_compiler::diag::render::ordered;
+use impasto_compiler::source::{IMPORTED, Origin};
+use impasto_compiler::{Loader, check};
 
 use crate::error::ImportError;
 use crate::files::Files;
@@ -48,7 +53,8 @@ pub(crate) fn import(
     let document = xml::read(path, files, options.allow_outside)?;
     upgrade::check_version(&document).map_err(|error| vec![error])?;
     let mut graphs = Graphs::new(&document);
-    let mut source = SourceText::new();
+    let folder = path.rfind('/').map_or("", |end| &path[..=end]);
+    let mut source = SourceText::new(options.in_place.then(|| folder.to_owned()));
     let roots = roots::find(&document, &mut source);
     if roots.len() > MOST_MATERIALS {
         let message = format!(
@@ -63,7 +69,7 @@ pub(crate) fn import(
     let mut names = Vec::new();
     for root in &roots {
         let name = source.names.unique(&root.name(&document), "material");
-        match roots::written(root, &name, &mut graphs, &mut source, options.allow_outside) {
+        match roots::written(root, &name, &mut graphs, &mut source, options) {
             Ok(Some(material)) => {
                 source.add(material);
                 materials.insert(root.element(), name.clone());
@@ -98,25 +104,29 @@ pub(crate) fn import(
         return Err(vec![error.maybe_hint(said.first().cloned())]);
     }
     let file = file_name(path);
-    let header = format!(
-        "//! Imported from {}.\n",
-        path.rsplit('/').next().unwrap_or(path)
-    );
-    let text = source
+    let header = format!("{IMPORTED}{}.\n", path.rsplit('/').next().unwrap_or(path));
+    let (text, marks) = source
         .finished(path, &header)
         .map_err(|error| vec![error])?;
-    let problems = if options.unchecked {
-        Vec::new()
-    } else {
-        problems(path, &file, &text)
+    let origin = origin::origin(&document, &text, &marks);
+    let mut compiled = Compiled {
+        text: &text,
+        origin: Arc::new(origin),
     };
-    if !problems.is_empty() {
-        return Err(problems);
+    if !options.unchecked {
+        compiled.check(path)?;
     }
     let textures = source.textures(&text, files);
     let assignments = assignments(&document, &roots, &materials, &mut source);
+    let origin = Arc::unwrap_or_clone(compiled.origin);
+    let text = if options.in_place {
+        text
+    } else {
+        origin::commented(&document, &text, &marks)
+    };
     Ok(Imported {
         textures,
+        origin,
         warnings: source.warnings,
         materials: names.into_iter().map(|name| (name, file.clone())).collect(),
         assignments,
@@ -124,31 +134,52 @@ pub(crate) fn import(
     })
 }
 
-/// What the compiler says against a source: nothing is written that does not compile. Nodes have no such errors of their
-/// own, but what they are put together to may have, such as a medium that varies over its surface.
-fn problems(path: &str, file: &Path, text: &str) -> Vec<ImportError> {
-    let name = file.to_string_lossy();
-    let mut loader = MemoryLoader::default();
-    loader.add(name.as_ref(), text);
-    let checked = check(&name, &mut loader);
-    let errors = checked.diagnostics.into_iter().filter(Diagnostic::is_error);
-    let told = errors.map(|problem| {
-        let line = problem.span.map(|span| {
-            let (line, _) = checked.sources.line_column(span);
-            let text = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
-            format!(" in `{}`", text.trim())
+/// A source as the compiler reads it, with its origin.
+struct Compiled<'t> {
+    text: &'t str,
+    origin: Arc<Origin>,
+}
+
+impl Loader for Compiled<'_> {
+    fn load(&mut self, _: &str) -> Result<Vec<u8>, String> {
+        Ok(self.text.as_bytes().to_vec())
+    }
+
+    fn origin(&mut self, _: &str) -> Option<Arc<Origin>> {
+        Some(self.origin.clone())
+    }
+}
+
+impl Compiled<'_> {
+    /// What the compiler says against the source: nothing is written that does not compile. Nodes have no such errors of
+    /// their own, but what they are put together to may have, such as a medium that varies over its surface.
+    fn check(&mut self, path: &str) -> Result<(), Vec<ImportError>> {
+        let checked = check(path, self);
+        let shown = ordered(&checked.sources, &checked.diagnostics);
+        let errors = shown.into_iter().filter(Diagnostic::is_error);
+        let told = errors.map(|problem| {
+            let (code, message) = (problem.code.id(), &problem.message);
+            let message = format!("{code}: {message}\n  {}", problem.notes.join("\n  "));
+            let message = message.trim_end();
+            let error = match problem.span {
+                Some(span) => {
+                    let (line, _) = checked.sources.line_column(span);
+                    let file = checked.sources.file(span.file).name.as_str();
+                    ImportError::new(file, message).line(line as u32)
+                }
+                None => ImportError::new(path, message),
+            };
+            let mut error = error.maybe_hint(problem.hint);
+            error.expected = problem.expected;
+            error
         });
-        let message = format!(
-            "what the document becomes does not compile: {}: {}{}",
-            problem.code.id(),
-            problem.message,
-            line.unwrap_or_default()
-        );
-        let mut error = ImportError::new(path, message).maybe_hint(problem.hint);
-        error.expected = problem.expected;
-        error
-    });
-    told.take(MOST_ERRORS).collect()
+        let problems: Vec<ImportError> = told.take(MOST_ERRORS).collect();
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(problems)
+        }
+    }
 }
 
 /// The source of a document: its name, as other sources can import it.

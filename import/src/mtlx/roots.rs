@@ -5,9 +5,11 @@
 use std::collections::HashSet;
 
 use crate::error::ImportError;
+use crate::imported::Options;
 use crate::mtlx::document::{Document, Id, ROOT};
 use crate::mtlx::graph::{Graphs, Key, ScopeId, Source, TOP};
 use crate::mtlx::material::Builder;
+use crate::mtlx::origin::Traced;
 use crate::mtlx::parameters::wrapped;
 use crate::mtlx::source::SourceText;
 use crate::mtlx::text;
@@ -151,8 +153,8 @@ pub(crate) fn written(
     name: &str,
     graphs: &mut Graphs<'_>,
     source: &mut SourceText,
-    allow_outside: bool,
-) -> Result<Option<String>, Vec<ImportError>> {
+    options: &Options,
+) -> Result<Option<Traced>, Vec<ImportError>> {
     let document = graphs.document;
     let id = root.element();
     let scope = match document.scope_of(id) {
@@ -165,7 +167,7 @@ pub(crate) fn written(
         Root::Output(_) => graphs.source(scope, id),
     };
     let from = from.map_err(|error| vec![error])?;
-    let mut builder = Builder::new(graphs, source, allow_outside);
+    let mut builder = Builder::new(graphs, source, options);
     let value = match &from {
         Source::Nothing => None,
         Source::Node(key, _) => {
@@ -194,7 +196,11 @@ pub(crate) fn written(
     };
     let docs = document.attribute(id, "doc").unwrap_or_default();
     let docs = wrapped(docs).join("\n");
-    Ok(Some(builder.finished(name, &docs, &assignments)))
+    let shown = match from {
+        Source::Node(key, _) => Some(key),
+        _ => None,
+    };
+    Ok(Some(builder.finished((name, &docs), id, &assignments, shown)))
 }
 
 fn shader_of(
@@ -227,13 +233,16 @@ fn node_of(scope: ScopeId, node: Id, graphs: &mut Graphs<'_>) -> Result<Source, 
     graphs.node_source(Key { scope, node })
 }
 
+/// An output of a material and its value.
+type Assignment = (&'static str, String);
+
 /// What the material assigns to show a value; nothing if it cannot be shown.
-fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<String>> {
+fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Assignment>> {
     let text = value.plain();
     let color = match value.ty {
         Type::SurfaceShader => match &value.extra {
             Extra::Shader(Shader::Call(call)) => {
-                return Some(vec![format!("material = {call};\n")]);
+                return Some(vec![("material", call.clone())]);
             }
             Extra::Shader(Shader::Outputs(outputs)) => return Some(assigned(outputs)),
             _ => return None,
@@ -246,7 +255,7 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
                 ..Outputs::default()
             }));
         }
-        Type::Edf => return Some(vec![format!("emission = {text};\n")]),
+        Type::Edf => return Some(vec![("emission", text)]),
         Type::Color3 => text,
         Type::Float => format!("color({text})"),
         Type::Integer => format!("color(float({text}))"),
@@ -270,21 +279,19 @@ fn assignments(value: &Value, builder: &mut Builder<'_, '_>) -> Option<Vec<Strin
         _ => return None,
     };
     let shown = builder.source.names_in("@edf::uniform");
-    Some(vec![format!("emission = {shown}({color});\n")])
+    Some(vec![("emission", format!("{shown}({color})"))])
 }
 
 /// Assignments of outputs.
-fn assigned(outputs: &Outputs) -> Vec<String> {
+fn assigned(outputs: &Outputs) -> Vec<Assignment> {
     let all = [
         ("surface", &outputs.surface),
         ("emission", &outputs.emission),
         ("opacity", &outputs.opacity),
         ("interior", &outputs.interior),
     ];
-    let given = all
-        .iter()
-        .filter_map(|(name, text)| text.as_ref().map(|text| (name, text)));
+    let given = all.iter();
     given
-        .map(|(name, text)| format!("{name} = {text};\n"))
+        .filter_map(|(name, text)| text.as_ref().map(|text| (*name, text.clone())))
         .collect()
 }

@@ -1,6 +1,7 @@
 //! The source that a document becomes: what it imports, helper functions, pictures, materials.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::ops::Range;
 
 use impasto_compiler::format::format;
 use impasto_compiler::source::FileId;
@@ -10,6 +11,7 @@ use crate::files::{Files, joined};
 use crate::imported::Texture;
 use crate::mtlx::helpers::{self, HELPERS};
 use crate::mtlx::names::Names;
+use crate::mtlx::origin::{Mark, Traced};
 
 /// The longest source that the compiler reads.
 const MOST_BYTES: usize = 1 << 20;
@@ -29,17 +31,20 @@ pub(crate) struct SourceText {
     pub named: BTreeMap<String, Warning>,
     pub warnings: Vec<Warning>,
     warned: HashSet<String>,
-    materials: Vec<String>,
+    materials: Vec<Traced>,
+    /// The folder that the source is read in, where pictures stay where they are.
+    in_place: Option<String>,
 }
 
 impl SourceText {
-    pub fn new() -> Self {
+    pub fn new(in_place: Option<String>) -> Self {
         let mut names = Names::default();
         for helper in HELPERS {
             names.keep(helper.name);
         }
         Self {
             names,
+            in_place,
             ..Self::default()
         }
     }
@@ -101,6 +106,17 @@ impl SourceText {
         if let Some(texture) = self.textures.get(&found) {
             return Ok(texture.clone());
         }
+        if let Some(folder) = &self.in_place {
+            let written = found.strip_prefix(folder.as_str()).unwrap_or(&found);
+            let written = written.to_owned();
+            let texture = Texture {
+                exists: true,
+                found: found.clone(),
+                written,
+            };
+            self.textures.insert(found, texture.clone());
+            return Ok(texture);
+        }
         let file = found
             .rsplit_once('/')
             .map_or(found.as_str(), |(_, file)| file);
@@ -125,7 +141,7 @@ impl SourceText {
     }
 
     /// Adds a material.
-    pub fn add(&mut self, material: String) {
+    pub fn add(&mut self, material: Traced) {
         self.materials.push(material);
     }
 
@@ -143,13 +159,13 @@ impl SourceText {
         textures
     }
 
-    /// The whole source, formatted.
+    /// The whole source, formatted, and where its parts come from.
     ///
     /// # Errors
     /// It is too long.
-    pub fn finished(&mut self, path: &str, header: &str) -> Result<String, ImportError> {
-        let mut parts = self.materials.clone();
-        let mut words: HashSet<String> = parts.iter().flat_map(|part| words(part)).collect();
+    pub fn finished(&mut self, path: &str, header: &str) -> Result<Finished, ImportError> {
+        let materials = self.materials.iter();
+        let mut words: HashSet<String> = materials.flat_map(|m| words(&m.text)).collect();
         // Helpers that materials use, and those that they use themselves; the last first.
         let mut texts = Vec::new();
         for helper in HELPERS.iter().rev() {
@@ -164,7 +180,6 @@ impl SourceText {
             }
         }
         texts.reverse();
-        texts.append(&mut parts);
         let mut folders: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
         for (local, (folder, name)) in &self.imports {
             if words.contains(local) {
@@ -184,16 +199,20 @@ impl SourceText {
                 names => text.push_str(&format!("use std::{folder}::{{{}}};\n", names.join(", "))),
             }
         }
-        text.push('\n');
-        text.push_str(&texts.join("\n"));
+        let mut whole = Traced::new(text);
+        let helpers = texts.into_iter().map(Traced::new);
+        for part in helpers.chain(self.materials.iter().cloned()) {
+            whole.text.push('\n');
+            whole.push(&part);
+        }
         let too_long = || {
             let message = "the source would have more than 1 MiB, which the compiler does not read";
             ImportError::new(path, message).hint("import fewer materials at once")
         };
-        if text.len() > MOST_BYTES {
+        if whole.text.len() > MOST_BYTES {
             return Err(too_long());
         }
-        let formatted = format(FileId(0), &text).map_err(|reason| {
+        let formatted = format(FileId(0), &whole.text).map_err(|reason| {
             let message =
                 format!("the source cannot be formatted, a defect of the importer: {reason:?}");
             ImportError::new(path, message)
@@ -201,10 +220,14 @@ impl SourceText {
         if formatted.len() > MOST_BYTES {
             Err(too_long())
         } else {
-            Ok(formatted)
+            let marks = whole.moved(&formatted);
+            Ok((formatted, marks))
         }
     }
 }
+
+/// A source, and where its parts come from.
+type Finished = (String, Vec<(Range<usize>, Mark)>);
 
 /// The words of a text that are no fields and stand in no string.
 pub(crate) fn words(text: &str) -> Vec<String> {

@@ -117,10 +117,11 @@ impl Reader<'_> {
         }
         let file = self.document.files.len() as u32;
         self.document.files.push(path.to_owned());
+        self.document.texts.push(text.into());
         let mut included = Vec::new();
         // What a file says of all it has (`colorspace`, `fileprefix`) holds for what it has alone: each file has an
         // element of its own, and their children count as those of the document.
-        let own = self.push(root, ROOT, file, &lines)?;
+        let own = self.push(root, ROOT, file, (text, &lines))?;
         let mut stack: Vec<(Node, Id)> = Vec::new();
         let mut top: Vec<Node> = root.children().filter(Node::is_element).collect();
         top.reverse();
@@ -134,7 +135,7 @@ impl Reader<'_> {
                 ));
                 continue;
             }
-            let id = self.push(node, parent, file, &lines)?;
+            let id = self.push(node, parent, file, (text, &lines))?;
             let below: Vec<Node> = node.children().filter(Node::is_element).collect();
             stack.extend(below.into_iter().rev().map(|child| (child, id)));
         }
@@ -162,10 +163,13 @@ impl Reader<'_> {
         node: Node<'_, '_>,
         parent: Id,
         file: u32,
-        lines: &Lines,
+        (text, lines): (&str, &Lines),
     ) -> Result<Id, ImportError> {
         let id = self.document.elements.len();
-        let line = lines.line(node.range().start);
+        let range = node.range();
+        let line = lines.line(range.start);
+        let tag = closing(&text.as_bytes()[range.clone()]);
+        let tag = range.start..tag.map_or(range.end, |end| range.start + end + 1);
         if id >= MOST_ELEMENTS {
             let path = self.document.files[file as usize].clone();
             let message = format!("the document has more than {MOST_ELEMENTS} elements");
@@ -181,6 +185,8 @@ impl Reader<'_> {
             parent,
             file,
             line,
+            // Files are shorter than 4 GiB.
+            tag: (tag.start as u32, tag.end as u32),
         });
         let id = id as Id;
         if id != ROOT {

@@ -329,7 +329,7 @@ impl<'c> Server<'c> {
     fn edited(&mut self, path: String) {
         self.worker.edited();
         let made = self.documents.made_of(&path);
-        let is_source = path.ends_with(".impasto");
+        let is_source = path.ends_with(".impasto") || path.ends_with(".mtlx");
         if is_source {
             // Scenes name materials and their parameters; what a whole check found waits for them to be saved.
             let scenes = self
@@ -392,7 +392,7 @@ impl<'c> Server<'c> {
                     committed: true,
                 })
             }
-            Language::Material | Language::Other => None,
+            Language::Material | Language::MaterialX | Language::Other => None,
         }
     }
 

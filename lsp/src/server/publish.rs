@@ -3,8 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use gen_lsp_types as lsp;
-use impasto_compiler::diag::{Code, Diagnostic, Severity};
+use impasto_compiler::diag::{self, Code, Diagnostic, Severity};
 use impasto_compiler::source::{FileId, SourceMap, Span};
+use impasto_runtime::input::mtlx::ImportError;
 use serde_json::{Value, json};
 
 use super::{Deep, Server, convert};
@@ -33,6 +34,7 @@ impl Server<'_> {
                 Language::Material if library::file_of(&path).is_some() => Vec::new(),
                 Language::Material => self.of_source(&path),
                 Language::Scene => self.of_scene(&path),
+                Language::MaterialX => self.of_document(&path),
                 Language::Other => Vec::new(),
             };
             self.publish(&uri, Some(version), found);
@@ -81,14 +83,39 @@ impl Server<'_> {
         found
     }
 
+    /// What is wrong with a document of MaterialX, at its own lines.
+    fn of_document(&mut self, path: &str) -> Vec<Value> {
+        let imported = self.documents.imported(path);
+        let Some(document) = self.documents.at(path) else {
+            return Vec::new();
+        };
+        let text = &document.text;
+        match imported {
+            Ok(analysis) => {
+                let sources = &analysis.sources;
+                let own = analysis.file().map(|file| sources.document(file));
+                let mut texts = Related::default();
+                let shown = analysis.diagnostics.iter().take(MOST);
+                shown
+                    .map(|d| self.diagnostic(text, &mut texts, sources, own, d, |_| None))
+                    .collect()
+            }
+            Err(errors) => {
+                let shown = errors.iter().take(MOST);
+                shown.map(|error| refused(text, path, error)).collect()
+            }
+        }
+    }
+
     /// What a whole check found in a file, and `with_others` in those that it names.
     fn of_deep(&self, text: &Text, path: &str, deep: &Deep, with_others: bool) -> Vec<Value> {
         let sources = &deep.found.sources;
         let mut files = sources.files();
         let own = files.find(|(_, f)| f.name == path).map(|(id, _)| id);
         let mut texts = Related::default();
+        let found = diag::render::ordered(sources, &deep.found.diagnostics);
         let is_shown = |d: &&Diagnostic| with_others || d.span.is_none_or(|s| Some(s.file) == own);
-        let shown = deep.found.diagnostics.iter().filter(is_shown).take(MOST);
+        let shown = found.iter().filter(is_shown).take(MOST);
         shown
             .map(|d| self.diagnostic(text, &mut texts, sources, own, d, |_| None))
             .collect()
@@ -132,6 +159,9 @@ impl Server<'_> {
         }
         if let Some(hint) = &diagnostic.hint {
             message += &format!("\nhint: {hint}");
+        }
+        for note in &diagnostic.notes {
+            message += &format!("\n{note}");
         }
         let mut related: Vec<Value> = Vec::new();
         let mut relate = |span: Span, message: &str| {
@@ -189,6 +219,40 @@ fn import_of(
         _ => false,
     };
     analysis.occurrences.iter().find(leads).map(|o| o.span)
+}
+
+/// Why a document is not imported: at the line that says so, or at the start where that is in another file.
+fn refused(text: &Text, path: &str, error: &ImportError) -> Value {
+    let line = error.line.filter(|_| error.path == path);
+    let (place, message) = match line {
+        Some(line) => {
+            let own = format!("{path}:{line}: ");
+            let message = error.to_string();
+            let message = message.strip_prefix(&own).unwrap_or(&message).to_owned();
+            (line_of(text.as_str(), line as usize), message)
+        }
+        None => (0..0, error.to_string()),
+    };
+    json!({
+        "range": text.range(place),
+        "severity": 1,
+        "source": "impasto",
+        "message": message,
+    })
+}
+
+/// The bytes of a line, counted from 1, without the blanks around it.
+fn line_of(text: &str, line: usize) -> std::ops::Range<usize> {
+    let mut start = 0;
+    for (index, content) in text.split_inclusive('\n').enumerate() {
+        if index + 1 == line {
+            let end = content.trim_end().len();
+            let blanks = content.len() - content.trim_start().len();
+            return start + blanks.min(end)..start + end;
+        }
+        start += content.len();
+    }
+    0..0
 }
 
 fn of_problem(text: &Text, problem: &Problem) -> Value {

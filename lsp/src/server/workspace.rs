@@ -6,8 +6,9 @@ use std::sync::Arc;
 use gen_lsp_types as lsp;
 use impasto_compiler::analysis::{Analysis, Symbol, analyse};
 use impasto_compiler::ast::ItemKind;
-use impasto_compiler::parser;
-use impasto_compiler::source::FileId;
+use impasto_compiler::{Loader, parser};
+use impasto_compiler::source::{FileId, SourceMap, Span};
+use impasto_runtime::input::mtlx;
 use lsp_server::ErrorCode;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -45,6 +46,19 @@ impl Server<'_> {
             None => documents::text_at(path)?,
         };
         Some(Text::new(text, self.documents.encoding()))
+    }
+
+    /// Adds the source that a file is read as.
+    fn source(&self, path: &str, sources: &mut SourceMap) -> Option<FileId> {
+        if !mtlx::is_document(Path::new(path)) {
+            return Some(sources.add(path, self.text(path)?.as_str()));
+        }
+        let mut loader = Overlay::new(self.documents.texts());
+        let text = String::from_utf8(loader.load(path).ok()?).ok()?;
+        Some(match loader.origin(path) {
+            Some(origin) => sources.add_made(path, text, origin),
+            None => sources.add(path, text),
+        })
     }
 
     /// A location for a client.
@@ -98,19 +112,22 @@ impl Server<'_> {
                     Some(_) => file,
                     None => documents::normal(&Path::new(path).with_file_name(file)),
                 };
-                let text = self.text(&path)?;
-                let (ast, _) = parser::parse(FileId(0), text.as_str());
+                let mut sources = SourceMap::default();
+                let file = self.source(&path, &mut sources)?;
+                let (ast, _) = parser::parse(file, &sources.file(file).text);
                 let wanted = |item: &&impasto_compiler::ast::Item| {
                     matches!(item.kind, ItemKind::Material(_))
                         && material.as_ref().is_none_or(|m| *m == item.name.node)
                 };
                 let item = ast.items.iter().find(wanted);
-                let place = item.map_or(0..0, |item| {
+                let start = Span::new(sources.document(file), 0..0);
+                let place = item.map_or(start, |item| {
                     let params = impasto_compiler::analysis::params(item);
                     let of_name = params.iter().find(|p| Some(&p.name.node) == param.as_ref());
-                    of_name.map_or(item.name.span.range(), |p| p.name.span.range())
+                    sources.known(of_name.map_or(item.name.span, |p| p.name.span))
                 });
-                self.location(&path, place)
+                let path = &sources.file(place.file).name;
+                self.location(path, place.range())
             }
         }
     }

@@ -7,6 +7,9 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use impasto_compiler::source::Origin;
 
 use crate::error::SceneError;
 
@@ -52,15 +55,33 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
+/// A source that was read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// Its text, if it is one.
+    pub bytes: Vec<u8>,
+    /// What it was made from, if it was.
+    pub origin: Option<Arc<Origin>>,
+}
+
+impl From<Vec<u8>> for Source {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self {
+            bytes,
+            origin: None,
+        }
+    }
+}
+
 /// The text of the source at `path`, as [`at_most`] reads it, or of what the MaterialX document there becomes.
 ///
 /// # Errors
 /// As [`open`], or if it cannot be read or imported.
-pub fn source(path: &Path, most: usize) -> io::Result<Vec<u8>> {
+pub fn source(path: &Path, most: usize) -> io::Result<Source> {
     if mtlx::is_document(path) {
-        return mtlx::source(path).map(String::into_bytes);
+        return mtlx::source(path, &mut mtlx::Disk);
     }
-    at_most(open(path)?, most)
+    Ok(at_most(open(path)?, most)?.into())
 }
 
 /// What can be read, but for what is more than one byte beyond `most`: so one sees that it is too long.

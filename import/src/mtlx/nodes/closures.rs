@@ -337,9 +337,11 @@ fn schlick(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 fn subsurface(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     let anisotropy = argument(call, "anisotropy", "anisotropy", "0.0")?;
     let frame = frame(call)?;
-    let radius = match call.arg("radius")?.literal {
+    let radius = call.arg("radius")?;
+    let radius = call.in_metres("radius", radius, false);
+    let radius = match &radius.literal {
         Some(literal) => literal.written(Vector3),
-        None => "vec3({radius})".to_owned(),
+        None => format!("vec3({})", call.named("radius", radius).text),
     };
     bsdf(
         call,
@@ -392,12 +394,16 @@ fn volume(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
         Some(literal) => literal.written(Color3),
         None => format!("color({})", value.plain()),
     };
+    let inverse = |call: &mut Call<'_, '_, '_>, name: &str| {
+        let value = call.arg(name)?;
+        Ok::<_, ImportError>(color(call.in_metres(name, value, true)))
+    };
     let mut medium = Medium {
-        absorption: color(call.arg("absorption")?),
+        absorption: inverse(call, "absorption")?,
         ..Medium::default()
     };
     if call.row.category == "anisotropic_vdf" {
-        medium.scattering = color(call.arg("scattering")?);
+        medium.scattering = inverse(call, "scattering")?;
         let anisotropy = call.arg("anisotropy")?;
         medium.anisotropy = if anisotropy.is_zero() {
             String::new()

@@ -245,13 +245,19 @@ fn conductor(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 
 /// The medium behind a boundary.
 fn medium(call: &mut Call<'_, '_, '_>, ior: String) -> Result<Medium, ImportError> {
-    let radius = call.arg("absorptionRadius")?;
+    let mut radius = call.arg("absorptionRadius")?;
     let absorption = call.arg("absorptionColor")?;
+    if !absorption.is_zero() {
+        radius = call.in_metres("absorptionRadius", radius, false);
+    }
     let absorption = match (absorption.literal, radius.single()) {
         (Some(Literal::Numbers(color)), Some(radius)) if radius > 0.0 => {
             Literal::Numbers(color.iter().map(|c| c / radius).collect()).written(Color3)
         }
-        _ => call.filled("{absorptionColor} / {absorptionRadius}")?,
+        _ => {
+            let radius = call.named("radius", radius).text;
+            call.filled(&format!("{{absorptionColor}} / {radius}"))?
+        }
     };
     let (scattering, anisotropy) = (call.arg("scatterColor")?, call.arg("scatterAnisotropy")?);
     let given = |value: Value| {

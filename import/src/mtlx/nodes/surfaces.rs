@@ -12,7 +12,8 @@ use crate::mtlx::nodes::Make::Code;
 use crate::mtlx::nodes::{Made, NodeRow, one, row};
 use crate::mtlx::text::{Level, bound, weighted};
 use crate::mtlx::types::Type::{self, *};
-use crate::mtlx::types::number;
+use crate::mtlx::types::{Literal, number};
+use crate::mtlx::units::length;
 use crate::mtlx::value::{Extra, Outputs, Shader, Value};
 
 pub(super) const ROWS: &[NodeRow] = &[
@@ -104,6 +105,12 @@ pub(in crate::mtlx) const MODELS: &[(&str, &str)] = &[
     ("UsdPreviewSurface", "usd_preview_surface"),
 ];
 
+/// Lengths whose default is a unit: the model, the input, and the input without which it says nothing.
+const METRIC: &[(&str, &str, &str)] = &[
+    ("standard_surface", "subsurface_scale", "subsurface"),
+    ("open_pbr_surface", "subsurface_radius", "subsurface_weight"),
+];
+
 /// Parameters of materials that their nodes in MaterialX 1.39 lack. Documents of others that have them are read.
 pub(in crate::mtlx) const LACKING: &[(&str, &[&str])] = &[(
     "disney_principled",
@@ -179,6 +186,19 @@ fn model(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
             arguments.push(format!("{name}: {text}"));
         }
     }
+    // What is not given is a length all the same.
+    for (_, name, of) in METRIC.iter().filter(|(model, _, _)| *model == category) {
+        let needed = document.input(call.key.node, of).is_some();
+        let given = document.input(call.key.node, name).is_some();
+        let parameter = known.iter().find(|parameter| parameter.name == *name);
+        if let Some(parameter) = parameter.filter(|_| needed && !given) {
+            let one = Value::of(Float, Literal::Numbers(vec![1.0]));
+            let text = argument(call, parameter, &one)?.unwrap_or_default();
+            if text != parameter.default {
+                arguments.push(format!("{name}: {text}"));
+            }
+        }
+    }
     let callee = match helpers::find(material) {
         Some(_) => format!("#{material}"),
         None => format!("@surface::{material}"),
@@ -226,6 +246,15 @@ fn argument(
             .expected(format!("`{}`", parameter.input_type().name()))
             .hint("put a `convert` between them"));
     }
+    let is_length = |(model, name, _): &(&str, &str, &str)| {
+        *model == call.row.category && *name == parameter.name
+    };
+    let metric = METRIC.iter().any(is_length) && parameter.ty == "float";
+    let value = &if metric {
+        call.in_metres(parameter.name, value.clone(), false)
+    } else {
+        value.clone()
+    };
     Ok(Some(match parameter.ty {
         // Documents of some programs write directions that are not given so.
         "normal" | "vector" if value.is_zero() => return Ok(None),
@@ -237,6 +266,7 @@ fn argument(
             let texel = bound(&value.text, Level::Prefix);
             format!("{map}(color(0.5 * {texel} + 0.5), normal, tangent)")
         }
+        "length" if parameter.unit() == "m" => call.length(parameter.name, value),
         "length" | "angle" => {
             let unit = parameter.unit();
             match value.single() {
@@ -256,17 +286,6 @@ fn argument(
         },
         _ => value.text.clone(),
     }))
-}
-
-/// A number of units; short lengths in smaller ones.
-fn length(value: f64, unit: &str) -> String {
-    const SMALLER: [(&str, f64); 2] = [("cm", 1e2), ("mm", 1e3)];
-    let smaller = SMALLER.iter().find(|(_, count)| value * count >= 1.0);
-    let (unit, value) = match smaller.filter(|_| unit == "m" && value < 0.1) {
-        Some((unit, count)) => (*unit, value * count),
-        None => (unit, value),
-    };
-    format!("{} {unit}", number(value).trim_end_matches(".0"))
 }
 
 /// A surface of closures.
