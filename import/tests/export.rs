@@ -7,7 +7,7 @@ use impasto_compiler::diag::{self, Code};
 use impasto_compiler::inspect::{Precision, Query, Shown, inspect};
 use impasto_compiler::instance::{Instance, NormalMap, Value, Varying, instance};
 use impasto_compiler::interface::{ParamInterface, interface};
-use impasto_compiler::{Loader, MaterialRequest, MemoryLoader};
+use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, ParameterValue};
 use impasto_import::{MemoryFiles, Options, import, to_materialx};
 
 use crate::common::{Disk, documents};
@@ -291,7 +291,28 @@ fn every_parameter_of_every_model_comes_back_as_a_picture() {
             }
         }
     }
-    assert!(media.len() < 8, "{media:?}");
+    assert!(media.len() < 5, "{media:?}");
+    for weight in ["transmission", "transmission_weight", "specTrans"] {
+        assert!(!media.iter().any(|name| name == weight), "{weight}");
+    }
+}
+
+#[test]
+fn a_model_is_an_instance_of_itself() {
+    let request = MaterialRequest {
+        params: vec![("coat_weight".into(), ParameterValue::Float(0.5))],
+        ..MaterialRequest::new("open_pbr", "std::surface::open_pbr")
+    };
+    let found = instance(&request, &mut MemoryLoader::default());
+    let instance = found.instance.expect("an instance");
+    assert_eq!(instance.model, "open_pbr");
+    let text = document(&instance);
+    assert!(
+        text.contains("<input name=\"coat_weight\" type=\"float\" value=\"0.5\" />"),
+        "{text}"
+    );
+    assert_eq!(text.matches("<input").count(), 2, "{text}");
+    imported(&text, false);
 }
 
 #[test]

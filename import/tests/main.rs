@@ -4,6 +4,7 @@ mod bad_input;
 mod common;
 mod documents;
 mod export;
+mod origins;
 mod page;
 mod rows;
 mod values;

@@ -182,3 +182,81 @@ fn a_binding_without_a_file_does_not_hide_the_next() {
     let found = client.ask("textDocument/definition", Client::at(&uri, &text, at));
     assert_eq!(found["range"]["start"]["line"], 6, "{found}");
 }
+
+const DOCUMENT: &str = "<materialx version=\"1.39\">
+  <nodegraph name=\"paint\">
+    <input name=\"tint\" type=\"color3\" value=\"0.5, 0.2, 0.1\" />
+    <multiply name=\"dark\" type=\"color3\">
+      <input name=\"in1\" type=\"color3\" interfacename=\"tint\" />
+      <input name=\"in2\" type=\"float\" value=\"0.5\" />
+    </multiply>
+    <output name=\"out\" type=\"color3\" nodename=\"dark\" />
+  </nodegraph>
+  <standard_surface name=\"shader\" type=\"surfaceshader\">
+    <input name=\"base_color\" type=\"color3\" nodegraph=\"paint\" />
+  </standard_surface>
+  <surfacematerial name=\"clay\" type=\"material\">
+    <input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"shader\" />
+  </surfacematerial>
+</materialx>
+";
+
+#[test]
+fn a_scene_leads_into_documents_of_materialx() {
+    let mut client = Client::new();
+    client.write("clay.mtlx", DOCUMENT);
+    client.write("room.obj", TRIANGLE);
+    let text = SCENE
+        .replace("wall.impasto", "clay.mtlx")
+        .replace(", size = \"2 cm\"", "");
+    let uri = client.open("scene.toml", &text);
+    assert_eq!(client.diagnostics(&uri), Vec::<Value>::new());
+    let mut leads = |word: &str| {
+        let at = text.find(word).expect("it is there") + 1;
+        let found = client.ask("textDocument/definition", Client::at(&uri, &text, at));
+        let file = found["uri"].as_str().unwrap_or("-").to_owned();
+        assert!(file.ends_with("/clay.mtlx"), "{found}");
+        let (start, end) = (&found["range"]["start"], &found["range"]["end"]);
+        DOCUMENT[offset(DOCUMENT, start)..offset(DOCUMENT, end)].to_owned()
+    };
+    assert_eq!(leads("clay.mtlx"), "<surfacematerial name=\"clay\" type=\"material\">");
+    assert_eq!(
+        leads("tint ="),
+        "<input name=\"tint\" type=\"color3\" value=\"0.5, 0.2, 0.1\" />"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_document_is_shown_at_its_elements() {
+    let mut client = Client::new();
+    let uri = client.open("clay.mtlx", DOCUMENT);
+    assert_eq!(client.diagnostics(&uri), Vec::<Value>::new());
+    let mut shown = |text: &str| {
+        client.change(&uri, text);
+        let found = client.diagnostics_where(&uri, |list| !list.is_empty());
+        let (start, end) = (&found[0]["range"]["start"], &found[0]["range"]["end"]);
+        let place = text[offset(text, start)..offset(text, end)].to_owned();
+        (place, found[0]["message"].as_str().unwrap_or_default().to_owned())
+    };
+    let unknown = DOCUMENT.replace("multiply", "multipli");
+    let (place, message) = shown(&unknown);
+    assert_eq!(place, "<multipli name=\"dark\" type=\"color3\">");
+    assert!(message.contains("did you mean `multiply`?"), "{message}");
+    // A sum of closures may gain energy.
+    let sum = DOCUMENT.replace(
+        "  <surfacematerial",
+        "  <oren_nayar_diffuse_bsdf name=\"a\" type=\"BSDF\" />
+  <add name=\"sum\" type=\"BSDF\">
+    <input name=\"in1\" type=\"BSDF\" nodename=\"a\" />
+    <input name=\"in2\" type=\"BSDF\" nodename=\"a\" />
+  </add>
+  <surface name=\"other\" type=\"surfaceshader\">
+    <input name=\"bsdf\" type=\"BSDF\" nodename=\"sum\" />
+  </surface>
+  <surfacematerial",
+    );
+    let sum = sum.replace("nodename=\"shader\"", "nodename=\"other\"");
+    let (place, message) = shown(&sum);
+    assert_eq!(place, "<add name=\"sum\" type=\"BSDF\">");
+    assert!(message.contains("from: the `add` node `sum`"), "{message}");
+}

@@ -250,6 +250,26 @@ fn documents_are_sources_where_they_are() {
     let is_red = |p: &image::Rgb<u8>| p.0[0] > p.0[2].saturating_add(20);
     assert!(lit.pixels().any(is_red));
 
+    // What the compiler has against it is told by its lines.
+    let medium = "<materialx version=\"1.39\">\n  <noise3d name=\"clouds\" type=\"color3\" />\n  \
+        <absorption_vdf name=\"inside\" type=\"VDF\">\n    \
+        <input name=\"absorption\" type=\"vector3\" nodename=\"thick\" />\n  </absorption_vdf>\n  \
+        <convert name=\"thick\" type=\"vector3\"><input name=\"in\" type=\"color3\" nodename=\"clouds\" /></convert>\n  \
+        <dielectric_bsdf name=\"clear\" type=\"BSDF\"><input name=\"scatter_mode\" type=\"string\" value=\"RT\" /></dielectric_bsdf>\n  \
+        <layer name=\"filled\" type=\"BSDF\"><input name=\"top\" type=\"BSDF\" nodename=\"clear\" />\
+        <input name=\"base\" type=\"VDF\" nodename=\"inside\" /></layer>\n  \
+        <surface name=\"s\" type=\"surfaceshader\"><input name=\"bsdf\" type=\"BSDF\" nodename=\"filled\" /></surface>\n\
+        </materialx>\n";
+    std::fs::write(&file, medium).expect("a document");
+    for of in [&path, &scene] {
+        impasto(&["check", of])
+            .exits(1)
+            .says("clay.mtlx:2:3")
+            .says("<noise3d name=\"clouds\" type=\"color3\" />")
+            .says("from: the `noise3d` node `clouds`, which becomes");
+    }
+    std::fs::write(&file, DOCUMENT).expect("a document");
+
     // It is read only.
     impasto(&["fmt", &path]).exits(2).says("impasto import");
     assert_eq!(std::fs::read_to_string(&file).expect("it"), DOCUMENT);
