@@ -13,8 +13,8 @@ use impasto_compiler::source::{MAX_SOURCE_BYTES, Origin};
 use impasto_compiler::{Loader, library_text};
 use impasto_runtime::film::output;
 pub use impasto_runtime::film::output::Unwritten;
-use impasto_runtime::input::{self, Source};
 pub use impasto_runtime::input::reason;
+use impasto_runtime::input::{self, Source};
 
 use crate::set;
 

@@ -182,7 +182,10 @@ impl SourceMap {
             }
         }
         let user = part.user.as_ref();
-        Some((told(*first, &part.place), user.map(|place| told(*first, place))))
+        Some((
+            told(*first, &part.place),
+            user.map(|place| told(*first, place)),
+        ))
     }
 
     /// The place in a document, `marble.mtlx:12`, that a comment names as the origin of what is at `span`.

@@ -113,6 +113,7 @@ fn json_has_the_documented_keys() {
         "end": 52,
         "expected": "a closure",
         "hint": "import it with `use`",
+        "notes": [],
         "labels": [{
             "message": "in this material",
             "file": "a.impasto",
@@ -131,8 +132,11 @@ fn json_has_the_documented_keys() {
 
 #[test]
 fn the_summary_counts_each_once() {
-    let (_, file) = sources();
-    assert_eq!(render::summary(&sources, &some(file)), "3 errors, 1 warning");
+    let (sources, file) = sources();
+    assert_eq!(
+        render::summary(&sources, &some(file)),
+        "3 errors, 1 warning"
+    );
     assert_eq!(render::summary(&sources, &some(file)[..1]), "1 error");
     assert_eq!(render::summary(&sources, &[]), "");
 }

@@ -33,7 +33,10 @@ fn every_statement_comes_from_an_element() {
         let text = imported.in_place();
         for part in imported.origin.parts() {
             let element = element(&imported.origin, part);
-            assert!(element.starts_with('<') && element.ends_with('>'), "{element}");
+            assert!(
+                element.starts_with('<') && element.ends_with('>'),
+                "{element}"
+            );
             assert!(text.get(part.range.clone()).is_some_and(|t| !t.is_empty()));
         }
         let mut at = 0;
@@ -47,7 +50,10 @@ fn every_statement_comes_from_an_element() {
             if !is_statement || helper {
                 continue;
             }
-            let part = imported.origin.part(start..start + 1).expect("the document");
+            let part = imported
+                .origin
+                .part(start..start + 1)
+                .expect("the document");
             let what = &part.place.what;
             assert!(what.contains("node `"), "{what}: {line}");
             if let Some(name) = line.trim().strip_prefix("let ") {
@@ -66,7 +72,9 @@ fn what_is_within_a_statement_comes_from_its_own_element() {
     let imported = in_place("tests/documents/definitions.mtlx");
     let text = imported.in_place();
     let of = |words: &str| {
-        let at = text.find(words).unwrap_or_else(|| panic!("{words}\n{text}"));
+        let at = text
+            .find(words)
+            .unwrap_or_else(|| panic!("{words}\n{text}"));
         let part = imported.origin.part(at..at + words.len()).expect("a part");
         let user = part.user.as_ref().map(|user| user.what.clone());
         (part.place.what.clone(), user.unwrap_or_default())
@@ -110,7 +118,10 @@ fn diagnostics_show_the_lines_of_the_document() {
         assert!(text.contains(said), "{said}\n{text}");
     }
     let json = render::json(&checked.sources, &checked.diagnostics);
-    assert!(json.contains("\"line\": 2") && json.contains("\"notes\""), "{json}");
+    assert!(
+        json.contains("\"line\": 2") && json.contains("\"notes\""),
+        "{json}"
+    );
 }
 
 #[test]
@@ -127,9 +138,17 @@ fn what_an_included_file_says_is_told_of_that_file() {
         "<materialx version=\"1.39\">\n <randomcolor name=\"tint\" type=\"color3\" />\n</materialx>",
     );
     let imported = import("art/a.mtlx", &mut files, &IN_PLACE).expect("it is imported");
-    let names = imported.origin.documents().iter().map(|(name, _)| name.as_str());
+    let names = imported
+        .origin
+        .documents()
+        .iter()
+        .map(|(name, _)| name.as_str());
     assert_eq!(names.collect::<Vec<_>>(), ["art/a.mtlx", "art/lib/b.mtlx"]);
-    let tint = imported.origin.parts().iter().find(|part| part.place.what.contains("`tint`"));
+    let tint = imported
+        .origin
+        .parts()
+        .iter()
+        .find(|part| part.place.what.contains("`tint`"));
     assert_eq!(tint.map(|part| part.place.document), Some(1));
     let written = import("art/a.mtlx", &mut files, &Options::default()).expect("it is imported");
     let text = &written.files[0].1;
@@ -147,7 +166,10 @@ fn diagnostics_of_files_quote_the_comment_of_the_statement() {
     files.add("tiles.impasto", text.as_str());
     let checked = check("tiles.impasto", &mut files);
     let shown = render::text(&checked.sources, &checked.diagnostics, false);
-    assert!(shown.contains("E0201") && shown.contains("from: tiles.mtlx:9"), "{shown}");
+    assert!(
+        shown.contains("E0201") && shown.contains("from: tiles.mtlx:9"),
+        "{shown}"
+    );
 }
 
 #[test]
@@ -173,7 +195,10 @@ fn lengths_without_a_unit_are_as_long_as_the_scene_says() {
     };
     let asks = source("", None);
     assert!(asks.contains("param scene_unit: length = 1 m"), "{asks}");
-    assert!(asks.contains("transmission_depth: 2.0 * scene_unit"), "{asks}");
+    assert!(
+        asks.contains("transmission_depth: 2.0 * scene_unit"),
+        "{asks}"
+    );
     let told = source("", Some(0.01));
     assert!(told.contains("transmission_depth: 2 cm"), "{told}");
     assert!(told.contains("subsurface_radius: 1 cm"), "{told}");

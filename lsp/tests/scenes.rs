@@ -219,7 +219,10 @@ fn a_scene_leads_into_documents_of_materialx() {
         let (start, end) = (&found["range"]["start"], &found["range"]["end"]);
         DOCUMENT[offset(DOCUMENT, start)..offset(DOCUMENT, end)].to_owned()
     };
-    assert_eq!(leads("clay.mtlx"), "<surfacematerial name=\"clay\" type=\"material\">");
+    assert_eq!(
+        leads("clay.mtlx"),
+        "<surfacematerial name=\"clay\" type=\"material\">"
+    );
     assert_eq!(
         leads("tint ="),
         "<input name=\"tint\" type=\"color3\" value=\"0.5, 0.2, 0.1\" />"
@@ -236,7 +239,10 @@ fn what_is_wrong_with_a_document_is_shown_at_its_elements() {
         let found = client.diagnostics_where(&uri, |list| !list.is_empty());
         let (start, end) = (&found[0]["range"]["start"], &found[0]["range"]["end"]);
         let place = text[offset(text, start)..offset(text, end)].to_owned();
-        (place, found[0]["message"].as_str().unwrap_or_default().to_owned())
+        (
+            place,
+            found[0]["message"].as_str().unwrap_or_default().to_owned(),
+        )
     };
     let unknown = DOCUMENT.replace("multiply", "multipli");
     let (place, message) = shown(&unknown);

@@ -56,7 +56,10 @@ pub fn text(sources: &SourceMap, diagnostics: &[Diagnostic], color: bool) -> Str
 pub fn summary(sources: &SourceMap, diagnostics: &[Diagnostic]) -> String {
     let shown = ordered(sources, diagnostics);
     let count = |severity| {
-        shown.iter().filter(|d| d.code.severity() == severity).count()
+        shown
+            .iter()
+            .filter(|d| d.code.severity() == severity)
+            .count()
     };
     let words = |count: usize, word: &str| match count {
         0 => None,

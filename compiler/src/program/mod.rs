@@ -117,7 +117,9 @@ impl Program {
 
     /// The file and the line, from 1, where a material is defined.
     pub fn place(&self, material: usize) -> Option<(String, u32)> {
-        let span = self.sources.known(self.recipes.get(material)?.material.span);
+        let span = self
+            .sources
+            .known(self.recipes.get(material)?.material.span);
         let file = self.sources.file(span.file).name.clone();
         Some((file, self.sources.line_column(span).0 as u32))
     }

@@ -216,7 +216,9 @@ fn somewhere(body: &mut Function, causes: &Causes, id: ExprId) -> Option<ExprId>
     if causes.of(id).is_none() {
         return Some(id);
     }
-    let Expr { kind, span, via, .. } = body.expr(id).clone();
+    let Expr {
+        kind, span, via, ..
+    } = body.expr(id).clone();
     match kind {
         ExprKind::Op(Op::Greater, args) if is_zero(body, args[1]) => None,
         ExprKind::Op(Op::And, args) => {

@@ -294,7 +294,9 @@ impl<'b, 'a> Builder<'b, 'a> {
                 .error(at, message)
                 .expected(format!("{expected}, for the type `{}`", ty.name()))
         })?;
-        if let (Literal::Numbers(numbers), Some(size)) = (&mut literal, units::stated(document, at)?) {
+        if let (Literal::Numbers(numbers), Some(size)) =
+            (&mut literal, units::stated(document, at)?)
+        {
             numbers.iter_mut().for_each(|number| *number *= size);
         }
         if !matches!(ty, Type::Color3 | Type::Color4) {
@@ -351,9 +353,9 @@ impl<'b, 'a> Builder<'b, 'a> {
         }
         let prefix = document.inherited(at, "fileprefix").unwrap_or_default();
         let base = &document.files[document.element(at).file as usize];
-        let found = self
-            .source
-            .texture(base, &format!("{prefix}{name}"), self.options.allow_outside);
+        let found =
+            self.source
+                .texture(base, &format!("{prefix}{name}"), self.options.allow_outside);
         let texture = found.map_err(|message| {
             let error = document.error(at, message);
             error.hint("`impasto import --allow-outside` reads it, if you trust the document")
@@ -451,7 +453,8 @@ impl<'b, 'a> Builder<'b, 'a> {
         }
         lets.reverse();
         let outputs = assignments.iter();
-        let outputs = outputs.map(|(name, text)| self.statement(&format!("{name} = "), text, shown));
+        let outputs =
+            outputs.map(|(name, text)| self.statement(&format!("{name} = "), text, shown));
         let outputs: Vec<Traced> = outputs.collect();
         let mark = self.mark(TOP, element);
         self.params.sort_by_key(|(at, _)| *at);

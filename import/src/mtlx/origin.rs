@@ -81,9 +81,10 @@ fn places(text: &str, formatted: &str) -> Vec<Option<usize>> {
         if byte.is_ascii_whitespace() {
             continue;
         }
-        while bytes.get(there).is_some_and(|other| {
-            other.is_ascii_whitespace() || *other == b',' && byte != b','
-        }) {
+        while bytes
+            .get(there)
+            .is_some_and(|other| other.is_ascii_whitespace() || *other == b',' && byte != b',')
+        {
             there += 1;
         }
         if bytes.get(there) == Some(&byte) {
@@ -159,7 +160,10 @@ impl Document {
             "nodegraph" => format!("the graph `{name}`"),
             "output" => format!("the output `{name}`"),
             "input" | "parameter" => {
-                format!("the input `{name}` of `{}`", self.name(self.element(id).parent))
+                format!(
+                    "the input `{name}` of `{}`",
+                    self.name(self.element(id).parent)
+                )
             }
             category => format!("the `{category}` node `{name}`"),
         }
@@ -253,7 +257,10 @@ impl Builder<'_, '_> {
             let mut at = within.start;
             while let Some(found) = text[at..within.end].find(own) {
                 let found = at + found..at + found + own.len();
-                if taken.iter().all(|t| t.end <= found.start || found.end <= t.start) {
+                if taken
+                    .iter()
+                    .all(|t| t.end <= found.start || found.end <= t.start)
+                {
                     return Some(found);
                 }
                 at = found.end;

@@ -200,7 +200,12 @@ pub(crate) fn written(
         Source::Node(key, _) => Some(key),
         _ => None,
     };
-    Ok(Some(builder.finished((name, &docs), id, &assignments, shown)))
+    Ok(Some(builder.finished(
+        (name, &docs),
+        id,
+        &assignments,
+        shown,
+    )))
 }
 
 fn shader_of(

@@ -209,10 +209,6 @@ fn every_parameter_comes_back_as_a_picture_where_gltf_has_one() {
             Some(Channel::Green) => "0.5 * texel.y".to_owned(),
             Some(Channel::Blue) => "0.5 * texel.z".to_owned(),
         };
-        // What fills an object does not vary, nor whether something does.
-        if row.name == "transmission" {
-            continue;
-        }
         // Both in one picture.
         let other = match row.name {
             "roughness" => ", metallic: texel.z",
