@@ -42,9 +42,15 @@ impl FileLoader {
         }
     }
 
-    /// The files that were asked for, whether they were there or not; those of the library are none.
+    /// The files that were asked for, whether they were there or not, with what documents include; those of the library
+    /// are none.
     pub fn asked(&self) -> impl Iterator<Item = PathBuf> {
         let paths = self.loaded.keys().map(|path| self.base.join(path));
+        let made = self.loaded.values().flatten();
+        let made = made.filter_map(|source| source.origin.as_ref());
+        let included = made.flat_map(|origin| origin.documents().iter().skip(1));
+        let included = included.map(|(path, _)| PathBuf::from(path));
+        let paths = paths.chain(included);
         paths.map(|path| input::on_disk(&path).to_owned())
     }
 

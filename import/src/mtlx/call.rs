@@ -211,6 +211,8 @@ impl Call<'_, '_, '_> {
             Kind::Any => (true, ""),
             Kind::Of(ty) => (fits(ty), ty.name()),
             Kind::Same => (fits(self.ty), self.ty.name()),
+            // Closures are not weighted by closures.
+            Kind::Scalar if !self.ty.is_numeric() => (fits(Type::Float), Type::Float.name()),
             Kind::Scalar => (fits(self.ty) || fits(Type::Float), self.ty.name()),
         };
         if fits {

@@ -149,6 +149,13 @@ impl Document {
         }
     }
 
+    /// The error about two elements of one name.
+    fn second(&self, what: &str, id: Id, first: Id) -> ImportError {
+        let (name, line) = (self.name(id), self.element(first).line);
+        let message = format!("a second {what} is called `{name}`; the first is in line {line}");
+        self.error(id, message).hint("rename one of them")
+    }
+
     /// Finds children by name from now on.
     ///
     /// # Errors
@@ -159,11 +166,11 @@ impl Document {
             let element = self.element(id);
             if matches!(element.category.as_str(), "input" | "parameter") {
                 let (name, parent) = (self.name(id).to_owned(), element.parent);
-                self.inputs
-                    .entry(parent)
-                    .or_default()
-                    .entry(name)
-                    .or_insert(id);
+                let inputs = self.inputs.entry(parent).or_default();
+                let first = *inputs.entry(name.clone()).or_insert(id);
+                if first != id && !name.is_empty() {
+                    errors.push(self.second("input", id, first));
+                }
                 continue;
             }
             if element.category == "token" || id == ROOT {
@@ -175,10 +182,7 @@ impl Document {
             }
             let names = self.names.entry(parent).or_default();
             if let Some(first) = names.get(&name).copied() {
-                let line = self.element(first).line;
-                let message =
-                    format!("a second element is called `{name}`; the first is in line {line}");
-                errors.push(self.error(id, message).hint("rename one of them"));
+                errors.push(self.second("element", id, first));
             } else {
                 names.insert(name, id);
             }

@@ -5,7 +5,7 @@ use crate::mtlx::call::Call;
 use crate::mtlx::nodes::Make::{Code, Each, Text};
 use crate::mtlx::nodes::{Made, NodeRow, matrices, one, row};
 use crate::mtlx::text::{Level, bound};
-use crate::mtlx::types::Type::*;
+use crate::mtlx::types::Type::{self, *};
 use crate::mtlx::types::{Literal, list, number};
 use crate::mtlx::value::{Extra, Value};
 
@@ -249,6 +249,7 @@ fn sum(call: &mut Call<'_, '_, '_>, operator: &str) -> Result<&'static str, Impo
 
 fn multiply(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
     if matches!(call.ty, Bsdf | Edf) {
+        factor(call, Color3)?;
         let made = call.template("{in2} * {in1}")?;
         return with_medium(call, made, &["in1"]);
     }
@@ -257,12 +258,25 @@ fn multiply(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
 
 /// A product or quotient; a vector of equal numbers is one number.
 fn scaled(call: &mut Call<'_, '_, '_>, operator: &str) -> Result<Made, ImportError> {
-    let by = call.arg("in2")?;
+    let by = factor(call, call.ty)?;
     let is_vector = matches!(call.ty, Color3 | Color4 | Vector2 | Vector3 | Vector4);
     match by.single().filter(|_| is_vector && by.ty == call.ty) {
         Some(by) => call.template(&format!("{{in1}} {operator} {}", number(by))),
         None => call.template(&format!("{{in1}} {operator} {{in2}}")),
     }
+}
+
+/// The second factor: a number, or a value of this type.
+fn factor(call: &mut Call<'_, '_, '_>, ty: Type) -> Result<Value, ImportError> {
+    let by = call.arg("in2")?;
+    if by.ty == ty || matches!(by.ty, Float | Integer) {
+        return Ok(by);
+    }
+    let (own, wrong) = (call.described(), by.ty.name());
+    let error = call.error(format!("the input `in2` of {own} has the type `{wrong}`"));
+    Err(error
+        .expected(format!("`{}` or `float`", ty.name()))
+        .hint("put a `convert` between them"))
 }
 
 fn divide(call: &mut Call<'_, '_, '_>) -> Result<Made, ImportError> {
