@@ -46,8 +46,13 @@ fn every_statement_comes_from_an_element() {
             let words = ["let ", "surface = ", "emission = ", "material = "];
             let is_statement = words.iter().any(|word| line.trim_start().starts_with(word));
             // Helpers come from the importer.
-            let helper = text[..start].rfind("\nfn ") > text[..start].rfind("\nmaterial ");
-            if !is_statement || helper {
+            let before = &text[..start];
+            let material = before
+                .rfind("\nmaterial ")
+                .map_or("", |at| &before[at + 10..]);
+            let material = material.split(' ').next().unwrap_or_default();
+            let is_helper = !imported.materials.iter().any(|(name, _)| name == material);
+            if !is_statement || is_helper || before.rfind("\n}\n") > before.rfind("\nmaterial ") {
                 continue;
             }
             let part = imported
@@ -87,7 +92,7 @@ fn what_is_within_a_statement_comes_from_its_own_element() {
         of("specular_roughness: narrow_part").0,
         "the input `specular_roughness` of `shader`"
     );
-    assert_eq!(of("material sin {").0, "the material `sin`");
+    assert_eq!(of("material sin_material {").0, "the material `sin`");
 }
 
 /// A source in place, as the compiler reads it.

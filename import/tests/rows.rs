@@ -99,7 +99,12 @@ fn compiles_for_some_type(inputs: impl Fn(&NodeRow, &str, &str) -> String) {
         let mut why = String::new();
         let works = TYPES.iter().any(|ty| {
             [ty, "float", "vector3", "matrix33"].iter().any(|any| {
-                let inputs = format!("{}{}", needed(row.category), inputs(&row, ty, any));
+                let mut inputs = inputs(&row, ty, any);
+                let needed = needed(row.category);
+                let name = needed.split(" type").next().unwrap_or_default();
+                if name.is_empty() || !inputs.contains(name) {
+                    inputs.insert_str(0, needed);
+                }
                 let problem = problem(&row, ty, &inputs).err();
                 why = problem.clone().unwrap_or_default();
                 problem.is_none()

@@ -195,10 +195,10 @@ fn found(checker: &mut Checker, request: &MaterialRequest) -> Option<Instance> {
     let written = request.written.as_deref();
     let values = checker.parameter_values(module, &material, params, &origin, written)?;
     let values = checker.values_at(&material, values, request.moment.unwrap_or_default())?;
-    let item = ItemRef { module, index };
-    let Some(whole) = checker.whole(item).cloned() else {
-        if let (Some(MODELS), model) = checker.named(item) {
-            return Some(itself(model, &material, &values));
+    let Some(whole) = checker.whole(ItemRef { module, index }).cloned() else {
+        let path = request.file.strip_prefix("std::");
+        if path.and_then(|path| path.split_once("::")) == Some((MODELS, &material.name)) {
+            return Some(itself(&material, &values));
         }
         checker.diagnostics.push(no_instance(&material));
         return None;
@@ -254,7 +254,7 @@ fn found(checker: &mut Checker, request: &MaterialRequest) -> Option<Instance> {
 }
 
 /// A model as an instance of itself: what it is given are values of parameters.
-fn itself(model: String, material: &crate::ir::Material, values: &[Const]) -> Instance {
+fn itself(material: &crate::ir::Material, values: &[Const]) -> Instance {
     let given = material.params.iter().zip(values);
     let given = given.filter(|(param, value)| !param.is_input && **value != param.default);
     let arguments = given.map(|(param, value)| {
@@ -271,7 +271,7 @@ fn itself(model: String, material: &crate::ir::Material, values: &[Const]) -> In
     });
     Instance {
         name: material.name.clone(),
-        model,
+        model: material.name.clone(),
         arguments: arguments.collect(),
         lookups: Vec::new(),
         pictures: Vec::new(),
