@@ -49,7 +49,7 @@ impl Server<'_> {
     }
 
     /// Adds the source that a file is read as.
-    fn source(&self, path: &str, sources: &mut SourceMap) -> Option<FileId> {
+    fn add_source(&self, path: &str, sources: &mut SourceMap) -> Option<FileId> {
         if !mtlx::is_document(Path::new(path)) {
             return Some(sources.add(path, self.text(path)?.as_str()));
         }
@@ -113,7 +113,7 @@ impl Server<'_> {
                     None => documents::normal(&Path::new(path).with_file_name(file)),
                 };
                 let mut sources = SourceMap::default();
-                let file = self.source(&path, &mut sources)?;
+                let file = self.add_source(&path, &mut sources)?;
                 let (ast, _) = parser::parse(file, &sources.file(file).text);
                 let wanted = |item: &&impasto_compiler::ast::Item| {
                     matches!(item.kind, ItemKind::Material(_))

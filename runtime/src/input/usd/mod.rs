@@ -189,7 +189,7 @@ impl Model {
         let imported = self.imported(material);
         Some(
             imported
-                .map(|imported| imported.in_place(""))
+                .map(|imported| imported.in_place())
                 .map_err(io::Error::other),
         )
     }
@@ -203,6 +203,6 @@ impl Model {
 
     fn imported(&self, material: &Material) -> Result<Imported, String> {
         let document = material.document.as_ref().map_err(Clone::clone)?;
-        shade::imported(&material.name, &material.source, document)
+        shade::imported(&material.name, &material.source, document, material.metres)
     }
 }

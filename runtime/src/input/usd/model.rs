@@ -108,6 +108,8 @@ pub(crate) struct Material {
     /// The name of its source and of the material within.
     pub(super) source: String,
     pub(super) document: Result<String, String>,
+    /// What lengths of it are counted in, in metres: the stage's unit.
+    pub(super) metres: f64,
 }
 
 /// A camera.

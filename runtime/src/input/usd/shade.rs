@@ -22,6 +22,7 @@ pub(super) fn material(walk: &mut Walk<'_>, path: &Path) -> Checked<Material> {
         .names
         .name(path.name().unwrap_or("material").to_owned());
     let source = walk.sources_named.name(names::identifier(&name, &[BARE]));
+    let metres = walk.upright.x_axis.length();
     let mut document = None;
     let mut coordinates = Vec::new();
     for output in ["outputs:mtlx:surface", "outputs:surface"] {
@@ -30,7 +31,7 @@ pub(super) fn material(walk: &mut Walk<'_>, path: &Path) -> Checked<Material> {
             continue;
         };
         let read = network.coordinates;
-        let found = found.and_then(|text| imported(&name, &source, &text).map(|_| text));
+        let found = found.and_then(|text| imported(&name, &source, &text, metres).map(|_| text));
         match (&document, found) {
             (None | Some(Err(_)), Ok(text)) => {
                 if let Some(Err(why)) = &document {
@@ -56,6 +57,7 @@ pub(super) fn material(walk: &mut Walk<'_>, path: &Path) -> Checked<Material> {
         name,
         source,
         document,
+        metres,
     })
 }
 
@@ -81,12 +83,19 @@ fn bare(walk: &mut Walk<'_>, path: &Path) {
     ));
 }
 
-/// What a document becomes.
-pub(super) fn imported(name: &str, source: &str, document: &str) -> Result<Imported, String> {
+/// What a document becomes, whose lengths are in units of so many metres.
+pub(super) fn imported(
+    name: &str,
+    source: &str,
+    document: &str,
+    metres: f64,
+) -> Result<Imported, String> {
     let path = format!("{source}.mtlx");
     let options = Options {
-        allow_outside: false,
+        metres_per_unit: Some(metres),
         unchecked: true,
+        in_place: true,
+        ..Options::default()
     };
     let imported = impasto_import::import(&path, &mut Within(document), &options);
     imported.map_err(|errors| {
