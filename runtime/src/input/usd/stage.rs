@@ -12,7 +12,7 @@ use openusd::usd::Stage;
 use super::arcs::Arcs;
 use super::model::Model;
 use super::resolver::Files;
-use super::values::Reader;
+use super::values::{Known, Reader};
 use super::walk::Walk;
 use crate::error::SceneError;
 use crate::input::file;
@@ -150,9 +150,11 @@ fn read(path: &Path, stamp: Stamp, seconds: f64) -> Result<Model, String> {
         layers: Vec::new(),
         warnings: Vec::new(),
     };
+    let known = Known::default();
     let reader = Reader {
         stage: &stage,
         time: seconds * rate,
+        known: &known,
     };
     let mut model = Walk::new(reader, arcs, model).whole()?;
     if let Some(why) = files.refused() {

@@ -1,5 +1,9 @@
 //! Values of attributes as numbers: USD has each in halves, floats and doubles.
 
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+
 use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
 use openusd::sdf::{Path, Value};
 use openusd::usd::{Stage, TimeCode};
@@ -10,11 +14,39 @@ pub(super) struct Reader<'s> {
     pub(super) stage: &'s Stage,
     /// In time codes.
     pub(super) time: f64,
+    pub(super) known: &'s Known,
 }
 
+/// What prims say anything of, so that nobody asks the composition for what none of its layers has.
+#[derive(Default)]
+pub(super) struct Known(RefCell<HashMap<Path, Rc<HashSet<String>>>>);
+
+/// How many prims are known.
+const KNOWN: usize = 256;
+
 impl Reader<'_> {
+    /// Does a prim say anything of a property?
+    pub(super) fn has(&self, prim: &Path, name: &str) -> bool {
+        if let Some(names) = self.known.0.borrow().get(prim) {
+            return names.contains(name);
+        }
+        let names = self.stage.prim(prim.clone()).property_names();
+        let names = names.unwrap_or_default();
+        let names: HashSet<String> = names.iter().map(|n| n.as_str().to_owned()).collect();
+        let is_there = names.contains(name);
+        let mut known = self.known.0.borrow_mut();
+        if known.len() >= KNOWN {
+            known.clear();
+        }
+        known.insert(prim.clone(), Rc::new(names));
+        is_there
+    }
+
     /// The value of an attribute of a prim; none if it has none.
     pub(super) fn value(&self, prim: &Path, name: &str) -> Result<Option<Value>, String> {
+        if !self.has(prim, name) {
+            return Ok(None);
+        }
         let path = prim.append_property(name).map_err(|e| e.to_string())?;
         let attribute = self.stage.attribute(path);
         let value = attribute.get_at::<Value>(Some(TimeCode::new(self.time)));
@@ -25,6 +57,7 @@ impl Reader<'_> {
     /// Is the value another at other times?
     pub(super) fn varies(&self, prim: &Path, name: &str) -> bool {
         let path = prim.append_property(name).ok();
+        let path = path.filter(|_| self.has(prim, name));
         path.is_some_and(|path| {
             self.stage
                 .value_might_be_time_varying(path)
@@ -88,6 +121,9 @@ impl Reader<'_> {
 
     /// The targets of a relationship.
     pub(super) fn targets(&self, prim: &Path, name: &str) -> Result<Vec<Path>, String> {
+        if !self.has(prim, name) {
+            return Ok(Vec::new());
+        }
         let path = prim.append_property(name).map_err(|e| e.to_string())?;
         let targets = self.stage.relationship(path).forwarded_targets();
         targets.map_err(|e| format!("`{prim}.{name}` cannot be read: {e:#}"))
