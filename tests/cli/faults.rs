@@ -301,7 +301,7 @@ fn the_memory_of_a_merge_does_not_grow_with_its_films() {
 
 /// Address space for the program and a small film.
 #[cfg(target_os = "linux")]
-const PROGRAM_KIB: u64 = 160 << 10;
+const PROGRAM_KIB: u64 = 192 << 10;
 
 #[test]
 fn a_small_stack_is_enough() {

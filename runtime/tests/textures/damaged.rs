@@ -41,6 +41,7 @@ fn good() -> Vec<(&'static str, Vec<u8>)> {
     let grey = ImageBuffer::from_fn(24, 17, |x, y| Luma([(x * y * 97) as u16]));
     let float = || ImageBuffer::from_fn(24, 17, |x, y| Rgb([x as f32, y as f32 * 0.3, 7.0]));
     vec![
+        ("a.webp", encode(rgba.clone(), ImageFormat::WebP)),
         ("a.png", encode(rgba, ImageFormat::Png)),
         ("b.png", encode(grey, ImageFormat::Png)),
         ("a.jpg", encode(rgb, ImageFormat::Jpeg)),
@@ -138,7 +139,7 @@ fn what_is_no_picture_is_said_to_be_none() {
         (
             "a.png",
             b"RIFF\x24\x00\x00\x00WEBPVP8 ",
-            "a format that is not read here: WebP",
+            "the texture is damaged or cut short",
         ),
         (
             "a.jpg",
@@ -149,7 +150,9 @@ fn what_is_no_picture_is_said_to_be_none() {
         let text = problem(name, bytes);
         assert!(text.contains(says), "{text}");
     }
-    assert!(problem("a.tga", b"??").contains("PNG, JPEG, Radiance HDR (.hdr) or OpenEXR (.exr)"));
+    assert!(
+        problem("a.tga", b"??").contains("PNG, JPEG, WebP, Radiance HDR (.hdr) or OpenEXR (.exr)")
+    );
 }
 
 #[test]
