@@ -50,7 +50,12 @@ pub(crate) fn load(path: &Path, what: &str, is_color: bool) -> Result<Picture, S
     let (format, decoder) = open(path, what)?;
     let decoded = guarded(|| DynamicImage::from_decoder(decoder));
     let image = decoded.map_err(|e| decode_error(path, what, &e))?;
-    if format == ImageFormat::Jpeg && !jpeg_is_whole(path).unwrap_or(false) {
+    let is_whole = match format {
+        ImageFormat::Jpeg => jpeg_is_whole(path),
+        ImageFormat::WebP => webp_is_whole(path),
+        _ => Ok(true),
+    };
+    if !is_whole.unwrap_or(false) {
         return Err(damaged(path, what, "its end is missing"));
     }
     Ok(Picture {
@@ -162,6 +167,15 @@ fn jpeg_is_whole(path: &Path) -> std::io::Result<bool> {
         before = byte;
     }
     Ok(whole)
+}
+
+/// Has a WebP file as many bytes as its head says? Its decoder does without the last ones.
+fn webp_is_whole(path: &Path) -> std::io::Result<bool> {
+    let mut head = [0; 8];
+    let mut file = input::open(path)?;
+    file.read_exact(&mut head)?;
+    let says = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
+    Ok(file.metadata()?.len() >= u64::from(says) + 8)
 }
 
 /// The formats that are read.

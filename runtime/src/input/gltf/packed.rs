@@ -219,7 +219,7 @@ impl<'m> Buffers<'m> {
         let data = attribute.buffer().data();
         for point in 0..count {
             let index = attribute.mapped_index(PointIndex(point as u32)).0 as usize;
-            let at = index.checked_mul(stride).unwrap_or(usize::MAX);
+            let at = index.saturating_mul(stride);
             let element = data
                 .get(at..)
                 .and_then(|rest| rest.get(..components * width));
