@@ -5,7 +5,8 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
 
-use gltf::json::validation::{Error as Invalid, Validate};
+use gltf::Semantic;
+use gltf::json::validation::{Checked, Error as Invalid, Validate};
 use serde_json::Value;
 
 use super::motion::Motion;
@@ -308,6 +309,22 @@ fn check(path: &Path, root: &gltf::json::Root) -> Result<(), SceneError> {
             first = Some((place, what));
         }
     };
+    // The crate looks at the accessors of positions before it checks that they are there.
+    let lost = |p: &gltf::json::mesh::Primitive| {
+        let places = p.attributes.get(&Checked::Valid(Semantic::Positions));
+        places.is_some_and(|accessor| accessor.value() >= root.accessors.len())
+    };
+    for (mesh, number) in root.meshes.iter().zip(0..) {
+        if let Some(place) = mesh.primitives.iter().position(lost) {
+            return Err(SceneError::in_file(
+                path,
+                format!(
+                    "the glTF file is damaged: `meshes[{number}].primitives[{place}].attributes[\"POSITION\"]` \
+                     leads to something that is not there"
+                ),
+            ));
+        }
+    }
     root.validate(root, gltf::json::Path::new, &mut report);
     let Some((place, what)) = first else {
         return Ok(());

@@ -543,7 +543,13 @@ fn odd_kinds_of_values_are_no_panic() {
 #[test]
 fn damage_is_told() {
     type Change<'a> = &'a dyn Fn(&mut Value);
-    let cases: [(&str, Change); 10] = [
+    let cases: [(&str, Change); 11] = [
+        (
+            "`meshes[0].primitives[0].attributes[\"POSITION\"]` leads to something",
+            &|j| {
+                j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 3.into();
+            },
+        ),
         ("glTF of 1.0", &|j| j["asset"]["version"] = "1.0".into()),
         ("`KHR_none`", &|j| {
             j["extensionsRequired"] = json!(["KHR_none"])
