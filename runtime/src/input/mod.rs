@@ -11,9 +11,8 @@ use std::sync::Arc;
 
 use impasto_compiler::source::Origin;
 
-use crate::error::SceneError;
-
 mod file;
+mod folder;
 pub mod gltf;
 pub mod mtlx;
 mod names;
@@ -21,7 +20,10 @@ mod shown;
 mod stamp;
 pub mod usd;
 
+use folder::SCENE;
+
 pub use file::{is_transient, reason};
+pub(crate) use folder::inside;
 
 /// Opens the file at `path` for reading.
 ///
@@ -108,20 +110,9 @@ pub fn scene(path: &Path) -> PathBuf {
     }
 }
 
-/// The scene in a file that is a folder.
-const SCENE: &str = "scene.toml";
-
 /// Does the extension say that the file is a folder here?
 pub fn is_folder(path: &Path) -> bool {
     gltf::is_named_so(path) || usd::is_named_so(path)
-}
-
-/// The file that `path` leads into, which is named so, and the name of the member there; none if it leads into no such
-/// file.
-pub(crate) fn inside(path: &Path, is_named_so: fn(&Path) -> bool) -> Option<(&Path, &Path)> {
-    let mut parents = path.ancestors().skip(1).filter(|file| is_named_so(file));
-    let file = parents.find(|file| file.is_file())?;
-    Some((file, path.strip_prefix(file).ok()?))
 }
 
 /// What `path` names within a file that is a folder; none if it leads into none.
@@ -132,16 +123,4 @@ fn member(path: &Path) -> Option<io::Result<Vec<u8>>> {
     } else {
         usd::member(file, name)
     })
-}
-
-/// What is wrong with a file, for whoever tells its name.
-fn said(error: SceneError) -> String {
-    let line = error.line.map(|line| format!("line {line}: "));
-    let hint = error.hint.map(|hint| format!("\n  hint: {hint}"));
-    format!(
-        "{}{}{}",
-        line.unwrap_or_default(),
-        error.message,
-        hint.unwrap_or_default()
-    )
 }

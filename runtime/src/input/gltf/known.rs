@@ -28,8 +28,8 @@ impl Model {
         let (file, stamp) = open().map_err(|e| unreadable(path, &e))?;
         // Who asks meanwhile waits, and finds it known.
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut found = known.iter();
-        let found = found.position(|m| m.path == path && m.choice == *choice);
+        let is_it = |m: &Arc<Self>| m.path == path && m.choice == *choice;
+        let found = known.iter().position(is_it);
         if let Some(model) = found.map(|at| known.remove(at))
             && model.stamp == stamp
         {

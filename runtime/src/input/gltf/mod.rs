@@ -22,8 +22,9 @@ use serde_json::Value;
 
 use self::motion::Motion;
 use self::packed::Packed;
+use super::folder::SCENE;
 use super::stamp::Stamp;
-use super::{SCENE, file};
+use super::{file, folder};
 use crate::error::SceneError;
 
 mod accessor;
@@ -124,10 +125,7 @@ impl Member {
         if name == Path::new(ALL) {
             return Some((choice, Self::All));
         }
-        let number = |folder: &str| {
-            let within = name.strip_prefix(folder).ok()?.to_str()?;
-            within.strip_suffix(".gltf")?.parse().ok()
-        };
+        let number = |of: &str| folder::numbered(name, of, ".gltf");
         let node = || number("nodes").map(Self::Node);
         let member = number("meshes").map(Self::Mesh).or_else(node);
         member.map(|member| (choice, member))
@@ -136,13 +134,12 @@ impl Member {
 
 /// Does the extension say that it is a glTF file?
 pub fn is_named_so(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    extension.is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
+    folder::has_extension(path, &EXTENSIONS)
 }
 
 /// The glTF file that `path` leads into, and the name of the member there; none if it leads into no such file.
 pub(crate) fn inside(path: &Path) -> Option<(&Path, &Path)> {
-    super::inside(path, is_named_so)
+    folder::inside(path, is_named_so)
 }
 
 /// Does `path` name a file, or a choice in one, and no member?
@@ -157,22 +154,19 @@ pub(crate) fn is_folder(path: &Path) -> bool {
 /// There is no such member, or the file is damaged.
 pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
     let (choice, name) = Choice::of(name);
-    let model = Model::read(path, &choice).map_err(|e| io::Error::other(super::said(e)))?;
+    let model = Model::read(path, &choice).map_err(|e| io::Error::other(folder::said(e)))?;
     let missing = || io::Error::from(io::ErrorKind::NotFound);
-    let name = name.to_str().ok_or_else(missing)?;
-    if name == SCENE {
+    if name == Path::new(SCENE) {
         return Ok(model.scene("").into_bytes());
     }
-    if let Some(source) = name.strip_suffix(".impasto") {
+    if let Some(source) = name.to_str().and_then(|n| n.strip_suffix(".impasto")) {
         let source = model.source(source);
         return source.map(String::into_bytes).ok_or_else(missing);
     }
-    let mesh = name.strip_prefix("placements/");
-    let mesh = mesh.and_then(|n| n.strip_suffix(".txt")?.parse().ok());
-    if let Some(mesh) = mesh {
+    if let Some(mesh) = folder::numbered(name, "placements", ".txt") {
         return Ok(model.placements(mesh).into_bytes());
     }
-    let number = name.strip_prefix("images/").and_then(|n| n.parse().ok());
+    let number = folder::numbered(name, "images", "");
     model.picture(number.ok_or_else(missing)?)
 }
 

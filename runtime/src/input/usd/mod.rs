@@ -17,10 +17,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use impasto_import::Imported;
 
-use self::model::{Light, Material};
-use super::{SCENE, file};
+use self::model::Light;
+use super::folder::SCENE;
+use super::{file, folder};
 use crate::error::SceneError;
 
 mod archive;
@@ -70,10 +70,7 @@ impl Member {
         if name == Path::new(ALL) {
             return Some(Self::All);
         }
-        let number = |folder: &str| {
-            let within = name.strip_prefix(folder).ok()?.to_str()?;
-            within.strip_suffix(".usd")?.parse().ok()
-        };
+        let number = |of: &str| folder::numbered(name, of, ".usd");
         let prim = || number("prims").map(Self::Prim);
         let light = || number("lights").map(Self::Light);
         number("meshes")
@@ -85,8 +82,7 @@ impl Member {
 
 /// Does the extension say that it is a USD file?
 pub fn is_named_so(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    extension.is_some_and(|e| EXTENSIONS.contains(&e.to_ascii_lowercase().as_str()))
+    folder::has_extension(path, &EXTENSIONS)
 }
 
 /// A member of the file at `path`, as bytes.
@@ -94,24 +90,21 @@ pub fn is_named_so(path: &Path) -> bool {
 /// # Errors
 /// There is no such member, or the file is damaged.
 pub(crate) fn member(path: &Path, name: &Path) -> io::Result<Vec<u8>> {
-    let model = Model::read(path, 0.0).map_err(|e| io::Error::other(super::said(e)))?;
+    let model = Model::read(path, 0.0).map_err(|e| io::Error::other(folder::said(e)))?;
     let missing = || io::Error::from(io::ErrorKind::NotFound);
-    let name = name.to_str().ok_or_else(missing)?;
-    if name == SCENE {
+    if name == Path::new(SCENE) {
         return Ok(model.scene("").into_bytes());
     }
-    if let Some(source) = name.strip_suffix(".impasto") {
+    if let Some(source) = name.to_str().and_then(|n| n.strip_suffix(".impasto")) {
         return model
             .source(source)
             .ok_or_else(missing)?
             .map(String::into_bytes);
     }
-    let mesh = name.strip_prefix("placements/");
-    let mesh = mesh.and_then(|n| n.strip_suffix(".txt")?.parse().ok());
-    if let Some(mesh) = mesh {
+    if let Some(mesh) = folder::numbered(name, "placements", ".txt") {
         return Ok(model.placements(mesh).into_bytes());
     }
-    let number = name.strip_prefix("images/").and_then(|n| n.parse().ok());
+    let number = folder::numbered(name, "images", "");
     model.picture(number.ok_or_else(missing)?)
 }
 
@@ -182,27 +175,11 @@ impl Model {
             }
             _ => {}
         }
-        let material = self
-            .materials
-            .iter()
-            .find(|material| material.source == name)?;
-        let imported = self.imported(material);
-        Some(
-            imported
-                .map(|imported| imported.in_place())
-                .map_err(io::Error::other),
-        )
-    }
-
-    /// The name of a material in its source.
-    fn within(&self, material: &Material) -> String {
-        let imported = self.imported(material).ok();
-        let first = imported.and_then(|imported| imported.materials.into_iter().next());
-        first.map_or_else(|| material.source.clone(), |(name, _)| name)
-    }
-
-    fn imported(&self, material: &Material) -> Result<Imported, String> {
-        let document = material.document.as_ref().map_err(Clone::clone)?;
-        shade::imported(&material.name, &material.source, document, material.metres)
+        let mut materials = self.materials.iter();
+        let material = materials.find(|material| material.source == name)?;
+        match &material.made {
+            Ok(made) => made.as_ref().map(|made| Ok(made.text.clone())),
+            Err(why) => Some(Err(io::Error::other(why.clone()))),
+        }
     }
 }

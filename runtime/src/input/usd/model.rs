@@ -101,15 +101,22 @@ pub(crate) struct Placed {
     pub(crate) is_visible: bool,
 }
 
-/// A material, as a MaterialX document or what keeps it from being one.
+/// A material.
 pub(crate) struct Material {
     /// What scenes call it.
     pub(crate) name: String,
-    /// The name of its source and of the material within.
+    /// The name of its source.
     pub(super) source: String,
-    pub(super) document: Result<String, String>,
-    /// What lengths of it are counted in, in metres: the stage's unit.
-    pub(super) metres: f64,
+    /// What it is in the language; none if it has no network, and then the color of the geometry takes its place. Else
+    /// what keeps it from being imported.
+    pub(super) made: Result<Option<Made>, String>,
+}
+
+/// A material in the language.
+pub(super) struct Made {
+    pub(super) text: String,
+    /// The name of the material in it.
+    pub(super) within: String,
 }
 
 /// A camera.

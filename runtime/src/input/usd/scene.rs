@@ -44,17 +44,16 @@ impl Model {
         for material in &self.materials {
             let source = &material.source;
             let _ = writeln!(text, "[materials.{}]", quoted(&material.name));
-            let of_several = match &material.document {
-                Ok(document) if document.is_empty() => {
-                    let _ = writeln!(text, "file = \"{BARE}.impasto\"\n");
-                    continue;
-                }
-                _ => format!(
-                    "file = \"{source}.impasto\"\nmaterial = {}\n\n",
-                    quoted(&self.within(material))
-                ),
+            let (file, within) = match &material.made {
+                Ok(None) => (BARE, None),
+                Ok(Some(made)) => (source.as_str(), Some(&made.within)),
+                Err(_) => (source.as_str(), Some(source)),
             };
-            text.push_str(&of_several);
+            let _ = writeln!(text, "file = \"{file}.impasto\"");
+            if let Some(within) = within {
+                let _ = writeln!(text, "material = {}", quoted(within));
+            }
+            text.push('\n');
         }
         let _ = write!(text, "[materials.\"*\"]\nfile = \"{BARE}.impasto\"\n\n");
         self.write_lights(prefix, &mut text);

@@ -1,11 +1,11 @@
 //! Materials of a stage as MaterialX documents: networks of UsdShade are networks of MaterialX, whose nodes have other
 //! names here and there. What nodes mean, the importer of MaterialX knows.
 
-use impasto_import::{Files, Imported, Options};
+use impasto_import::{Files, Options};
 use openusd::sdf::{AssetPath, Path};
 
 use self::network::Network;
-use super::model::Material;
+use super::model::{Made, Material};
 use super::walk::Walk;
 use crate::input::names;
 
@@ -23,7 +23,7 @@ pub(super) fn material(walk: &mut Walk<'_>, path: &Path) -> Checked<Material> {
         .name(path.name().unwrap_or("material").to_owned());
     let source = walk.sources_named.name(names::identifier(&name, &[BARE]));
     let metres = walk.upright.x_axis.length();
-    let mut document = None;
+    let mut made = None;
     let mut coordinates = Vec::new();
     for output in ["outputs:mtlx:surface", "outputs:surface"] {
         let mut network = Network::new(walk);
@@ -31,33 +31,31 @@ pub(super) fn material(walk: &mut Walk<'_>, path: &Path) -> Checked<Material> {
             continue;
         };
         let read = network.coordinates;
-        let found = found.and_then(|text| imported(&name, &source, &text, metres).map(|_| text));
-        match (&document, found) {
-            (None | Some(Err(_)), Ok(text)) => {
-                if let Some(Err(why)) = &document {
+        let found = found.and_then(|text| imported(&name, &source, &text, metres));
+        match (&made, found) {
+            (None | Some(Err(_)), Ok(found)) => {
+                if let Some(Err(why)) = &made {
                     let why: &String = why;
                     let first = why.lines().next().unwrap_or_default().to_owned();
                     walk.warn(format!(
                         "the material `{path}` is that of `{output}`: {first}"
                     ));
                 }
-                (document, coordinates) = (Some(Ok(text)), read);
+                (made, coordinates) = (Some(Ok(found)), read);
                 break;
             }
-            (None, Err(why)) => (document, coordinates) = (Some(Err(why)), read),
+            (None, Err(why)) => (made, coordinates) = (Some(Err(why)), read),
             _ => {}
         }
     }
-    let document = document.unwrap_or_else(|| {
+    if made.is_none() {
         bare(walk, path);
-        Ok(String::new())
-    });
+    }
     walk.coordinates.push(coordinates);
     Ok(Material {
         name,
         source,
-        document,
-        metres,
+        made: made.transpose(),
     })
 }
 
@@ -84,12 +82,7 @@ fn bare(walk: &mut Walk<'_>, path: &Path) {
 }
 
 /// What a document becomes, whose lengths are in units of so many metres.
-pub(super) fn imported(
-    name: &str,
-    source: &str,
-    document: &str,
-    metres: f64,
-) -> Result<Imported, String> {
+fn imported(name: &str, source: &str, document: &str, metres: f64) -> Result<Made, String> {
     let path = format!("{source}.mtlx");
     let options = Options {
         metres_per_unit: Some(metres),
@@ -98,7 +91,7 @@ pub(super) fn imported(
         ..Options::default()
     };
     let imported = impasto_import::import(&path, &mut Within(document), &options);
-    imported.map_err(|errors| {
+    let imported = imported.map_err(|errors| {
         let said = errors.into_iter().map(|mut error| {
             // Lines are of a document that nobody has.
             error.line = None;
@@ -106,7 +99,11 @@ pub(super) fn imported(
             error.to_string()
         });
         said.collect::<Vec<_>>().join("\n")
-    })
+    })?;
+    let text = imported.in_place();
+    let first = imported.materials.into_iter().next();
+    let within = first.map_or_else(|| source.to_owned(), |(name, _)| name);
+    Ok(Made { text, within })
 }
 
 /// A document that names pictures of the file.
