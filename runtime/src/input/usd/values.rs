@@ -26,7 +26,7 @@ const KNOWN: usize = 256;
 
 impl Reader<'_> {
     /// Does a prim say anything of a property?
-    pub(super) fn has(&self, prim: &Path, name: &str) -> bool {
+    fn has(&self, prim: &Path, name: &str) -> bool {
         if let Some(names) = self.known.0.borrow().get(prim) {
             return names.contains(name);
         }
@@ -42,12 +42,20 @@ impl Reader<'_> {
         is_there
     }
 
+    /// The path of a property that a prim says anything of. Others are not asked for: it takes the composition long, and with
+    /// text that is no name, without end.
+    fn property(&self, prim: &Path, name: &str) -> Option<Path> {
+        if !self.has(prim, name) {
+            return None;
+        }
+        prim.append_property(name).ok()
+    }
+
     /// The value of an attribute of a prim; none if it has none.
     pub(super) fn value(&self, prim: &Path, name: &str) -> Result<Option<Value>, String> {
-        if !self.has(prim, name) {
+        let Some(path) = self.property(prim, name) else {
             return Ok(None);
-        }
-        let path = prim.append_property(name).map_err(|e| e.to_string())?;
+        };
         let attribute = self.stage.attribute(path);
         let value = attribute.get_at::<Value>(Some(TimeCode::new(self.time)));
         let value = value.map_err(|e| format!("`{prim}.{name}` cannot be read: {e:#}"))?;
@@ -56,9 +64,7 @@ impl Reader<'_> {
 
     /// Is the value another at other times?
     pub(super) fn varies(&self, prim: &Path, name: &str) -> bool {
-        let path = prim.append_property(name).ok();
-        let path = path.filter(|_| self.has(prim, name));
-        path.is_some_and(|path| {
+        self.property(prim, name).is_some_and(|path| {
             self.stage
                 .value_might_be_time_varying(path)
                 .unwrap_or(false)
@@ -67,7 +73,7 @@ impl Reader<'_> {
 
     /// Where an attribute has samples, in time codes.
     pub(super) fn times(&self, prim: &Path, name: &str) -> Vec<f64> {
-        let path = prim.append_property(name).ok();
+        let path = self.property(prim, name);
         let times = path.and_then(|path| self.stage.time_sample_times(path).ok().flatten());
         times.unwrap_or_default()
     }
@@ -121,17 +127,16 @@ impl Reader<'_> {
 
     /// The targets of a relationship.
     pub(super) fn targets(&self, prim: &Path, name: &str) -> Result<Vec<Path>, String> {
-        if !self.has(prim, name) {
+        let Some(path) = self.property(prim, name) else {
             return Ok(Vec::new());
-        }
-        let path = prim.append_property(name).map_err(|e| e.to_string())?;
+        };
         let targets = self.stage.relationship(path).forwarded_targets();
         targets.map_err(|e| format!("`{prim}.{name}` cannot be read: {e:#}"))
     }
 
     /// A field of an attribute that is a word.
     pub(super) fn field(&self, prim: &Path, name: &str, field: &str) -> Option<String> {
-        let path = prim.append_property(name).ok()?;
+        let path = self.property(prim, name)?;
         let value = self.stage.attribute(path).get_metadata::<Value>(field);
         value.ok().flatten().as_ref().and_then(text)
     }

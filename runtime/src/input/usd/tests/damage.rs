@@ -206,3 +206,17 @@ fn a_text_that_is_no_layer_is_an_error_with_the_file() {
             .contains("m.usd")
     );
 }
+
+/// Text that is no name of a property is none that a prim has. The composition looks for it without end.
+#[test]
+fn operations_that_no_prim_has_are_left_out() {
+    let order = format!("xformOp:translat{}e", "}".repeat(600));
+    let text = format!(
+        "def Mesh \"m\" {{ {SQUARE} }}
+        def Camera \"c\" {{
+            double3 xformOp:translate = (0, 0, 5)
+            uniform token[] xformOpOrder = [\"{order}\"]
+        }}"
+    );
+    assert_eq!(Room::of(&text).all().triangles.len(), 2);
+}
