@@ -27,7 +27,7 @@ const MAX_BESIDE: usize = 4096;
 /// Loads sources from files; relative paths are taken from `base`, and `std::...` from the library.
 ///
 /// A source is read once, so that all of one compilation sees one version of it.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct FileLoader {
     base: PathBuf,
     loaded: BTreeMap<String, Result<Source, String>>,
@@ -128,6 +128,20 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
         Ok(_) => Ok(()),
         Err(error) => cannot(reason(&error)),
     }
+}
+
+/// Makes a folder, if it is not there.
+///
+/// # Errors
+/// What the file system says.
+pub fn make_folder(folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|e| {
+        format!(
+            "cannot make the folder `{}`: {}",
+            folder.display(),
+            reason(&e)
+        )
+    })
 }
 
 /// Writes a whole file or none: a temporary one beside it takes its name once it is complete.

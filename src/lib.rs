@@ -26,8 +26,12 @@
 //! Each step has more to offer than its function here: the crates [`compiler`] and [`runtime`]
 //! are the places to look. The `impasto` command is built on the same functions.
 
+// The command names the library as other programs do.
+extern crate self as impasto;
+
 pub use impasto_compiler as compiler;
 pub use impasto_runtime as runtime;
+pub use impasto_verify as verify;
 
 pub use compiler::partition::{Plan, PlanError, Strategy};
 pub use compiler::{Compilation, MaterialRequest, Program};
@@ -45,13 +49,16 @@ pub use runtime::options::RenderOptions;
 pub use runtime::render::{Renderer, Rendering};
 pub use runtime::scene::Scene;
 
+pub mod cache;
 pub mod calibrate;
+pub mod cli;
 pub mod converge;
 pub mod cost;
 pub mod docs;
 mod driver;
 pub mod editor;
-mod error;
+pub mod error;
+pub mod experiment;
 pub mod farm;
 pub mod files;
 pub mod goal;
@@ -62,6 +69,7 @@ pub mod plan;
 pub mod plot;
 pub mod set;
 pub mod shot;
+pub mod snapshots;
 pub mod starter;
 pub mod tev;
 pub mod trace;

@@ -24,8 +24,8 @@ use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::explain::{Explanation, Subject, explain};
 use impasto_compiler::partition::{
-    Calibrated, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel, Strategy,
-    Workload,
+    Calibrated, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel, Requires,
+    Strategy, Workload, candidates,
 };
 use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{NOBODY, Planner, Watch, profile_workload};
@@ -33,7 +33,7 @@ use impasto_runtime::technique::Technique;
 use impasto_runtime::world::{MaterialSource, World};
 use serde::Serialize;
 
-use crate::{Gpu, RuntimeError, Scene};
+use crate::{Device, Gpu, RuntimeError, Scene};
 
 /// Iterations whose mean a workload is.
 const ITERATIONS: u32 = 16;
@@ -43,6 +43,10 @@ pub const POINTS: usize = 1024;
 
 /// Materials for which a plan is renewed while rendering: searching one and compiling it takes too long for more.
 pub const MOST_RENEWED: usize = 256;
+
+/// Plans of either kind that are tried beside the one that the model finds fastest, unless another number is asked for
+/// (docs/measurements.md, "Trials").
+const TRIALS: usize = 4;
 
 /// What is known of a scene's materials without rendering it.
 #[derive(Clone, Debug)]
@@ -118,20 +122,112 @@ impl SceneMaterials {
     }
 }
 
-/// Plans while a scene is rendered: the plan of a strategy for what paths turn out to hit, by what
-/// materials cost at `samples` points of the scene's surfaces and by what the GPU takes.
-pub fn planner(
-    strategy: Strategy,
-    scene: Arc<Scene>,
-    program: Arc<Program>,
-    profile: DeviceProfile,
-    samples: usize,
-) -> Planner {
-    Box::new(move |workload| {
-        let materials = SceneMaterials::new(&scene, &program, samples);
-        let plan = strategy.plan(&materials.inputs(workload, &profile));
-        plan.map_err(|error| error.to_string())
-    })
+/// Planning while a scene is rendered: the plan of a strategy for what paths turn out to hit.
+#[derive(Clone, Debug)]
+pub struct Planning {
+    /// The strategy.
+    pub strategy: Strategy,
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Its materials.
+    pub program: Arc<Program>,
+    /// What the GPU takes.
+    pub profile: DeviceProfile,
+    /// At how many points of the scene's surfaces materials are evaluated to see what they cost.
+    pub points: usize,
+    /// Plans of either kind that are tried beside that of `auto`; other strategies are not doubted.
+    pub trials: usize,
+}
+
+impl Planning {
+    /// What does it.
+    pub fn planner(self) -> Planner {
+        Box::new(move |workload| {
+            let materials = SceneMaterials::new(&self.scene, &self.program, self.points);
+            let inputs = materials.inputs(workload, &self.profile);
+            let plan = self.strategy.plan(&inputs).map_err(|e| e.to_string())?;
+            let is_doubted = self.strategy == Strategy::AUTO;
+            let (chosen, workload) = (plan.clone(), workload.clone());
+            // The first goes on while the others are searched.
+            let others = std::iter::once_with(move || {
+                let trials = if is_doubted { self.trials } else { 0 };
+                candidates(&materials.inputs(&workload, &self.profile), &chosen, trials)
+            });
+            Ok(Box::new(std::iter::once(plan).chain(others.flatten())))
+        })
+    }
+}
+
+/// Plans of either kind that are tried on a device where nothing else is asked for: none by a GPU in software, whose kernels
+/// are compiled by the cores that render.
+pub fn trials(device: &Device) -> usize {
+    if is_fast(device) { TRIALS } else { 0 }
+}
+
+/// Whether a GPU renders that is no software.
+pub(crate) fn is_fast(device: &Device) -> bool {
+    matches!(device, Device::Gpu(gpu) if gpu.info().kind != "software")
+}
+
+/// The plan that a render begins with.
+#[derive(Clone, Debug)]
+pub struct Begun {
+    /// The plan.
+    pub plan: Plan,
+    /// The strategy that renews it for what paths turn out to hit.
+    pub renewed_by: Option<Strategy>,
+}
+
+impl Begun {
+    /// One that stays.
+    pub fn fixed(plan: Plan) -> Self {
+        Self {
+            plan,
+            renewed_by: None,
+        }
+    }
+
+    /// That of a strategy on a device. A strategy that must know how paths hit materials begins with a kernel a material,
+    /// and plans when that is known. What the device replaces is not made.
+    ///
+    /// # Errors
+    /// If the strategy must know what only measuring kernels tells.
+    pub fn new(
+        strategy: Strategy,
+        scene: &Scene,
+        program: &Program,
+        device: &Device,
+    ) -> Result<Self, PlanError> {
+        let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
+        let unused = unused(scene, program);
+        let begun = || Plan {
+            strategy: strategy.to_string(),
+            ..Plan::few_kernels(&names, &unused)
+        };
+        let is_replaced = device.replaces(&strategy.to_string());
+        if is_replaced && strategy.requires() != Requires::Measurements {
+            return Ok(Self::fixed(begun()));
+        }
+        let inputs = PlanInputs {
+            unused: &unused,
+            ..PlanInputs::of_names(&names)
+        };
+        match strategy.requires() {
+            Requires::Nothing | Requires::Measurements => strategy.plan(&inputs).map(Self::fixed),
+            Requires::Costs => {
+                let materials = SceneMaterials::new(scene, program, POINTS);
+                let inputs = PlanInputs {
+                    costs: Some(&materials.costs),
+                    ..inputs
+                };
+                strategy.plan(&inputs).map(Self::fixed)
+            }
+            Requires::Workload => Ok(Self {
+                plan: begun(),
+                renewed_by: (names.len() <= MOST_RENEWED).then_some(strategy),
+            }),
+        }
+    }
 }
 
 /// The materials of `program` that no triangle of `scene` binds, ascending: they need no kernel.

@@ -14,9 +14,21 @@ use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, MaterialRequest};
 
 /// Codes that no source can provoke, and why.
-const INTERNAL: [Code; 2] = [
+const INTERNAL: [Code; 14] = [
     Code::InvalidWgsl, // a defect of the compiler itself
     Code::NotExported, // of the command `export`, whose tests provoke it
+    Code::NotSound,    // this and what follows of the command `test`, as do its tests and examples
+    Code::MakesLight,
+    Code::WrongDensity,
+    Code::Imprecise,
+    Code::NotReciprocal,
+    Code::BrokenPromise,
+    Code::UnreadPromise,
+    Code::NotEvaluated,
+    Code::FailedAssertion,
+    Code::SnapshotDiffers,
+    Code::NoSnapshot,
+    Code::BadSnapshot,
 ];
 
 #[test]

@@ -17,6 +17,19 @@ pub struct Module {
     pub uses: Vec<Use>,
     /// Everything the file defines.
     pub items: Vec<Item>,
+    /// What it asserts of that; `impasto test` runs them.
+    pub tests: Vec<Test>,
+}
+
+/// `test "a title" { statements }`: it defines nothing, and nothing can name it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Test {
+    /// Its title, without quotes.
+    pub title: Name,
+    /// Statements, [`StmtKind::Assert`] among them.
+    pub body: Block,
+    /// The whole test, without docs.
+    pub span: Span,
 }
 
 /// `use std::noise::{flakes, perlin as noise};`
@@ -291,6 +304,8 @@ pub enum StmtKind {
     Break,
     /// `continue;`
     Continue,
+    /// `assert condition;`, in a test
+    Assert(Expr),
 }
 
 /// An expression.

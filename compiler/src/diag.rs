@@ -146,6 +146,31 @@ codes! {
     // E04xx: export
     NotExported = "E0401", Error, "cannot be exported",
         "`impasto export` writes materials that are one call of a surface model, as in `material = open_pbr(..);`. Each argument is a constant, a picture, a constant times a picture, or a normal map; the format that is written to may have further limits.";
+    // E05xx: what `impasto test` finds
+    NotSound = "E0501", Error, "unsound answers",
+        "Whatever its parameters, directions and random numbers are, a material answers with finite numbers that are not negative, and samples unit directions. `impasto test` asks it at the ends of their ranges, in single and in double precision.";
+    MakesLight = "E0502", Error, "makes light",
+        "A surface reflects and transmits at most the light that falls on it: paths gain energy at one that does not, and pictures of it do not converge. `layer` and `mix` keep energy where `+` and weights above 1 do not. A bsdf that is known to gain some states it: `Gain: within 0.02`.";
+    WrongDensity = "E0503", Error, "sampled otherwise than stated",
+        "`pdf` is the density of what `sample` draws, by solid angle, and integrates to at most 1; directions toward which `eval` is not zero can be drawn. Otherwise pictures are wrong, not only noisy. Samples are compared with the density by a chi-squared test, and what they add up to with the integral of `eval`.";
+    Imprecise = "E0504", Error, "far from double precision",
+        "Kernels compute in single precision. An answer is far if it differs from that in double precision by more than 1e-3 beyond what the last digits of its inputs change. A material states which share of directions may be, `Precision: within 0.1`, and a bsdf where it is further off: `Region: within 0.01 where condition`.";
+    NotReciprocal = "E0505", Error, "not reciprocal",
+        "f(wo, wi) and f(wi, wo) differ. A bsdf is reciprocal unless its documentation says `Not reciprocal`; a material, if it promises `Reciprocal: within X`. `layer` is not.";
+    BrokenPromise = "E0506", Error, "promise not kept",
+        "A line of the documentation states what is not so: of a material `Furnace: within 0.02 with a = 1`, `Albedo: 0.2 .. 0.8`, `Cost: at most 3000 operations`, `Registers: at most 60`, `Lines: at most 200`; of a bsdf `Furnace:`, `Albedo:`, `Gain:` and `Weights:`. See docs/testing.md.";
+    UnreadPromise = "E0507", Error, "promise that cannot be read",
+        "A line of the documentation begins with a word that states a promise, and goes on otherwise than promises do. docs/testing.md has the form of each. A line that is meant as prose begins with another word.";
+    NotEvaluated = "E0508", Error, "cannot be tested",
+        "Materials are evaluated at some hundred thousand directions. Evaluations of this one take more work together than is granted (as a rule, some loop goes round very often), or there is no way to give its parameters values.";
+    FailedAssertion = "E0509", Error, "assertion fails",
+        "`impasto test` ran a test of the file, and what it asserts does not hold. Values of the operands, or of the arguments, are those of the first time that it failed. Tests are evaluated in single and in double precision; `near(a, b, within)` allows for rounding.";
+    SnapshotDiffers = "E0510", Error, "not as the snapshot",
+        "The folder `snapshots` beside the source keeps the WGSL, the costs, the parameters and a small picture of a material, and what is differs from that. `impasto test --review` shows both and asks; `--accept` makes what is the snapshot.";
+    NoSnapshot = "E0511", Error, "no snapshot",
+        "The folder `snapshots` beside the source has snapshots of other materials, and none of this one. `impasto test --accept` takes it.";
+    BadSnapshot = "E0512", Error, "snapshot that cannot be read",
+        "A file of the snapshot is damaged, has a merge conflict, or was written by another version of Impasto. `impasto test --accept` writes it anew; version control has what it was.";
     // E09xx: generated code
     InvalidWgsl = "E0901", Error, "generated code was rejected",
         "The WGSL validator refused generated code. This is a defect of the compiler; please report it with the source.";

@@ -12,7 +12,7 @@ use crate::moment::Moment;
 use crate::parameter_value::ParameterValue;
 use crate::passes::MaterialState;
 use crate::program::Program;
-use crate::sema::{Checker, ModuleId};
+use crate::sema::{self, Checker, ModuleId};
 use crate::source::SourceMap;
 use crate::stages::{Progress, Stage};
 use crate::written::Written;
@@ -93,6 +93,8 @@ pub struct Checked {
     pub ir: Module,
     /// Its materials, before layering is lowered.
     pub checked: Vec<ir::Material>,
+    /// Its tests.
+    pub tests: Vec<sema::Test>,
 }
 
 /// Compiles materials into one program.
@@ -149,11 +151,11 @@ fn compile_as<'a>(
 pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
     let mut checker = Checker::new(loader);
     let mut materials = Vec::new();
-    let mut checked = Vec::new();
+    let (mut checked, mut tests) = (Vec::new(), Vec::new());
     // First, so that the ABI's structs get their names before the file's own.
     let builder = ProgramBuilder::new(&mut checker);
     if let Some(module) = checker.load(path) {
-        checked = checker.check_all(module);
+        (checked, tests) = checker.check_all(module);
         let ast = checker.ast(module);
         let all = ast.items.iter();
         let of_file = all.filter(|item| matches!(item.kind, ast::ItemKind::Material(_)));
@@ -175,6 +177,7 @@ pub fn check(path: &str, loader: &mut dyn Loader) -> Checked {
         materials,
         ir,
         checked,
+        tests,
     }
 }
 

@@ -220,8 +220,21 @@ fn readable(name: &str) -> String {
 
 /// What a line of a doc comment begins with that tells tests of the library what to try, and to
 /// what a definition is held.
-const FOR_TESTS: [&str; 9] = [
-    "Albedo", "Furnace", "Gain", "Gallery", "Range", "Region", "Try", "Value", "Weights",
+const FOR_TESTS: [&str; 14] = [
+    "Albedo",
+    "Cost",
+    "Furnace",
+    "Gain",
+    "Gallery",
+    "Lines",
+    "Precision",
+    "Range",
+    "Reciprocal",
+    "Region",
+    "Registers",
+    "Try",
+    "Value",
+    "Weights",
 ];
 
 /// A doc comment as a person reads it: without what is for tests, which goes on to the next empty line

@@ -7,6 +7,7 @@ use impasto_compiler::format::format;
 use impasto_compiler::instance::instance;
 use impasto_compiler::source::SourceMap;
 use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile};
+use impasto_verify::check::Options;
 
 /// Checks an example by itself, and compiles it if it is a material's, or if none was found.
 fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
@@ -24,6 +25,9 @@ fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
             .collect(),
         ..MaterialRequest::new("example", FILE)
     };
+    if code.id().starts_with("E05") {
+        return tested(&mut files);
+    }
     if code == Code::NotExported {
         let found = instance(&request, &mut files);
         return (found.sources, found.diagnostics);
@@ -35,9 +39,22 @@ fn found(example: &Example, code: Code) -> (SourceMap, Vec<Diagnostic>) {
     (compiled.sources, compiled.diagnostics)
 }
 
-/// Codes without an example: what no source can provoke.
+/// What `impasto test` finds.
+fn tested(files: &mut MemoryLoader) -> (SourceMap, Vec<Diagnostic>) {
+    let mut file = impasto_verify::check::read(FILE, files);
+    let mut found = std::mem::take(&mut file.diagnostics);
+    for subject in &file.subjects {
+        let verdict = impasto_verify::check::examine(&file, subject, files, Options::default());
+        found.extend(verdict.diagnostics);
+    }
+    (file.sources, found)
+}
+
+/// Codes without an example: what no source can provoke, or none in a second.
 fn has_example(code: Code) -> bool {
-    code != Code::InvalidWgsl
+    // What needs more than one source has none.
+    let kept = [Code::SnapshotDiffers, Code::NoSnapshot, Code::BadSnapshot];
+    ![Code::InvalidWgsl, Code::NotEvaluated].contains(&code) && !kept.contains(&code)
 }
 
 #[test]

@@ -304,19 +304,24 @@ const MOST_GROWTH: f64 = 8.0;
 /// What is wrong with how the time of a shape grows, if anything.
 fn growth(name: &str) -> Option<String> {
     let shape = shape(name).expect("the table has it");
-    let [short, long] = LENGTHS.map(|bytes| {
-        let source = shape.source(bytes);
-        // The lesser of two: a busy machine only adds.
-        let times = (0..2).map(|_| timed(checked_and_formatted, source.as_bytes()));
-        let times: Result<Vec<Duration>, _> = times.collect();
-        let least = times.map(|all| all.into_iter().min().unwrap_or_default());
-        least.map_err(|failure| format!("{name}: {failure:?}"))
-    });
-    let (short, long) = match (short, long) {
-        (Ok(short), Ok(long)) => (short, long),
-        (Err(why), _) | (_, Err(why)) => return Some(why),
-    };
-    let growth = long.as_secs_f64() / short.as_secs_f64();
-    let fine = growth < MOST_GROWTH && long < 2 * MAX_TIME;
-    (!fine).then(|| format!("{name}: {short:?} grow to {long:?}"))
+    let sources = LENGTHS.map(|bytes| shape.source(bytes));
+    let mut least = [Duration::MAX; 2];
+    let mut told = None;
+    // The least of two, and of more where that is too much: a busy machine only adds.
+    for round in 0..6 {
+        for (source, least) in sources.iter().zip(&mut least) {
+            match timed(checked_and_formatted, source.as_bytes()) {
+                Ok(time) => *least = time.min(*least),
+                Err(failure) => return Some(format!("{name}: {failure:?}")),
+            }
+        }
+        let [short, long] = least;
+        let growth = long.as_secs_f64() / short.as_secs_f64();
+        let fine = growth < MOST_GROWTH && long < 2 * MAX_TIME;
+        told = (!fine).then(|| format!("{name}: {short:?} grow to {long:?}"));
+        if fine && round > 0 {
+            break;
+        }
+    }
+    told
 }

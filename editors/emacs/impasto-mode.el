@@ -39,7 +39,7 @@
 
 (defconst impasto-keywords
   '("material" "bsdf" "delta" "edf" "fn" "struct" "const" "private" "use" "as" "param" "let" "var" "if" "else"
-    "for" "in" "while" "limit" "break" "continue" "when" "true" "false"))
+    "for" "in" "while" "limit" "break" "continue" "assert" "when" "true" "false"))
 
 (defconst impasto-types
   '("bool" "int" "uint" "float" "length" "angle" "vec2" "vec3" "vec4" "color" "point" "vector" "normal" "mat2"

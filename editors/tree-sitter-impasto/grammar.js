@@ -34,7 +34,7 @@ const ASSIGNMENTS = ["=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=",
 const KEYWORDS = [
   "material", "bsdf", "delta", "edf", "fn", "struct",
   "const", "private", "use", "as", "param", "let", "var", "if", "else",
-  "for", "in", "while", "limit", "break", "continue",
+  "for", "in", "while", "limit", "break", "continue", "assert",
   "when", "true", "false",
 ];
 
@@ -135,6 +135,7 @@ export default grammar({
       $.function_definition,
       $.struct_definition,
       $.constant_definition,
+      $.test_definition,
     ),
 
     material_definition: $ => seq(
@@ -243,6 +244,14 @@ export default grammar({
       ";",
     ),
 
+    // The word is not reserved: only a title behind it makes a test.
+    test_definition: $ => seq(
+      optional(field("documentation", $.documentation)),
+      "test",
+      field("title", $.string),
+      field("body", $.block),
+    ),
+
     type: $ => seq(
       field("name", choice(
         alias($.identifier, $.type_identifier),
@@ -266,6 +275,7 @@ export default grammar({
       $.while_statement,
       $.break_statement,
       $.continue_statement,
+      $.assert_statement,
       // An `if` that starts a statement ends it, too: `if a { } -b` is two.
       prec(1, $.if_expression),
     ),
@@ -309,6 +319,8 @@ export default grammar({
     break_statement: _ => seq("break", ";"),
 
     continue_statement: _ => seq("continue", ";"),
+
+    assert_statement: $ => seq("assert", field("condition", $.expression), ";"),
 
     // Expressions
 

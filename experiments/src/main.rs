@@ -12,8 +12,6 @@ mod editor;
 mod farm;
 mod gallery;
 mod live;
-mod paper;
-mod partition;
 mod process;
 mod stress;
 
@@ -29,10 +27,6 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Experiment {
-    /// Measure the tables of the paper on this machine's GPU, and write docs/paper.md
-    Paper(paper::PaperArgs),
-    /// Measure partitions of materials into kernels, and hold the automatic one against the best
-    Partition(partition::PartitionArgs),
     /// Run the tests of numerical stability at full effort, and write docs/stability.md
     Stress(stress::StressArgs),
     /// Time what an editor waits for, and print a table
@@ -47,8 +41,6 @@ enum Experiment {
 
 fn main() -> ExitCode {
     xtask::shell::exit_code(match Cli::parse().experiment {
-        Experiment::Paper(args) => paper::run(&args),
-        Experiment::Partition(args) => partition::run(&args),
         Experiment::Stress(args) => stress::run(&args),
         Experiment::Editor(args) => editor::run(&args),
         Experiment::Farm(args) => farm::run(&args),

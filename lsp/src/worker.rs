@@ -10,8 +10,9 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, Sender};
 use impasto_compiler::cost::{MaterialCost, anywhere};
 use impasto_compiler::diag::Diagnostic;
+use impasto_compiler::inspect::run_test;
 use impasto_compiler::source::SourceMap;
-use impasto_compiler::{MaterialRequest, compile_until};
+use impasto_compiler::{MaterialRequest, check, compile_until};
 use impasto_runtime::error::SceneError;
 use impasto_runtime::scene::Asked;
 use impasto_runtime::world;
@@ -39,12 +40,14 @@ pub struct Job {
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// Measures the materials of a source; it is checked to the end as well.
+    /// Measures the materials of a source and runs its tests; it is checked to the end as well.
     Cost {
         /// The file.
         path: String,
-        /// The materials of the file.
+        /// The materials of the file that are measured.
         materials: Vec<String>,
+        /// Has it tests?
+        tested: bool,
         /// Is the cost of the committed version wanted, too?
         committed: bool,
     },
@@ -62,8 +65,8 @@ pub enum Done {
         path: String,
         /// Its margin; nothing if it does not compile.
         margin: Option<Margin>,
-        /// What was found when it was compiled, checking apart.
-        found: Found,
+        /// What was found when it was compiled, checking apart, and by its tests.
+        found: Vec<Found>,
     },
     /// What is wrong with a scene.
     Scene {
@@ -152,9 +155,14 @@ fn run(job: &Job, host: &dyn Host, stop: &dyn Fn() -> bool) -> Option<Done> {
         Task::Cost {
             path,
             materials,
+            tested,
             committed,
         } => {
-            let (costs, found) = costs(path, materials, job.texts.clone(), stop)?;
+            let (costs, compiled) = costs(path, materials, job.texts.clone(), stop)?;
+            let mut found = vec![compiled];
+            if *tested {
+                found.push(failures(path, job.texts.clone(), stop)?);
+            }
             let before = if *committed {
                 committed_costs(path, materials, job, host, stop)
             } else {
@@ -205,6 +213,22 @@ fn costs(
     }
     let costs = compiled.program.map(|program| anywhere(&program, SAMPLES));
     Some((costs, found))
+}
+
+/// What the tests of a file find to be wrong.
+fn failures(path: &str, texts: Texts, stop: &dyn Fn() -> bool) -> Option<Found> {
+    let checked = check(path, &mut Overlay::new(texts));
+    let mut diagnostics = Vec::new();
+    for test in &checked.tests {
+        if stop() {
+            return None;
+        }
+        diagnostics.extend(run_test(&checked, test));
+    }
+    Some(Found {
+        sources: checked.sources,
+        diagnostics,
+    })
 }
 
 /// What the materials cost as they were committed.

@@ -347,6 +347,21 @@ fn costs_come_once_they_are_wanted() {
 }
 
 #[test]
+fn assertions_that_fail_are_shown_when_typing_rests() {
+    // Without costs, and in a file without materials.
+    let none = json!({ "lens": false, "inlayHints": false });
+    let mut client = Client::with(Bare::default(), json!({ "cost": none }));
+    let text = "fn twice(x: float) -> float = 2.0 * x;\n\
+                test \"twice\" { assert near(twice(1.5), 3.1, 1e-3); }\n";
+    let uri = client.open("twice.impasto", text);
+    let found = client.diagnostics_where(&uri, |all| !all.is_empty());
+    assert_eq!(found[0]["code"], "E0509", "{found:?}");
+    assert_eq!(found[0]["range"]["start"]["line"], 1, "{found:?}");
+    client.change(&uri, &text.replace("3.1", "3.0"));
+    client.diagnostics_where(&uri, |all| all.is_empty());
+}
+
+#[test]
 fn who_shows_no_markdown_gets_plain_text() {
     let mut client = Client::that_can(Bare::default(), json!({}), &json!({}));
     let uri = client.open("glaze.impasto", GLAZE);

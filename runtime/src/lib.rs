@@ -12,12 +12,14 @@
 //! | [`device`] | either of them |
 //! | [`render`] | a [`render::Renderer`] dispatches kernels until every path is done, and gives a [`film::Film`] and a [`render::report::Report`] |
 //! | [`multi`] | renderers on several devices share the samples of one picture |
+//! | [`evaluate`] | materials at arrays of points, without a scene |
 //! | [`lab`], [`audit`] | experiments on top of all |
 
 pub mod audit;
 pub mod cpu;
 pub mod device;
 pub mod error;
+pub mod evaluate;
 pub mod film;
 pub mod fingerprint;
 pub mod gpu;

@@ -115,6 +115,16 @@ choices! {
         Bvh2 = "bvh2",
     }
 
+    /// In how many leaves of an acceleration structure a triangle lies.
+    Tree {
+        /// Large ones in several where that makes the tree cheaper to cast rays through, else each in one
+        Auto = "auto",
+        /// Each in one
+        Whole = "whole",
+        /// Large ones in several: boxes of their pieces are smaller than one around all of it
+        Split = "split",
+    }
+
     /// Where a ray cast keeps the nodes it has yet to visit.
     Stack {
         /// An array of the thread's own
@@ -197,6 +207,8 @@ pub struct Technique {
     pub regeneration: Regeneration,
     /// What rays are cast through.
     pub traversal: Traversal,
+    /// In how many leaves a triangle lies.
+    pub tree: Tree,
     /// Where casts keep the nodes they have yet to visit.
     pub stack: Stack,
     /// When threads that fetch rays test triangles; others do it at once.
@@ -254,6 +266,7 @@ mod tests {
         check_names::<StateLayout>();
         check_names::<Regeneration>();
         check_names::<Traversal>();
+        check_names::<Tree>();
         check_names::<Stack>();
         check_names::<Leaves>();
         check_names::<RayFetch>();

@@ -3,7 +3,7 @@
 use crate::support::{CAST, MISS, Random, Ray, Row, floats, ray_rows, run};
 use glam::{DVec3, EulerRot, Quat, Vec3};
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
-use impasto_runtime::technique::{Choice, Stack, Technique, Traversal};
+use impasto_runtime::technique::{Choice, Stack, Technique, Traversal, Tree};
 use impasto_runtime::world::bvh::Bvh;
 use impasto_runtime::world::surface::{geometry_part, positions_part};
 
@@ -16,9 +16,11 @@ struct Hit {
     any: bool,
 }
 
-/// A mesh as kernels see it: `positions[p]` are the corners of primitive p.
+/// A mesh as kernels see it: `positions[r]` are the corners of reference r.
 struct Built {
     positions: Vec<[Vec3; 3]>,
+    /// The primitive of each reference.
+    primitives: Vec<u32>,
     bvh: Bvh,
     technique: Technique,
     mesh: Mesh,
@@ -52,14 +54,20 @@ fn mesh(positions: Vec<[Vec3; 3]>) -> Mesh {
 fn build(positions: Vec<[Vec3; 3]>, technique: Technique) -> Built {
     eprintln!("{technique:?}");
     let mesh = mesh(positions);
-    let bvh = Bvh::build(&mesh, technique.traversal);
+    let bvh = Bvh::build(&mesh, &technique);
     let mut order = bvh.order().to_vec();
     let positions = order.iter().map(|&i| mesh.positions[i as usize]).collect();
+    let first = |triangle| bvh.order().iter().position(|other| other == triangle);
+    let primitives = order.iter().map(|t| first(t).expect("it is there") as u32);
+    let primitives = primitives.collect();
     order.sort_unstable();
     let all: Vec<u32> = (0..mesh.len() as u32).collect();
-    assert_eq!(order, all, "each triangle is in one leaf");
+    assert_eq!(bvh.is_split(), order.len() > all.len());
+    order.dedup();
+    assert_eq!(order, all, "each triangle is in a leaf");
     Built {
         positions,
+        primitives,
         bvh,
         technique,
         mesh,
@@ -91,11 +99,11 @@ fn cast(built: &Built, rays: &[Ray]) -> Vec<Hit> {
 
 /// Nearest hit by testing every triangle in f64, and whether a boundary is so near that f32 may
 /// decide otherwise.
-fn brute_force(positions: &[[Vec3; 3]], ray: &Ray) -> (Option<(f64, u32)>, bool) {
+fn brute_force(built: &Built, ray: &Ray) -> (Option<(f64, u32)>, bool) {
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let (mut best, mut doubtful) = (None::<(f64, u32)>, false);
-    for (primitive, corners) in positions.iter().enumerate() {
-        if primitive as u32 == ray.skip {
+    for (&primitive, corners) in built.primitives.iter().zip(&built.positions) {
+        if primitive == ray.skip {
             continue;
         }
         let [a, b, c] = corners.map(|p| p.as_dvec3());
@@ -117,7 +125,7 @@ fn brute_force(positions: &[[Vec3; 3]], ray: &Ray) -> (Option<(f64, u32)>, bool)
             && t > -reach
             && t < best.map_or(f64::MAX, |b| b.0 + reach);
         if hits && best.is_none_or(|b| t < b.0) {
-            best = Some((t, primitive as u32));
+            best = Some((t, primitive));
         }
     }
     (best, doubtful)
@@ -127,7 +135,7 @@ fn brute_force(positions: &[[Vec3; 3]], ray: &Ray) -> (Option<(f64, u32)>, bool)
 fn compare(built: &Built, rays: &[Ray]) -> usize {
     let mut clear = 0;
     for (ray, hit) in rays.iter().zip(cast(built, rays)) {
-        let (expected, doubtful) = brute_force(&built.positions, ray);
+        let (expected, doubtful) = brute_force(built, ray);
         assert_eq!(
             hit.any,
             hit.primitive != MISS,
@@ -142,6 +150,8 @@ fn compare(built: &Built, rays: &[Ray]) -> usize {
             continue;
         };
         assert_ne!(hit.primitive, MISS, "missed primitive {primitive} at {t}");
+        let named = built.primitives[hit.primitive as usize];
+        assert_eq!(hit.primitive, named, "a hit names the first reference");
         let tolerance = 1e-5 * (t + ray.origin.length() as f64);
         assert!(
             (hit.t as f64 - t).abs() <= tolerance,
@@ -430,14 +440,105 @@ fn rays_that_leave_a_surface_do_not_hit_it_again() {
     }
 }
 
+/// Large triangles askew among small ones, which so have several references.
+fn with_large_ones(random: &mut Random, count: usize) -> Vec<[Vec3; 3]> {
+    let mut triangles = soup(random, count, 0.03);
+    for _ in 0..count / 50 {
+        // Long and thin, or rather large.
+        let [center, along, across] = [
+            random.point(-0.5, 0.5),
+            random.direction(),
+            random.direction(),
+        ];
+        let width = if random.uniform() < 0.5 { 0.05 } else { 1.0 };
+        triangles.push([center - along, center + along, center + width * across]);
+    }
+    triangles
+}
+
+/// The ways of [`ways`] with large triangles in several leaves.
+fn split_ways() -> Vec<Technique> {
+    let split = |way: Technique| Technique {
+        tree: Tree::Split,
+        ..way
+    };
+    ways().into_iter().map(split).collect()
+}
+
+#[test]
+fn triangles_in_several_leaves_agree_with_brute_force() {
+    for way in split_ways() {
+        let mut random = Random::new(5);
+        for (count, scale, place) in [
+            (400, 1.0, Vec3::ZERO),
+            (1500, 1e-3, Vec3::ZERO),
+            (1500, 30.0, Vec3::new(200.0, -70.0, 4.0)),
+        ] {
+            let triangles = with_large_ones(&mut random, count);
+            let triangles = triangles.iter().map(|t| t.map(|p| place + scale * p));
+            let built = build(triangles.collect(), way);
+            assert!(built.bvh.is_split());
+            let mut rays = random_rays(&mut random, 1500, 3.0);
+            for (index, ray) in rays.iter_mut().enumerate() {
+                ray.origin = place + scale * ray.origin;
+                ray.t_max = (scale * ray.t_max).min(3e38);
+                // One that is large, as the last ones are.
+                if index % 3 == 0 {
+                    let large = count as u32 + random.bits() % (count / 50) as u32;
+                    let first = built.bvh.order().iter().position(|t| *t == large);
+                    ray.skip = first.expect("it is there") as u32;
+                }
+            }
+            let clear = compare(&built, &rays);
+            assert!(clear > 600, "{clear} clear rays");
+        }
+    }
+}
+
+/// A ray that leaves a triangle does not hit it by another reference to it, nor its neighbors of the same flat side.
+#[test]
+fn rays_that_leave_a_triangle_of_several_leaves_do_not_hit_it_again() {
+    let turn = Quat::from_euler(EulerRot::XYZ, 0.7, 0.5, 0.4);
+    for way in split_ways() {
+        let mut random = Random::new(6);
+        for (center, radius) in [
+            (Vec3::ZERO, 1.0),
+            (Vec3::ZERO, 1e-4),
+            (Vec3::new(1e5, 0.0, 0.0), 1e4),
+            (Vec3::new(-30.0, 40.0, 1.0), 1.0),
+        ] {
+            // The side -x of strips, the others of small triangles.
+            let placed = |t: &[Vec3; 3]| t.map(|p| center + radius * (turn * p));
+            let others = cube(16);
+            let at = |y: f32, z: f32| Vec3::new(-1.0, y, z);
+            let strip = |index: usize| {
+                let [low, high] = [0, 1].map(|k| (index + k) as f32 / 8.0 - 1.0);
+                let [a, b, c, d] = [at(-1.0, low), at(-1.0, high), at(1.0, high), at(1.0, low)];
+                [[a, b, c], [a, c, d]]
+            };
+            let strips: Vec<[Vec3; 3]> = (0..16).flat_map(strip).collect();
+            let triangles = strips.iter().chain(&others[2 * 16 * 16..]);
+            let built = build(triangles.map(placed).collect(), way);
+            assert!(built.bvh.is_split());
+            let leaving = leaving_rays(&built, &mut random, 20_000);
+            let rays: Vec<Ray> = leaving.iter().map(|l| l.0).collect();
+            let hits = cast(&built, &rays);
+            let wrong = leaving.iter().zip(&hits);
+            let wrong = wrong.filter(|((_, outward), hit)| (hit.primitive == MISS) != *outward);
+            assert_eq!(wrong.count(), 0, "radius {radius} at {center}");
+            let large = |ray: &&Ray| built.bvh.order()[ray.skip as usize] < 32;
+            assert!(rays.iter().filter(large).count() > 30);
+        }
+    }
+}
+
 /// Rays from random points of a convex mesh, offset and with their primitive skipped, and whether
 /// they leave to the outside. Most directions are close to the surface.
 fn leaving_rays(built: &Built, random: &mut Random, count: usize) -> Vec<(Ray, bool)> {
-    let primitives = built.positions.len() as u32;
     let input: Vec<Row> = (0..count)
         .map(|_| {
             let (p, s, t) = (
-                random.bits() % primitives,
+                built.primitives[random.bits() as usize % built.primitives.len()],
                 random.uniform(),
                 random.uniform(),
             );

@@ -7,10 +7,12 @@ use crate::support::light_scenes::{
     push_light, push_quad, push_triangle, quad, sample, sample_with, scenes, sphere,
     uniform_environment,
 };
+use crate::support::worlds::kernel_parts;
 use crate::support::{Random, Row, floats, row};
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
-use impasto_runtime::scene::Scene;
+use impasto_runtime::scene::{NO_MATERIAL, Scene};
+use impasto_runtime::technique::{Technique, Tree};
 use impasto_runtime::world::lights::quad::QuadLight;
 use impasto_runtime::world::lights::sphere::{Cone, SphereLight};
 use impasto_runtime::world::{KernelParts, lights};
@@ -573,4 +575,93 @@ fn lights_found_by_chance_are_never_sampled() {
     let samples = sample(&parts(&scene, &[]), Vec3::ZERO, 1000, 8);
     let towards_sampled = |s: &Sample| s.radiance != Vec3::ZERO && s.wi.x < 0.0;
     assert!(samples.iter().all(towards_sampled));
+}
+
+/// A field of small triangles, and above it large ones that shine, askew, so that each lies in several leaves.
+fn lamps_in_pieces() -> (Scene, Vec<InstanceInfo>) {
+    let mut scene = dark_scene();
+    let mut random = Random::new(3);
+    for _ in 0..600 {
+        let center = Vec3::new(1.0, -2.0, 0.0) + random.point(-2.0, 2.0) * Vec3::new(1.0, 0.2, 1.0);
+        let corners = [(); 3].map(|()| center + 0.03 * random.direction());
+        push_triangle(&mut scene, corners, NO_MATERIAL);
+    }
+    // Not the last, so that primitives have another order than triangles.
+    scene.mesh.positions.swap(0, 300);
+    for _ in 0..6 {
+        let [center, along, across] = [
+            Vec3::new(0.0, 3.5, 0.0) + random.point(-1.0, 1.0),
+            random.direction(),
+            random.direction(),
+        ];
+        let corners = [center - along, center + along, center + 0.05 * across];
+        push_triangle(&mut scene, corners, 0);
+    }
+    (scene, vec![emissive([2.0, 1.0, 0.5])])
+}
+
+/// Rows of the table of lights, and the corners of the triangle that each is.
+fn rows_of_lights(parts: &KernelParts) -> Vec<([u32; 8], [u32; 12])> {
+    let words = |buffers: &[impasto_runtime::wgsl::BufferData], name: &str| -> Vec<u32> {
+        let buffer = buffers.iter().find(|b| b.name == name);
+        bytemuck::pod_collect_to_vec(&buffer.expect("a buffer").bytes)
+    };
+    let triangles = words(&parts.geometry.buffers, "triangles");
+    let table = words(&parts.lights.buffers, "light_table");
+    let row = |row: &[u32]| {
+        let mut row: [u32; 8] = row.try_into().expect("eight words");
+        let first = 12 * row[3] as usize;
+        row[3] = 0;
+        (
+            row,
+            triangles[first..first + 12].try_into().expect("a triangle"),
+        )
+    };
+    table.chunks_exact(8).map(row).collect()
+}
+
+/// A light is one light however many references there are to its triangle: it is in the table once, and samples
+/// find as much of it as rays do, whichever reference these meet.
+#[test]
+fn a_lamp_in_several_leaves_is_one_light() {
+    let (scene, infos) = lamps_in_pieces();
+    let [whole, split] = [Tree::Whole, Tree::Split].map(|tree| {
+        let technique = Technique {
+            tree,
+            ..Technique::default()
+        };
+        kernel_parts(&scene, &infos, &technique).expect("the parts build")
+    });
+    let triangles = |parts: &KernelParts| parts.geometry.buffers[0].bytes.len() / 48;
+    assert!(triangles(&split) > triangles(&whole) + 6);
+    let rows = rows_of_lights(&split);
+    assert_eq!(rows.len(), 6);
+    assert_eq!(rows, rows_of_lights(&whole));
+
+    let lamps = &scene.mesh.positions[scene.mesh.len() - 6..];
+    let mut random = Random::new(12);
+    let mut lit = 0;
+    for position in POSITIONS.map(Vec3::from) {
+        // At points of lamps, each along all of its length.
+        let towards = |index: usize| {
+            let [a, b, c] = lamps[index % lamps.len()];
+            let (s, t) = (random.uniform(), 0.3 * random.uniform());
+            (a + (1.0 - t) * s * (b - a) + t * (c - a) - position).normalize()
+        };
+        let directions: Vec<Vec3> = (0..6000).map(towards).collect();
+        for pdf in [0.0, 0.4] {
+            let [a, b] = [&whole, &split].map(|parts| met(parts, position, &directions, pdf));
+            lit += a.iter().filter(|light| light.x > 0.0).count();
+            let differ = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+            assert_eq!(differ, 0, "of what rays meet");
+        }
+        let [a, b] = [&whole, &split].map(|parts| sample(parts, position, 4000, 4));
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(
+                (a.wi, a.pdf, a.radiance, a.visible),
+                (b.wi, b.pdf, b.radiance, b.visible)
+            );
+        }
+    }
+    assert!(lit > 4000, "{lit} rays met light");
 }

@@ -13,7 +13,7 @@ mod support;
 mod surface;
 mod textures;
 
-#[allow(dead_code)] // the rest is for tests of the library itself
+#[allow(dead_code, unused_imports)] // the rest is for tests of the library itself
 #[path = "../../compiler/tests/stdlib/library.rs"]
 mod library;
 #[path = "../../compiler/tests/common/listed.rs"]

@@ -3,12 +3,13 @@
 mod exact;
 mod reference;
 mod speed;
+mod steps;
 
 use crate::placed::{crowd, placed_parts};
 use crate::support::{CAST, MISS, Random, Ray, ray_rows, run};
 use glam::Vec3;
 use impasto_runtime::scene::{Mesh, NO_MATERIAL};
-use impasto_runtime::technique::{Technique, Traversal};
+use impasto_runtime::technique::{Technique, Traversal, Tree};
 use impasto_runtime::wgsl::ShaderPart;
 use impasto_runtime::world::bvh::{Bvh, Caster, Hit, Rays};
 use impasto_runtime::world::surface::geometry_part;
@@ -29,7 +30,25 @@ fn soup(random: &mut Random, count: usize, size: f32) -> Vec<[Vec3; 3]> {
     (0..count).map(triangle).collect()
 }
 
-fn one_level(positions: Vec<[Vec3; 3]>, traversal: Traversal) -> [ShaderPart; 2] {
+/// A long triangle.
+fn splinter(random: &mut Random, length: f32) -> [Vec3; 3] {
+    let center = random.point(-1.0, 1.0);
+    let along = length * random.direction();
+    [
+        center - along,
+        center + along,
+        center + 0.05 * length * random.direction(),
+    ]
+}
+
+/// Small triangles, and large ones among them that lie in several leaves.
+fn with_large_ones(random: &mut Random, count: usize) -> Vec<[Vec3; 3]> {
+    let mut all = soup(random, count, 0.05);
+    all.extend((0..count / 30).map(|_| splinter(random, 0.9)));
+    all
+}
+
+fn one_level(positions: Vec<[Vec3; 3]>, traversal: Traversal, tree: Tree) -> [ShaderPart; 2] {
     let count = positions.len();
     let mesh = Mesh {
         positions,
@@ -39,23 +58,50 @@ fn one_level(positions: Vec<[Vec3; 3]>, traversal: Traversal) -> [ShaderPart; 2]
     };
     let technique = Technique {
         traversal,
+        tree,
         ..Technique::default()
     };
-    let bvh = Bvh::build(&mesh, traversal);
+    let bvh = Bvh::build(&mesh, &technique);
     let geometry = geometry_part(&mesh, bvh.order(), &vec![u32::MAX; count], &[]);
+    assert_eq!(bvh.is_split(), tree == Tree::Split);
     [geometry, bvh.part(&technique)]
+}
+
+/// Adds triangles to a mesh that are several times as large as its own.
+fn add_large_ones(random: &mut Random, mesh: &mut Mesh) {
+    for _ in 0..mesh.len() / 10 {
+        mesh.positions.push(splinter(random, 2.0));
+        mesh.normals.push(None);
+        mesh.uvs.push(mesh.uvs[0]);
+        mesh.materials.push(0);
+        mesh.lights.push(None);
+    }
 }
 
 /// Worlds of one level and of two.
 fn worlds(random: &mut Random) -> Vec<[ShaderPart; 2]> {
     let sizes = [(1, 1.0), (3, 0.8), (40, 0.5), (2500, 0.1)];
-    let flat = sizes.map(|(count, size)| one_level(soup(random, count, size), Traversal::Cwbvh));
+    let whole = |positions| one_level(positions, Traversal::Cwbvh, Tree::Whole);
+    let flat = sizes.map(|(count, size)| whole(soup(random, count, size)));
     let mut worlds = flat.to_vec();
+    let large = with_large_ones(random, 900);
+    worlds.push(one_level(large, Traversal::Cwbvh, Tree::Split));
     for (scale, world) in [(1.0, true), (1e-3, false)] {
         let scene = crowd(random, scale, world);
         let [geometry, bvh, _] = placed_parts(&scene, &Technique::default());
         worlds.push([geometry, bvh]);
     }
+    let mut scene = crowd(random, 1.0, true);
+    for mesh in scene.objects.iter_mut().map(|object| &mut object.mesh) {
+        add_large_ones(random, mesh);
+    }
+    let split = Technique {
+        tree: Tree::Split,
+        ..Technique::default()
+    };
+    let [geometry, bvh, _] = placed_parts(&scene, &split);
+    assert!(bvh.wgsl.contains("fn primitive_of"));
+    worlds.push([geometry, bvh]);
     worlds
 }
 
@@ -169,7 +215,7 @@ fn rays_side_by_side_hit_what_they_hit_alone() {
     let mut random = Random::new(15);
     for world in worlds(&mut random) {
         let geometry = Geometry::new(&world[0]);
-        let mut rays = rays(&mut random, &geometry, 1200);
+        let mut rays = rays(&mut random, &geometry, 3000);
         for ray in rays.iter_mut().step_by(31) {
             ray.direction.x = f32::NAN;
         }
@@ -290,6 +336,6 @@ fn trees_that_lead_astray_are_refused() {
         }
     }
     assert!(taken > 500, "{taken} trees that can be walked");
-    let binary = one_level(soup(&mut random, 9, 0.5), Traversal::Bvh2);
+    let binary = one_level(soup(&mut random, 9, 0.5), Traversal::Bvh2, Tree::Whole);
     assert!(Caster::new(&binary[0], &binary[1]).is_none());
 }

@@ -20,7 +20,10 @@ impl GeneratedFile {
     /// The two files of a model: geometry and its material library.
     pub(crate) fn of_model(folder: &str, name: &str, model: &Model) -> Vec<Self> {
         let file = |extension: &str, bytes| Self {
-            path: format!("{folder}/{name}.{extension}"),
+            path: match folder {
+                "" => format!("{name}.{extension}"),
+                folder => format!("{folder}/{name}.{extension}"),
+            },
             bytes,
         };
         vec![

@@ -41,7 +41,7 @@ struct Generator {
     generate: fn() -> Result<Vec<GeneratedFile>, String>,
 }
 
-const GENERATORS: [Generator; 11] = [
+const GENERATORS: [Generator; 10] = [
     Generator {
         name: "cornell",
         generate: || model("examples/cornell", "cornell", &cornell::build()),
@@ -80,10 +80,6 @@ const GENERATORS: [Generator; 11] = [
     Generator {
         name: "crossover",
         generate: || Ok(crossover::files()),
-    },
-    Generator {
-        name: "mixes",
-        generate: || Ok(mixes::files()),
     },
     Generator {
         name: "textures",

@@ -1,13 +1,12 @@
 //! `cargo scenes [NAMES]`: writes the example scenes that are generated.
 
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
 use impasto_scenes::GeneratedFile;
-use xtask::shell;
 
 /// Generates the geometry, environment maps and textures of the example scenes
 #[derive(Parser)]
@@ -22,11 +21,17 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    shell::exit_code(run(&Cli::parse()))
+    match run(&Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
-fn run(cli: &Cli) -> shell::Result {
-    let root = cli.out.as_deref().unwrap_or(shell::root());
+fn run(cli: &Cli) -> Result<(), String> {
+    let root = cli.out.as_deref().unwrap_or(root());
     let is_chosen = |known: &&str| cli.names.is_empty() || cli.names.iter().any(|n| n == known);
     for name in impasto_scenes::names().filter(is_chosen) {
         for file in impasto_scenes::write(name, root)? {
@@ -36,8 +41,17 @@ fn run(cli: &Cli) -> shell::Result {
     Ok(())
 }
 
+/// The root of the repository: where this was built, or the current folder if that is not there.
+fn root() -> &'static Path {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    match manifest.parent() {
+        Some(built) if built.is_dir() => built,
+        _ => Path::new("."),
+    }
+}
+
 /// Says on standard output what was written.
-fn say(file: &GeneratedFile) -> shell::Result {
+fn say(file: &GeneratedFile) -> Result<(), String> {
     let kib = file.bytes.len().div_ceil(1024);
     let triangles = file.triangles();
     let triangles = triangles.map_or_else(String::new, |n| format!(", {n} triangles"));

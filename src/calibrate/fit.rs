@@ -278,7 +278,7 @@ pub(super) mod tests {
     }
 
     /// Scenes whose kernels take exactly what the model says by `truth`.
-    pub(in super::super) fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
+    pub(crate) fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
         let mut numbers = Inputs::new(7);
         let scene = |(index, pool): (usize, u32)| {
             let name = |m: usize| format!("m{index}{m}");

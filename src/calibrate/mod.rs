@@ -13,6 +13,8 @@ mod score;
 mod sources;
 
 pub use errors::Errors;
+#[cfg(test)]
+pub(crate) use fit::tests::measured_by;
 pub use fit::{Fitted, Residual, fit};
 pub use measure::{Effort, Step, measure};
 pub use registers::{Registers, registers};

@@ -9,6 +9,7 @@ use clap::{Args, ValueHint};
 use impasto::compiler::diag::Diagnostic;
 use impasto::compiler::source::SourceMap;
 use impasto::compiler::{self, Loader, diag};
+use impasto::error::{scene_diagnostic, scene_warning};
 use impasto::files;
 use impasto::runtime::error::SceneError;
 use impasto::runtime::input;
@@ -157,44 +158,14 @@ impl Findings {
         if !global.json() {
             return super::say(&format!("{}: {error}", global.error_word()));
         }
-        let label = error.excerpt.iter().map(|named| {
-            json!({
-                "message": "the scene's line",
-                "file": named.path.display().to_string(),
-                "line": named.line,
-                "column": named.column,
-            })
-        });
-        let labels: Vec<Value> = label.collect();
-        let file = error.path.as_ref().map(|path| path.display().to_string());
-        self.diagnostics.push(json!({
-            "code": null,
-            "severity": "error",
-            "message": error.message,
-            "file": file,
-            "line": error.line,
-            "column": error.column,
-            "expected": null,
-            "hint": error.hint,
-            "labels": labels,
-        }));
+        self.diagnostics.push(scene_diagnostic(error));
     }
 
     fn scene_warning(&mut self, path: &Path, warning: &str, global: &Global) {
         self.warnings += 1;
         let file = path.display().to_string();
         if global.json() {
-            self.diagnostics.push(json!({
-                "code": null,
-                "severity": "warning",
-                "message": warning,
-                "file": file,
-                "line": null,
-                "column": null,
-                "expected": null,
-                "hint": null,
-                "labels": [],
-            }));
+            self.diagnostics.push(scene_warning(&file, warning));
         } else {
             global.note(&format!("warning: {file}: {warning}"));
         }

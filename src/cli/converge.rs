@@ -104,7 +104,7 @@ pub(super) fn run(args: &ConvergeArgs, global: &Global) -> Outcome {
     args.device.check()?;
     let mut settings = args.settings()?;
     let names = names(&args.scenes);
-    make_folder(&args.out)?;
+    files::make_folder(&args.out)?;
     files::check_writable(&args.out.join("convergence.json"))?;
     interrupt::install()?;
     let device = args.device.open(global)?;
@@ -169,6 +169,7 @@ impl ConvergeArgs {
         }
         Ok(Settings {
             strategies: distinct(&self.strategies),
+            plans: Vec::new(),
             samplers: distinct(&self.samplers),
             samples: quarters(self.min_spp, self.max_spp),
             seeds: self.seed..end,
@@ -287,13 +288,6 @@ fn plain(name: &str) -> String {
         "" => "scene".into(),
         name => name.into(),
     }
-}
-
-fn make_folder(folder: &Path) -> Result<(), String> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        let why = files::reason(&error);
-        format!("cannot make the folder `{}`: {why}", folder.display())
-    })
 }
 
 /// What was typed, with the program's name alone in the place of its path.

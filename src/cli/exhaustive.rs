@@ -24,6 +24,9 @@ pub(super) struct ExhaustiveArgs {
     /// Measure no further kernel after so many seconds
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     limit: Option<u64>,
+    /// Measure at most so many kernels beside those of the strategies' plans
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    kernels: Option<u32>,
 }
 
 impl ExhaustiveArgs {
@@ -47,6 +50,7 @@ impl ExhaustiveArgs {
                 ..LabOptions::default()
             },
             limit: self.limit.map(Duration::from_secs),
+            kernels: self.kernels.map(|most| most as usize),
         };
         let kernels = meter.part(0.0, KERNELS);
         let mut progress = |at: Progress| kernels.count(at.done, at.all, "measuring kernels");

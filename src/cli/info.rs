@@ -1,8 +1,9 @@
 //! `impasto info`: the device that would render and the others, and the choice of it for all commands.
 
 use clap::{Args, ValueEnum};
+use impasto::cache;
 use impasto::runtime::cpu::MOST_THREADS;
-use impasto::runtime::gpu::{DeviceInfo, Environment, Selector, Several};
+use impasto::runtime::gpu::{DeviceInfo, Environment, KernelFolder, Selector, Several};
 use impasto::{Choice, CpuOptions, Device, DeviceOptions, Gpu, GpuOptions, RuntimeError, Width};
 use serde::Serialize;
 
@@ -69,20 +70,39 @@ impl DeviceArgs {
         )))
     }
 
+    /// The same as words, for processes that are to use the same device.
+    pub(super) fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        words.extend(self.device.map(|kind| match kind {
+            Kind::Gpu => "--device=gpu".to_owned(),
+            Kind::Cpu => "--device=cpu".to_owned(),
+        }));
+        words.extend(self.one_lane.then(|| "--one-lane".to_owned()));
+        words.extend(self.threads.map(|threads| format!("--threads={threads}")));
+        words.extend(self.gpu.gpu.as_ref().map(|gpu| format!("--gpu={gpu}")));
+        words.extend(self.gpu.checked.then(|| "--checked".to_owned()));
+        words.extend(
+            self.gpu
+                .validate_indirect
+                .then(|| "--validate-indirect".to_owned()),
+        );
+        words
+    }
+
     /// Was the processor asked for?
     pub(super) fn is_cpu(&self) -> bool {
         self.device == Some(Kind::Cpu)
     }
 
-    /// Which device is asked for.
-    pub(super) fn options(&self) -> DeviceOptions {
+    /// Which device is asked for; `warn` is told if kernels cannot be kept for the next start.
+    pub(super) fn options(&self, warn: fn(&str)) -> DeviceOptions {
         DeviceOptions {
             choice: match self.device {
                 None => Choice::Best,
                 Some(Kind::Gpu) => Choice::Gpu,
                 Some(Kind::Cpu) => Choice::Cpu,
             },
-            gpu: self.gpu.options(),
+            gpu: self.gpu.options(warn),
             cpu: CpuOptions {
                 threads: self.threads.map(|threads| threads as usize),
                 width: if self.one_lane {
@@ -97,7 +117,7 @@ impl DeviceArgs {
     /// The device that was asked for.
     pub(super) fn open(&self, global: &Global) -> Result<Device, Failure> {
         self.check()?;
-        let options = self.options();
+        let options = self.options(global.warner());
         let mut note = |line: &str| global.note(line);
         let device = Device::open_noting(&options, &mut note).map_err(super::runtime)?;
         if let (Device::Gpu(gpu), Some(_)) = (&device, self.threads) {
@@ -132,7 +152,7 @@ impl DeviceArgs {
         };
         self.check_several(Some(several))?;
         let mut note = |line: &str| global.note(line);
-        let gpus = Gpu::several(several, &self.gpu.options(), &mut note);
+        let gpus = Gpu::several(several, &self.gpu.options(global.warner()), &mut note);
         let gpus = gpus.map_err(super::runtime)?;
         Ok(gpus
             .into_iter()
@@ -151,12 +171,13 @@ impl DeviceArgs {
 }
 
 impl GpuArgs {
-    fn options(&self) -> GpuOptions {
+    fn options(&self, warn: fn(&str)) -> GpuOptions {
         GpuOptions {
             adapter: self.gpu.clone(),
             environment: Environment::of_process(),
             checked: self.checked,
             validate_indirect: self.validate_indirect,
+            kernels: cache::folder("kernels").map(|path| KernelFolder { path, warn }),
             ..GpuOptions::default()
         }
     }
@@ -167,7 +188,7 @@ impl GpuArgs {
             Failure::new(format!("{what} needs a GPU: {error}"), error.is_transient())
         };
         let mut note = |line: &str| global.note(line);
-        Gpu::new_noting(&self.options(), &mut note).map_err(needed)
+        Gpu::new_noting(&self.options(global.warner()), &mut note).map_err(needed)
     }
 }
 

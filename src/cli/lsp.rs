@@ -19,6 +19,6 @@ pub(super) struct LspArgs {
 
 pub(super) fn run(args: &LspArgs) -> Outcome {
     args.device.check()?;
-    let host = Arc::new(Workbench::new(args.device.options()));
+    let host = Arc::new(Workbench::new(args.device.options(super::say)));
     impasto_lsp::run(host).map_err(Failure::Error)
 }

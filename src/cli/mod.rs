@@ -1,13 +1,11 @@
 //! The command line: options, exit codes, and what goes to which stream.
 //!
 //! Results and what programs read go to standard output; diagnostics for people, progress and
-//! notes go to standard error. A command fails in one of four ways, see [`Failure`].
+//! notes go to standard error. A command fails in one of four ways, see `Failure`.
 
+use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
-use std::process::ExitCode;
-use std::sync::mpsc::Sender;
-#[cfg(feature = "window")]
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Sender, channel};
 
 use clap::{ArgAction, ColorChoice, Parser, Subcommand, ValueEnum};
 use impasto::compiler::diag::{self, Diagnostic};
@@ -27,6 +25,7 @@ mod dropped;
 mod emit;
 mod eval;
 mod exhaustive;
+mod experiment;
 mod explain;
 mod export;
 mod farm;
@@ -41,6 +40,7 @@ mod needs;
 mod new;
 mod outputs;
 mod plan;
+mod planned;
 mod profile;
 mod progress;
 mod rays;
@@ -49,6 +49,7 @@ mod shot;
 mod sources;
 mod strategy;
 mod technique;
+mod test;
 mod trace;
 mod until;
 mod view;
@@ -118,6 +119,8 @@ enum Command {
     Import(import::ImportArgs),
     /// Write a material that is an instance of a surface model as MaterialX or glTF, with its pictures
     Export(export::ExportArgs),
+    /// Hold materials and bsdfs to what any must keep and to what their documentation promises
+    Test(test::TestArgs),
     /// Format sources, keeping every comment
     Fmt(fmt::FmtArgs),
     /// Print a stage of the compilation of a material file
@@ -136,6 +139,8 @@ enum Command {
     View(Box<view::ViewArgs>),
     /// Measure how fast renders converge: error against run time
     Converge(Box<converge::ConvergeArgs>),
+    /// Run a study: scenes, materials, models and GPUs, measured and told on a page
+    Experiment(Box<experiment::ExperimentArgs>),
     /// Replay the path of one sample, and print every vertex
     Trace(trace::TraceArgs),
     /// Time ray casts alone, by every technique
@@ -222,7 +227,7 @@ impl Failure {
 type Outcome = Result<(), Failure>;
 
 /// Something that only the main thread may do.
-pub(crate) type Job = Box<dyn FnOnce() + Send>;
+pub type Job = Box<dyn FnOnce() + Send>;
 
 /// Has something done by the main thread, which takes `jobs`; by this one if it is that.
 #[cfg(feature = "window")]
@@ -241,20 +246,45 @@ fn on_main_thread<T: Send + 'static>(
     done.recv().map_err(|_| gone(()))
 }
 
+/// Stack of the thread that does the work. That of the main thread is what the system grants it (`ulimit -s`), which
+/// may be little.
+const STACK_BYTES: usize = 32 << 20;
+
+/// Runs the command by its arguments, of which the first is its name, and reports its failure; the exit code. It is the main
+/// thread that calls this: it does what only that may do. Wrong arguments end the process.
+pub fn main(args: Vec<OsString>) -> u8 {
+    let builder = std::thread::Builder::new().name("main".into());
+    let (sender, jobs) = channel::<Job>();
+    let given = args.clone();
+    let work = move || run(given, Some(&sender));
+    match builder.stack_size(STACK_BYTES).spawn(work) {
+        Ok(thread) => {
+            // Windows are the main thread's on some systems. There are no more jobs when the work is done.
+            jobs.into_iter().for_each(|job| job());
+            thread
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        }
+        Err(_) => run(args, None),
+    }
+}
+
 /// Reads the arguments, runs the command, reports its failure. The main thread takes `jobs`, unless it is this one.
-pub(crate) fn main(jobs: Option<&Sender<Job>>) -> ExitCode {
+fn run(args: Vec<OsString>, jobs: Option<&Sender<Job>>) -> u8 {
     interrupt::outlive_file_limit();
-    let cli = Cli::parse();
+    let cli = Cli::parse_from(args);
     let global = cli.global;
     let outcome = match cli.command {
         Command::Check(args) => check::run(&args, &global),
         Command::Emit(args) => emit::run(&args, &global),
         Command::New(args) => new::run(&args, &global),
+        Command::Test(args) => test::run(&args, &global),
         Command::Fmt(args) => fmt::run(&args, &global),
         Command::Import(args) => import::run(&args, &global),
         Command::Export(args) => export::run(&args, &global),
         Command::Calibrate(args) => calibrate::run(&args, &global),
         Command::Converge(args) => converge::run(&args, &global),
+        Command::Experiment(args) => experiment::run(&args, &global),
         Command::Cost(args) => cost::run(&args, &global),
         Command::Plan(args) => plan::run(&args, &global),
         Command::Eval(args) => eval::run(&args, &global),
@@ -272,14 +302,14 @@ pub(crate) fn main(jobs: Option<&Sender<Job>>) -> ExitCode {
     match outcome {
         Ok(()) => {
             progress::complete(&global);
-            ExitCode::SUCCESS
+            0
         }
         Err(failure) => {
             if let Some(message) = failure.message() {
                 say(&format!("{}: {message}", global.error_word()));
                 progress::failed(&global, message);
             }
-            ExitCode::from(failure.code())
+            failure.code()
         }
     }
 }
@@ -308,6 +338,11 @@ impl Global {
         } else {
             "error"
         }
+    }
+
+    /// What says a note on standard error, unless `--quiet`, for who outlives this.
+    fn warner(&self) -> fn(&str) {
+        if self.quiet { |_| () } else { say }
     }
 
     /// A note on standard error, unless `--quiet`.

@@ -31,7 +31,7 @@ pub(super) struct PlanCommandArgs {
     /// rendered
     #[arg(long, value_name = "FILE")]
     workload: Option<PathBuf>,
-    /// Device profile: a built-in one (h200, llvmpipe) or a file from `impasto calibrate`; by default the
+    /// Device profile: a built-in one (h200, h100, llvmpipe) or a file from `impasto calibrate`; by default the
     /// one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     profile: Option<String>,
@@ -222,6 +222,16 @@ impl PlanCommandArgs {
             &meter,
         )?;
         drop(meter);
+        if answer.best.is_empty() {
+            let failed = answer
+                .failed
+                .first()
+                .map_or_else(String::new, |why| format!(": {why}"));
+            let why = format!(
+                "the kernels that could be measured make no plan for all materials{failed}"
+            );
+            return Err(Failure::Error(why));
+        }
         let best = text::parse(&answer.best, &materials.names, &materials.unused);
         let best = best.map_err(|e| e.to_string())?;
         self.save(&best, &materials.names, &answer.measurement.workload)?;

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use impasto::runtime::lab::rays::{RayOptions, RayRate, RayReport, measure, techniques};
-use impasto::runtime::technique::{Choice, Technique};
+use impasto::runtime::technique::{Choice, Technique, Tree};
 
 use super::info::GpuArgs;
 use super::progress::Meter;
 use super::render::parse_size;
+use super::technique::{default_name, named};
 use super::{Global, Outcome, print, runtime};
 
 #[derive(Args)]
@@ -21,6 +22,9 @@ pub(super) struct RaysArgs {
     /// How often each cast is timed; the median counts
     #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
     repetitions: u32,
+    /// In how many leaves of the acceleration structure a triangle lies
+    #[arg(long, value_name = "NAME", default_value = default_name::<Tree>(), value_parser = named::<Tree>())]
+    tree: Tree,
     /// Threads of a workgroup
     #[arg(long, value_name = "THREADS", value_parser = clap::value_parser!(u32).range(1..))]
     workgroup: Option<u32>,
@@ -40,6 +44,7 @@ pub(super) fn run(args: &RaysArgs, global: &Global) -> Outcome {
     let set_sizes = |technique| Technique {
         workgroup: args.workgroup,
         threads: args.fetch_threads,
+        tree: args.tree,
         ..technique
     };
     let options = RayOptions {

@@ -12,20 +12,20 @@ use std::time::Instant;
 use clap::builder::StringValueParser;
 use clap::{Args, ValueHint};
 use impasto::compiler::diag::{Code, Diagnostic};
-use impasto::compiler::partition::{PlanInputs, Requires};
 use impasto::compiler::{self, Loader, Moment, Written};
+use impasto::plan::{Begun, Planning};
 use impasto::runtime::error::{Excerpt, SceneError};
 use impasto::runtime::film::file::FilmFile;
 use impasto::runtime::film::outputs::{ID_SLOTS, ask_for_looks};
 use impasto::runtime::gpu::Several;
 use impasto::runtime::options::Progress;
 use impasto::runtime::render::Replanning;
-use impasto::runtime::render::report::{MaterialReport, ReplanReport, Report};
+use impasto::runtime::render::report::{MaterialReport, Report};
 use impasto::runtime::render::until::{Check, Ending, Goals};
 use impasto::runtime::scene::MAX_NESTED;
 use impasto::{
     Device, FileLoader, MaterialRequest, MultiRenderer, Plan, Program, RenderOptions, Rendering,
-    RuntimeError, Scene, Strategy, files, plan, shot,
+    RuntimeError, Scene, files, plan, shot,
 };
 
 use super::checkpoint::CheckpointArgs;
@@ -69,10 +69,14 @@ pub(super) struct RenderArgs {
     seed: u32,
     #[command(flatten)]
     pub(super) plan: PlanArgs,
-    /// Device profile for the automatic plan: a built-in one (h200, llvmpipe) or a file from
+    /// Device profile for the automatic plan: a built-in one (h200, h100, llvmpipe) or a file from
     /// `impasto calibrate`; by default the one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     pub(super) device_profile: Option<String>,
+    /// How many plans of either kind the automatic plan is tried against while rendering (docs/plan.md): 4 by default, and 0
+    /// on a GPU in software
+    #[arg(long, value_name = "N")]
+    trials: Option<usize>,
     /// Where to write the report, as JSON (see docs/report.md)
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
@@ -169,10 +173,15 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
             global.detail("no profile is of this GPU; `impasto calibrate` makes one");
         }
         renderer.replan(|index| {
-            let (scene, program) = (scene.clone(), program.clone());
-            let profile = profiles[index].profile.clone();
-            let planner = plan::planner(strategy, scene, program.clone(), profile, plan::POINTS);
-            Replanning::new(program, planner)
+            let planning = Planning {
+                strategy,
+                scene: scene.clone(),
+                program: program.clone(),
+                profile: profiles[index].profile.clone(),
+                points: plan::POINTS,
+                trials: args.trials.unwrap_or_else(|| plan::trials(&devices[index])),
+            };
+            Replanning::new(program.clone(), planning.planner())
         });
     }
     let mut rendering = match &goals {
@@ -205,61 +214,17 @@ pub(super) const COMPILING: &str = "compiling materials";
 /// Samples per pixel where nothing is said of them.
 const SAMPLES: u32 = 64;
 
-/// The plan that a render begins with.
-struct Planned {
-    plan: Plan,
-    /// The strategy that renews it for what paths turn out to hit.
-    renewed_by: Option<Strategy>,
-}
-
 impl RenderArgs {
-    /// The plan that was asked for. A strategy that must know how paths hit materials begins with a kernel
-    /// a material, and plans when that is known. What the device replaces is not made.
-    fn planned(
-        &self,
-        scene: &Scene,
-        program: &Program,
-        device: &Device,
-    ) -> Result<Planned, Failure> {
+    /// The plan that was asked for.
+    fn planned(&self, scene: &Scene, program: &Program, device: &Device) -> Result<Begun, Failure> {
         let names: Vec<String> = program.materials().map(|m| m.name.clone()).collect();
         let unused = plan::unused(scene, program);
-        let fixed = |plan| Planned {
-            plan,
-            renewed_by: None,
-        };
-        let strategy = match self.plan.source(&names, &unused, device.strategy())? {
-            Source::Given(plan) => return Ok(fixed(plan)),
-            Source::Strategy(strategy) => strategy,
-        };
-        let begun = || Plan {
-            strategy: strategy.to_string(),
-            ..Plan::few_kernels(&names, &unused)
-        };
-        let is_replaced = device.replaces(&strategy.to_string());
-        if is_replaced && strategy.requires() != Requires::Measurements {
-            return Ok(fixed(begun()));
-        }
-        let inputs = PlanInputs {
-            unused: &unused,
-            ..PlanInputs::of_names(&names)
-        };
-        let planned = |inputs: &PlanInputs<'_>| {
-            let plan = strategy.plan(inputs).map_err(|e| e.to_string())?;
-            Ok(fixed(plan))
-        };
-        match strategy.requires() {
-            Requires::Nothing | Requires::Measurements => planned(&inputs),
-            Requires::Costs => {
-                let materials = plan::SceneMaterials::new(scene, program, plan::POINTS);
-                planned(&PlanInputs {
-                    costs: Some(&materials.costs),
-                    ..inputs
-                })
+        match self.plan.source(&names, &unused, device.strategy())? {
+            Source::Given(plan) => Ok(Begun::fixed(plan)),
+            Source::Strategy(strategy) => {
+                let begun = Begun::new(strategy, scene, program, device);
+                Ok(begun.map_err(|e| e.to_string())?)
             }
-            Requires::Workload => Ok(Planned {
-                plan: begun(),
-                renewed_by: (names.len() <= plan::MOST_RENEWED).then_some(strategy),
-            }),
         }
     }
 
@@ -483,7 +448,7 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
         material_list(report),
     ));
     if let Some(change) = &report.replanned {
-        global.note(&plan_note(change));
+        global.note(&super::planned::note(change));
     }
     if report.placements > 0 {
         let [objects, placements] = [report.objects, report.placements].map(|n| n as usize);
@@ -497,6 +462,12 @@ fn summarise(rendering: &Rendering, args: &RenderArgs, outputs: &Outputs, global
     }
     for warning in dropped::warnings(report, args) {
         global.note(&warning);
+    }
+    if let Some(wanted) = report.wanted_pool_size {
+        let pool = report.pool_size;
+        global.note(&format!(
+            "warning: the GPU had memory for {pool} paths in flight, not for {wanted}, which takes longer"
+        ));
     }
     if report.queue_overflow > 0 {
         let lost = report.queue_overflow;
@@ -554,18 +525,6 @@ fn lost(report: &Report) -> impl Iterator<Item = String> {
             device.adapter.name, device.samples
         ))
     })
-}
-
-/// What became of the automatic plan.
-fn plan_note(change: &ReplanReport) -> String {
-    let (iteration, seconds) = (change.at_iteration, change.at_seconds);
-    match (&change.kept, &change.to) {
-        (Some(why), _) => format!("warning: the first plan went on: {why}"),
-        (None, Some(plan)) if *plan != change.from => {
-            format!("planned after {iteration} iterations ({seconds:.1} s): {plan}")
-        }
-        _ => format!("a kernel a material is the best plan, found after {seconds:.1} s"),
-    }
 }
 
 /// The names of materials, each with how often it is used if that is more than once.

@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
     Append, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
-    Stack, StateLayout, Technique, Traversal,
+    Stack, StateLayout, Technique, Traversal, Tree,
 };
 
 /// Every choice of [`Technique`].
@@ -26,6 +26,9 @@ pub(super) struct TechniqueArgs {
     /// The acceleration structure
     #[arg(long, value_name = "NAME", default_value = default_name::<Traversal>(), value_parser = named::<Traversal>())]
     traversal: Traversal,
+    /// In how many leaves of the acceleration structure a triangle lies
+    #[arg(long, value_name = "NAME", default_value = default_name::<Tree>(), value_parser = named::<Tree>())]
+    tree: Tree,
     /// Where ray casts keep the nodes they have yet to visit
     #[arg(long, value_name = "NAME", default_value = default_name::<Stack>(), value_parser = named::<Stack>())]
     stack: Stack,
@@ -69,6 +72,7 @@ impl TechniqueArgs {
             workgroup: self.workgroup,
             threads: self.fetch_threads,
             traversal: self.traversal,
+            tree: self.tree,
             stack: self.stack,
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,

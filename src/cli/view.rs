@@ -87,7 +87,7 @@ pub(super) fn run(args: &ViewArgs, global: &Global, jobs: Option<&Sender<Job>>) 
         // That is a slip, and nothing to wait for.
         files::check_readable(&args.scene)?;
     }
-    let live = Live::new(&args.scene, args.options()?);
+    let live = Live::new(&args.scene, args.options(global)?);
     let live = live.map_err(|error| format!("cannot begin to render: {error}"))?;
     match &args.tev {
         Some(address) => send(&live, address, global),
@@ -101,7 +101,7 @@ fn goal_text(text: &str) -> Result<String, String> {
 }
 
 impl ViewArgs {
-    fn options(&self) -> Result<LiveOptions, Failure> {
+    fn options(&self, global: &Global) -> Result<LiveOptions, Failure> {
         let is_material = shot::is_material(&self.scene);
         let of_materials = [
             ("--on", self.on.is_some()),
@@ -144,7 +144,7 @@ impl ViewArgs {
             values.push((ParamId { binding, param }, value.clone()));
         }
         Ok(LiveOptions {
-            device: self.device.options(),
+            device: self.device.options(global.warner()),
             set: self.on.map_or_else(Default::default, Into::into),
             material: self.material.clone(),
             turntable: self.turntable,

@@ -40,17 +40,28 @@ pub fn write(dir: &Path, convergence: &Convergence, pictures: &Pictures) -> Resu
         format!("cannot make the folder `{}`: {why}", dir.display())
     })?;
     let keep = |name: &str, text: &str| files::write_whole(&dir.join(name), text.as_bytes());
-    for (drawn, scene) in all_drawn(convergence).iter().zip(&convergence.scenes) {
-        for drawn in drawn {
-            keep(&drawn.file, &drawn.svg(scene)?)?;
-        }
+    for (name, text) in committed(convergence)? {
+        keep(&name, &text)?;
     }
     keep("convergence.csv", &csv::csv(convergence))?;
-    keep("report.md", &markdown(convergence))?;
     keep("index.html", &html(convergence, pictures))?;
     let json = serde_json::to_string_pretty(convergence)
         .map_err(|error| format!("cannot write what was found as JSON: {error}"))?;
     Ok(keep("convergence.json", &format!("{json}\n"))?)
+}
+
+/// What repositories keep beside the numbers: names and texts of the report and of its plots.
+///
+/// # Errors
+/// In words, if a plot cannot be drawn.
+pub fn committed(convergence: &Convergence) -> Result<Vec<(String, String)>, String> {
+    let mut all = vec![("report.md".to_owned(), markdown(convergence))];
+    for (drawn, scene) in all_drawn(convergence).iter().zip(&convergence.scenes) {
+        for drawn in drawn {
+            all.push((drawn.file.clone(), drawn.svg(scene)?));
+        }
+    }
+    Ok(all)
 }
 
 /// The report: tables and plots as Markdown. Links to plots are relative.

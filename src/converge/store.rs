@@ -321,13 +321,7 @@ impl Store {
 }
 
 fn make_folder(folder: &Path) -> Result<(), StudyError> {
-    fs::create_dir_all(folder).map_err(|error| {
-        let why = files::reason(&error);
-        StudyError::Folder(format!(
-            "cannot make the folder `{}`: {why}",
-            folder.display()
-        ))
-    })
+    files::make_folder(folder).map_err(StudyError::Folder)
 }
 
 /// What a JSON file says; none if it is not there, or says something else.

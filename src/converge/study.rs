@@ -27,6 +27,8 @@ use super::{StudyError, fit, flip, materials, metrics};
 pub struct Settings {
     /// A series for each of these with each sampler.
     pub strategies: Vec<Strategy>,
+    /// The same for each of these plans for the scene, under its name: those that no strategy of the table makes.
+    pub plans: Vec<(String, Plan)>,
     /// The samplers.
     pub samplers: Vec<Sampler>,
     /// Samples a pixel, ascending.
@@ -116,9 +118,9 @@ impl Study<'_> {
     /// The plan of each strategy.
     fn plans(&self) -> Result<Vec<(String, Plan)>, StudyError> {
         let strategies = self.settings.strategies.iter();
-        strategies
-            .map(|wanted| Ok((wanted.to_string(), self.stage.plan(*wanted)?)))
-            .collect()
+        let made = strategies.map(|wanted| Ok((wanted.to_string(), self.stage.plan(*wanted)?)));
+        let given = self.settings.plans.iter().cloned().map(Ok);
+        made.chain(given).collect()
     }
 
     /// All series. Each has an equal part of the time, and what those before it left.

@@ -34,7 +34,7 @@ use super::project::describe;
 use super::shared::{Origin, Shared, lock};
 use super::wanted::Wanted;
 use crate::files::FileLoader;
-use crate::plan::{self, POINTS, SceneMaterials};
+use crate::plan::{self, POINTS, Planning, SceneMaterials};
 use crate::set::Sample;
 use crate::shot::{self, Subject};
 
@@ -281,7 +281,7 @@ impl<'d> Maker<'d, '_> {
         let strategy = wanted.strategy.unwrap_or_else(|| device.strategy());
         // What is final renders for long enough to be worth a plan of its own.
         let is_renewed = of.code == Code::Final
-            && is_fast(device)
+            && plan::is_fast(device)
             && strategy.requires() == Requires::Workload
             && of.program.materials().len() <= plan::MOST_RENEWED;
         let options = RenderOptions {
@@ -301,7 +301,11 @@ impl<'d> Maker<'d, '_> {
         if is_renewed {
             self.renew(&mut renderer, strategy, &of.scene, program);
         }
-        renderer.answer_within(if is_fast(device) { ANSWER } else { SLOW_ANSWER });
+        renderer.answer_within(if plan::is_fast(device) {
+            ANSWER
+        } else {
+            SLOW_ANSWER
+        });
         let stands_in = !std::ptr::eq(device, self.device);
         let mut reasons = kernels::reasons(plan, renderer.plan(), program, device);
         if stands_in {
@@ -418,11 +422,18 @@ impl<'d> Maker<'d, '_> {
         let Ok(choice) = DeviceProfile::shipped(&info.name, info.kind) else {
             return;
         };
-        let (profile, of) = (choice.profile, (scene.clone(), program.clone()));
-        let planner = plan::planner(strategy, of.0, of.1, profile, POINTS);
+        // Nobody looks at it long enough for trials.
+        let planning = Planning {
+            strategy,
+            scene: scene.clone(),
+            program: program.clone(),
+            profile: choice.profile,
+            points: POINTS,
+            trials: 0,
+        };
         renderer.replan(Replanning {
             worthwhile: Duration::ZERO,
-            ..Replanning::new(program.clone(), planner)
+            ..Replanning::new(program.clone(), planning.planner())
         });
     }
 
@@ -439,11 +450,6 @@ impl<'d> Maker<'d, '_> {
             ..RenderOptions::default()
         }
     }
-}
-
-/// Whether a GPU renders that is no software.
-pub(super) fn is_fast(device: &Device) -> bool {
-    matches!(device, Device::Gpu(gpu) if gpu.info().kind != "software")
 }
 
 /// Paths in flight, where they are not as many as in a render. A GPU in software takes fewer, since an iteration is what one

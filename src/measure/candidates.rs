@@ -1,10 +1,12 @@
-//! Which kernels to measure: all of them where materials are few, a stated sample where they are many.
+//! Which kernels to measure: all of them where materials are few, a stated sample where they are many or time is short.
 
 use std::collections::BTreeSet;
 
 use impasto_compiler::cost::Inputs;
-use impasto_compiler::partition::Form;
+use impasto_compiler::partition::{Form, Groups};
 use impasto_runtime::lab::Candidate;
+
+use super::plans::draw;
 
 /// The most materials of which every subset is measured.
 pub const ALL: usize = 6;
@@ -22,6 +24,88 @@ pub fn candidates(materials: &[usize]) -> Vec<Candidate> {
         _ => sample(materials),
     };
     in_all_forms(materials, subsets)
+}
+
+/// The same, but no more than `most` kernels beyond those of `plans`, which come first: single materials, then in turn what
+/// comes of a plan when one material moves to another kernel, and the kernels of a plan drawn by chance. So those that
+/// were measured go together into many plans, good ones above all.
+pub fn candidates_within(materials: &[usize], plans: &[Groups], most: usize) -> Vec<Candidate> {
+    let mut all = Distinct::default();
+    for (form, members) in plans.iter().flatten() {
+        all.add(*form, members.clone());
+    }
+    let most = most.saturating_add(all.0.len());
+    let every = candidates(materials);
+    let rest = every.iter().filter(|c| !all.0.contains(c)).count();
+    if all.0.len() + rest <= most {
+        let every = every.into_iter().filter(|c| !all.0.contains(c));
+        return all.0.iter().cloned().chain(every).collect();
+    }
+    for material in materials {
+        all.add(Form::Own, vec![*material]);
+        all.add(Form::Inline, vec![*material]);
+    }
+    let mut numbers = Inputs::new(SEED);
+    // What chance finds again and again is known already.
+    for turn in 0..20 * most {
+        let groups = match plans {
+            [_, ..] if turn % 2 == 0 => {
+                let plan = &plans[turn / 2 % plans.len()];
+                moved(plan, &mut numbers)
+            }
+            _ => draw(materials, &mut numbers),
+        };
+        for (form, members) in groups {
+            if all.0.len() >= most {
+                return all.0;
+            }
+            all.add(form, members);
+        }
+    }
+    all.0
+}
+
+/// The kernels that a plan gets when one of its materials moves to another of them, or inline, or out of all.
+fn moved(plan: &Groups, numbers: &mut Inputs) -> Groups {
+    let mut below = |n: usize| ((numbers.unit() * n as f64) as usize).min(n.saturating_sub(1));
+    let mut plan = plan.clone();
+    if plan.is_empty() {
+        return plan;
+    }
+    let from = below(plan.len());
+    let taken = below(plan[from].1.len());
+    let material = plan[from].1.remove(taken);
+    // One place more than there are kernels: a queue of its own, or inline with what is.
+    match below(plan.len() + 2) {
+        to if to < plan.len() && to != from => plan[to].1.push(material),
+        to if to % 2 == 0 => plan.push((Form::Own, vec![material])),
+        _ => match plan.iter_mut().find(|(form, _)| *form == Form::Inline) {
+            Some((_, inline)) => inline.push(material),
+            None => plan.push((Form::Inline, vec![material])),
+        },
+    }
+    plan.retain(|(_, members)| !members.is_empty());
+    for (form, members) in &mut plan {
+        members.sort_unstable();
+        // What had one material and has two shares a queue.
+        if *form == Form::Own && members.len() > 1 {
+            *form = Form::Binned;
+        }
+    }
+    plan
+}
+
+/// Kernels, each once.
+#[derive(Default)]
+struct Distinct(Vec<Candidate>);
+
+impl Distinct {
+    fn add(&mut self, form: Form, members: Vec<usize>) {
+        let new = candidate(form.with_members(members.len()), members);
+        if !self.0.contains(&new) {
+            self.0.push(new);
+        }
+    }
 }
 
 /// Every material by itself, and the subsets, in all forms that they may have.
@@ -107,6 +191,34 @@ mod tests {
         assert_eq!(candidates(&(0..6).collect::<Vec<_>>()).len(), 12 + 57 * 3);
         assert_eq!(candidates(&[4]).len(), 2);
         assert!(candidates(&[]).is_empty());
+    }
+
+    #[test]
+    fn within_a_number_the_kernels_of_plans_come_first_and_make_up_others() {
+        let materials: Vec<usize> = (0..8).collect();
+        let plans = [
+            vec![(Form::Binned, materials.clone())],
+            vec![
+                (Form::Mixed, vec![0, 1, 2]),
+                (Form::Inline, vec![3, 4, 5, 6, 7]),
+            ],
+        ];
+        let some = candidates_within(&materials, &plans, 60);
+        assert_eq!(some.len(), 63);
+        assert_eq!(some, candidates_within(&materials, &plans, 60));
+        assert_eq!(some[0], candidate(Form::Binned, materials.clone()));
+        for (at, kernel) in some.iter().enumerate() {
+            assert!(!some[..at].contains(kernel), "{kernel:?} twice");
+            assert!(kernel.members.is_sorted() && !kernel.members.is_empty());
+            let forms: Vec<Form> = Form::of_members(kernel.members.len()).collect();
+            assert!(forms.contains(&kernel.form), "{kernel:?}");
+        }
+        let of = |size: usize| some.iter().filter(|c| c.members.len() == size).count();
+        assert!(of(1) >= 16 && of(7) > 0, "{some:?}");
+        // Where all fit, all are measured.
+        let few = candidates_within(&[0, 1, 2], &[], 18);
+        assert_eq!(few.len(), 18);
+        assert_eq!(candidates_within(&[0, 1, 2], &[], 7).len(), 7);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use impasto_runtime::lab::{Candidate, Iteration, Lab, LabOptions};
 use serde::{Deserialize, Serialize};
 
 use super::plans::Times;
-use super::{MeasuredScene, Measurement, Progress, candidate, candidates};
+use super::{MeasuredScene, Measurement, Progress, candidates_within};
 use crate::Error;
 
 /// How many plans are drawn by chance to be timed as a whole.
@@ -27,6 +27,8 @@ pub struct Options {
     pub lab: LabOptions,
     /// After how long no further kernel is measured.
     pub limit: Option<Duration>,
+    /// The most kernels beside those of the strategies' plans; all that `candidates` names if `None`.
+    pub kernels: Option<usize>,
 }
 
 /// What was measured, and what follows from it.
@@ -98,7 +100,7 @@ pub fn exhaustive(
         profile: profile.1,
     };
     let (mut plans, planning_seconds) = strategies(&inputs);
-    let kernels = kernels(&plans, &on_surface);
+    let kernels = kernels(&plans, &on_surface, options.kernels);
     let timed = subject.time(&mut lab, &kernels, deadline, progress)?;
     let mut measurement = subject.measurement(gpu, &lab, &options.lab, timed.kernels);
     let times = tabulate(&mut measurement, &model);
@@ -208,18 +210,10 @@ fn strategies(inputs: &PlanInputs<'_>) -> (Vec<Plan>, f64) {
     (plans, planning_seconds)
 }
 
-/// The kernels of those plans first, in case that time is short, then all others.
-fn kernels(plans: &[Plan], materials: &[usize]) -> Vec<Candidate> {
-    let of_plans = plans.iter().flat_map(groups);
-    let of_plans =
-        of_plans.map(|(form, members)| candidate(form.with_members(members.len()), members));
-    let mut all: Vec<Candidate> = Vec::new();
-    for candidate in of_plans.chain(candidates(materials)) {
-        if !all.contains(&candidate) {
-            all.push(candidate);
-        }
-    }
-    all
+/// The kernels of those plans first, in case that time is short, then others.
+fn kernels(plans: &[Plan], materials: &[usize], most: Option<usize>) -> Vec<Candidate> {
+    let plans: Vec<Groups> = plans.iter().map(groups).collect();
+    candidates_within(materials, &plans, most.unwrap_or(usize::MAX))
 }
 
 fn groups(plan: &Plan) -> Groups {

@@ -6,7 +6,7 @@ mod exhaustive;
 mod plans;
 mod scene;
 
-pub use candidates::{ALL, candidate, candidates, sample_for_fit};
+pub use candidates::{ALL, candidate, candidates, candidates_within, sample_for_fit};
 pub use data::{Adapter, Data, Kernel, Material, Measurement};
 pub use exhaustive::{Answer, Options, PlanTime, exhaustive};
 pub use scene::{Kernels, MeasuredScene, Progress};

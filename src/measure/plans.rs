@@ -102,7 +102,7 @@ fn chosen(materials: &[usize], set: u32) -> Vec<usize> {
 }
 
 /// Materials thrown into as many boxes, the first of them inline at times.
-fn draw(materials: &[usize], numbers: &mut Inputs) -> Groups {
+pub(super) fn draw(materials: &[usize], numbers: &mut Inputs) -> Groups {
     let boxes = materials.len();
     let mut below = |n: usize| ((numbers.unit() * n as f64) as usize).min(n - 1);
     let mut groups: Vec<Vec<usize>> = vec![Vec::new(); boxes];

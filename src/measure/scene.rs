@@ -78,7 +78,8 @@ impl<'p> MeasuredScene<'p> {
         all.filter(|m| !self.materials.unused.contains(m)).collect()
     }
 
-    /// Times kernels, until `deadline` if there is one.
+    /// Times kernels, until `deadline` if there is one. The first of them are always timed: building what precedes them may
+    /// take all of the time, and without kernels there is no plan.
     ///
     /// # Errors
     /// If the GPU fails.
@@ -96,7 +97,7 @@ impl<'p> MeasuredScene<'p> {
                 done,
                 all: candidates.len(),
             });
-            if deadline.is_some_and(|end| Instant::now() >= end) {
+            if done > 0 && deadline.is_some_and(|end| Instant::now() >= end) {
                 all.left_out = candidates.len() - done;
                 break;
             }

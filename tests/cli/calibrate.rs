@@ -151,6 +151,24 @@ fn measuring_ends_when_its_time_is_used_up() {
     impasto(&["plan", &scene, "--strategy=exhaustive", "--limit=0"])
         .exits(2)
         .says("--limit");
+    // However short the time is, the kernels of strategies' plans are timed: there is a best plan.
+    let words = [
+        "plan",
+        &scene,
+        "--strategy=exhaustive",
+        "--limit=1",
+        "--pool=512",
+    ];
+    let more = ["--repetitions=1", "--format=json"];
+    let told = impasto(&[&words[..], &more].concat()).exits(0).json();
+    assert!(
+        told["best"].as_str().is_some_and(|best| !best.is_empty()),
+        "{told}"
+    );
+    assert!(
+        told["kernels"].as_array().is_some_and(|k| k.len() > 3),
+        "{told}"
+    );
 }
 
 #[test]

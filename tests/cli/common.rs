@@ -23,6 +23,9 @@ pub(crate) fn command(args: &[&str]) -> Command {
         .args(args)
         .current_dir(root())
         .env_remove("NO_COLOR")
+        .env_remove("CI")
+        // What another run found would hide what this one does.
+        .env("IMPASTO_CACHE", "off")
         .stdin(Stdio::null());
     command
 }

@@ -115,6 +115,11 @@ fn files_are_offered_where_files_are_taken() {
         [
             "converge --out",
             "converge -o",
+            "experiment --farm",
+            "experiment --out",
+            "experiment -o",
+            "experiment mixes --out",
+            "experiment mixes -o",
             "farm new --out",
             "farm new -o",
             "import --out"
@@ -131,6 +136,7 @@ fn files_are_offered_where_files_are_taken() {
             "converge --reference",
             "emit --out",
             "emit -o",
+            "experiment --data",
             "export --out",
             "export -o",
             "farm new --commands",
@@ -147,6 +153,7 @@ fn files_are_offered_where_files_are_taken() {
             "render --plan",
             "render --report",
             "render -o",
+            "test --junit",
             "view --compare",
             "view --out",
             "view -o",

@@ -205,6 +205,77 @@ fn several_gpus_are_chosen_as_one_is() {
     assert!(!names(folder.path()).contains(&"x.exr".to_string()));
 }
 
+/// Kernels that an earlier start has built make the same picture, whatever became of their files.
+#[test]
+fn kernels_are_kept_for_the_next_start_and_never_make_it_fail() {
+    let folder = folder();
+    let cache = folder.path().join("cache");
+    let kernels = cache.join("kernels");
+    let start = |out: &str, cache: &std::path::Path| {
+        let out = folder.path().join(out).display().to_string();
+        let args = [
+            "render", SCENE, "--device", "gpu", "--size", "6x4", "--spp", "3", "--out", &out,
+        ];
+        let mut command = command(&args);
+        command.env("IMPASTO_CACHE", cache);
+        (command, out)
+    };
+    let rendered = |out: &str, cache: &std::path::Path| {
+        let (mut command, out) = start(out, cache);
+        let run: Run = command.output().expect("it starts").into();
+        (run.exits(0), std::fs::read(out).expect("a picture"))
+    };
+    let (_, fresh) = rendered("off.exr", "off".as_ref());
+    // Two processes build into one folder.
+    let both = ["a.exr", "b.exr"].map(|out| start(out, &cache));
+    let both = both.map(|(mut command, out)| {
+        let process = command.arg("--quiet").spawn();
+        (process.expect("it starts"), out)
+    });
+    for (mut process, out) in both {
+        assert!(process.wait().expect("it ends").success());
+        assert_eq!(std::fs::read(out).expect("a picture"), fresh);
+    }
+    let kept = names(&kernels);
+    assert!(
+        kept.len() > 3 && kept.iter().all(|n| n.ends_with(".kernel")),
+        "{kept:?}"
+    );
+    let whole = |name: &String| std::fs::read(kernels.join(name)).expect("a kernel");
+    let before: Vec<Vec<u8>> = kept.iter().map(whole).collect();
+    let (run, again) = rendered("again.exr", &cache);
+    assert!(
+        again == fresh && !run.stderr.contains("warning"),
+        "{run:#?}"
+    );
+    // Cut short, empty, of another kernel, and with a bit turned over.
+    for (i, name) in kept.iter().enumerate() {
+        let mut bytes = before[i].clone();
+        match i % 4 {
+            0 => bytes.truncate(bytes.len() / 2),
+            1 => bytes.clear(),
+            2 => bytes.clone_from(&before[(i + 1) % before.len()]),
+            _ => bytes[70] ^= 1,
+        }
+        std::fs::write(kernels.join(name), bytes).expect("written");
+    }
+    let (run, mended) = rendered("mended.exr", &cache);
+    assert_eq!(run.stderr.matches("is damaged").count(), 1, "{run:#?}");
+    assert_eq!(mended, fresh);
+    let (run, _) = rendered("after.exr", &cache);
+    assert!(!run.stderr.contains("warning"), "{run:#?}");
+    // A folder that cannot be.
+    let file = folder.path().join("file");
+    std::fs::write(&file, "x").expect("written");
+    let (run, nowhere) = rendered("nowhere.exr", &file);
+    assert_eq!(
+        run.stderr.matches("kernels are not kept").count(),
+        1,
+        "{run:#?}"
+    );
+    assert_eq!(nowhere, fresh);
+}
+
 #[test]
 fn so_many_threads_are_there_as_asked_for() {
     for threads in [1u64, 3] {

@@ -12,6 +12,7 @@ mod cost_lines;
 mod devices;
 mod emit_check;
 mod eval;
+mod experiment;
 mod explain;
 mod export;
 mod farm;
@@ -29,8 +30,10 @@ mod progress;
 mod rays;
 mod render;
 mod shot;
+mod snapshots;
 #[cfg(unix)]
 mod streams;
+mod test;
 mod trace;
 mod until;
 mod usd;

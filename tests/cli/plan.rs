@@ -241,7 +241,7 @@ fn what_does_not_fit_is_said_before_anything_is_rendered() {
         });
         impasto(&args).exits(2).prints_nothing()
     };
-    with("--profile", "voodoo").says("hint: give a file, or one of h200, llvmpipe");
+    with("--profile", "voodoo").says("hint: give a file, or one of h200, h100, llvmpipe");
     with("--profile", &broken)
         .says("the device profile cannot be read")
         .says("impasto calibrate");

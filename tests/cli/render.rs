@@ -38,7 +38,7 @@ fn a_picture_a_look_at_it_and_a_report() {
 }
 
 /// What every report has; docs/report.md says what they mean.
-const REPORT_FIELDS: [&str; 19] = [
+const REPORT_FIELDS: [&str; 20] = [
     "adapter",
     "strategy",
     "plan",
@@ -55,6 +55,7 @@ const REPORT_FIELDS: [&str; 19] = [
     "dropped",
     "queue_overflow",
     "triangles",
+    "references",
     "placed_triangles",
     "objects",
     "placements",

@@ -121,8 +121,17 @@ def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
     if spec["kind"] == "quad":
         u, v = np.array(spec["u"], float), np.array(spec["v"], float)
         corner = np.array(spec["corner"], float)
-        sides = [(u, v)] + ([(v, u)] if spec.get("two_sided") else [])
-        return [rectangle(corner, a, b, colour(spec["radiance"])) for a, b in sides]
+        radiance = colour(spec["radiance"])
+        if not spec.get("two_sided"):
+            return [rectangle(corner, u, v, radiance)]
+        # Mitsuba's rectangles emit from one side. Two in the same place would be hit from behind as often as from the front,
+        # and be black there, so each lies a little before the other's back.
+        gap = 1e-4 * max(np.linalg.norm(u), np.linalg.norm(v))
+        normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
+        return [
+            rectangle(corner + side * gap * normal, *edges, radiance)
+            for side, edges in [(1, (u, v)), (-1, (v, u))]
+        ]
     to_light = np.array(spec["to_light"], float)
     to_light /= np.linalg.norm(to_light)
     irradiance = np.array(colour(spec["irradiance"]))
@@ -147,6 +156,7 @@ def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
 
 
 def rectangle(corner: np.ndarray, u: np.ndarray, v: np.ndarray, radiance: list[float]) -> dict:
+    """A lamp that emits to the side of u x v."""
     matrix = np.eye(4)
     normal = np.cross(u, v)
     matrix[:3, 0], matrix[:3, 1] = 0.5 * u, 0.5 * v

@@ -16,6 +16,7 @@ mod hostile;
 mod layers;
 #[cfg(test)]
 mod licenses;
+mod python;
 mod test;
 
 #[derive(Parser)]
@@ -38,6 +39,8 @@ enum Command {
     Hostile(hostile::HostileArgs),
     /// Draw the folders of each crate with the folders that they name; fail if one may not
     Layers(layers::LayersArgs),
+    /// Install the Python package by `pip install .`, and run its tests and the notebooks
+    Python(python::PythonArgs),
     /// Accept the present output as the expected one of the snapshot tests
     Bless,
 }
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Farm(args) => farm::run(&args),
         Command::Hostile(args) => hostile::run(&args),
         Command::Layers(args) => layers::run(&args),
+        Command::Python(args) => python::run(&args),
         Command::Bless => bless::run(),
     })
 }

@@ -144,6 +144,10 @@ pub fn resolve(
     for (index, item) in ast.items.iter().enumerate() {
         resolver.item(item, ItemRef { module, index });
     }
+    resolver.in_material = false;
+    for test in &ast.tests {
+        resolver.scoped(test.span.end, |r| r.statements(&test.body.stmts));
+    }
     let Resolver {
         mut occurrences,
         locals,
@@ -363,6 +367,7 @@ impl Resolver<'_> {
                 limit.iter().for_each(|limit| self.expr(limit));
                 self.block(body);
             }
+            StmtKind::Assert(condition) => self.expr(condition),
             StmtKind::Break | StmtKind::Continue => {}
         }
     }

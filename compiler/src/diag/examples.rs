@@ -50,12 +50,13 @@ examples! {
     "E0301" "E0302" "E0303" "E0304" "E0305" "E0306" "E0307" "E0308" "E0309" "E0310" "E0311"
     "E0312" "E0313" "E0314" "E0315" "E0316" "E0317"
     "E0401"
+    "E0501" "E0502" "E0503" "E0504" "E0505" "E0506" "E0507" "E0509"
     "W0001" "W0002" "W0003" "W0004" "W0005" "W0006"
 }
 
 impl Code {
     /// A source that provokes this diagnostic, and the same repaired. Defects of the compiler have
-    /// none.
+    /// none, nor has what takes very long.
     pub fn example(self) -> Option<(Example, Example)> {
         let (broken, repaired) = text(self)?.split_once("=== repaired\n")?;
         Some((read(broken), read(repaired)))

@@ -15,6 +15,19 @@ impl<'t> Layout<'t> {
             && matches!(self.peek_at(at + 1), Some(Ident | Bsdf))
     }
 
+    /// Does `test "title" { ... }` start here?
+    pub(super) fn starts_test(&self) -> bool {
+        self.is_spelled("test") && self.peek_at(1) == Some(Token::Str)
+    }
+
+    pub(super) fn test(&mut self) -> Doc<'t> {
+        let mut parts = vec![self.token(), Doc::space(), self.token()];
+        if self.is(Token::LeftBrace) {
+            parts.extend([Doc::space(), self.block(true)]);
+        }
+        Doc::concat(parts)
+    }
+
     fn is_private(&self) -> bool {
         self.is_spelled("private") && self.peek_at(1).is_some_and(Token::is_keyword)
     }

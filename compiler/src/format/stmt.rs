@@ -46,10 +46,19 @@ impl<'t> Layout<'t> {
                 Doc::concat(parts)
             }
             Some(Token::Let | Token::Var | Token::Const | Token::Param) => self.binding(),
+            Some(Token::Assert) => self.assertion(),
             Some(Token::Use) => self.import(),
             _ if self.starts_definition() => self.definition(),
+            _ if self.starts_test() => self.test(),
             _ => self.assignment(),
         }
+    }
+
+    /// `assert condition;`
+    fn assertion(&mut self) -> Doc<'t> {
+        let mut parts = vec![self.token(), Doc::space(), self.expr()];
+        self.semicolon(&mut parts);
+        Doc::concat(parts)
     }
 
     /// `for name in low .. high { ... }`, `while condition limit count { ... }`

@@ -18,12 +18,14 @@ use crate::passes;
 use crate::source::{FileId, Origin, SourceMap};
 use crate::{lexer, parser};
 
+mod asserted;
 mod at;
 mod difference;
 mod items;
 mod run;
 mod values;
 
+pub use asserted::run_test;
 pub use at::At;
 pub use difference::Difference;
 pub use items::Kind;

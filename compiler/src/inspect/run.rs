@@ -107,7 +107,7 @@ pub(super) struct Spent {
 }
 
 /// Evaluates a function.
-fn value<'a, F: Real>(
+pub(super) fn value<'a, F: Real>(
     run: &mut Interpreter<'a, F>,
     f: &'a Function,
     args: Vec<Value<F>>,

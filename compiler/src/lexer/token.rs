@@ -89,7 +89,7 @@ tokens! {
         Material "material" Bsdf "bsdf" Delta "delta" Edf "edf" Fn "fn" Struct "struct"
         Const "const" Private "private" Use "use" As "as" Param "param" Let "let" Var "var" If "if" Else "else"
         For "for" In "in" While "while" Limit "limit" Break "break" Continue "continue"
-        When "when" True "true" False "false"
+        Assert "assert" When "when" True "true" False "false"
     }
     punctuation {
         Comma "," Semicolon ";" Colon ":" PathSeparator "::" Dot "." Range ".." Arrow "->"

@@ -62,6 +62,25 @@ pub(super) fn name<'t>(text: &'t str) -> impl Parse<'t, Name> + Copy {
     one(Expected::want(Want::Name), |t| t == Token::Ident).map(move |span| spell(text, span))
 }
 
+/// A name that is a word of the grammar before a token that `follows` accepts. Fails, before it takes anything, elsewhere.
+pub(super) fn contextual<'t>(
+    text: &'t str,
+    word: &'static str,
+    follows: impl Fn(Token) -> bool + Copy + 't,
+) -> impl Parse<'t, Span> + Copy {
+    custom(move |inp: &mut Input<'t, '_>| {
+        let start = inp.save();
+        let found = inp.next();
+        let span: Span = inp.span_since(start.cursor());
+        let is_word = found == Some(Token::Ident) && text.get(span.range()) == Some(word);
+        if is_word && inp.peek().is_some_and(follows) {
+            return Ok(span);
+        }
+        inp.rewind(start);
+        Err(nothing(span))
+    })
+}
+
 /// A type: a name or a keyword that names a closure, and `[count]` or `[]` after it for an array.
 pub(super) fn type_name<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, TypeName> {
     let accept = |t| matches!(t, Token::Ident | Token::Bsdf | Token::Edf);

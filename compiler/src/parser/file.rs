@@ -8,9 +8,9 @@ use super::common::{
     spell,
 };
 use super::error::{Expected, SyntaxError, Want};
-use super::item::item;
+use super::item::{item, test};
 use super::stmt::misplaced_docs;
-use crate::ast::{Expr, Item, Module, Use, UseName};
+use crate::ast::{Expr, Item, Module, Test, Use, UseName};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
@@ -29,17 +29,19 @@ pub(super) fn module<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, 
                 docs,
                 uses: Vec::new(),
                 items: Vec::new(),
+                tests: Vec::new(),
             };
             for entry in entries {
                 match entry {
                     Entry::Use(declaration) => {
-                        if !module.items.is_empty() {
+                        if !(module.items.is_empty() && module.tests.is_empty()) {
                             let late = late_use(declaration.span);
                             e.emit(SyntaxError::special(declaration.span, late));
                         }
                         module.uses.push(declaration);
                     }
                     Entry::Item(item) => module.items.push(*item),
+                    Entry::Test(test) => module.tests.push(*test),
                     Entry::Broken => {}
                 }
             }
@@ -52,6 +54,7 @@ pub(super) fn module<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, 
 enum Entry {
     Use(Use),
     Item(Box<Item>),
+    Test(Box<Test>),
     Broken,
 }
 
@@ -61,6 +64,7 @@ fn late_use(span: Span) -> Diagnostic {
 }
 
 fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry> {
+    let test = test(text, expression.clone()).map(|test| Entry::Test(Box::new(test)));
     let item = item(text, expression);
     let private = just(Token::Private).or_not().map(|word| word.is_some());
     let item = docs(text)
@@ -79,6 +83,7 @@ fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry>
             }))
         });
     choice((
+        docs(text).ignore_then(test),
         item,
         use_declaration(text).map(Entry::Use),
         undocumented().to(Entry::Broken),
@@ -134,6 +139,8 @@ fn at_entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
         None | Some(Private | Material | Fn | Struct | Const | Use | Delta) => true,
         // These two are also types.
         Some(Bsdf | Edf) => line_starts || second == Some(Ident),
+        // `test "title" { ... }`
+        Some(Ident) if second == Some(Str) => true,
         Some(token) => line_starts && (matches!(token, Ident | DocOuter) || token.is_keyword()),
     }
 }

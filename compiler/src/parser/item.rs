@@ -2,13 +2,15 @@
 
 use chumsky::prelude::*;
 
-use super::common::{Parse, Rule, broken_statement, close, docs, list, name, semicolon, type_name};
+use super::common::{
+    Parse, Rule, broken_statement, close, contextual, docs, list, name, semicolon, spell, type_name,
+};
 use super::error::SyntaxError;
 use super::expr::required;
 use super::stmt::{self, Piece, piece, stray_docs};
 use crate::ast::{
     Block, Body, ClosureDef, ClosureKind, Const, Entry, Expr, Field, Function, ItemKind, Material,
-    MaterialParam, Method, Name, Param, Stmt,
+    MaterialParam, Method, Name, Param, Stmt, Test,
 };
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
@@ -29,6 +31,26 @@ pub(super) fn item<'t>(
         structure(text, expression.clone()),
         constant(text, expression),
     ))
+}
+
+/// `test "title" { statements }`. The word is none of the language's where no title follows it.
+pub(super) fn test<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Test> {
+    let title = just(Token::Str).map_with(move |_, e| {
+        let quoted = spell(text, e.span());
+        Name {
+            node: quoted.node.trim_matches('"').to_owned(),
+            ..quoted
+        }
+    });
+    contextual(text, "test", |t| t == Token::Str)
+        .ignore_then(title)
+        .then(stmt::block(text, expression))
+        .map_with(|(title, body), e| Test {
+            title,
+            body,
+            span: e.span(),
+        })
+        .boxed()
 }
 
 #[derive(Clone)]

@@ -41,6 +41,7 @@ pub fn parse(file: FileId, text: &str) -> (Module, Vec<Diagnostic>) {
         docs: Vec::new(),
         uses: Vec::new(),
         items: Vec::new(),
+        tests: Vec::new(),
     };
     let (module, diagnostics) = run(file, text, file::module);
     (module.unwrap_or(empty), diagnostics)

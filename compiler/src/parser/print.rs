@@ -4,7 +4,7 @@
 
 use crate::ast::{
     Arg, Block, Body, ClosureDef, ClosureKind, Entry, Expr, ExprKind, IfExpr, Item, ItemKind,
-    MaterialParam, Module, Name, Param, Stmt, StmtKind, TypeName, UnaryOp, Use, UseName,
+    MaterialParam, Module, Name, Param, Stmt, StmtKind, Test, TypeName, UnaryOp, Use, UseName,
 };
 
 /// The width that lists are broken to, in characters.
@@ -15,7 +15,9 @@ pub fn print(module: &Module) -> String {
     let mut out = String::new();
     let uses = module.uses.iter().map(use_declaration);
     let items = module.items.iter().map(item);
-    for tree in docs(&module.docs).into_iter().chain(uses).chain(items) {
+    let tests = module.tests.iter().map(test);
+    let all = docs(&module.docs).into_iter().chain(uses);
+    for tree in all.chain(items).chain(tests) {
         tree.write(0, &mut out);
         out.push('\n');
     }
@@ -152,6 +154,11 @@ fn item(item: &Item) -> Tree {
     }
 }
 
+fn test(test: &Test) -> Tree {
+    let title = word(format!("{:?}", test.title.node));
+    list("test", 1, [title].into_iter().chain(contents(&test.body)))
+}
+
 fn closure(head: impl Iterator<Item = Tree>, definition: &ClosureDef) -> Tree {
     let keyword = match definition.kind {
         ClosureKind::Bsdf => "bsdf",
@@ -250,6 +257,7 @@ fn stmt(stmt: &Stmt) -> Tree {
         }
         StmtKind::Break => list("break", 0, []),
         StmtKind::Continue => list("continue", 0, []),
+        StmtKind::Assert(condition) => list("assert", 0, [expr(condition)]),
     }
 }
 

@@ -92,6 +92,7 @@ pub(super) fn piece<'t>(
         for_loop(text, expression.clone(), block.clone()),
         while_loop(text, expression.clone(), block.clone()),
         jump(text),
+        assertion(text, expression.clone()),
     ))
     .map_with(|kind, e| {
         Piece::Stmt(Stmt {
@@ -209,6 +210,14 @@ fn jump<'t>(text: &'t str) -> impl Parse<'t, StmtKind> {
         just(Token::Continue).to(StmtKind::Continue),
     ))
     .then_ignore(semicolon(text))
+}
+
+/// `assert condition;`
+fn assertion<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, StmtKind> {
+    just(Token::Assert)
+        .ignore_then(required(expression))
+        .then_ignore(semicolon(text))
+        .map(StmtKind::Assert)
 }
 
 /// What follows an expression in a block.

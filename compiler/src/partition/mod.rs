@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+mod candidates;
 #[cfg(test)]
 mod cases;
 mod check;
@@ -21,6 +22,7 @@ mod strategy;
 pub mod text;
 pub mod workload;
 
+pub use candidates::candidates;
 pub use error::PlanError;
 pub use form::Form;
 pub use inputs::PlanInputs;
@@ -90,6 +92,20 @@ impl Plan {
             kernels,
             unused,
         }
+    }
+
+    /// Whether another has the same kernels, whatever they are called.
+    pub fn does_as(&self, other: &Self) -> bool {
+        let kernels = |plan: &Self| {
+            let kernels = plan.kernels.iter();
+            let mut kernels: Vec<(Form, Vec<usize>)> =
+                kernels.map(|k| (k.form, k.materials.clone())).collect();
+            kernels.sort();
+            kernels
+        };
+        self.organisation == other.organisation
+            && self.unused == other.unused
+            && kernels(self) == kernels(other)
     }
 
     /// The same plan without kernels for the materials `unused`, which no surface binds.

@@ -178,8 +178,9 @@ impl Weights {
 
 /// The profiles that are part of the program: the name that `--profile` takes, the part of an
 /// adapter's name by which it is known, in lower case, and the text.
-const SHIPPED: [(&str, &str, &str); 2] = [
+const SHIPPED: [(&str, &str, &str); 3] = [
     ("h200", "h200", include_str!("profiles/h200.json")),
+    ("h100", "h100", include_str!("profiles/h100.json")),
     (
         "llvmpipe",
         "llvmpipe",
@@ -232,7 +233,7 @@ impl DeviceProfile {
                 exact: true,
             });
         }
-        let [h200, llvmpipe] = SHIPPED;
+        let [h200, _, llvmpipe] = SHIPPED;
         let scale = SCALE.iter().find(|(k, _)| *k == kind);
         let scale = scale.map_or(SCALE_OTHERWISE, |(_, scale)| *scale);
         let ((name, _, text), scale) = match kind {
@@ -278,6 +279,8 @@ mod tests {
         let get = |adapter, kind| DeviceProfile::shipped(adapter, kind).expect("they are sound");
         let own = get("NVIDIA H200", "discrete");
         assert_eq!((own.name, own.exact), ("h200", true));
+        let sibling = get("NVIDIA H100 80GB HBM3", "discrete");
+        assert_eq!((sibling.name, sibling.exact), ("h100", true));
         let software = get("llvmpipe (LLVM 15.0.6, 256 bits)", "software");
         assert_eq!((software.name, software.exact), ("llvmpipe", true));
         let other = get("SwiftShader", "software");

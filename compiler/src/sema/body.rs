@@ -12,6 +12,7 @@ use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::outputs::OUTPUTS;
 use super::scopes::Scopes;
+use super::test::Asserted;
 use super::tree::TreeSize;
 use super::types::Ty;
 use super::{Checked, Checker, Param, Signature};
@@ -127,6 +128,8 @@ pub struct Body<'c, 'l> {
     pub moment: [Option<u32>; 2],
     /// These parameters, which come after those that it declares.
     pub inputs: Vec<ir::MaterialParam>,
+    /// What a test asserts; nothing else may.
+    pub assertions: Option<Vec<Asserted>>,
 }
 
 impl<'c, 'l> Body<'c, 'l> {
@@ -154,6 +157,7 @@ impl<'c, 'l> Body<'c, 'l> {
             slopes: 0,
             moment: [None; 2],
             inputs: Vec::new(),
+            assertions: None,
         }
     }
 

@@ -13,8 +13,8 @@ use super::inputs;
 use super::matrix::FUNCTIONS;
 use super::notes::Meaning;
 use super::types::{NAMED, Ty};
-use super::words;
 use super::{Checked, Param};
+use super::{test, words};
 
 /// Arguments by the parameters that they are for.
 pub struct Given {
@@ -75,6 +75,7 @@ impl Body<'_, '_> {
                 self.mix_closures(args, span)
             }
             "srgb" => self.srgb(args, span),
+            test::NEAR => self.near(callee, args, span),
             "filter_width" => self.filter_width(callee, args, span),
             name if inputs::FUNCTIONS.contains(&name) => {
                 self.function_of_surface(callee, args, span)

@@ -42,6 +42,7 @@ mod params;
 mod scopes;
 mod slope;
 mod stmt;
+mod test;
 mod texture;
 mod tree;
 pub mod types;
@@ -56,6 +57,7 @@ pub use metadata::Metadata;
 pub use modules::{ItemRef, ModuleId, std_path};
 use modules::{Loading, ModuleData};
 use notes::Notes;
+pub use test::{Assertion, Test};
 use types::Ty;
 
 /// Everything known while a compilation's sources are checked.
@@ -210,8 +212,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks all of a file, the bodies of its materials too; gives those of them that check.
-    pub fn check_all(&mut self, module: ModuleId) -> Vec<ir::Material> {
+    /// Checks all of a file, the bodies of its materials and its tests too; gives those of them that check.
+    pub fn check_all(&mut self, module: ModuleId) -> (Vec<ir::Material>, Vec<Test>) {
         self.check_items(module);
         let mut materials = Vec::new();
         for (index, item) in self.ast(module).items.iter().enumerate() {
@@ -219,9 +221,10 @@ impl<'a> Checker<'a> {
                 materials.extend(self.material(module, index));
             }
         }
+        let tests = self.tests(module);
         self.report_unused_items(module);
         self.report_unused_imports(module);
-        materials
+        (materials, tests)
     }
 
     /// Warns of private definitions of a file that nothing uses, once all of the file is checked.

@@ -50,6 +50,7 @@ impl Body<'_, '_> {
             }
             StmtKind::Break => self.jump(ir::Stmt::Break, "break", stmt.span),
             StmtKind::Continue => self.jump(ir::Stmt::Continue, "continue", stmt.span),
+            StmtKind::Assert(condition) => self.assert(condition, stmt.span),
         }
     }
 

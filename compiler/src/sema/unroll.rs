@@ -97,6 +97,7 @@ fn any_in_block(block: &Block, found: &mut dyn FnMut(&Expr) -> bool) -> bool {
             low, high, body, ..
         } => any(low, found) || any(high, found) || any_in_block(body, found),
         StmtKind::While { cond, body, .. } => any(cond, found) || any_in_block(body, found),
+        StmtKind::Assert(condition) => any(condition, found),
         StmtKind::Break | StmtKind::Continue => false,
     };
     block.stmts.iter().any(&mut in_stmt)

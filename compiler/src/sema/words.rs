@@ -4,10 +4,17 @@ use crate::ir::ops::Op;
 
 pub use super::expr::{NO_MEDIUM, PICTURES};
 use super::types::NAMED;
-use super::{array, inputs, matrix, outputs};
+use super::{array, inputs, matrix, outputs, test};
 
 /// Functions of the language that are no row of the op table.
-const FORMS: [&str; 5] = ["filter_width", "gradient", "layer", "medium", "srgb"];
+const FORMS: [&str; 6] = [
+    "filter_width",
+    "gradient",
+    "layer",
+    "medium",
+    test::NEAR,
+    "srgb",
+];
 
 /// Functions that a source can call without a definition; conversions to types apart.
 pub fn built_in_functions() -> impl Iterator<Item = &'static str> {

@@ -1,8 +1,8 @@
 //! Gradients of functions of a point, and normals bent by heights and by maps.
 
-use super::statistics::Numbers;
 use super::text::Text;
 use super::vectors::{dot, length};
+use impasto_verify::statistics::Numbers;
 
 const FIELDS: &str = "
     use std::pattern::{bump, normal_map};

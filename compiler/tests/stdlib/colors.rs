@@ -1,7 +1,7 @@
 //! Colors: round trips between spaces, black bodies against Planck's law, metals against Fresnel.
 
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 #[test]
 fn spaces_are_left_as_they_were_entered() {

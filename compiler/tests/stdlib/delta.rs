@@ -1,8 +1,9 @@
 //! Holds every discrete BSDF to scattering into directions of the right masses.
 
 use super::library::{Bsdf, Case};
-use super::sampling::{BATCH, VIEWS, distribution, view};
-use super::statistics::Numbers;
+use super::sampling::{BATCH, distribution, view};
+use impasto_verify::distribution::VIEWS;
+use impasto_verify::statistics::Numbers;
 
 /// Directions drawn for each case and view.
 const SAMPLES: usize = 1 << 15;
@@ -23,14 +24,14 @@ fn directions(bsdf: &Bsdf, case: &Case, wo: [f64; 3], seed: u64) -> (Vec<Found>,
     let mut failed = 0.0;
     for _ in 0..SAMPLES / BATCH {
         let u: Vec<[f64; 4]> = (0..BATCH).map(|_| n.four()).collect();
-        for wi in (d.sample)(&u) {
+        for wi in (d.sample)(&u).expect("directions") {
             let same = |f: &&mut Found| (0..3).all(|c| (f.wi[c] - wi[c]).abs() < 1e-9);
             if wi == [0.0; 3] {
                 failed += 1.0;
             } else if let Some(known) = found.iter_mut().find(same) {
                 known.times += 1.0;
             } else {
-                let [mass, value @ ..] = (d.measure)(&[wi])[0];
+                let [mass, value @ ..] = (d.measure)(&[wi]).expect("a density")[0];
                 found.push(Found {
                     wi,
                     times: 1.0,
@@ -132,7 +133,8 @@ fn what_goes_one_way_goes_the_other() {
             for degrees in VIEWS {
                 let wo = view(degrees);
                 for f in directions(bsdf, case, wo, i as u64).0 {
-                    let [_, back @ ..] = (distribution(bsdf, case, f.wi).measure)(&[wo])[0];
+                    let [_, back @ ..] =
+                        (distribution(bsdf, case, f.wi).measure)(&[wo]).expect("a density")[0];
                     for (there, back) in f.value.iter().zip(back) {
                         assert!(
                             (there - back).abs() < 1e-9,

@@ -8,8 +8,8 @@ use impasto_compiler::{MemoryLoader, check, diag};
 
 use super::known::assert_near;
 use super::library::{arguments_of, documented};
-use super::statistics::direction;
 use crate::common::kept;
+use impasto_verify::statistics::direction;
 
 /// An EDF with some parameters.
 struct Lamp {
@@ -66,7 +66,7 @@ fn with_lamps(name: &str, calls: &[String], mut job: impl FnMut(&Lamp)) {
             label: format!("{name}({call})"),
             module,
             emit,
-            args: arguments_of(module, material, emission),
+            args: arguments_of(module, material, emission).expect("constants"),
         });
     }
 }

@@ -31,10 +31,10 @@ use impasto_compiler::{MaterialRequest, MemoryLoader, compile, diag};
 use super::lanes::{self, Lanes};
 use super::library::{Bsdf, Case, bsdf_with};
 use super::sampling::{albedo, distribution, view};
-use super::statistics::{Numbers, direction};
 use super::text::Text;
 use super::vectors::{dot, length, reflect};
 use crate::common::record::{Bound, Row};
+use impasto_verify::statistics::{Numbers, direction};
 
 const FUNCTIONS: &str = "
     use std::noise::{perlin, cell, fractal};
@@ -135,8 +135,8 @@ fn sound(bsdf: &Bsdf, case: &Case, wo: [f64; 3], worst: &mut Worst) {
         .flat_map(|&a| [[a, 0.3, a, 0.0], [0.7, a, 0.2, 0.0]])
         .collect();
     let d = distribution(bsdf, case, wo);
-    let wi: Vec<[f64; 3]> = (d.sample)(&u);
-    for (w, m) in wi.iter().zip((d.measure)(&wi)) {
+    let wi: Vec<[f64; 3]> = (d.sample)(&u).expect("directions");
+    for (w, m) in wi.iter().zip((d.measure)(&wi).expect("densities")) {
         let fine = w.iter().chain(&m).all(|x| x.is_finite()) && m.iter().all(|x| *x >= 0.0);
         worst.add(f64::from(u8::from(!fine)), || {
             format!("{} to {w:?}: {m:?}", d.label)
@@ -235,7 +235,7 @@ fn half_vectors_and_cosines_at_the_horizon_give_0() {
                 (view(30.0), flat),
                 (flat, [-1.0, 0.0, 0.0]),
             ] {
-                let m = (distribution(bsdf, case, wo).measure)(&[wi])[0];
+                let m = (distribution(bsdf, case, wo).measure)(&[wi]).expect("a density")[0];
                 worst.add(m.iter().fold(0.0, |a, &b| a.max(b)), || {
                     format!("{}: {m:?}", case.label)
                 });
@@ -497,10 +497,16 @@ fn white_surfaces_of_roughness_1_keep_their_light() {
         let mut n = Numbers::new(26);
         let u: Vec<[f64; 4]> = (0..1 << 14).map(|_| n.four()).collect();
         let wi: Vec<[f64; 3]> = (d.sample)(&u)
+            .expect("directions")
             .into_iter()
             .filter(|w| *w != [0.0; 3])
             .collect();
-        (d.measure)(&wi).iter().map(|m| m[1] / m[0]).sum::<f64>() / f64::from(1 << 14)
+        (d.measure)(&wi)
+            .expect("densities")
+            .iter()
+            .map(|m| m[1] / m[0])
+            .sum::<f64>()
+            / f64::from(1 << 14)
     };
     for (name, call) in [
         ("metal", "reflectance: 1.0, edge: 1.0, roughness: 1"),

@@ -1,8 +1,8 @@
 //! Fresnel's equations and Snell's law, against formulas written down another way.
 
-use super::statistics::Numbers;
 use super::text::Text;
 use super::vectors::{dot, length};
+use impasto_verify::statistics::Numbers;
 
 /// Reflectance by the amplitudes of both polarisations, from Snell's law.
 fn dielectric(cos_i: f64, n: f64) -> f64 {

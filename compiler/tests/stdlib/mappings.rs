@@ -1,11 +1,13 @@
 //! Mappings from uniform numbers to directions, facet distributions, and constants of `std::core`.
 
-use super::cells::{self, Measures};
+use super::how_hard;
 use super::lanes;
 use super::sampling::{Distribution, examine};
-use super::statistics::{Numbers, direction};
 use super::text::Text;
 use super::vectors::length;
+use impasto_verify::cells::{self, Measures};
+use impasto_verify::lanes::Stuck;
+use impasto_verify::statistics::{Numbers, direction};
 
 #[test]
 fn mappings_have_the_densities_they_state() {
@@ -33,12 +35,11 @@ fn mappings_have_the_densities_they_state() {
         let sample = |u: &[[f64; 4]]| {
             let column = |c: usize| lanes::floats(u.iter().map(|u| u[c]).collect());
             let w = lanes::call(text.module, id, vec![vec![column(0), column(1)]]);
-            (0..u.len())
-                .map(|l| std::array::from_fn(|c| lanes::float_at(&w, c, l)))
-                .collect()
+            let one = |l| std::array::from_fn(|c| lanes::float_at(&w, c, l));
+            Ok((0..u.len()).map(one).collect())
         };
-        let measure = |w: &[[f64; 3]]| -> Vec<Measures> {
-            w.iter().map(|w| [density(w), 0.0, 0.0, 0.0]).collect()
+        let measure = |w: &[[f64; 3]]| -> Result<Vec<Measures>, Stuck> {
+            Ok(w.iter().map(|w| [density(w), 0.0, 0.0, 0.0]).collect())
         };
         let d = Distribution {
             label: name.into(),
@@ -77,7 +78,7 @@ fn facets_cover_the_surface_once() {
     let text = Text::new(GGX);
     let id = text.id("d");
     for alpha in [[1.0, 1.0], [0.3, 0.3], [0.05, 0.4], [0.01, 0.01]] {
-        let measure = |m: &[[f64; 3]]| -> Vec<Measures> {
+        let measure = |m: &[[f64; 3]]| -> Result<Vec<Measures>, Stuck> {
             let columns = (0..3)
                 .map(|c| lanes::floats(m.iter().map(|m| m[c]).collect()))
                 .collect();
@@ -85,7 +86,7 @@ fn facets_cover_the_surface_once() {
             let value = |(l, m): (usize, &[f64; 3])| {
                 [lanes::float_at(&d, 0, l) * m[2].max(0.0), 0.0, 0.0, 0.0]
             };
-            m.iter().enumerate().map(value).collect()
+            Ok(m.iter().enumerate().map(value).collect())
         };
         // Cells follow the distribution's own shape: normals whose slopes are alpha times those of a
         // unit distribution.
@@ -103,8 +104,9 @@ fn facets_cover_the_surface_once() {
                 m.map(|x| x / l)
             })
             .collect();
-        let cells = cells::partition(&facets, 100);
+        let cells = cells::partition(&facets, 100, how_hard());
         let sum: f64 = cells::integrate(&cells, &measure)
+            .expect("answers")
             .iter()
             .map(|m| m[0])
             .sum();

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::known::{Known, assert_near};
-use super::statistics::{Numbers, direction};
+use impasto_verify::statistics::{Numbers, direction};
 
 /// A pair of directions by their angles: from the normal, and between their azimuths.
 struct Pair {

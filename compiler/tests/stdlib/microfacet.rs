@@ -6,8 +6,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::library::{Bsdf, Case, bsdf_with};
 use super::sampling::{albedo, distribution, view};
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 type Complex = (f64, f64);
 
@@ -258,7 +258,7 @@ impl Given {
 
     /// Density and value from `wo` to `wi`.
     fn measure(&self, wo: [f64; 3], wi: [f64; 3]) -> [f64; 4] {
-        (distribution(&self.bsdf, self.case(), wo).measure)(&[wi])[0]
+        (distribution(&self.bsdf, self.case(), wo).measure)(&[wi]).expect("a density")[0]
     }
 
     /// What is reflected and passes in all, from samples.
@@ -266,9 +266,12 @@ impl Given {
         let d = distribution(&self.bsdf, self.case(), wo);
         let mut n = Numbers::new(3);
         let u: Vec<[f64; 4]> = (0..samples).map(|_| n.four()).collect();
-        let wi: Vec<[f64; 3]> = (d.sample)(&u);
+        let wi: Vec<[f64; 3]> = (d.sample)(&u).expect("directions");
         let wi: Vec<[f64; 3]> = wi.into_iter().filter(|w| *w != [0.0; 3]).collect();
-        let weights = (d.measure)(&wi).into_iter().map(|m| m[1] / m[0]);
+        let weights = (d.measure)(&wi)
+            .expect("densities")
+            .into_iter()
+            .map(|m| m[1] / m[0]);
         weights.sum::<f64>() / samples as f64
     }
 }
@@ -363,8 +366,8 @@ fn lambda(cos: f64, a: f64) -> f64 {
 fn single_pairs_of_directions_have_the_values_of_the_formulas() {
     let a = 0.36;
     let (wo, wi) = (
-        super::statistics::direction(0.8, 0.3),
-        super::statistics::direction(0.55, 2.9),
+        impasto_verify::statistics::direction(0.8, 0.3),
+        impasto_verify::statistics::direction(0.55, 2.9),
     );
     let sum: [f64; 3] = std::array::from_fn(|i| wo[i] + wi[i]);
     let l = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -406,7 +409,11 @@ fn single_pairs_of_directions_have_the_values_of_the_formulas() {
 #[test]
 fn what_passes_has_the_jacobian_of_refraction() {
     // The Jacobian by differences: how the refracted direction turns with the facet.
-    let (wo, n, a) = (super::statistics::direction(0.8, 0.3), 1.5f64, 0.36);
+    let (wo, n, a) = (
+        impasto_verify::statistics::direction(0.8, 0.3),
+        1.5f64,
+        0.36,
+    );
     let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let tilted = |x: f64, y: f64| {
         let l = (x * x + y * y + 1.0).sqrt();

@@ -3,13 +3,12 @@
 //! the library's folders, so a new file is tested without being named here.
 
 mod bumps;
-mod cells;
 mod colors;
 mod delta;
 mod emission;
-mod energy;
 mod extremes;
 mod fresnel;
+mod held;
 mod known;
 mod lanes;
 mod library;
@@ -24,18 +23,13 @@ mod octaves;
 mod open_pbr;
 mod precision;
 mod promises;
-mod region;
 mod sampling;
 mod scattered;
-mod search;
 mod several_facets;
 mod sheen;
-mod space;
-mod statistics;
 mod stops;
 mod subsurface;
 mod surfaces;
-mod symmetry;
 mod tally;
 mod text;
 mod vectors;
@@ -44,6 +38,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use impasto_compiler::{MaterialRequest, MemoryLoader, check, compile, diag};
+use impasto_verify::effort::Effort;
+
+use crate::common::record::{full, share};
 
 /// Does `job` for each item, on all cores, and fails with all faults that it found. The job gives
 /// the item's label and what is wrong with it.
@@ -78,6 +75,15 @@ fn each_in_parallel<T: Sync>(items: &[T], job: impl Fn(usize, &T) -> (String, Ve
 /// at full effort take seconds, of all many minutes.
 fn asked_for(name: &str) -> bool {
     std::env::var("IMPASTO_ONLY").map_or(true, |only| only.split(',').any(|o| o == name))
+}
+
+/// How hard the crate of the tests is to try: a share of the cases is as many as `impasto test` takes.
+fn how_hard() -> Effort {
+    match (full(), share()) {
+        (true, _) => Effort::Full,
+        (false, true) => Effort::Quick,
+        (false, false) => Effort::Thorough,
+    }
 }
 
 /// Checks a text as a file of its own and returns the rendered diagnostics.

@@ -5,8 +5,8 @@ use impasto_compiler::parser;
 use impasto_compiler::source::FileId;
 
 use super::lanes::{self, Lanes};
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 /// Coordinates about which noises are looked at; single precision has no fractions beyond 2^23.
 const PLACES: [f64; 7] = [0.0, 1.0, 1e3, 1e5, 1e7, 1e9, -1e9];
@@ -267,7 +267,7 @@ fn cells_are_constant_and_uniform() {
         .map(|&t| (t as f64 - 5000.0).powi(2) / 5000.0)
         .sum();
     assert!(
-        super::statistics::chi_squared_tail(squares, 9.0) > 1e-4,
+        impasto_verify::statistics::chi_squared_tail(squares, 9.0) > 1e-4,
         "{tenths:?}"
     );
 }

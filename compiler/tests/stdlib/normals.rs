@@ -1,8 +1,8 @@
 //! Frames, shading normals that are always of use, and what counts as reflection.
 
-use super::statistics::{Numbers, direction};
 use super::text::Text;
 use super::vectors::{dot, length, reflect};
+use impasto_verify::statistics::{Numbers, direction};
 
 const FRAMES: &str = "
     fn f(n: normal, t: vector) -> Frame = frame(n, t);

@@ -1,8 +1,8 @@
 //! Noises that are sums of others or their derivatives: means, slopes, fading, seeds.
 
 use super::lanes::{self, Lanes};
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 const ALL: &str = "
     use std::noise::{perlin, perlin_2d, perlin_4d, simplex, simplex_2d, simplex_gradient, curl};

@@ -13,9 +13,10 @@ use super::known::assert_near;
 use super::lanes;
 use super::materials::{LIGHT_PDF, LIGHT_THROUGHPUT, answers, point, reflected};
 use super::sampling::view;
-use super::statistics::{Numbers, direction};
-use super::surfaces::{Setting, set};
+use super::surfaces::set;
 use super::text::Text;
+use impasto_verify::drawn::Setting;
+use impasto_verify::statistics::{Numbers, direction};
 
 /// Two lobes as a person would write them who needs no more.
 const BY_HAND: &str = include_str!("two_lobes.impasto");

@@ -8,8 +8,8 @@ use impasto_compiler::source::FileId;
 use impasto_stdlib::StdFile;
 
 use super::lanes::{self, Lanes};
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 /// Folders whose functions are held to what they say.
 const FOLDERS: [&str; 3] = ["noise", "pattern", "color"];

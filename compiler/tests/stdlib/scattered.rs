@@ -2,8 +2,8 @@
 //! borders by search through all points around, variances by integrals.
 
 use super::lanes;
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 /// Text that gives a noise, and the points that it scatters: those that `worley` is nearest to,
 /// found by asking it at the centres of a fine grid.

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use super::known::{Known, assert_near};
-use super::statistics::{Numbers, direction};
+use impasto_verify::statistics::{Numbers, direction};
 
 /// The distribution of Estevez and Kulla 2017, equation 2.
 fn charlie(sin: f64, roughness: f64) -> f64 {

@@ -1,8 +1,8 @@
 //! Ramps and splines of any number of values against those of up to eight, which have tests of their
 //! own.
 
-use super::statistics::Numbers;
 use super::text::Text;
+use impasto_verify::statistics::Numbers;
 
 const TEXT: &str = "
 use std::pattern::{color_ramp, color_spline, color_stops, spline, spline_through, value_stops};

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::known::{Known, assert_near};
-use super::statistics::{Numbers, direction};
+use impasto_verify::statistics::{Numbers, direction};
 
 /// Points of the midpoint rule over cosines.
 const POINTS: usize = 200;

@@ -7,6 +7,8 @@ endif
 syntax keyword impastoKeyword material bsdf delta edf fn struct const private use as param let var
 syntax keyword impastoConditional if else when
 syntax keyword impastoRepeat for in while limit break continue
+syntax keyword impastoStatement assert
+syntax match impastoKeyword /^\s*\zstest\ze\s*"/
 syntax keyword impastoBoolean true false
 syntax keyword impastoType bool int uint float length angle vec2 vec3 vec4 color point vector normal mat2 mat3 texture medium contained
 syntax keyword impastoSurface position normal geometric_normal tangent uv exterior_ior view instance_id
@@ -40,6 +42,7 @@ syntax match impastoDoc /\/\/!.*\|\/\/\/\/\@!.*/ contains=impastoTodo,impastoLab
 highlight default link impastoKeyword Keyword
 highlight default link impastoConditional Conditional
 highlight default link impastoRepeat Repeat
+highlight default link impastoStatement Statement
 highlight default link impastoBoolean Boolean
 highlight default link impastoType Type
 highlight default link impastoSurface Special

@@ -103,6 +103,9 @@
 
 "fn" @keyword.function
 
+(test_definition
+  "test" @keyword.function)
+
 [
   "const"
   "private"
@@ -117,6 +120,7 @@
   "param"
   "let"
   "var"
+  "assert"
 ] @keyword
 
 [

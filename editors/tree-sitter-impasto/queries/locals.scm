@@ -6,6 +6,7 @@
   (closure_definition)
   (method_definition)
   (function_definition)
+  (test_definition)
   (block)
   (for_statement)
 ] @local.scope

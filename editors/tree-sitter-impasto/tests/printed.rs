@@ -7,14 +7,16 @@ use impasto_compiler::lexer::doc_text;
 /// The tree of `text` as the compiler prints its own, but for line breaks.
 pub(crate) fn printed(text: &str, file: Node<'_>) -> String {
     let printer = Printer { text };
-    let mut out = Vec::new();
+    let (mut out, mut tests) = (Vec::new(), Vec::new());
     for node in printer.children(file) {
         match node.kind() {
             "file_documentation" => out.push(printer.documentation(node)),
             "use_declaration" => out.push(printer.import(node)),
+            "test_definition" => tests.push(printer.test(node)),
             _ => out.push(printer.item(node)),
         }
     }
+    out.extend(tests);
     out.join(" ")
 }
 
@@ -146,6 +148,11 @@ impl<'t> Printer<'t> {
             }
         }
         list(entries)
+    }
+
+    fn test(&self, node: Node<'_>) -> String {
+        let head = ["test".to_owned(), self.word(field(node, "title"))];
+        list(head.into_iter().chain(self.contents(field(node, "body"))))
     }
 
     fn material_param(&self, node: Node<'_>) -> String {
@@ -282,6 +289,7 @@ impl<'t> Printer<'t> {
                 let head = head.into_iter().chain(limit);
                 list(head.chain(self.contents(field(node, "body"))))
             }
+            "assert_statement" => list(["assert".to_owned(), child("condition")]),
             "break_statement" | "continue_statement" => {
                 list([node.kind().replace("_statement", "")])
             }

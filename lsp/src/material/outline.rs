@@ -42,11 +42,22 @@ pub enum EntryKind {
     Output,
     Method,
     Field,
+    Test,
 }
 
-/// The definitions of a file.
+/// The definitions and tests of a file.
 pub fn outline(ast: &ast::Module) -> Vec<Entry> {
-    ast.items.iter().map(entry).collect()
+    let tests = ast.tests.iter().map(test);
+    let mut all: Vec<Entry> = ast.items.iter().map(entry).chain(tests).collect();
+    all.sort_by_key(|entry| entry.whole.start);
+    all
+}
+
+fn test(test: &ast::Test) -> Entry {
+    Entry {
+        whole: test.span.range(),
+        ..leaf(&test.title, "test", EntryKind::Test, test.span)
+    }
 }
 
 fn entry(item: &Item) -> Entry {
@@ -317,6 +328,7 @@ impl Walk {
                     limit.iter().for_each(|l| self.expr(l));
                     self.block(body);
                 }
+                StmtKind::Assert(condition) => self.expr(condition),
                 StmtKind::Break | StmtKind::Continue => {}
             }
         }

@@ -137,6 +137,7 @@ pub fn document_symbol(text: &Text, entry: &Entry) -> Value {
         EntryKind::Parameter | EntryKind::Output => 7,
         EntryKind::Variable => 13,
         EntryKind::Method => 6,
+        EntryKind::Test => 24,
         EntryKind::Field => 8,
     };
     let children = entry.children.iter();

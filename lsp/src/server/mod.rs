@@ -94,7 +94,7 @@ struct Server<'c> {
 #[derive(Default)]
 struct Deep {
     version: i32,
-    found: Found,
+    found: Vec<Found>,
     problems: Vec<crate::scene::features::Problem>,
 }
 
@@ -385,11 +385,14 @@ impl<'c> Server<'c> {
                 let analysis = self.documents.analysis(path)?;
                 let has_errors = impasto_compiler::diag::has_errors(&analysis.diagnostics);
                 let materials = materials_of(&analysis);
-                let is_wanted = wants_cost && !has_errors && !materials.is_empty();
+                let materials = if wants_cost { materials } else { Vec::new() };
+                let tested = analysis.ast().is_some_and(|ast| !ast.tests.is_empty());
+                let is_wanted = !has_errors && (tested || !materials.is_empty());
                 is_wanted.then(|| Task::Cost {
                     path: path.to_owned(),
+                    committed: !materials.is_empty(),
                     materials,
-                    committed: true,
+                    tested,
                 })
             }
             Language::Material | Language::MaterialX | Language::Other => None,
@@ -434,7 +437,7 @@ impl<'c> Server<'c> {
                     let problems = self.scene_problems(&path, error.as_ref(), &warnings);
                     let deep = Deep {
                         version,
-                        found,
+                        found: vec![found],
                         problems,
                     };
                     self.deep.insert(path.clone(), deep);

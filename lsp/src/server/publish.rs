@@ -109,16 +109,19 @@ impl Server<'_> {
 
     /// What a whole check found in a file, and `with_others` in those that it names.
     fn of_deep(&self, text: &Text, path: &str, deep: &Deep, with_others: bool) -> Vec<Value> {
-        let sources = &deep.found.sources;
-        let mut files = sources.files();
-        let own = files.find(|(_, f)| f.name == path).map(|(id, _)| id);
-        let mut texts = Related::default();
-        let found = diag::render::ordered(sources, &deep.found.diagnostics);
-        let is_shown = |d: &&Diagnostic| with_others || d.span.is_none_or(|s| Some(s.file) == own);
-        let shown = found.iter().filter(is_shown).take(MOST);
-        shown
-            .map(|d| self.diagnostic(text, &mut texts, sources, own, d, |_| None))
-            .collect()
+        let mut all = Vec::new();
+        for found in &deep.found {
+            let sources = &found.sources;
+            let mut files = sources.files();
+            let own = files.find(|(_, f)| f.name == path).map(|(id, _)| id);
+            let mut texts = Related::default();
+            let ordered = diag::render::ordered(sources, &found.diagnostics);
+            let is_shown =
+                |d: &&Diagnostic| with_others || d.span.is_none_or(|s| Some(s.file) == own);
+            let shown = ordered.iter().filter(is_shown).take(MOST - all.len());
+            all.extend(shown.map(|d| self.diagnostic(text, &mut texts, sources, own, d, |_| None)));
+        }
+        all
     }
 
     fn of_scene(&mut self, path: &str) -> Vec<Value> {

@@ -159,7 +159,7 @@ impl Cpu {
         let groups = |items: u32| Groups::Known(items.div_ceil(sizes.workgroup));
         Ok(Step {
             name: kernel.desc.name.clone(),
-            kernel: self.compiled(kernel, casts.is_some())?,
+            kernel: self.compiled(&kernel.desc.name, &kernel.wgsl, casts.is_some())?,
             hands_out: kernel.wgsl.contains("fn hand_out_work"),
             groups: match kernel.desc.source {
                 DispatchSource::Once => Groups::Known(1),
@@ -173,28 +173,42 @@ impl Cpu {
         })
     }
 
+    /// The threads that render.
+    pub(crate) fn threads_that_render(&self) -> Arc<ThreadPool> {
+        self.threads.clone()
+    }
+
+    /// The machine code of a kernel that casts no rays, unless it was built before.
+    pub(crate) fn compiled_alone(
+        &self,
+        name: &str,
+        wgsl: &str,
+    ) -> Result<Arc<impasto_cpu::Kernel>, RuntimeError> {
+        self.compiled(name, wgsl, false)
+    }
+
     /// The machine code of a kernel, unless it was built before.
     fn compiled(
         &self,
-        kernel: &Kernel,
+        name: &str,
+        wgsl: &str,
         casts: bool,
     ) -> Result<Arc<impasto_cpu::Kernel>, RuntimeError> {
-        let key = (kernel.wgsl.clone(), casts);
+        let key = (wgsl.to_owned(), casts);
         let kept = || self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept().get(&key) {
             return Ok(known.clone());
         }
-        let name = &kernel.desc.name;
         let refused = |error: KernelError| match error {
             KernelError::Memory(_) | KernelError::Processor(_) => {
                 RuntimeError::NoNativeCode(error.to_string())
             }
             other => RuntimeError::Shader {
-                kernel: name.clone(),
+                kernel: name.to_owned(),
                 message: other.to_string(),
             },
         };
-        let (module, info) = validate(name, &kernel.wgsl)?;
+        let (module, info) = validate(name, wgsl)?;
         let answered = if casts { &casts::ANSWERED[..] } else { &[] };
         let names: Vec<&str> = answered.iter().map(|(name, _)| *name).collect();
         let hooks: Vec<usize> = (0..names.len()).collect();

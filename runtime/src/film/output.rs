@@ -222,6 +222,14 @@ fn write_exr(film: &Film, file: &mut BufWriter<&mut File>) -> Result<(), Unwritt
 }
 
 fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Result<(), Unwritten> {
+    Ok(file.write_all(&png(film, exposure)?)?)
+}
+
+/// The bytes of a PNG file of what a screen shows after `exposure` stops.
+///
+/// # Errors
+/// In words, if a picture of this size has no such file.
+pub fn png(film: &Film, exposure: f32) -> Result<Vec<u8>, String> {
     let scale = exposure.exp2();
     let bytes: Vec<u8> = film
         .pixels
@@ -233,11 +241,24 @@ fn write_png(film: &Film, exposure: f32, file: &mut BufWriter<&mut File>) -> Res
     image::codecs::png::PngEncoder::new(&mut encoded)
         .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
-    Ok(file.write_all(&encoded)?)
+    Ok(encoded)
+}
+
+/// What a PNG file of a picture holds, linear again: eight bits a channel.
+pub fn shown(film: &Film, exposure: f32) -> Film {
+    let scale = exposure.exp2();
+    let channel = |v: f32| {
+        let byte = f64::from(srgb_byte(v * scale));
+        image_file::srgb_to_linear(byte / 255.0) as f32
+    };
+    Film {
+        pixels: film.pixels.iter().map(|p| p.map(channel)).collect(),
+        ..film.clone()
+    }
 }
 
 /// A linear value as sRGB (IEC 61966-2-1) in 8 bits, clamped to [0, 1]: the curve of docs/outputs.md, "The PNG".
-fn srgb_byte(linear: f32) -> u8 {
+pub fn srgb_byte(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded = if linear <= 0.003_130_8 {
         12.92 * linear

@@ -9,6 +9,7 @@ use crate::error::RuntimeError;
 
 mod adapters;
 mod info;
+mod kept;
 mod memory;
 mod nvidia;
 pub(crate) mod resources;
@@ -22,6 +23,7 @@ mod timing;
 pub(crate) mod work;
 
 pub use info::{DeviceIds, DeviceInfo};
+pub use kept::KernelFolder;
 pub use selection::{Environment, Selector, Several};
 pub use statistics::KernelStatistics;
 pub use timing::Timing;
@@ -43,6 +45,8 @@ pub struct GpuOptions {
     pub validate_indirect: bool,
     /// How finely to time kernels; coarser if the GPU cannot.
     pub timing: Timing,
+    /// Where kernels that were built are kept for the next start; if `None`, nowhere.
+    pub kernels: Option<KernelFolder>,
 }
 
 /// An open GPU; copies are of the same.
@@ -56,6 +60,7 @@ pub struct Gpu {
     pub(crate) timing: Timing,
     failure: Arc<Failure>,
     pipelines: Arc<shader::Pipelines>,
+    kept: Option<Arc<kept::Kept>>,
 }
 
 /// What went wrong on a device.
@@ -148,9 +153,14 @@ impl Gpu {
     }
 
     fn open(Found { adapter, ids }: Found, options: &GpuOptions) -> Result<Self, RuntimeError> {
+        // Asked for only where it serves: it changes nothing but the time of a start.
+        let features = match options.kernels {
+            Some(_) => USED_FEATURES | wgpu::Features::PIPELINE_CACHE,
+            None => USED_FEATURES,
+        };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("impasto"),
-            required_features: adapter.features() & USED_FEATURES,
+            required_features: adapter.features() & features,
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()
@@ -162,6 +172,8 @@ impl Gpu {
         })?;
         let failure = collect_errors(&device);
         let timing = options.timing.min(Timing::finest(device.features()));
+        let kept = options.kernels.clone();
+        let kept = kept.map(|folder| Arc::new(kept::Kept::new(folder, &adapter.get_info())));
         Ok(Self {
             device,
             queue,
@@ -171,6 +183,7 @@ impl Gpu {
             timing,
             failure,
             pipelines: Arc::default(),
+            kept,
         })
     }
 

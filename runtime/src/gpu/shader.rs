@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use naga::valid::ModuleInfo;
 use wgpu::naga;
 
+use super::kept::{Built, Kept, Key};
 use super::{Gpu, spirv};
 use crate::error::RuntimeError;
 use crate::kernels::validate::validate;
@@ -38,6 +39,15 @@ impl Pipelines {
     }
 }
 
+/// A kernel that is to become a pipeline.
+#[derive(Clone, Copy)]
+struct Wanted<'a> {
+    kernel: &'a str,
+    layout: &'a wgpu::BindGroupLayout,
+    /// Does workgroup memory begin as zeros?
+    zero_workgroup: bool,
+}
+
 impl Gpu {
     /// The pipeline of one kernel, whose entry point is `main`. What wgpu has to say against it comes
     /// through [`Gpu::check`].
@@ -50,63 +60,137 @@ impl Gpu {
         if let Some(known) = self.pipelines.get(wgsl) {
             return Ok(known);
         }
+        let wanted = Wanted {
+            kernel,
+            layout,
+            zero_workgroup: self.checked || !bvh::shares_stack(wgsl),
+        };
+        let way = u8::from(self.checked);
+        let kept = self.kept.as_deref().filter(|_| self.takes_spirv());
+        let kept = kept.map(|kept| (kept, kept.key(wgsl, way)));
+        if let Some(pipeline) = kept.and_then(|(kept, key)| self.built_before(wanted, kept, key)) {
+            self.pipelines.keep(wgsl, &pipeline);
+            return Ok(pipeline);
+        }
         let (module, info) = validate(kernel, wgsl)?;
-        let build = || Ok(self.build_pipeline(kernel, wgsl, (&module, &info), layout));
+        let build = || Ok(self.build_pipeline(wanted, (&module, &info), kept));
         Ok(match self.guarded(build) {
             Ok(pipeline) => {
                 self.pipelines.keep(wgsl, &pipeline);
                 pipeline
             }
             // Once more, so that whoever listens hears of it.
-            Err(_) => self.build_pipeline(kernel, wgsl, (&module, &info), layout),
+            Err(_) => self.build_pipeline(wanted, (&module, &info), None),
         })
+    }
+
+    /// The pipeline of what an earlier start has built, if that is there and the driver takes it.
+    fn built_before(
+        &self,
+        wanted: Wanted<'_>,
+        kept: &Kept,
+        key: Key,
+    ) -> Option<wgpu::ComputePipeline> {
+        let built = kept.load(key)?;
+        let build = || {
+            let module = self.passthrough(wanted.kernel, built.workgroup, &built.module);
+            let cache = self.cache(&built.binary);
+            Ok((self.of_module(wanted, &module, cache.as_ref()), cache))
+        };
+        let (pipeline, cache) = self.guarded(build).ok()?;
+        // Another driver makes something else of the module.
+        let binary = cache.and_then(|cache| cache.get_data());
+        if let Some(binary) = binary.filter(|binary| *binary != built.binary) {
+            kept.store(key, &Built { binary, ..built });
+        }
+        Some(pipeline)
     }
 
     fn build_pipeline(
         &self,
-        kernel: &str,
-        wgsl: &str,
+        wanted: Wanted<'_>,
         (module, info): (&naga::Module, &ModuleInfo),
-        layout: &wgpu::BindGroupLayout,
+        kept: Option<(&Kept, Key)>,
     ) -> wgpu::ComputePipeline {
-        let zero_workgroup = self.checked || !bvh::shares_stack(wgsl);
-        let uncontracted = self.uncontracted(kernel, (module, info), zero_workgroup);
-        let module = uncontracted.unwrap_or_else(|| self.shader_module(kernel, module));
+        let written = self.uncontracted((module, info), wanted.zero_workgroup);
+        let Some((workgroup, words)) = written else {
+            let module = self.shader_module(wanted.kernel, module);
+            return self.of_module(wanted, &module, None);
+        };
+        let module = self.passthrough(wanted.kernel, workgroup, &words);
+        let cache = kept.and_then(|_| self.cache(&[]));
+        let pipeline = self.of_module(wanted, &module, cache.as_ref());
+        if let Some((kept, key)) = kept {
+            let binary = cache.and_then(|cache| cache.get_data());
+            let built = Built {
+                workgroup,
+                module: words,
+                binary: binary.unwrap_or_default(),
+            };
+            kept.store(key, &built);
+        }
+        pipeline
+    }
+
+    fn of_module(
+        &self,
+        wanted: Wanted<'_>,
+        module: &wgpu::ShaderModule,
+        cache: Option<&wgpu::PipelineCache>,
+    ) -> wgpu::ComputePipeline {
         let compilation_options = wgpu::PipelineCompilationOptions {
-            zero_initialize_workgroup_memory: zero_workgroup,
+            zero_initialize_workgroup_memory: wanted.zero_workgroup,
             ..Default::default()
         };
         let layout = self
             .device
             .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(kernel),
-                bind_group_layouts: &[Some(layout)],
+                label: Some(wanted.kernel),
+                bind_group_layouts: &[Some(wanted.layout)],
                 immediate_size: 0,
             });
         self.device
             .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(kernel),
+                label: Some(wanted.kernel),
                 layout: Some(&layout),
-                module: &module,
+                module,
                 entry_point: Some("main"),
                 compilation_options,
-                cache: None,
+                cache,
             })
     }
 
-    /// The module whose arithmetic is rounded as it is written, where the GPU takes one.
+    /// What a driver made of a kernel before, for it to take up; nothing where it tells nothing.
     #[allow(unsafe_code)]
+    fn cache(&self, binary: &[u8]) -> Option<wgpu::PipelineCache> {
+        let features = self.device.features();
+        if !features.contains(wgpu::Features::PIPELINE_CACHE) {
+            return None;
+        }
+        let descriptor = wgpu::PipelineCacheDescriptor {
+            label: None,
+            data: Some(binary).filter(|binary| !binary.is_empty()),
+            // What another driver wrote is left out.
+            fallback: true,
+        };
+        // SAFETY: the bytes are what `get_data` gave, by a fingerprint.
+        Some(unsafe { self.device.create_pipeline_cache(&descriptor) })
+    }
+
+    /// Does the GPU take modules as they are written here?
+    fn takes_spirv(&self) -> bool {
+        let features = self.device.features();
+        features.contains(wgpu::Features::PASSTHROUGH_SHADERS)
+            && self.adapter.get_info().backend == wgpu::Backend::Vulkan
+    }
+
+    /// The module whose arithmetic is rounded as it is written, where the GPU takes one, and the size of its workgroups.
     fn uncontracted(
         &self,
-        kernel: &str,
         (module, info): (&naga::Module, &ModuleInfo),
         zero_workgroup: bool,
-    ) -> Option<wgpu::ShaderModule> {
-        let takes = self
-            .device
-            .features()
-            .contains(wgpu::Features::PASSTHROUGH_SHADERS);
-        if !takes || self.adapter.get_info().backend != wgpu::Backend::Vulkan {
+    ) -> Option<([u32; 3], Vec<u32>)> {
+        if !self.takes_spirv() {
             return None;
         }
         let kind = spirv::Kind {
@@ -115,19 +199,23 @@ impl Gpu {
         };
         let words = spirv::write(module, info, kind, &bvh::is_traversal).ok()?;
         let entry = module.entry_points.first()?;
-        let [x, y, z] = entry.workgroup_size;
+        Some((entry.workgroup_size, words))
+    }
+
+    #[allow(unsafe_code)]
+    fn passthrough(&self, kernel: &str, [x, y, z]: [u32; 3], words: &[u32]) -> wgpu::ShaderModule {
         let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
             label: Some(kernel),
             entry_points: Cow::Owned(vec![wgpu::PassthroughShaderEntryPoint {
-                name: entry.name.as_str().into(),
+                name: "main".into(),
                 workgroup_size: (x, y, z),
             }]),
-            spirv: Some(Cow::Owned(words)),
+            spirv: Some(Cow::Borrowed(words)),
             ..Default::default()
         };
-        // SAFETY: naga wrote the module, of text that it validated, and what was added are decorations of results. Why
-        // checks are left out is said below.
-        Some(unsafe { self.device.create_shader_module_passthrough(descriptor) })
+        // SAFETY: naga wrote the module, of text that it validated, and what was added are decorations of results; one that
+        // an earlier start has kept is the same by its fingerprint. Why checks are left out is said below.
+        unsafe { self.device.create_shader_module_passthrough(descriptor) }
     }
 
     /// Of what was parsed to be validated: wgpu would parse the text again, which takes longer than to

@@ -131,11 +131,13 @@ impl Work {
         self.resources.read_film(&self.gpu)
     }
 
-    /// Makes the scalar counters go on from those of another plan of the same render.
+    /// Makes the scalar counters go on from those of another plan of the same render. The others begin anew: this plan may have
+    /// run before.
     pub(crate) fn take_over(&self, old: &Self) {
         let (gpu, bytes) = (&self.gpu, 4 * Counters::SCALARS as u64);
         let (from, to) = (old.resources.counters(), self.resources.counters());
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.clear_buffer(to, 0, None);
         encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
         gpu.queue.submit([encoder.finish()]);
     }

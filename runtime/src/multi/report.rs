@@ -16,6 +16,7 @@ pub(super) fn of_all(reports: &[(Report, &Given)]) -> Report {
         plan: report.plan.clone(),
         replanned: report.replanned.clone(),
         pool_size: report.pool_size,
+        wanted_pool_size: report.wanted_pool_size,
         iterations: report.iterations,
         kernels: report.kernels.clone(),
         lost: given.lost.clone(),

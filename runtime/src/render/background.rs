@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvError, SyncSender, TryRecvError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::Instant;
 
@@ -23,7 +24,7 @@ use crate::world::{MaterialSource, World};
 /// Compiling materials recurses.
 const STACK_BYTES: usize = 32 << 20;
 
-/// A plan to be made, and kernels to be compiled.
+/// Plans to be made, and kernels to be compiled.
 pub(super) struct Job {
     pub gpu: Gpu,
     /// Without the contents of buffers.
@@ -47,34 +48,90 @@ pub(super) struct Made {
     pub plan: Option<Plan>,
 }
 
-impl Job {
-    /// Does it on a thread of its own: the plan ready to run, or why it cannot take over.
-    pub(super) fn spawn(
-        self,
-        planner: Planner,
-        workload: Workload,
-    ) -> std::io::Result<JoinHandle<(Made, Result<BuiltPlan, String>)>> {
-        let builder = Builder::new().name("plan".into());
-        let work = move || self.run(planner, &workload);
-        builder.stack_size(STACK_BYTES).spawn(work)
+/// A plan and its kernels, or why they cannot take over.
+pub(super) type Outcome = (Made, Result<BuiltPlan, String>);
+
+/// A job that is under way.
+#[derive(Debug)]
+pub(super) struct Jobbing {
+    outcomes: Receiver<Outcome>,
+    thread: Option<JoinHandle<()>>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Jobbing {
+    /// The next plan, if it is built; the error says whether there will be another.
+    pub(super) fn next(&self) -> Result<Outcome, TryRecvError> {
+        self.outcomes.try_recv()
     }
 
-    fn run(self, planner: Planner, workload: &Workload) -> (Made, Result<BuiltPlan, String>) {
+    /// The next plan, waited for.
+    pub(super) fn wait(&self) -> Result<Outcome, TryRecvError> {
+        let next = self.outcomes.recv();
+        next.map_err(|RecvError| TryRecvError::Disconnected)
+    }
+
+    /// Lets it end: nobody waits for another plan.
+    pub(super) fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Jobbing {
+    /// Lets the thread end: drivers do not take it well if a process ends while they compile.
+    fn drop(&mut self) {
+        self.cancel();
+        // Whoever waits to be heard is told that nobody listens.
+        self.outcomes = sync_channel(0).1;
+        if let Some(thread) = self.thread.take() {
+            drop(thread.join());
+        }
+    }
+}
+
+impl Job {
+    /// Does it on a thread of its own. Plans come one by one, in the planner's order, and each is built when the one before
+    /// was taken: so no more than one waits, with the memory of its queues.
+    pub(super) fn spawn(self, planner: Planner, workload: Workload) -> std::io::Result<Jobbing> {
+        let cancelled = self.cancelled.clone();
+        let (tell, outcomes) = sync_channel(0);
+        let builder = Builder::new().name("plan".into());
+        let work = move || self.run(planner, &workload, &tell);
+        Ok(Jobbing {
+            outcomes,
+            thread: Some(builder.stack_size(STACK_BYTES).spawn(work)?),
+            cancelled,
+        })
+    }
+
+    fn run(self, planner: Planner, workload: &Workload, tell: &SyncSender<Outcome>) {
         let begin = Instant::now();
         let planned = planner(workload);
-        let mut made = Made {
-            planning_seconds: begin.elapsed().as_secs_f64(),
-            ..Made::default()
+        let mut planning_seconds = begin.elapsed().as_secs_f64();
+        let plans = match planned {
+            Ok(plans) => plans,
+            Err(why) => {
+                let made = Made {
+                    planning_seconds,
+                    ..Made::default()
+                };
+                drop(tell.send((made, Err(why))));
+                return;
+            }
         };
-        let plan = match planned {
-            Ok(plan) => plan,
-            Err(why) => return (made, Err(why)),
-        };
-        let begin = Instant::now();
-        let built = self.gpu.guarded(|| self.compile(&plan));
-        made.compile_seconds = begin.elapsed().as_secs_f64();
-        made.plan = Some(plan);
-        (made, built.map_err(|error| error.to_string()))
+        for plan in plans {
+            let begin = Instant::now();
+            let built = self.gpu.guarded(|| self.compile(&plan));
+            let made = Made {
+                planning_seconds: std::mem::take(&mut planning_seconds),
+                compile_seconds: begin.elapsed().as_secs_f64(),
+                plan: Some(plan),
+            };
+            let built = built.map_err(|error| error.to_string());
+            if tell.send((made, built)).is_err() {
+                return;
+            }
+        }
     }
 
     fn compile(&self, plan: &Plan) -> Result<BuiltPlan, RuntimeError> {

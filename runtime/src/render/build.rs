@@ -192,11 +192,14 @@ impl<'g> Renderer<'g> {
         if options.count_hits {
             composer.layout.counters.hits = counted_materials(device, &composer);
         }
-        let facts = ReportInputs::of(&composer, &options);
         let building = Building::of(composer.descs().len(), watch);
         let (kernels, work) = match device {
             DeviceRef::Gpu(gpu) => {
-                let resources = Resources::new(gpu, &composer, &options)?;
+                let resources = pool::within_memory(sizes, &mut |sizes| {
+                    composer.sizes = sizes;
+                    gpu.guarded(|| Resources::new(gpu, &composer, &options))
+                })?;
+                let sizes = composer.sizes;
                 let build =
                     |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
                 let (kernels, steps) = build_all(&composer, build)?;
@@ -214,6 +217,12 @@ impl<'g> Renderer<'g> {
                 let work = cpu::Work::new(cpu, &composer, steps, casts, &options)?;
                 (kernels, Work::Cpu(work))
             }
+        };
+        let wanted_pool = sizes.slots();
+        let sizes = composer.sizes;
+        let facts = ReportInputs {
+            wanted_pool: (wanted_pool > sizes.slots()).then_some(wanted_pool),
+            ..ReportInputs::of(&composer, &options)
         };
         warm_up(&work, &options, &building)?;
         Ok(Self {
@@ -355,7 +364,7 @@ fn longest_path(max_depth: u32, needs: Needs) -> u64 {
 }
 
 impl ReportInputs {
-    /// What is known before kernels are built, which takes yet unknown time.
+    /// What is known of kernels whose building takes yet unknown time.
     fn of(composer: &Composer<'_>, options: &RenderOptions) -> Self {
         let world = composer.world;
         let prints = Prints::of(composer);
@@ -388,6 +397,7 @@ impl ReportInputs {
                 composer.sizes.pool,
             ),
             compile_seconds: 0.0,
+            wanted_pool: None,
         }
     }
 }

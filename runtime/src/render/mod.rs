@@ -15,13 +15,14 @@ mod selection;
 pub(crate) mod settings;
 mod sitting;
 pub(crate) mod status;
+mod trials;
 pub mod until;
 pub(crate) mod workload;
 
 pub(crate) use build::{CompositionInputs, build_step};
 pub use build::{NOBODY, Watch, identity};
 pub use observe::profile_workload;
-pub use replan::{Planner, Replanning};
+pub use replan::{Planner, Plans, Replanning};
 pub use selection::Samples;
 pub use sitting::{Portion, Sitting};
 
@@ -127,6 +128,8 @@ struct ReportInputs {
     /// What is known of the workload before rendering.
     workload: Workload,
     compile_seconds: f64,
+    /// Paths in flight that the GPU's memory had no room for.
+    wanted_pool: Option<u32>,
 }
 
 impl<'g> Renderer<'g> {
@@ -405,6 +408,7 @@ impl<'g> Renderer<'g> {
             replanned: self.replan_report(status),
             geometry: self.facts.geometry,
             pool: self.built.sizes.slots(),
+            wanted_pool: self.facts.wanted_pool,
             materials: &self.facts.materials,
             workload: self.workload(status),
             compile_seconds: self.facts.compile_seconds,

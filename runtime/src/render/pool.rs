@@ -77,6 +77,37 @@ pub(crate) fn sizes(
     dispatch_sizes(device, pool, &options.technique)
 }
 
+/// The fewest paths in flight for which memory is still asked.
+const LEAST_POOL: u32 = 1 << 12;
+
+/// What is made for a pool, or for the largest that is the half of it, a quarter and so on, where there is not memory for more.
+/// What others on the same GPU hold is not known before it is asked for.
+///
+/// # Errors
+/// If there is none for [`LEAST_POOL`] paths either, or making it fails otherwise.
+pub(crate) fn within_memory<T>(
+    sizes: Sizes,
+    make: &mut dyn FnMut(Sizes) -> Result<T, RuntimeError>,
+) -> Result<T, RuntimeError> {
+    let mut sizes = sizes;
+    loop {
+        match make(sizes) {
+            Err(RuntimeError::OutOfMemory(_)) if sizes.pool > LEAST_POOL => sizes = halved(sizes),
+            made => return made,
+        }
+    }
+}
+
+/// Dispatches over half as many slots, by half as many threads where slots are fetched.
+fn halved(sizes: Sizes) -> Sizes {
+    let pool = sizes.pool.div_ceil(2);
+    Sizes {
+        pool,
+        threads: sizes.threads.min(pool),
+        ..sizes
+    }
+}
+
 /// The sizes of dispatches over `items` slots.
 pub(crate) fn dispatch_sizes(
     device: DeviceRef<'_>,
@@ -202,6 +233,48 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pool_is_halved_until_there_is_memory_for_it() {
+        let sizes = |pool| Sizes {
+            pool,
+            pools: 1,
+            workgroup: 256,
+            threads: THREADS.min(pool),
+            fetch_limit: FETCH_LIMIT,
+            row_groups: 65_535,
+        };
+        let within = |room: u32, wanted: u32| {
+            let mut asked = Vec::new();
+            let made = within_memory(sizes(wanted), &mut |sizes| {
+                asked.push(sizes.pool);
+                assert!(sizes.threads <= sizes.pool);
+                assert!(sizes.threads * sizes.fetch_limit >= sizes.pool);
+                if sizes.pool > room {
+                    Err(RuntimeError::OutOfMemory("full".into()))
+                } else {
+                    Ok(sizes.pool)
+                }
+            });
+            (made, asked)
+        };
+        let (made, asked) = within(3_000_000, 1 << 23);
+        assert_eq!(made.expect("there is room"), 1 << 21);
+        assert_eq!(asked, [1 << 23, 1 << 22, 1 << 21]);
+        assert_eq!(within(u32::MAX, 12_345).1, [12_345]);
+        assert_eq!(within(6_000, 9_999).0.expect("there is room"), 5_000);
+        let (made, asked) = within(100, 1 << 14);
+        assert!(matches!(made, Err(RuntimeError::OutOfMemory(_))));
+        assert_eq!(asked, [1 << 14, 1 << 13, 1 << 12]);
+        // What is wrong otherwise does not get right with less.
+        let mut times = 0;
+        let made: Result<(), _> = within_memory(sizes(1 << 20), &mut |_| {
+            times += 1;
+            Err(RuntimeError::DeviceLost("gone".into()))
+        });
+        assert!(matches!(made, Err(RuntimeError::DeviceLost(_))));
+        assert_eq!(times, 1);
+    }
 
     #[test]
     fn a_submission_asks_for_what_is_left() {

@@ -1,28 +1,32 @@
 //! Renewing the plan while rendering: count what paths hit, plan for that and compile in the background,
-//! then go on with the new kernels.
+//! then go on with the new kernels, and try other plans beside it ([`trials`](super::trials)).
 //!
 //! Between two iterations the queues are empty, and state, film and scalar counters are the same under
 //! every plan. So another may go on where one ends, and the picture has the same bits.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::TryRecvError;
 use std::time::Duration;
 
 use impasto_compiler::partition::{Form, Plan, Workload};
 
 use super::Renderer;
-use super::background::{Job, Made};
+use super::background::{Job, Jobbing, Made, Outcome};
 use super::build::BuiltPlan;
+use super::trials::{Least, Trials, Tried};
 use crate::device::{DeviceRef, Work};
 use crate::kernels::dropped::Dropped;
-use crate::render::report::{Ran, ReplanReport, partition};
+use crate::render::report::{Ran, ReplanReport, TrialReport, add_kernels, partition};
 use crate::render::status::{Before, Status};
 use crate::render::workload::Mark;
 use crate::world::MaterialSource;
 
-/// Makes a plan for a workload, or says why there is none. It runs on a thread of its own.
-pub type Planner = Box<dyn FnOnce(&Workload) -> Result<Plan, String> + Send>;
+/// Makes plans for a workload, or says why there is none. It runs on a thread of its own.
+pub type Planner = Box<dyn FnOnce(&Workload) -> Result<Plans, String> + Send>;
+
+/// First the plan to go on with, then those that are worth a trial beside it. Each is asked for when the one before is built.
+pub type Plans = Box<dyn Iterator<Item = Plan>>;
 
 /// When and how to renew a plan.
 pub struct Replanning {
@@ -39,14 +43,17 @@ pub struct Replanning {
     pub least_hits: f64,
     /// A render that will be done sooner keeps its plan.
     pub worthwhile: Duration,
-    /// Whether to wait for the new plan instead of rendering on: for experiments that must not depend on
-    /// how long it takes.
+    /// GPU time over which plans are timed that are tried beside each other, at least; also so many iterations as hits are
+    /// counted over.
+    pub trial: Duration,
+    /// Whether to wait for new plans instead of rendering on: for experiments that must not depend on
+    /// how long they take.
     pub wait: bool,
 }
 
 impl Replanning {
     /// With the defaults: after 16 iterations hits are counted over 16, at least 10,000 of them;
-    /// less than half a second of rendering is not worth a plan.
+    /// less than half a second of rendering is not worth a plan, and 30 ms tell plans apart.
     pub fn new(source: Arc<dyn MaterialSource + Send + Sync>, planner: Planner) -> Self {
         Self {
             source,
@@ -55,6 +62,7 @@ impl Replanning {
             counted_iterations: 16,
             least_hits: 10_000.0,
             worthwhile: Duration::from_millis(500),
+            trial: Duration::from_millis(30),
             wait: false,
         }
     }
@@ -67,7 +75,6 @@ pub(super) struct Replan {
     settings: Settings,
     stage: Stage,
     workload: Option<Workload>,
-    cancelled: Arc<AtomicBool>,
 }
 
 /// The numbers of [`Replanning`].
@@ -77,6 +84,7 @@ struct Settings {
     counted: u64,
     least_hits: f64,
     worthwhile: f64,
+    trial: f64,
     wait: bool,
 }
 
@@ -86,11 +94,13 @@ enum Stage {
     /// Hits are counted.
     Counting(Mark),
     /// A plan is made and compiled.
-    Working(JoinHandle<(Made, Result<BuiltPlan, String>)>),
-    /// It is there.
-    Made(Made, Box<BuiltPlan>),
+    Working(Jobbing),
+    /// It is there, and others may follow.
+    Made(Box<(Made, BuiltPlan)>, Jobbing),
     /// There is none, or it cannot take over.
     Failed(Made, String),
+    /// It runs, and others are tried beside it.
+    Trying(Trials),
     /// Nothing is left to do.
     Done,
 }
@@ -107,9 +117,10 @@ pub(super) struct Change {
     report: ReplanReport,
     /// GPU seconds of the logic kernel in an iteration of the old plan.
     logic_seconds: f64,
-    /// Those that count as the new plan's and are not.
+    /// Those that count as the present plan's and are not.
     logic_before: f64,
-    iterations: u64,
+    /// Iterations until the present plan took over.
+    since: u64,
 }
 
 impl Renderer<'_> {
@@ -127,11 +138,11 @@ impl Renderer<'_> {
                 counted: replanning.counted_iterations.max(1),
                 least_hits: replanning.least_hits,
                 worthwhile: replanning.worthwhile.as_secs_f64(),
+                trial: replanning.trial.as_secs_f64(),
                 wait: replanning.wait,
             },
             stage: Stage::Warming(0),
             workload: None,
-            cancelled: Arc::default(),
         });
     }
 
@@ -141,35 +152,60 @@ impl Renderer<'_> {
         let Some(mut replan) = self.replan.take() else {
             return;
         };
-        replan.advance(self, status, left);
+        let tried = replan.advance(self, status, left);
         if let Some((made, why)) = replan.failed() {
             let mut change = self.change(&made, status, elapsed);
             change.report.kept = Some(why);
             self.replanned = Some(change);
+        }
+        if let (Some(tried), Some(change)) = (tried, &mut self.replanned) {
+            let trial = TrialReport::of(tried, &self.facts.materials);
+            change.report.trials.push(trial);
         }
         self.replan = Some(replan);
     }
 
     /// Whether a new plan waits to take over.
     pub(super) fn is_replanned(&self) -> bool {
-        let stage = self.replan.as_ref().map(|replan| &replan.stage);
-        matches!(stage, Some(Stage::Made(..)))
+        match self.replan.as_ref().map(|replan| &replan.stage) {
+            Some(Stage::Made(..)) => true,
+            Some(Stage::Trying(trials)) => trials.is_due(),
+            _ => false,
+        }
     }
 
     /// Goes on with the new plan. Nothing may be in flight.
     pub(super) fn change_plan(&mut self, status: &mut Status, elapsed: Duration) {
-        let made = self.replan.as_mut().and_then(Replan::take);
-        let Some((made, built)) = made else {
+        let Some(mut replan) = self.replan.take() else {
             return;
         };
-        let mut change = self.change(&made, status, elapsed);
-        let old = std::mem::replace(&mut self.built, built);
-        if !self.built.shares_counters(&old) {
-            change.report.kernels = self.ran(&old).report(status, 0);
-            change.logic_before = 0.0;
-            self.take_over(&old, status);
+        if let Some((made, built)) = replan.take(status) {
+            self.replanned = Some(self.change(&made, status, elapsed));
+            self.go_on_with(built, status);
+        } else if let Stage::Trying(trials) = &mut replan.stage
+            && let Some(next) = trials.change(&self.built, status)
+        {
+            self.go_on_with(next, status);
         }
-        self.replanned = Some(change);
+        self.replan = Some(replan);
+    }
+
+    /// Puts a plan in the place of the present one.
+    fn go_on_with(&mut self, next: BuiltPlan, status: &mut Status) {
+        let old = std::mem::replace(&mut self.built, next);
+        let ran = (!self.built.shares_counters(&old)).then(|| {
+            let ran = self.ran(&old).report(status, 0);
+            self.take_over(&old, status);
+            ran
+        });
+        let Some(change) = &mut self.replanned else {
+            return;
+        };
+        change.since = status.iterations;
+        if let Some(ran) = ran {
+            add_kernels(&mut change.report.kernels, ran);
+            change.logic_before = 0.0;
+        }
     }
 
     pub(super) fn ran<'r>(&'r self, built: &'r BuiltPlan) -> Ran<'r> {
@@ -198,10 +234,11 @@ impl Renderer<'_> {
                 gpu_seconds: status.gpu_seconds,
                 counting_seconds: None,
                 kernels: Vec::new(),
+                trials: Vec::new(),
             },
             logic_seconds: logic / iterations.max(1) as f64,
             logic_before: logic,
-            iterations: status.iterations,
+            since: status.iterations,
         }
     }
 
@@ -228,14 +265,14 @@ impl Renderer<'_> {
     pub(super) fn replan_report(&self, status: &Status) -> Option<ReplanReport> {
         let change = self.replanned.as_ref()?;
         let mut report = change.report.clone();
-        let since = status.iterations - change.iterations;
+        let since = status.iterations - change.since;
         let inline = self.built.plan.kernels.iter();
         let inline = inline.filter(|k| k.form == Form::Inline).count();
         let logic = status.step_seconds.first().copied().unwrap_or(0.0);
         if report.kept.is_none() && inline == 0 && since > 0 && logic > 0.0 {
             let now = (logic - change.logic_before) / since as f64;
             let saved = (change.logic_seconds - now).max(0.0);
-            report.counting_seconds = Some(saved * change.iterations as f64);
+            report.counting_seconds = Some(saved * report.at_iteration as f64);
         }
         Some(report)
     }
@@ -250,21 +287,30 @@ impl Replan {
     /// Counts anew in a pass: at the end of the one before slots idle, and at its beginning paths
     /// begin together.
     pub(super) fn begin_pass(&mut self, iterations: u64) {
-        if let Stage::Warming(_) | Stage::Counting(_) = self.stage {
-            self.stage = Stage::Warming(iterations);
+        match &mut self.stage {
+            Stage::Warming(_) | Stage::Counting(_) => self.stage = Stage::Warming(iterations),
+            Stage::Trying(trials) => trials.begin_pass(iterations, self.settings.warm),
+            _ => {}
         }
     }
 
-    /// Goes on to the next stage if it is time.
-    fn advance(&mut self, renderer: &Renderer<'_>, status: &Status, left: f64) {
+    /// Goes on to the next stage if it is time; what became of a trial, if one ended.
+    fn advance(&mut self, renderer: &Renderer<'_>, status: &Status, left: f64) -> Option<Tried> {
+        let settings = self.settings;
         self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Warming(begin) if status.iterations >= begin + self.settings.warm => {
+            Stage::Warming(begin) if status.iterations >= begin + settings.warm => {
                 Stage::Counting(Mark::of(status))
             }
             Stage::Counting(mark) => self.count(mark, renderer, status, left),
-            Stage::Working(thread) if thread.is_finished() => joined(thread),
+            Stage::Working(job) => worked(job, false),
+            Stage::Trying(mut trials) => {
+                let tried = trials.advance(status, left, settings.wait);
+                self.stage = Stage::Trying(trials);
+                return tried;
+            }
             same => same,
         };
+        None
     }
 
     /// Lets a plan be made once enough is counted.
@@ -308,11 +354,11 @@ impl Replan {
             technique: renderer.options.technique,
             present: renderer.built.clone(),
             present_work: work.clone(),
-            cancelled: self.cancelled.clone(),
+            cancelled: Arc::<AtomicBool>::default(),
         };
         match job.spawn(planner, workload) {
-            Ok(thread) if self.settings.wait => joined(thread),
-            Ok(thread) => Stage::Working(thread),
+            Ok(job) if self.settings.wait => worked(job, true),
+            Ok(job) => Stage::Working(job),
             Err(error) => failed(format!("no thread for planning: {error}")),
         }
     }
@@ -328,34 +374,36 @@ impl Replan {
         }
     }
 
-    /// The new plan, if it is there.
-    fn take(&mut self) -> Option<(Made, BuiltPlan)> {
+    /// The new plan, if it is there. Others may be tried beside it from now on.
+    fn take(&mut self, status: &Status) -> Option<(Made, BuiltPlan)> {
         match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Made(made, built) => Some((made, *built)),
-            _ => None,
+            Stage::Made(made, job) => {
+                let least = Least {
+                    iterations: self.settings.counted,
+                    seconds: self.settings.trial,
+                };
+                self.stage = Stage::Trying(Trials::new(job, least, status));
+                Some(*made)
+            }
+            other => {
+                self.stage = other;
+                None
+            }
         }
     }
 }
 
-/// What a thread came to.
-fn joined(thread: JoinHandle<(Made, Result<BuiltPlan, String>)>) -> Stage {
-    match thread.join() {
-        Ok((made, Ok(built))) => Stage::Made(made, Box::new(built)),
+/// What a job has come to by now, or in the end if it is waited for.
+fn worked(job: Jobbing, wait: bool) -> Stage {
+    let first: Result<Outcome, TryRecvError> = if wait { job.wait() } else { job.next() };
+    match first {
+        Ok((made, Ok(built))) => Stage::Made(Box::new((made, built)), job),
         Ok((made, Err(why))) => Stage::Failed(made, why),
-        Err(_) => failed("planning broke off".into()),
+        Err(TryRecvError::Empty) => Stage::Working(job),
+        Err(TryRecvError::Disconnected) => failed("planning broke off".into()),
     }
 }
 
 fn failed(why: String) -> Stage {
     Stage::Failed(Made::default(), why)
-}
-
-impl Drop for Replan {
-    /// Lets the thread end: drivers do not take it well if a process ends while they compile.
-    fn drop(&mut self) {
-        self.cancelled.store(true, Ordering::Relaxed);
-        if let Stage::Working(thread) = std::mem::replace(&mut self.stage, Stage::Done) {
-            drop(thread.join());
-        }
-    }
 }

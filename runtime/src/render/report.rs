@@ -15,6 +15,7 @@ use crate::kernels::modules::{DispatchSource, Kernel, KernelDesc};
 use crate::kernels::queues::Scalar;
 use crate::options::RenderOptions;
 use crate::render::status::Status;
+use crate::render::trials::Tried;
 use crate::render::until::{Check, Ending};
 use crate::technique::Technique;
 use crate::world::GeometryCounts;
@@ -55,6 +56,8 @@ pub struct Report {
     pub seed: u32,
     /// Triangles that are stored.
     pub triangles: u64,
+    /// References of acceleration structures to them: more than triangles where large ones are in several leaves.
+    pub references: u64,
     /// Triangles that rays can hit: those of an object count once for each of its placements.
     pub placed_triangles: u64,
     /// Objects that are stored once and placed any number of times.
@@ -90,6 +93,9 @@ pub struct Report {
     pub path_state_bytes: u64,
     /// Paths in flight.
     pub pool_size: u32,
+    /// Paths that would be in flight if the GPU had had memory for them; absent if it had.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_pool_size: Option<u32>,
     /// Times every kernel was dispatched.
     pub iterations: u64,
     /// The kernels in the order of an iteration; of a renewed plan what they did since then.
@@ -220,6 +226,9 @@ pub struct DeviceReport {
     pub replanned: Option<ReplanReport>,
     /// Paths in flight.
     pub pool_size: u32,
+    /// Paths that would be in flight if the GPU had had memory for them; absent if it had.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_pool_size: Option<u32>,
     /// Times every kernel was dispatched.
     pub iterations: u64,
     /// Its kernels.
@@ -281,8 +290,72 @@ pub struct ReplanReport {
     /// the new plan's logic kernel evaluates materials, or there are no timestamps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub counting_seconds: Option<f64>,
-    /// What the first plan's kernels did; empty where they went on.
+    /// What kernels did before the last plan took over; empty where those of the first plan went on.
     pub kernels: Vec<KernelReport>,
+    /// Plans that were tried beside the new one, in this order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trials: Vec<TrialReport>,
+}
+
+/// A plan that was tried for some iterations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrialReport {
+    /// The plan.
+    pub plan: String,
+    /// Time that compiling its kernels took, while the GPU went on.
+    pub compile_seconds: f64,
+    /// GPU time of an iteration by it; absent if it could not run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    /// The same by the plan that ran before, which was the fastest until then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds_before: Option<f64>,
+    /// Whether it was faster, and went on.
+    pub kept: bool,
+    /// Why it could not run, if it could not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed: Option<String>,
+}
+
+impl TrialReport {
+    /// Of a trial of a plan for some materials.
+    pub(super) fn of(tried: Tried, materials: &[MaterialReport]) -> Self {
+        let made = tried.made;
+        let plan = made.plan.map(|plan| partition(&plan, materials));
+        let (seconds, failed) = match tried.outcome {
+            Ok(seconds) => (Some(seconds), None),
+            Err(why) => (None, Some(why)),
+        };
+        Self {
+            plan: plan.unwrap_or_default(),
+            compile_seconds: made.compile_seconds,
+            seconds: seconds.map(|[its, _]| its),
+            seconds_before: seconds.map(|[_, before]| before),
+            kept: tried.is_kept,
+            failed,
+        }
+    }
+}
+
+/// Adds what kernels did, of those that are there already to what these did.
+pub(super) fn add_kernels(all: &mut Vec<KernelReport>, more: Vec<KernelReport>) {
+    for kernel in more {
+        let is_same = |known: &&mut KernelReport| {
+            known.name == kernel.name
+                && known.form == kernel.form
+                && known.materials == kernel.materials
+        };
+        match all.iter_mut().find(is_same) {
+            Some(known) => {
+                known.items += kernel.items;
+                known.gpu_seconds += kernel.gpu_seconds;
+                known.nonfinite_samples += kernel.nonfinite_samples;
+                // Of a mean over several times nothing is known but of each.
+                known.utilisation = None;
+            }
+            None => all.push(kernel),
+        }
+    }
 }
 
 /// What a render took over from an earlier run.
@@ -316,6 +389,7 @@ pub(crate) struct Inputs<'a> {
     pub replanned: Option<ReplanReport>,
     pub geometry: GeometryCounts,
     pub pool: u32,
+    pub wanted_pool: Option<u32>,
     pub materials: &'a [MaterialReport],
     pub workload: Option<Workload>,
     pub compile_seconds: f64,
@@ -355,6 +429,7 @@ impl Inputs<'_> {
             first_sample: self.options.first_sample,
             seed: self.options.seed,
             triangles: self.geometry.triangles,
+            references: self.geometry.references,
             placed_triangles: self.geometry.placed_triangles,
             objects: self.geometry.objects,
             placements: self.geometry.placements,
@@ -375,6 +450,7 @@ impl Inputs<'_> {
             steady_paths_per_second: status.steady_rate(paths),
             path_state_bytes: self.layout.memory(),
             pool_size: self.pool,
+            wanted_pool_size: self.wanted_pool,
             iterations: status.iterations,
             kernels,
             devices: Vec::new(),

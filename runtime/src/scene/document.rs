@@ -1,4 +1,5 @@
-//! A TOML file read strictly: every value knows its place, and keys nobody asked for are errors.
+//! A TOML file read strictly: every value knows its place, and keys nobody asked for are errors. Scenes are read by it,
+//! and so are studies of experiments.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,17 +15,22 @@ use super::mesh::check_reach;
 use crate::error::{Excerpt, SceneError};
 
 /// The text of a TOML file.
-pub(crate) struct Document<'d> {
+pub struct Document<'d> {
     path: &'d Path,
     text: &'d str,
 }
 
 impl<'d> Document<'d> {
-    pub(super) fn new(path: &'d Path, text: &'d str) -> Self {
+    /// The text of the file at `path`.
+    pub fn new(path: &'d Path, text: &'d str) -> Self {
         Self { path, text }
     }
 
-    pub(super) fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
+    /// Its tables, of which [`Table::new`] takes the outermost.
+    ///
+    /// # Errors
+    /// If it is no TOML, with the place.
+    pub fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
         DeTable::parse(self.text).map_err(|e| {
             let place = e.span().unwrap_or(0..0);
             self.error(place, format!("not valid TOML: {}", e.message()))
@@ -32,7 +38,7 @@ impl<'d> Document<'d> {
     }
 
     /// An error at a byte range of the text.
-    pub(super) fn error(&self, place: Range<usize>, message: impl Into<String>) -> SceneError {
+    pub fn error(&self, place: Range<usize>, message: impl Into<String>) -> SceneError {
         SceneError::at(self.excerpt(place), message)
     }
 
@@ -43,7 +49,7 @@ impl<'d> Document<'d> {
 }
 
 /// A table whose keys are taken one by one; [`Table::finish`] refuses the rest.
-pub(crate) struct Table<'d> {
+pub struct Table<'d> {
     document: &'d Document<'d>,
     /// The table in words, such as `[camera]`.
     name: String,
@@ -55,7 +61,8 @@ pub(crate) struct Table<'d> {
 }
 
 impl<'d> Table<'d> {
-    pub(super) fn new(
+    /// The whole of `document`, which errors call `name`.
+    pub fn new(
         document: &'d Document<'d>,
         name: impl Into<String>,
         table: &'d Spanned<DeTable<'d>>,
@@ -85,12 +92,12 @@ impl<'d> Table<'d> {
     }
 
     /// An error about the table as a whole.
-    pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.place.clone(), message)
     }
 
     /// The value of an optional key.
-    pub(crate) fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
+    pub fn get(&mut self, key: &'static str) -> Option<Value<'d>> {
         self.asked.push(key);
         if let Some((_, value)) = self.held.iter().find(|(name, _)| *name == key) {
             return Some(value.clone());
@@ -100,7 +107,10 @@ impl<'d> Table<'d> {
     }
 
     /// The value of a key that must be there.
-    pub(crate) fn require(&mut self, key: &'static str) -> Result<Value<'d>, SceneError> {
+    ///
+    /// # Errors
+    /// If it is not, with the key that may have been meant for it.
+    pub fn require(&mut self, key: &'static str) -> Result<Value<'d>, SceneError> {
         if let Some(value) = self.get(key) {
             return Ok(value);
         }
@@ -112,7 +122,7 @@ impl<'d> Table<'d> {
     }
 
     /// All entries in the order of the file, for tables whose keys are names.
-    pub(super) fn named(&self) -> Vec<(&'d str, Value<'d>)> {
+    pub fn named(&self) -> Vec<(&'d str, Value<'d>)> {
         let mut entries: Vec<_> = self.entries.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
         let value = |(key, item): (&'d Spanned<_>, _)| {
@@ -128,7 +138,10 @@ impl<'d> Table<'d> {
     }
 
     /// Refuses the first key that was not asked for.
-    pub(super) fn finish(self) -> Result<(), SceneError> {
+    ///
+    /// # Errors
+    /// Its place, and what may have been meant.
+    pub fn finish(self) -> Result<(), SceneError> {
         let first = self.unknown().min_by_key(|k| k.span().start);
         if let Some(key) = first {
             return Err(self.no_such_key(key.get_ref(), key.span()));
@@ -169,7 +182,7 @@ impl<'d> Table<'d> {
 
 /// One value with its place.
 #[derive(Clone)]
-pub(crate) struct Value<'d> {
+pub struct Value<'d> {
     document: &'d Document<'d>,
     /// The value in words, such as `` `fov` of [camera] ``.
     name: String,
@@ -198,14 +211,14 @@ impl<'d> Value<'d> {
     }
 
     /// A finite number, or a list of such.
-    pub(super) fn numbers(&self) -> Option<Vec<f64>> {
+    pub fn numbers(&self) -> Option<Vec<f64>> {
         let held = self.held.clone();
         let one = || number(self.item()).map(|x| vec![x]);
         held.or_else(one).or_else(|| numbers(self.item()))
     }
 
     /// An error at the value.
-    pub(crate) fn error(&self, message: impl Into<String>) -> SceneError {
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.item.span(), message)
     }
 
@@ -235,7 +248,7 @@ impl<'d> Value<'d> {
     }
 
     /// `` `fov` of [camera] must be ..., but it is ... ``
-    pub(crate) fn mismatch(&self, expected: &str) -> SceneError {
+    pub fn mismatch(&self, expected: &str) -> SceneError {
         let found = &self.document.text[self.item.span()];
         let shown: String = found.chars().take(40).take_while(|c| *c != '\n').collect();
         let more = if shown.len() < found.len() { "..." } else { "" };
@@ -250,7 +263,7 @@ impl<'d> Value<'d> {
     }
 
     /// The items of a list.
-    pub(super) fn items(&self) -> Option<Vec<Value<'d>>> {
+    pub fn items(&self) -> Option<Vec<Value<'d>>> {
         // Of a part of a part the excerpt says enough.
         let whole = self.name.trim_start_matches("a part of ");
         let item = |item: &'d Spanned<DeValue<'d>>| Value {
@@ -263,18 +276,23 @@ impl<'d> Value<'d> {
         Some(self.item().as_array()?.iter().map(item).collect())
     }
 
-    pub(crate) fn string(&self) -> Result<&'d str, SceneError> {
+    /// A string.
+    ///
+    /// # Errors
+    /// If it is something else; so those of what follows.
+    pub fn string(&self) -> Result<&'d str, SceneError> {
         let text = self.item().as_str();
         text.ok_or_else(|| self.mismatch("a string in quotes"))
     }
 
-    pub(crate) fn boolean(&self) -> Result<bool, SceneError> {
+    /// True or false.
+    pub fn boolean(&self) -> Result<bool, SceneError> {
         let value = self.item().as_bool();
         value.ok_or_else(|| self.mismatch("true or false"))
     }
 
     /// An integer in `range`.
-    pub(crate) fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
+    pub fn integer(&self, range: std::ops::RangeInclusive<u32>) -> Result<u32, SceneError> {
         let (low, high) = (range.start(), range.end());
         let value = self.item().as_integer().and_then(|i| {
             let value = u32::from_str_radix(i.as_str(), i.radix()).ok()?;
@@ -284,13 +302,13 @@ impl<'d> Value<'d> {
     }
 
     /// A finite number.
-    pub(crate) fn float(&self) -> Result<f32, SceneError> {
+    pub fn float(&self) -> Result<f32, SceneError> {
         let value = self.number().map(|v| v as f32);
         value.ok_or_else(|| self.mismatch("a finite number"))
     }
 
     /// A finite number for which `holds`.
-    pub(crate) fn float_where(
+    pub fn float_where(
         &self,
         expected: &str,
         holds: impl Fn(f32) -> bool,
@@ -333,24 +351,20 @@ impl<'d> Value<'d> {
     }
 
     /// The table, which errors call `name`.
-    pub(super) fn table(&self, name: impl Into<String>) -> Result<Table<'d>, SceneError> {
+    pub fn table(&self, name: impl Into<String>) -> Result<Table<'d>, SceneError> {
         let entries = self.item().as_table();
         let entries = entries.ok_or_else(|| self.mismatch("a table"))?;
         Ok(Table::at(self.document, name, self.item.span(), entries))
     }
 
     /// The tables of `[[name]]`.
-    pub(super) fn tables(&self, name: &str) -> Result<Vec<Table<'d>>, SceneError> {
+    pub fn tables(&self, name: &str) -> Result<Vec<Table<'d>>, SceneError> {
         let expected = format!("a list of tables: write [[{name}]]");
         self.list_of_tables(&format!("[[{name}]]"), &expected)
     }
 
     /// The tables of a list, each of which errors call `name`.
-    pub(super) fn list_of_tables(
-        &self,
-        name: &str,
-        expected: &str,
-    ) -> Result<Vec<Table<'d>>, SceneError> {
+    pub fn list_of_tables(&self, name: &str, expected: &str) -> Result<Vec<Table<'d>>, SceneError> {
         let list = self.item().as_array();
         let list = list.ok_or_else(|| self.mismatch(expected))?;
         let table = |item: &'d Spanned<DeValue<'d>>| {

@@ -108,10 +108,11 @@ impl<'f> SceneFile<'f> {
         })?;
         let text = String::from_utf8(text)
             .map_err(|_| SceneError::in_file(path, "the scene is not UTF-8 text"))?;
-        Self::of_text(path, text, formats, lights)
+        Self::of_text(path, text, formats, lights, &BTreeMap::new())
     }
 
-    /// The same of a text that messages call `path`, and whose own paths are relative to its folder.
+    /// The same of a text that messages call `path`, and whose own paths are relative to its folder. Geometry whose name
+    /// `held` has is taken from there, and no file of that name is looked for.
     ///
     /// # Errors
     /// The first thing that is wrong, with its place.
@@ -120,12 +121,13 @@ impl<'f> SceneFile<'f> {
         text: String,
         formats: &'f [Format],
         lights: &[LightReader],
+        held: &BTreeMap<String, Geometry>,
     ) -> Result<Self, SceneError> {
         let frame = Asked::default().frame;
         let description = Description::read(&Document::new(path, &text), formats, lights, frame)?;
         let base = path.parent().unwrap_or(Path::new(""));
         let entries: Vec<&GeometrySpec<'f>> = description.geometry.iter().collect();
-        let sources = load_sources(base, &entries, frame)?;
+        let sources = load_sources(base, &entries, frame, held)?;
         let mut warnings = Vec::new();
         let environment = description.environment.as_ref();
         let environment = environment
@@ -187,6 +189,8 @@ impl<'f> SceneFile<'f> {
             base,
             &entries,
             frame / description.animation.frames_per_second,
+            // What is held does not move.
+            &BTreeMap::new(),
         )
     }
 
@@ -275,18 +279,23 @@ impl<'s, 'f> Sources<'s, 'f> {
     }
 }
 
-/// Every geometry file that entries name, read once as it is after so many seconds, by the names they use.
+/// Every geometry file that entries name, read once as it is after so many seconds, by the names they use; or taken from
+/// what is held.
 fn load_sources<'f>(
     base: &Path,
     entries: &[&GeometrySpec<'f>],
     seconds: f64,
+    held: &BTreeMap<String, Geometry>,
 ) -> Result<BTreeMap<SourceName, Source<'f>>, SceneError> {
     // In reverse, so that the first entry of a file is the one that errors name.
     let formats = entries.iter().rev().map(|entry| (entry.source(), *entry));
     let files: BTreeMap<SourceName, &GeometrySpec<'f>> = formats.collect();
     let files: Vec<(SourceName, &GeometrySpec<'f>)> = files.into_iter().collect();
     let load = |(name, entry): &(SourceName, &GeometrySpec<'f>)| {
-        let read = (entry.format.read)(base, &entry.file, seconds);
+        let read = match held.get(&entry.file) {
+            Some(geometry) => Ok(geometry.clone()),
+            None => (entry.format.read)(base, &entry.file, seconds),
+        };
         let mut geometry = read.map_err(|e| e.named_at(&entry.named))?;
         if let Some(second) = &entry.uv1 {
             let path = &base.join(&second.file);

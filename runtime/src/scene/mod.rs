@@ -27,7 +27,7 @@ mod transform;
 
 pub use animation::{Animation, MAX_FRAME};
 pub(crate) use description::optional;
-pub(crate) use document::{Table, Value};
+pub use document::{Document, Table, Value};
 pub use labels::Labels;
 pub(crate) use lights::ReadLight;
 pub use lights::{Light, LightReader, SceneLight};

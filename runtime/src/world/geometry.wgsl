@@ -3,7 +3,8 @@
 // world's own are an object, too. triangles[3t + k] is corner k in .xyz; .w of corner 0 is a row of
 // the placement's materials, of corner 1 the light.
 #else
-// The scene's triangles, in the order of the BVH's leaves: a primitive is an index into it.
+// The scene's triangles, in the order of the BVH's leaves: a primitive is an index into it. Where the BVH refers to
+// a triangle several times, it is there as often, and the first one is the primitive.
 // triangles[3p + k] is corner k in .xyz; .w of corner 0 is the instance of a material, of corner 1
 // the light, of corner 2 the medium.
 #endif

@@ -1,11 +1,12 @@
 //! Loading a scene with all that there is to put into one.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::lights::{LIGHT_KINDS, readers};
 use crate::error::SceneError;
 use crate::input;
-use crate::scene::formats::{FORMATS, Format};
+use crate::scene::formats::{FORMATS, Format, Geometry};
 use crate::scene::{Scene, SceneFile, load_with};
 
 /// [`load_with`] every format of geometry and every kind of light.
@@ -35,8 +36,44 @@ pub fn open_text<'f>(
     text: String,
     formats: &'f [Format],
 ) -> Result<SceneFile<'f>, SceneError> {
-    SceneFile::of_text(path, text, formats, &readers(LIGHT_KINDS))
+    SceneFile::of_text(path, text, formats, &readers(LIGHT_KINDS), &BTreeMap::new())
 }
+
+/// The same of a text that names files of every format of geometry, and geometry that is not in files: `held` has it by
+/// names, which end in `.arrays`.
+///
+/// # Errors
+/// The first thing that is wrong, with its place.
+pub fn open_holding(
+    path: &Path,
+    text: String,
+    held: &BTreeMap<String, Geometry>,
+) -> Result<SceneFile<'static>, SceneError> {
+    SceneFile::of_text(path, text, &WITH_HELD, &readers(LIGHT_KINDS), held)
+}
+
+/// Every format, and that of geometry which programs hold in memory.
+static WITH_HELD: [Format; FORMATS.len() + 1] = {
+    let held = Format {
+        name: "arrays",
+        extensions: &["arrays"],
+        read: |_, name, _| {
+            Err(SceneError::new(format!(
+                "nobody holds geometry called `{name}`"
+            )))
+        },
+        without_material: "triangles without a material",
+        values: &[],
+        values_of: "arrays",
+    };
+    let mut all = [held; FORMATS.len() + 1];
+    let mut row = 0;
+    while row < FORMATS.len() {
+        all[row] = FORMATS[row];
+        row += 1;
+    }
+    all
+};
 
 /// The text of a scene that may be read with every format of geometry, in place of what is at `path`.
 ///

@@ -19,7 +19,7 @@ mod split;
 pub mod surface;
 pub mod texture;
 
-pub use load::{check_text, load, open, open_edited, open_text};
+pub use load::{check_text, load, open, open_edited, open_holding, open_text};
 pub use parts::{KernelParts, SceneParts};
 pub use placed::Placed;
 pub use split::{GeometryCounts, Split};

@@ -21,7 +21,7 @@ use crate::film::outputs::Ask;
 use crate::scene::Scene;
 use crate::technique::{Stack, Technique};
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::bvh::Trees;
+use crate::world::bvh::{self, Trees};
 use crate::world::lights::{Kinds, Lights};
 use crate::world::media::{self, Media};
 use crate::world::needs::{Need, Needs};
@@ -110,11 +110,14 @@ impl SceneParts {
         let tells_objects = layers.ask(Ask::Objects);
         let split = Split::new(scene, instances, technique.copies)?;
         let lights = |order: &[u32]| {
-            Kinds::build(scene, &split.world, split.bounds, order, instances, &media)
-        };
-        let (geometry, bvh, corners, lights, objects) = if split.placements.is_empty() {
             let mesh = &*split.world;
-            let bvh = trees.over(mesh, technique.traversal);
+            // A light is chosen by its triangle, however many references there are to it.
+            let primitives = bvh::primitives(order, mesh.len());
+            Kinds::build(scene, mesh, split.bounds, &primitives, instances, &media)
+        };
+        let (geometry, bvh, corners, lights, objects, references) = if split.placements.is_empty() {
+            let mesh = &*split.world;
+            let bvh = trees.over(mesh, technique);
             let lights = lights(bvh.order());
             let of_triangle = lights.of_triangle(mesh.len());
             (
@@ -128,10 +131,11 @@ impl SceneParts {
                 },
                 lights,
                 tells_objects.then(|| objects_part(mesh, bvh.order())),
+                bvh.order().len() as u64,
             )
         } else {
             check_stack(technique.stack)?;
-            let placed = Placed::build(&split, instances.len(), technique.traversal, trees)?;
+            let placed = Placed::build(&split, instances.len(), technique, trees)?;
             let lights = lights(placed.world_order());
             let of_triangle = lights.of_triangle(split.world.len());
             (
@@ -143,6 +147,7 @@ impl SceneParts {
                 },
                 lights,
                 tells_objects.then(|| placed.objects_part(&split.first_objects)),
+                placed.references(),
             )
         };
         let recorded = Recorded {
@@ -160,7 +165,10 @@ impl SceneParts {
             })),
             bounds: split.bounds,
             lights: Lights::OfScene(lights),
-            counts: split.counts(),
+            counts: GeometryCounts {
+                references,
+                ..split.counts()
+            },
             unbound: scene.unbound(materials.len(), instances),
             media,
             texture,

@@ -11,10 +11,10 @@ use super::split::Split;
 use super::surface::{Corners, GEOMETRY, colors_buffer, normals_buffer, uvs_buffer, uvs1_buffer};
 use crate::error::SceneError;
 use crate::scene::{Mesh, NO_MATERIAL, Placement, Scene, Transform};
-use crate::technique::Traversal;
+use crate::technique::Technique;
 use crate::wgsl;
 use crate::wgsl::{BufferData, ShaderPart};
-use crate::world::bvh::{Levels, ObjectTree, Trees};
+use crate::world::bvh::{self, Levels, ObjectTree, Trees};
 use crate::world::lights::NO_LIGHT;
 
 /// The largest number that may stand for a primitive, and the one that leaves room for
@@ -40,7 +40,7 @@ impl<'s> Placed<'s> {
     pub fn build(
         split: &'s Split,
         materials: usize,
-        traversal: Traversal,
+        technique: &Technique,
         trees: &Trees,
     ) -> Result<Placed<'s>, SceneError> {
         let has_world = !split.world.is_empty();
@@ -60,16 +60,18 @@ impl<'s> Placed<'s> {
         });
         let at_home = has_world.then_some(at_home).into_iter();
         let placements: Vec<Placement> = at_home.chain(others).collect();
-        let sizes = placements
-            .iter()
-            .map(|p| meshes[p.object as usize].len() as u64);
-        let blocks = Blocks::new(&sizes.collect::<Vec<_>>()).ok_or_else(too_many)?;
         let places: Vec<(usize, Transform)> = placements
             .iter()
             .map(|p| (p.object as usize, p.transform))
             .collect();
+        let levels = Levels::build(&meshes, &places, technique, trees);
+        let objects = levels.objects();
+        let sizes = placements
+            .iter()
+            .map(|p| objects[p.object as usize].order.len() as u64);
+        let blocks = Blocks::new(&sizes.collect::<Vec<_>>()).ok_or_else(too_many)?;
         Ok(Placed {
-            levels: Levels::build(&meshes, &places, traversal, trees),
+            levels,
             meshes,
             placements,
             blocks,
@@ -83,7 +85,13 @@ impl<'s> Placed<'s> {
         &self.levels
     }
 
-    /// For each of the first primitives the triangle of the world that it stands for.
+    /// How many references there are to triangles.
+    pub fn references(&self) -> u64 {
+        let objects = self.levels.objects().iter();
+        objects.map(|tree| tree.order.len() as u64).sum()
+    }
+
+    /// For each of the first references the triangle of the world that it is to.
     pub fn world_order(&self) -> &[u32] {
         match self.levels.objects().first() {
             Some(world) if self.has_world => &world.order,
@@ -174,19 +182,33 @@ impl<'s> Placed<'s> {
         }
     }
 
-    /// Something of every triangle, in the order of all.
-    fn gather<T>(&self, of: impl Fn(&Mesh, usize) -> T) -> impl Iterator<Item = T> {
+    /// Something of the triangle of every reference, in the order of all.
+    fn gather<T>(&self, of: impl Fn(&'s Mesh, usize) -> T) -> impl Iterator<Item = T> {
         let objects = self.meshes.iter().zip(self.levels.objects());
         let each = objects.flat_map(|(mesh, tree)| tree.order.iter().map(|&t| (*mesh, t as usize)));
         each.map(move |(mesh, triangle)| of(mesh, triangle))
     }
 
+    /// Of every reference the one that is its triangle's primitive, in the order of all.
+    fn gather_primitives(&self) -> impl Iterator<Item = u32> {
+        let objects = self.meshes.iter().zip(self.levels.objects());
+        objects.flat_map(|(mesh, tree)| {
+            let primitives = bvh::primitives(&tree.order, mesh.len());
+            let of_triangle = move |&t: &u32| tree.first_triangle + primitives[t as usize];
+            tree.order.iter().map(of_triangle)
+        })
+    }
+
     fn triangles(&self, lights: &[u32]) -> BufferData {
         let nothing = self.placements.first().map_or(0, |p| p.materials.len()) as u32;
         let world = self.meshes.first().filter(|_| self.has_world);
-        let rows = self.gather(|mesh, t| {
+        let primitives = self.gather_primitives();
+        let triangles = self.gather(|mesh, t| (mesh, t));
+        let rows = (0..).zip(triangles).zip(primitives);
+        let rows = rows.map(|((reference, (mesh, t)), primitive)| {
             let at_home = world.is_some_and(|world| std::ptr::eq(*world, mesh));
             let light = if at_home { lights[t] } else { NO_LIGHT };
+            let light = bvh::light_word(reference, primitive, light);
             let material = match mesh.materials[t] {
                 // The last row of the world's.
                 NO_MATERIAL => nothing.saturating_sub(1),

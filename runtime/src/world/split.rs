@@ -33,6 +33,8 @@ pub struct Split<'s> {
 pub struct GeometryCounts {
     /// Triangles that are stored.
     pub triangles: u64,
+    /// References of acceleration structures to them: more than triangles where large ones are in several leaves.
+    pub references: u64,
     /// Triangles that rays can hit: those of an object count once for each of its placements.
     pub placed_triangles: u64,
     /// Objects that are stored once and placed any number of times.
@@ -126,8 +128,10 @@ impl<'s> Split<'s> {
         let placed = self.placements.iter();
         let placed = placed.map(|p| self.objects[p.object as usize].len() as u64);
         let world = self.world.len() as u64;
+        let triangles = world + of_objects.sum::<u64>();
         GeometryCounts {
-            triangles: world + of_objects.sum::<u64>(),
+            triangles,
+            references: triangles,
             placed_triangles: world + placed.sum::<u64>(),
             objects: self.objects.len() as u64,
             placements: self.placements.len() as u64,

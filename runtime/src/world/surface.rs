@@ -7,6 +7,7 @@ use crate::scene::Mesh;
 use crate::wgsl;
 use crate::wgsl::template::{Template, template};
 use crate::wgsl::{BufferData, ShaderPart};
+use crate::world::bvh;
 use crate::world::needs::{Need, Needs, SurfaceTraits};
 use crate::world::places::{Places, Reads};
 
@@ -22,16 +23,18 @@ const OFFSET: f32 = 1.0 / (1 << 19) as f32;
 const OFFSET_FLOOR: f32 = 1.0 / (1 << 23) as f32;
 
 /// `triangle_vertices`, `primitive_instance` and `primitive_light`, for the triangles of `mesh`
-/// in `order`; `lights` gives each triangle's index in the light table, `media` the word of
+/// in `order`, which may have some of them several times; `lights` gives each triangle's index in the light table, `media` the word of
 /// each instance's medium, or nothing where paths follow none.
 pub fn geometry_part(mesh: &Mesh, order: &[u32], lights: &[u32], media: &[u32]) -> ShaderPart {
-    let rows: Vec<[[u32; 4]; 3]> = order
-        .iter()
-        .map(|&index| {
+    let primitives = bvh::primitives(order, mesh.len());
+    let rows: Vec<[[u32; 4]; 3]> = (0..)
+        .zip(order)
+        .map(|(reference, &index)| {
             let index = index as usize;
             let instance = mesh.materials[index];
             let medium = media.get(instance as usize).copied().unwrap_or(0);
-            let extra = [instance, lights[index], medium];
+            let light = bvh::light_word(reference, primitives[index], lights[index]);
+            let extra = [instance, light, medium];
             [0, 1, 2].map(|k| {
                 let [x, y, z] = mesh.positions[index][k].to_array().map(f32::to_bits);
                 [x, y, z, extra[k]]

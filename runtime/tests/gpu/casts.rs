@@ -3,9 +3,11 @@
 
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
-use impasto_runtime::technique::{Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal};
+use impasto_runtime::technique::{
+    Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal, Tree,
+};
 
-use crate::gpu::scene::{load, render, room};
+use crate::gpu::scene::{load, load_with, render, room};
 use crate::gpu::stub::{gpu, samples};
 
 /// Renders with `technique`. There are more paths than a pool holds and more of them in the pool
@@ -143,5 +145,52 @@ fn rays_may_be_cast_in_another_order() {
             assert_eq!(items(&ordered, cast), count);
             assert_eq!(items(&ordered, &format!("scatter_{cast}")), count);
         }
+    }
+}
+
+/// Large triangles askew: two sheets that shine, and long splinters that light passes.
+const SHEETS: &str = "v -0.7 -0.6 -0.5\nv 0.1 0.8 -0.8\nv -0.6 -0.5 -0.3\nv 0.75 -0.7 0.1\nv 0.6 0.7 -0.7\n\
+                      v 0.8 -0.5 0.2\nusemtl sheet\nf 1 2 3\nf 4 5 6\n";
+const SPLINTERS: &str = "v -0.5 -0.7 0.2\nv 0.5 0.6 -0.1\nv -0.4 -0.7 0.3\nv -0.42 -0.62 0.18\nusemtl splinter\n\
+                         f 1 3 2\nf 1 2 4\nf 3 4 2\nf 1 4 3\n";
+
+/// Light, and what it passes, are found whichever reference to their triangle a ray meets: pictures of large triangles in
+/// several leaves have the bits of those in one, of every plan and on the processor.
+#[test]
+fn large_triangles_may_lie_in_several_leaves() {
+    let toml = room(1.0, 0.0, 6).replace("'glowing'", "'dull'")
+        + "[materials.ball]\nfile = 'm.impasto'\nmaterial = 'silver'\n\
+           [materials.sheet]\nfile = 'm.impasto'\nmaterial = 'glowing'\n\
+           [materials.splinter]\nfile = 'm.impasto'\nmaterial = 'glass'\n\
+           [[geometry]]\nobj = 'ball.obj'\n\
+           [[geometry]]\nobj = 'sheets.obj'\n\
+           [[geometry]]\nobj = 'splinters.obj'\n";
+    let files = [("sheets.obj", SHEETS), ("splinters.obj", SPLINTERS)];
+    let (scene, program) = load_with(&toml, &files);
+    let of = |strategy: &str, traversal, tree| {
+        let technique = Technique {
+            traversal,
+            tree,
+            ..Technique::default()
+        };
+        let options = RenderOptions {
+            technique,
+            ..samples(24)
+        };
+        render(&scene, &program, strategy, &options)
+    };
+    for (strategy, traversal) in [
+        ("own", Traversal::Cwbvh),
+        ("own", Traversal::Bvh2),
+        ("mega", Traversal::Cwbvh),
+        ("processor", Traversal::Cwbvh),
+    ] {
+        let [whole, split] = [Tree::Whole, Tree::Split].map(|tree| of(strategy, traversal, tree));
+        assert_eq!(whole.report.references, whole.report.triangles);
+        assert!(split.report.references > split.report.triangles + 10);
+        let [a, b] = [&whole, &split].map(|rendering| rendering.film.pixels.iter().flatten());
+        let differ = a.zip(b).filter(|(a, b)| a != b).count();
+        eprintln!("{strategy}, {}: {differ} differ", traversal.name());
+        assert_eq!(differ, 0, "{strategy}, {}", traversal.name());
     }
 }

@@ -58,13 +58,19 @@ fn at_once(planner: Planner) -> Replanning {
         counted_iterations: 2,
         least_hits: 1.0,
         worthwhile: Duration::ZERO,
+        trial: Duration::ZERO,
         wait: true,
         ..Replanning::new(Arc::new(surfaces()), planner)
     }
 }
 
 fn always(plan: Plan) -> Planner {
-    Box::new(move |_| Ok(plan))
+    in_turn(vec![plan])
+}
+
+/// The first, and the others as trials.
+fn in_turn(plans: Vec<Plan>) -> Planner {
+    Box::new(move |_| Ok(Box::new(plans.into_iter())))
 }
 
 fn go_on(_: &Progress) -> ControlFlow<()> {
@@ -156,6 +162,92 @@ fn whatever_takes_over_renders_the_same_picture() {
     }
 }
 
+/// Whatever is tried, and whatever turns out to be faster: the picture has the same bits, everything is counted once, and what
+/// is reported is what was done.
+#[test]
+fn plans_that_are_tried_render_the_same_picture() {
+    let options = options(600);
+    let whole = render(&mut renderer(&options));
+    let plans = || {
+        vec![
+            custom(&[(Form::Mixed, &[0, 1, 2, 3])]),
+            custom(&[(Form::Own, &[0]), (Form::Mixed, &[1, 2, 3])]),
+            // What the render began with.
+            plan(Strategy::OWN, &surfaces()),
+            // It lacks materials.
+            custom(&[(Form::Own, &[0])]),
+            custom(&[
+                (Form::Binned, &[1, 3]),
+                (Form::Own, &[0]),
+                (Form::Own, &[2]),
+            ]),
+        ]
+    };
+    let rendering = replanned(&options, at_once(in_turn(plans())));
+    assert!(rendering.film == whole.film);
+    let report = &rendering.report;
+    assert_same_work(report, &whole.report);
+    let change = report.replanned.as_ref().expect("a change");
+    let trials = &change.trials;
+    let tried: Vec<&str> = trials.iter().map(|trial| trial.plan.as_str()).collect();
+    assert_eq!(
+        tried,
+        [
+            "own:m0|mixed:m1,m2,m3",
+            "own:m0|own:m1|own:m2|own:m3",
+            "own:m0",
+            "binned:m1,m3|own:m0|own:m2"
+        ]
+    );
+    let mut fastest = change.to.clone().expect("a plan");
+    for trial in trials {
+        if trial.plan == "own:m0" {
+            assert!(
+                trial
+                    .failed
+                    .as_ref()
+                    .is_some_and(|why| why.contains("`m1`"))
+            );
+            assert_eq!((trial.seconds, trial.kept), (None, false));
+            continue;
+        }
+        assert_eq!(trial.failed, None);
+        let (Some(seconds), Some(before)) = (trial.seconds, trial.seconds_before) else {
+            panic!("{trial:?}");
+        };
+        assert!(seconds > 0.0 && before > 0.0);
+        assert_eq!(trial.kept, seconds < 0.995 * before);
+        if trial.kept {
+            fastest.clone_from(&trial.plan);
+        }
+    }
+    assert_eq!(report.plan, fastest);
+    assert_eq!(
+        evaluated(&whole.report.kernels),
+        evaluated(&change.kernels) + evaluated(&report.kernels)
+    );
+}
+
+/// Inline materials have no queues: what they were tried for comes to the same picture, too.
+#[test]
+fn inline_materials_may_be_tried() {
+    let options = options(600);
+    let whole = render(&mut renderer(&options));
+    let inline = || custom(&[(Form::Inline, &[0, 1, 2, 3])]);
+    let partly = || custom(&[(Form::Inline, &[0, 2]), (Form::Binned, &[1, 3])]);
+    for plans in [
+        vec![inline(), partly(), plan(Strategy::OWN, &surfaces())],
+        vec![plan(Strategy::OWN, &surfaces()), partly(), inline()],
+    ] {
+        let rendering = replanned(&options, at_once(in_turn(plans)));
+        assert!(rendering.film == whole.film);
+        let change = rendering.report.replanned.as_ref().expect("a change");
+        assert_eq!(change.trials.len(), 2);
+        assert!(change.trials.iter().all(|trial| trial.failed.is_none()));
+        assert_same_work(&rendering.report, &whole.report);
+    }
+}
+
 /// If the plan is the one that runs, it goes on without counting.
 #[test]
 fn the_same_plan_goes_on_without_counting() {
@@ -214,7 +306,8 @@ fn planners_are_told_the_workload() {
     let (tell, told) = mpsc::channel();
     let planner: Planner = Box::new(move |workload: &Workload| {
         let _ = tell.send(workload.clone());
-        Ok(custom(&[(Form::Mixed, &[0, 1, 2, 3])]))
+        let plan = custom(&[(Form::Mixed, &[0, 1, 2, 3])]);
+        Ok(Box::new(std::iter::once(plan)))
     });
     let rendering = replanned(&options(16), at_once(planner));
     let workload = told.try_recv().expect("a workload");

@@ -66,6 +66,10 @@ pub(crate) fn brute_force(geometry: &Geometry, ray: &Ray) -> (Hit, usize) {
         if primitive == ray.skip || !(t > 0.0 && t <= nearest.t && t < ray.t_max) {
             continue;
         }
+        if t == nearest.t && primitive == nearest.primitive {
+            // Another reference to the same.
+            continue;
+        }
         equals = if t < nearest.t { 1 } else { equals + 1 };
         if t < nearest.t {
             nearest = Hit { t, u, v, primitive };
@@ -74,7 +78,7 @@ pub(crate) fn brute_force(geometry: &Geometry, ray: &Ray) -> (Hit, usize) {
     (nearest, equals)
 }
 
-/// All primitives with their corners in the world.
+/// All references with the primitives that they are and their corners in the world.
 pub(crate) struct Geometry {
     pub(crate) all: Vec<(u32, [Vec3; 3])>,
     /// Ascending, for looking up.
@@ -95,9 +99,17 @@ impl Geometry {
                 [0, 4, 8].map(|k| Vec3::from_array([0, 1, 2].map(|i| f32::from_bits(t[k + i]))))
             })
             .collect();
+        // A further reference has the index of the first one in the place of a light.
+        let primitive = |(reference, word): (u32, &u32)| match *word {
+            u32::MAX => reference,
+            word if word >> 31 == 1 => word & 0x7fff_ffff,
+            _ => reference,
+        };
+        let lights = rows.iter().skip(7).step_by(12);
+        let primitives: Vec<u32> = (0..).zip(lights).map(primitive).collect();
         let Some(placements) = words("placements") else {
             return Self {
-                all: (0..).zip(triangles).collect(),
+                all: primitives.into_iter().zip(triangles).collect(),
                 firsts: vec![(0, 0)],
             };
         };
@@ -147,9 +159,10 @@ impl Geometry {
                 let [a, b, c] = corners;
                 let mirrored = f32::from_bits(placement[27]) < 0.0;
                 let corners = if mirrored { [a, c, b] } else { [a, b, c] };
-                geometry
-                    .all
-                    .push((triangle.wrapping_add(placement[15]), corners));
+                geometry.all.push((
+                    primitives[triangle as usize].wrapping_add(placement[15]),
+                    corners,
+                ));
             }
         }
         geometry

@@ -11,7 +11,7 @@ use crate::support::worlds::kernel_parts;
 use crate::support::{MISS, Random, Ray};
 use glam::{Vec3, Vec3A};
 use impasto_compiler::abi::{Emission, InstanceInfo};
-use impasto_runtime::technique::{Copies, Technique};
+use impasto_runtime::technique::{Copies, Technique, Tree};
 use impasto_runtime::world::KernelParts;
 use impasto_runtime::world::bvh::{Caster, Hit};
 use impasto_runtime::world::camera::CameraFrame;
@@ -25,14 +25,18 @@ use obvhs::triangle::Triangle;
 /// Times that each way casts all rays; the fastest counts.
 const REPETITIONS: usize = 3;
 
-struct Set {
-    name: &'static str,
-    any: bool,
-    rays: Vec<Ray>,
+pub(super) struct Set {
+    pub(super) name: &'static str,
+    pub(super) any: bool,
+    pub(super) rays: Vec<Ray>,
 }
 
 /// The rays of a path tracer.
-fn sets(scene: &impasto_runtime::scene::Scene, geometry: &Geometry, caster: &Caster) -> Vec<Set> {
+pub(super) fn sets(
+    scene: &impasto_runtime::scene::Scene,
+    geometry: &Geometry,
+    caster: &Caster,
+) -> Vec<Set> {
     let (width, height) = (480, 360);
     let frame = CameraFrame::new(&scene.camera, width as f32 / height as f32);
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -206,7 +210,11 @@ fn rate(set: &Set, cast: impl Fn(&Ray, bool) -> Found) -> (f64, Vec<Found>) {
     (set.rays.len() as f64 * 1e-6 / best, all)
 }
 
-fn parts(name: &str, copies: Copies) -> Option<(impasto_runtime::scene::Scene, KernelParts)> {
+pub(super) fn parts(
+    name: &str,
+    copies: Copies,
+    tree: Tree,
+) -> Option<(impasto_runtime::scene::Scene, KernelParts)> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../examples/{name}/scene.toml"));
     let scene = impasto_runtime::world::load(&path).ok()?;
     let instance = |index: usize| InstanceInfo {
@@ -218,6 +226,7 @@ fn parts(name: &str, copies: Copies) -> Option<(impasto_runtime::scene::Scene, K
     let instances: Vec<InstanceInfo> = (0..scene.materials.len()).map(instance).collect();
     let technique = Technique {
         copies,
+        tree,
         ..Technique::default()
     };
     let parts = kernel_parts(&scene, &instances, &technique).expect("it builds");
@@ -238,7 +247,7 @@ pub(crate) fn casts_a_second() {
         ("city", Copies::Flat),
         ("forest", Copies::Shared),
     ] {
-        let Some((scene, parts)) = parts(name, copies) else {
+        let Some((scene, parts)) = parts(name, copies, Tree::Auto) else {
             eprintln!("{name}: `cargo scenes` has not made it");
             continue;
         };

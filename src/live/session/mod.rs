@@ -26,7 +26,7 @@ use super::LiveOptions;
 use super::built::{Applied, Built, Code, settable};
 use super::course::{Asked, Course, Step, is_done};
 use super::mailbox::{Job, Mailbox, Outcome};
-use super::maker::{self, Maker};
+use super::maker::Maker;
 use super::pixels::Pixels;
 use super::problems;
 use super::shared::Shared;
@@ -138,7 +138,7 @@ impl<'d, 's> Session<'d, 's> {
         options: &'s LiveOptions,
     ) -> Self {
         let (following, pictures) = shared.wanted();
-        let is_fast = maker::is_fast(device);
+        let is_fast = crate::plan::is_fast(device);
         let news = shared.news();
         Self {
             device,

@@ -92,8 +92,11 @@ impl Screen {
     pub fn open(app: impl FnOnce(&Path) -> Command) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let [width, height] = SCREEN;
+        // Without -noreset the server starts anew when its only client leaves. Whoever connects meanwhile is refused: the
+        // window, when the eye has looked before it came.
         let mut xvfb = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0"])
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-noreset"])
+            .args(["-screen", "0"])
             .arg(format!("{width}x{height}x24"))
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -85,7 +85,7 @@ const CRATES: &[Crate] = &[
             &["device"],
             &["render"],
             &["multi"],
-            &["lab", "audit"],
+            &["lab", "audit", "evaluate"],
         ],
     },
     Crate {
@@ -112,6 +112,17 @@ const CRATES: &[Crate] = &[
         ],
     },
     Crate {
+        name: "impasto-verify",
+        folder: "verify/src",
+        layers: &[
+            &["effort", "lanes", "precision", "promise", "statistics"],
+            &["cells", "drawn", "evaluate"],
+            &["distribution"],
+            &["closure", "material"],
+            &["check"],
+        ],
+    },
+    Crate {
         name: "impasto-import",
         folder: "import/src",
         layers: &[&["error", "files"], &["imported"], &["mtlx"]],
@@ -122,12 +133,25 @@ const CRATES: &[Crate] = &[
         layers: &[
             &["set"],
             &[
-                "error", "files", "goal", "ir_text", "cost", "plot", "docs", "trace",
+                "cache", "error", "files", "goal", "ir_text", "cost", "plot", "docs", "trace",
             ],
             &["driver", "plan", "starter"],
             &["converge", "measure", "shot"],
-            &["calibrate", "editor", "farm", "live", "tev"],
+            &["calibrate", "editor", "farm", "live", "snapshots", "tev"],
+            &["experiment"],
             &["cli"],
+        ],
+    },
+    Crate {
+        name: "impasto-python",
+        folder: "python/src",
+        layers: &[
+            &["error"],
+            &["device", "process", "source"],
+            &["scene"],
+            &["bsdf", "material", "plan"],
+            &["model", "render", "study"],
+            &["command"],
         ],
     },
 ];

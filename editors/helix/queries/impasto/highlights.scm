@@ -101,6 +101,9 @@
 
 "fn" @keyword.function
 
+(test_definition
+  "test" @keyword.function)
+
 [
   "const"
   "private"
@@ -115,6 +118,7 @@
   "param"
   "let"
   "var"
+  "assert"
 ] @keyword
 
 [

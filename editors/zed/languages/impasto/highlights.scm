@@ -101,6 +101,9 @@
 
 "fn" @keyword
 
+(test_definition
+  "test" @keyword)
+
 [
   "const"
   "private"
@@ -115,6 +118,7 @@
   "param"
   "let"
   "var"
+  "assert"
 ] @keyword
 
 [

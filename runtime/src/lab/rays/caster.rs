@@ -44,7 +44,7 @@ pub(super) struct Caster<'g> {
     technique: Technique,
     parts: [ShaderPart; 2],
     scene_buffers: Vec<wgpu::Buffer>,
-    /// The triangle of each primitive, and the other way round.
+    /// The triangle of each reference, and the primitive of each triangle.
     order: Vec<u32>,
     primitives: Vec<u32>,
 }
@@ -57,11 +57,8 @@ impl<'g> Caster<'g> {
         technique: &Technique,
     ) -> Result<Self, RuntimeError> {
         let order = bvh.order().to_vec();
-        let mut primitives = vec![0; order.len()];
-        for (primitive, triangle) in (0..).zip(&order) {
-            primitives[*triangle as usize] = primitive;
-        }
-        let no_lights = vec![u32::MAX; order.len()];
+        let primitives = bvh::primitives(&order, scene.mesh.len());
+        let no_lights = vec![u32::MAX; scene.mesh.len()];
         let geometry = geometry_part(&scene.mesh, &order, &no_lights, &[]);
         let parts = [geometry, bvh.part(technique)];
         let mut scene_buffers = Vec::new();

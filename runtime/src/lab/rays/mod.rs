@@ -15,7 +15,7 @@ use crate::gpu::Gpu;
 use crate::lab::statistics::median;
 use crate::render::report::AdapterReport;
 use crate::scene::Scene;
-use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal};
+use crate::technique::{Choice, Leaves, RayFetch, Stack, Technique, Traversal, Tree};
 use crate::world::bvh::Bvh;
 
 use caster::Caster;
@@ -55,6 +55,9 @@ pub struct RayRate {
     pub mrays_per_second: f64,
     /// What rays were cast through.
     pub traversal: Traversal,
+    /// In how many leaves of that a triangle lay.
+    #[serde(default)]
+    pub tree: Tree,
     /// Where casts kept the nodes that they had yet to visit.
     pub stack: Stack,
     /// When threads that fetched rays tested triangles; others did at once.
@@ -119,7 +122,7 @@ pub fn measure(
     // What is measured is one level; two take the same steps.
     let scene = &*scene.flattened()?;
     let default = Technique::default().within(gpu.has_subgroups());
-    let reference = Bvh::build(&scene.mesh, default.traversal);
+    let reference = Bvh::build(&scene.mesh, &default);
     let caster = Caster::new(gpu, scene, &reference, &default)?;
     let mut sets = Vec::new();
     for kind in SetKind::ALL {
@@ -132,13 +135,15 @@ pub fn measure(
     }
     let mut rates = Vec::new();
     // Several techniques walk the same hierarchy.
-    let mut built = vec![(default.traversal, reference)];
+    let kind = |technique: &Technique| (technique.traversal, technique.tree);
+    let mut built = vec![(kind(&default), reference)];
     for technique in &options.techniques {
         progress(technique);
-        let traversal = technique.traversal;
-        let index = built.iter().position(|(known, _)| *known == traversal);
+        let index = built
+            .iter()
+            .position(|(known, _)| *known == kind(technique));
         let index = index.unwrap_or_else(|| {
-            built.push((traversal, Bvh::build(&scene.mesh, traversal)));
+            built.push((kind(technique), Bvh::build(&scene.mesh, technique)));
             built.len() - 1
         });
         let caster = Caster::new(gpu, scene, &built[index].1, technique)?;
@@ -186,6 +191,7 @@ fn rate(
         seconds,
         mrays_per_second: count as f64 * 1e-6 / seconds.max(1e-12),
         traversal: technique.traversal,
+        tree: technique.tree,
         stack: technique.stack,
         leaves: technique.leaves,
         ray_fetch: technique.ray_fetch,

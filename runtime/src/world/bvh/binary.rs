@@ -6,7 +6,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{Bvh, NO_PARENT};
+use super::{Bvh, NO_PARENT, TRIANGLE_COST, per_root};
 use crate::technique::Traversal;
 
 /// Triangles of a leaf, at most; a reference can count to 15.
@@ -38,8 +38,26 @@ pub(super) fn layout(mut tree: Bvh2) -> Bvh {
         parents: writer.parents,
         depth: writer.depth,
         root,
+        cost: cost(&tree),
+        is_split: false,
         order: tree.primitive_indices,
     }
+}
+
+/// See [`Bvh::cost`]. A visit tests both children.
+fn cost(tree: &Bvh2) -> f64 {
+    let each = |node: &Bvh2Node| {
+        if node.is_leaf() {
+            TRIANGLE_COST * f64::from(node.prim_count)
+        } else {
+            TRIANGLE_COST * f64::from(NODE_COST)
+        }
+    };
+    let Some((root, others)) = tree.nodes.split_first() else {
+        return 0.0;
+    };
+    let of_node = |node: &Bvh2Node| each(node) * f64::from(node.aabb().half_area());
+    per_root(each(root), others.iter().map(of_node).sum(), root.aabb())
 }
 
 fn padding(tree: &Bvh2) -> Vec3A {

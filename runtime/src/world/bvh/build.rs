@@ -12,7 +12,7 @@ use super::{cluster, reinsert};
 
 /// The largest coordinate of a box, in metres. Scene files go up to a tenth of it; beyond, the areas of boxes
 /// and sums of them would leave the range of floats.
-const MAX_COORDINATE: f32 = 1e13;
+pub(super) const MAX_COORDINATE: f32 = 1e13;
 
 /// Nodes on the longest path of a tree. What is deeper than this once nodes were moved is left as it was
 /// clustered: no deeper than the rounds that it took.

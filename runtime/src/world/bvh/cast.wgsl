@@ -98,11 +98,29 @@ fn begin_walk(
 fn visit_triangle(walk: ptr<function, Walk>) {
     let bit = firstLeadingBit((*walk).leaves.y);
     (*walk).leaves.y &= ~(1u << bit);
+#if split
+    let reference = (*walk).leaves.x + bit;
+    let tuv = intersect_triangle(triangle_vertices(reference), (*walk).frame);
+    if !(tuv.x > 0.0 && tuv.x < (*walk).hit.t) {
+        return;
+    }
+    let primitive = primitive_of(reference);
+#else
     let primitive = (*walk).leaves.x + bit;
     let tuv = intersect_triangle(triangle_vertices(primitive), (*walk).frame);
+#endif
     if primitive != (*walk).skip && tuv.x > 0.0 && tuv.x < (*walk).hit.t {
         (*walk).hit = Hit(tuv.x, tuv.y, tuv.z, primitive);
     }
+}
+#endif
+#if split
+
+// The primitive that a reference is: the first of those to its triangle. Where it is not the first, the place of
+// the light says which is: bits 0..30, below a set bit, and not all of them.
+fn primitive_of(reference: u32) -> u32 {
+    let light = triangles[3u * reference + 1u].w;
+    return select(reference, light & 0x7fffffffu, light >= 0x80000000u && light != 0xffffffffu);
 }
 #endif
 

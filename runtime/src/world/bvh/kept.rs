@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::Bvh;
 use crate::fingerprint;
 use crate::scene::Mesh;
-use crate::technique::Traversal;
+use crate::technique::{Technique, Traversal, Tree};
 
 /// Most triangles over which trees are kept; the oldest go first.
 const MOST_TRIANGLES: usize = 1 << 24;
@@ -20,24 +20,25 @@ pub struct Trees {
 #[derive(Debug)]
 struct Kept {
     corners: u64,
-    traversal: Traversal,
+    kind: (Traversal, Tree),
     tree: Arc<Bvh>,
 }
 
 impl Trees {
-    /// The tree over a mesh, built unless it is kept.
-    pub fn over(&self, mesh: &Mesh, traversal: Traversal) -> Arc<Bvh> {
+    /// The tree over a mesh that a technique asks for, built unless it is kept.
+    pub fn over(&self, mesh: &Mesh, technique: &Technique) -> Arc<Bvh> {
+        let kind = (technique.traversal, technique.tree);
         let corners = fingerprint::of(bytemuck::cast_slice(&mesh.positions));
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_it = |k: &&Kept| (k.corners, k.traversal) == (corners, traversal);
+        let is_it = |k: &&Kept| (k.corners, k.kind) == (corners, kind);
         if let Some(known) = kept().iter().find(is_it) {
             return known.tree.clone();
         }
-        let tree = Arc::new(Bvh::build(mesh, traversal));
+        let tree = Arc::new(Bvh::build(mesh, technique));
         let mut kept = kept();
         kept.push(Kept {
             corners,
-            traversal,
+            kind,
             tree: tree.clone(),
         });
         let mut triangles = 0;
@@ -68,10 +69,21 @@ mod tests {
     #[test]
     fn a_tree_is_built_once_for_equal_corners() {
         let trees = Trees::default();
-        let of = |x: f32, traversal| trees.over(&mesh(x), traversal);
-        let first = of(1.0, Traversal::Cwbvh);
-        assert!(Arc::ptr_eq(&first, &of(1.0, Traversal::Cwbvh)));
-        assert!(!Arc::ptr_eq(&first, &of(2.0, Traversal::Cwbvh)));
-        assert!(!Arc::ptr_eq(&first, &of(1.0, Traversal::Bvh2)));
+        let of = |x: f32, traversal, tree| {
+            let technique = Technique {
+                traversal,
+                tree,
+                ..Technique::default()
+            };
+            trees.over(&mesh(x), &technique)
+        };
+        let first = of(1.0, Traversal::Cwbvh, Tree::Auto);
+        assert!(Arc::ptr_eq(&first, &of(1.0, Traversal::Cwbvh, Tree::Auto)));
+        assert!(!Arc::ptr_eq(&first, &of(2.0, Traversal::Cwbvh, Tree::Auto)));
+        assert!(!Arc::ptr_eq(&first, &of(1.0, Traversal::Bvh2, Tree::Auto)));
+        assert!(!Arc::ptr_eq(
+            &first,
+            &of(1.0, Traversal::Cwbvh, Tree::Split)
+        ));
     }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{Bvh, Trees, bounds, tree_over};
 use crate::scene::{Mesh, Transform};
-use crate::technique::{Technique, Traversal};
+use crate::technique::Technique;
 use crate::wgsl::ShaderPart;
 
 /// Into how many boxes an object is divided to find the box of a placement: the box of turned
@@ -36,22 +36,22 @@ pub struct ObjectTree {
     pub root: u32,
     /// Its first triangle in the list of all.
     pub first_triangle: u32,
-    /// For each of its triangles in that list, the index in its mesh.
+    /// For each of its references in that list, the index of the triangle in its mesh.
     pub order: Vec<u32>,
 }
 
 impl Levels {
-    /// Builds the trees that `traversal` names over `objects`, none of them empty, and over their
+    /// Builds the trees that `technique` asks for over `objects`, none of them empty, and over their
     /// placements: each the index of an object, and where it is. Trees over objects may be kept.
     pub fn build(
         objects: &[&Mesh],
         placements: &[(usize, Transform)],
-        traversal: Traversal,
+        technique: &Technique,
         trees: &Trees,
     ) -> Levels {
         let trees: Vec<Arc<Bvh>> = objects
             .par_iter()
-            .map(|mesh| trees.over(mesh, traversal))
+            .map(|mesh| trees.over(mesh, technique))
             .collect();
         let hulls: Vec<Vec<Aabb>> = objects
             .par_iter()
@@ -63,9 +63,10 @@ impl Levels {
             .map(|(object, transform)| placed_box(&hulls[*object], transform))
             .collect();
         // A placement is much to enter for a box that holds three of them.
-        let mut upper = tree_over(&boxes, traversal, 1);
+        let mut upper = tree_over(&boxes, technique.traversal, 1);
         let below = trees.iter().map(|tree| tree.depth()).max().unwrap_or(0);
         upper.depth += below;
+        upper.is_split = trees.iter().any(|tree| tree.is_split);
         let mut first_triangle = 0;
         let objects = trees
             .into_iter()

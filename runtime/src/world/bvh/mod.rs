@@ -1,15 +1,19 @@
 //! The acceleration structures of ray casts, which are all made of one binary tree.
 //!
 //! `build` makes it, of what `cluster` and `reinsert` do; `wide` and `binary` lay it out for kernels, and
-//! `text` puts the WGSL of a cast together; `native` casts rays by the processor. Triangles are stored in the order of the leaves, so that a leaf is a
-//! contiguous range and a *primitive* is an index in that order.
+//! `text` puts the WGSL of a cast together; `native` casts rays by the processor. Triangles are stored in the order of
+//! the leaves, so that a leaf is a contiguous range of *references*, which are indices in that order. Large triangles may have
+//! several (`pieces`), if that makes a better tree (`choice`); the first of each is its *primitive* (`references`).
 
 mod binary;
 mod build;
+mod choice;
 mod cluster;
 mod kept;
 mod levels;
 mod native;
+mod pieces;
+mod references;
 mod reinsert;
 mod text;
 mod wide;
@@ -25,7 +29,13 @@ pub(crate) use build::binary_tree;
 pub use kept::Trees;
 pub use levels::{Levels, ObjectTree};
 pub use native::{Caster, Hit, Instructions, NO_PRIMITIVE, Rays};
+pub(crate) use references::{light_word, primitives};
 pub(crate) use text::{asks_for_lane, is_traversal, provides_steps, shares_stack};
+
+/// What it costs to visit a node of the wide tree, in cycles of a multiprocessor of an H200.
+pub const NODE_COST: f64 = 100.0;
+/// What it costs to test a triangle, in the same.
+pub const TRIANGLE_COST: f64 = 50.0;
 
 /// The parent of the root, which nobody asks for.
 const NO_PARENT: u32 = 0;
@@ -39,18 +49,32 @@ pub struct Bvh {
     order: Vec<u32>,
     root: u32,
     depth: usize,
+    cost: f64,
+    is_split: bool,
 }
 
 impl Bvh {
-    /// Builds the structure that `traversal` names. Equal meshes give equal trees.
-    pub fn build(mesh: &Mesh, traversal: Traversal) -> Bvh {
-        let boxes: Vec<Aabb> = mesh.positions.iter().map(bounds).collect();
-        tree_over(&boxes, traversal, wide::LEAF_SIZE)
+    /// Builds the structure that `technique` asks for. Equal meshes give equal trees.
+    pub fn build(mesh: &Mesh, technique: &Technique) -> Bvh {
+        choice::build(mesh, technique.traversal, technique.tree)
     }
 
-    /// For each primitive, the index of its triangle in the mesh.
+    /// For each reference, the index of its triangle in the mesh. The first reference to a triangle is its primitive.
     pub fn order(&self) -> &[u32] {
         &self.order
+    }
+
+    /// Has a triangle several references?
+    pub fn is_split(&self) -> bool {
+        self.is_split
+    }
+
+    /// What to cast a ray is expected to cost that meets the box around everything and hits nothing, in the units of
+    /// [`NODE_COST`] and [`TRIANGLE_COST`]: the areas of all boxes that it may meet, times what it costs to meet them,
+    /// over that of the root (Goldsmith and Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing", 1987).
+    /// 0 where there is no such area.
+    pub fn cost(&self) -> f64 {
+        self.cost
     }
 
     /// Number of inner nodes on the longest path from the root, which bounds the stack: each
@@ -76,7 +100,14 @@ impl Bvh {
             buffers.push(BufferData::new("bvh_parents", "array<u32>", &self.parents));
         }
         ShaderPart {
-            wgsl: text::casts(self.traversal, technique, self.root, self.depth, placed),
+            wgsl: text::casts(
+                self.traversal,
+                technique,
+                self.root,
+                self.depth,
+                placed,
+                self.is_split,
+            ),
             buffers,
         }
     }
@@ -112,6 +143,12 @@ fn tree_over(boxes: &[Aabb], traversal: Traversal, leaf_size: u32) -> Bvh {
         Traversal::Cwbvh => wide::layout(&binary_tree(boxes), leaf_size),
         Traversal::Bvh2 => binary::layout(binary_tree(boxes)),
     }
+}
+
+/// What the root costs and, of what it holds, a sum over areas, as [`Bvh::cost`].
+fn per_root(root: f64, sum: f64, whole: &Aabb) -> f64 {
+    let cost = root + sum / f64::from(whole.half_area());
+    if cost.is_finite() { cost } else { 0.0 }
 }
 
 pub(crate) fn bounds(corners: &[glam::Vec3; 3]) -> Aabb {

@@ -22,8 +22,16 @@ fn visit_triangle(walk: ptr<function, Walk>) {
     (*walk).leaves.y &= ~(1u << bit);
     let placement = (*walk).placement;
     let triangle = (*walk).leaves.x + bit;
+#if split
+    let tuv = intersect_triangle(placed_triangle(placement, triangle), (*walk).frame);
+    if !(tuv.x > 0.0 && tuv.x < (*walk).hit.t) {
+        return;
+    }
+    let primitive = primitive_of(triangle) + placements[PLACEMENT_WORDS * placement + 3u].w;
+#else
     let primitive = triangle + placements[PLACEMENT_WORDS * placement + 3u].w;
     let tuv = intersect_triangle(placed_triangle(placement, triangle), (*walk).frame);
+#endif
     if primitive != (*walk).skip && tuv.x > 0.0 && tuv.x < (*walk).hit.t {
         (*walk).hit = Hit(tuv.x, tuv.y, tuv.z, primitive);
     }

@@ -17,13 +17,15 @@ pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
 const SHARED_BYTES: usize = 96;
 
 /// Everything a kernel needs to cast rays through a tree of `depth` inner nodes below `root`.
-/// If it is a tree of placements, `depth` counts the deepest tree of an object as well.
+/// If it is a tree of placements, `depth` counts the deepest tree of an object as well. If it is
+/// `split`, several references may be to one triangle.
 pub(super) fn casts(
     traversal: Traversal,
     technique: &Technique,
     root: u32,
     depth: usize,
     placed: bool,
+    split: bool,
 ) -> String {
     let stack = technique.stack;
     let binary = traversal == Traversal::Bvh2;
@@ -31,6 +33,7 @@ pub(super) fn casts(
         ("wide", !binary),
         ("trail", stack == Stack::Trail),
         ("placed", placed),
+        ("split", split),
     ];
     let nodes = if binary {
         template!("binary.wgsl")

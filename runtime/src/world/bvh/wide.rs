@@ -1,10 +1,11 @@
 //! The eight-wide compressed layout, for `wide.wgsl`.
 
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 
-use super::{Bvh, NO_PARENT};
+use super::{Bvh, NO_PARENT, NODE_COST, TRIANGLE_COST, per_root};
 use crate::technique::Traversal;
 
 /// Triangles of a leaf: as many as a node's meta byte can count.
@@ -18,6 +19,8 @@ pub(super) fn layout(tree: &Bvh2, leaf_size: u32) -> Bvh {
         traversal: Traversal::Cwbvh,
         nodes: bytemuck::cast_slice(&tree.nodes).to_vec(),
         depth: depth(&parents),
+        cost: cost(&tree),
+        is_split: false,
         parents,
         order: tree.primitive_indices,
         root: 0,
@@ -43,6 +46,28 @@ fn parents(tree: &CwBvh) -> Vec<u32> {
         }
     }
     parents
+}
+
+/// See [`Bvh::cost`]; boxes are those that rays meet, rounded outward.
+fn cost(tree: &CwBvh) -> f64 {
+    let mut sum = 0.0;
+    let mut whole = Aabb::INVALID;
+    for (index, node) in tree.nodes.iter().enumerate() {
+        for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
+            let bounds = node.child_aabb(child);
+            if index == 0 {
+                whole = whole.union(&bounds);
+            }
+            let (_, triangles) = node.child_primitives(child);
+            let each = if node.is_leaf(child) {
+                TRIANGLE_COST * f64::from(triangles)
+            } else {
+                NODE_COST
+            };
+            sum += each * f64::from(bounds.half_area());
+        }
+    }
+    per_root(NODE_COST, sum, &whole)
 }
 
 /// Nodes on the longest path; children always come after their parent, and the root is first.

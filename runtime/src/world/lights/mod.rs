@@ -113,7 +113,7 @@ struct Context<'a> {
     instances: &'a [InstanceInfo],
     media: &'a Media,
     /// Triangle of the mesh to primitive.
-    primitives: Vec<u32>,
+    primitives: &'a [u32],
     /// Radius of a sphere around everything: what a light at infinity shines on.
     radius: f64,
 }
@@ -123,14 +123,10 @@ impl<'a> Context<'a> {
         scene: &'a Scene,
         mesh: &'a Mesh,
         bounds: [Vec3; 2],
-        order: &[u32],
+        primitives: &'a [u32],
         instances: &'a [InstanceInfo],
         media: &'a Media,
     ) -> Self {
-        let mut primitives = vec![0; order.len()];
-        for (primitive, &triangle) in order.iter().enumerate() {
-            primitives[triangle as usize] = primitive as u32;
-        }
         Context {
             scene,
             mesh,
@@ -242,18 +238,18 @@ struct Sampled {
 pub struct Kinds(Vec<Kind>);
 
 impl Kinds {
-    /// The lights of `scene`, whose triangles in the world are those of `mesh`, the first
-    /// primitives in `order`, and which reaches from corner to corner of `bounds`. Its bindings
-    /// compiled to `instances` with `media`.
+    /// The lights of `scene`, whose triangles in the world are those of `mesh`, each with its
+    /// primitive, and which reaches from corner to corner of `bounds`. Its bindings compiled to
+    /// `instances` with `media`.
     pub(super) fn build(
         scene: &Scene,
         mesh: &Mesh,
         bounds: [Vec3; 2],
-        order: &[u32],
+        primitives: &[u32],
         instances: &[InstanceInfo],
         media: &Media,
     ) -> Kinds {
-        let context = Context::new(scene, mesh, bounds, order, instances, media);
+        let context = Context::new(scene, mesh, bounds, primitives, instances, media);
         Kinds::of(LIGHT_KINDS, &context)
     }
 

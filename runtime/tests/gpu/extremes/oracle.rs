@@ -10,6 +10,7 @@ use impasto_compiler::ir::interp::Interpreter;
 use impasto_compiler::ir::value::Value;
 use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, Program, compile, diag};
 use impasto_runtime::wgsl::ShaderPart;
+use impasto_verify::promise::promise;
 
 use crate::library;
 use crate::record::{Bound, Row, effort};
@@ -155,7 +156,7 @@ fn every_bsdf_of_the_library_computes_what_it_says() {
         let name = file.name;
         let documented = library::documented(name, file.text, &[]);
         let stated = documented.lines.iter();
-        let stated = stated.filter_map(|l| library::promise(l, "Region:"));
+        let stated = stated.filter_map(|l| promise(l, "Region:"));
         let promised = stated.fold(FINE, |a, b| a.max(REORDERED * b));
         // The default and one from the middle; all of them where time is no concern.
         let all = documented.calls.len();

@@ -5,8 +5,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::NO_PRIMITIVE;
 use super::lanes::WIDTH;
 use crate::wgsl::ShaderPart;
+use crate::world::bvh::references::primitive_of;
 use crate::world::bvh::text::{self, SLACK};
 
 /// Words of a placement; see `geometry_placed.wgsl`.
@@ -53,8 +55,8 @@ pub(super) struct Boxes(pub [[[f32; WIDTH]; 2]; 3]);
 pub(super) struct Packet {
     /// `corners[c][axis]` of all.
     pub corners: [[[f32; WIDTH]; 3]; 3],
-    /// The index of the first one.
-    pub first: u32,
+    /// The primitive that each is, or that it is a further reference to.
+    pub primitives: [u32; WIDTH],
 }
 
 /// A placement's words, as floats.
@@ -267,12 +269,17 @@ fn below(x: f64) -> f32 {
 
 fn packet_of(first: u32, triangles: &[[[u32; 4]; 3]]) -> Packet {
     let mut corners = [[[0.0; WIDTH]; 3]; 3];
-    for (lane, triangle) in triangles.iter().enumerate() {
+    let mut primitives = [NO_PRIMITIVE; WIDTH];
+    for (lane, (reference, triangle)) in (first..).zip(triangles).enumerate() {
+        primitives[lane] = primitive_of(reference, triangle);
         for (to, from) in corners.iter_mut().zip(triangle) {
             for (to, from) in to.iter_mut().zip(from) {
                 to[lane] = f32::from_bits(*from);
             }
         }
     }
-    Packet { corners, first }
+    Packet {
+        corners,
+        primitives,
+    }
 }

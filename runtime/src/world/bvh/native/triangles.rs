@@ -94,7 +94,7 @@ impl<L: Lanes> Place<L> {
 }
 
 /// Tests the triangles of a packet that have a bit in `lanes`, the last first, and keeps the nearest hit.
-/// Primitives are `shift` more than triangles. Is there a hit that is nearer than before?
+/// Primitives are `shift` more than those of the packet. Is there a hit that is nearer than before?
 #[inline(always)]
 pub(super) fn intersect<L: Lanes>(
     packet: &Packet,
@@ -125,14 +125,7 @@ pub(super) fn intersect<L: Lanes>(
     let right = L::and(L::and(x.at_most(zero), y.at_most(zero)), z.at_most(zero));
     let sum = x.add(y).add(z);
     let inside = L::and(L::or(left, right), sum.abs().above(L::splat(1e-37)));
-    let first = packet.first.wrapping_add(shift);
-    let skipped = skip.wrapping_sub(first);
-    let skipped = if skipped < WIDTH as u32 {
-        1 << skipped
-    } else {
-        0
-    };
-    let lanes = L::bits(inside) & lanes & !skipped;
+    let lanes = L::bits(inside) & lanes;
     if lanes == 0 {
         return false;
     }
@@ -149,19 +142,22 @@ pub(super) fn intersect<L: Lanes>(
         return false;
     }
     let (t, u, v) = (t.values(), barycentric[1].values(), barycentric[2].values());
+    let mut is_hit = false;
     while lanes != 0 {
         let lane = (31 - lanes.leading_zeros()) as usize % WIDTH;
         lanes &= !(1 << lane);
-        if t[lane] < hit.t {
+        let primitive = packet.primitives[lane].wrapping_add(shift);
+        if t[lane] < hit.t && primitive != skip {
             *hit = Hit {
                 t: t[lane],
                 u: u[lane],
                 v: v[lane],
-                primitive: first.wrapping_add(lane as u32),
+                primitive,
             };
+            is_hit = true;
         }
     }
-    true
+    is_hit
 }
 
 /// See `edge_side` of the WGSL, whose order of operations this has.

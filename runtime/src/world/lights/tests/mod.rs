@@ -33,8 +33,8 @@ fn scene(lights: &str) -> Result<Scene, SceneError> {
 /// The lights of a scene.
 fn lights_of(scene: &Scene, table: &[LightKind]) -> Kinds {
     let (mesh, media) = (&scene.mesh, Media::default());
-    let order: Vec<u32> = (0..mesh.len() as u32).collect();
-    let context = Context::new(scene, mesh, mesh.bounds(), &order, &[], &media);
+    let primitives: Vec<u32> = (0..mesh.len() as u32).collect();
+    let context = Context::new(scene, mesh, mesh.bounds(), &primitives, &[], &media);
     Kinds::of(table, &context)
 }
 

@@ -1,0 +1,232 @@
+//! Trials: since every plan gives the same bits, a render that lasts runs several of those that the model finds good, each for
+//! some iterations, and keeps the one that was fastest.
+//!
+//! Two plans at a time are held against each other: the fastest so far and the next one. The paths in flight are the same and
+//! so is their mixture, so that the time of an iteration tells which is faster.
+
+use std::sync::mpsc::TryRecvError;
+
+use super::background::{Jobbing, Made, Outcome};
+use super::build::BuiltPlan;
+use crate::render::status::Status;
+
+/// By how much another plan must be faster, as a share: less is noise.
+const NOTABLE: f64 = 0.005;
+
+/// A trial begins if so many times the time that it takes is left of the render: since no candidate is expected to take 1.25 times
+/// as long, each trial costs it at most 0.4 %.
+const LEFT: f64 = 64.0;
+
+/// Plans that wait to be tried beside the one that runs.
+#[derive(Debug)]
+pub(super) struct Trials {
+    job: Jobbing,
+    stage: Stage,
+    least: Least,
+    stopwatch: Stopwatch,
+}
+
+/// How long a plan is timed, at least.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Least {
+    pub iterations: u64,
+    /// Of the GPU.
+    pub seconds: f64,
+}
+
+impl Least {
+    /// How long it is where an iteration takes some seconds.
+    fn time(self, iteration: f64) -> f64 {
+        self.seconds.max(self.iterations as f64 * iteration)
+    }
+}
+
+#[derive(Debug)]
+enum Stage {
+    /// The fastest so far runs and is timed, until another is built.
+    Timing,
+    /// Another is to run.
+    Due(Box<Trial>),
+    /// It runs and is timed.
+    Running(Box<Trial>),
+    /// The fastest is to run again.
+    Back(Box<BuiltPlan>),
+    Over,
+}
+
+/// A plan that is tried.
+#[derive(Debug)]
+struct Trial {
+    made: Made,
+    /// The plan that does not run meanwhile: before the trial the one to be tried, then the fastest so far.
+    other: BuiltPlan,
+    /// What an iteration took by the fastest so far, in seconds.
+    least: f64,
+}
+
+/// What became of a trial.
+#[derive(Debug)]
+pub(super) struct Tried {
+    /// The plan, and what it took to make.
+    pub made: Made,
+    /// Seconds of an iteration by it, and by the fastest until then; or why it could not run.
+    pub outcome: Result<[f64; 2], String>,
+    /// Whether it goes on.
+    pub is_kept: bool,
+}
+
+impl Trials {
+    /// Of what a job makes, beside a plan that begins to run now.
+    pub(super) fn new(job: Jobbing, least: Least, status: &Status) -> Self {
+        Self {
+            job,
+            least,
+            stage: Stage::Timing,
+            stopwatch: Stopwatch::new(status),
+        }
+    }
+
+    /// Times anew in a pass, after so many iterations in which the mixture of paths becomes steady.
+    pub(super) fn begin_pass(&mut self, iterations: u64, warm: u64) {
+        self.stopwatch = Stopwatch {
+            from: iterations + warm,
+            begin: None,
+        };
+    }
+
+    /// Goes on, now that more is known and `left` seconds of the render are; with `wait` not before the next plan is built. What
+    /// became of a trial, if one ended.
+    pub(super) fn advance(&mut self, status: &Status, left: f64, wait: bool) -> Option<Tried> {
+        let seconds = self.stopwatch.seconds(status, self.least)?;
+        let (stage, tried) = match std::mem::replace(&mut self.stage, Stage::Over) {
+            Stage::Timing if left < LEFT * self.least.time(seconds) => {
+                self.job.cancel();
+                (Stage::Over, None)
+            }
+            Stage::Timing => self.next(seconds, wait),
+            Stage::Running(trial) => {
+                let is_kept = seconds < trial.least * (1.0 - NOTABLE);
+                let tried = Tried {
+                    made: trial.made,
+                    outcome: Ok([seconds, trial.least]),
+                    is_kept,
+                };
+                let stage = if is_kept {
+                    Stage::Timing
+                } else {
+                    Stage::Back(Box::new(trial.other))
+                };
+                (stage, Some(tried))
+            }
+            same => (same, None),
+        };
+        self.stage = stage;
+        tried
+    }
+
+    /// The next plan, beside one of which an iteration takes `least` seconds.
+    fn next(&self, least: f64, wait: bool) -> (Stage, Option<Tried>) {
+        let next = if wait {
+            self.job.wait()
+        } else {
+            self.job.next()
+        };
+        let outcome: Outcome = match next {
+            Ok(outcome) => outcome,
+            Err(TryRecvError::Empty) => return (Stage::Timing, None),
+            Err(TryRecvError::Disconnected) => return (Stage::Over, None),
+        };
+        match outcome {
+            (made, Ok(other)) => (Stage::Due(Box::new(Trial { made, other, least })), None),
+            (made, Err(why)) => {
+                let tried = Tried {
+                    made,
+                    outcome: Err(why),
+                    is_kept: false,
+                };
+                (Stage::Timing, Some(tried))
+            }
+        }
+    }
+
+    /// Whether another plan is to run now.
+    pub(super) fn is_due(&self) -> bool {
+        matches!(self.stage, Stage::Due(_) | Stage::Back(_))
+    }
+
+    /// The plan that is to run in the place of the `present` one, if it is not the present one.
+    pub(super) fn change(&mut self, present: &BuiltPlan, status: &Status) -> Option<BuiltPlan> {
+        let (stage, next) = match std::mem::replace(&mut self.stage, Stage::Over) {
+            Stage::Due(mut trial) => {
+                let next = std::mem::replace(&mut trial.other, present.clone());
+                (Stage::Running(trial), Some(next))
+            }
+            Stage::Back(fastest) => (Stage::Timing, Some(*fastest)),
+            same => (same, None),
+        };
+        self.stage = stage;
+        if next.is_some() {
+            self.stopwatch = Stopwatch::new(status);
+        }
+        next
+    }
+}
+
+/// Times iterations of the plan that runs.
+#[derive(Debug)]
+struct Stopwatch {
+    /// It begins at the first submission that ends after so many iterations.
+    from: u64,
+    /// Iterations and GPU seconds then.
+    begin: Option<(u64, f64)>,
+}
+
+impl Stopwatch {
+    /// Begins when the next submission has ended.
+    fn new(status: &Status) -> Self {
+        Self {
+            from: status.iterations + 1,
+            begin: None,
+        }
+    }
+
+    /// Seconds of an iteration, once enough are over.
+    fn seconds(&mut self, status: &Status, least: Least) -> Option<f64> {
+        let now = (status.iterations, status.gpu_seconds);
+        if now.0 < self.from {
+            return None;
+        }
+        let begin = *self.begin.get_or_insert(now);
+        let (iterations, seconds) = (now.0 - begin.0, now.1 - begin.1);
+        (iterations >= least.iterations && seconds >= least.seconds)
+            .then(|| seconds / iterations as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(iterations: u64, gpu_seconds: f64) -> Status {
+        Status {
+            iterations,
+            gpu_seconds,
+            ..Status::new(1)
+        }
+    }
+
+    #[test]
+    fn what_is_timed_is_steady_and_long_enough() {
+        let least = Least {
+            iterations: 16,
+            seconds: 0.03,
+        };
+        let mut stopwatch = Stopwatch::new(&at(100, 5.0));
+        assert_eq!(stopwatch.seconds(&at(100, 5.0), least), None);
+        // The first submission is the first with warm caches behind it: it starts the watch.
+        assert_eq!(stopwatch.seconds(&at(104, 9.0), least), None);
+        assert_eq!(stopwatch.seconds(&at(119, 9.5), least), None, "too few");
+        assert_eq!(stopwatch.seconds(&at(124, 9.02), least), None, "too short");
+        assert_eq!(stopwatch.seconds(&at(124, 9.5), least), Some(0.025));
+    }
+}
