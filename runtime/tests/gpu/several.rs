@@ -116,29 +116,37 @@ fn progress_is_of_all_and_ends_with_them() {
     assert!(last > 0);
 }
 
+/// What some devices keep first and at last of a render with some samples.
+fn kept(devices: &[DeviceRef<'static>], count: u32) -> [FilmFile; 2] {
+    let mut kept: Vec<FilmFile> = Vec::new();
+    let mut keep = |film: &FilmFile| {
+        kept.push(film.clone());
+        Ok(())
+    };
+    let keeping = Keeping {
+        start: None,
+        every: Duration::from_nanos(1),
+        keep: &mut keep,
+    };
+    let rendering = renderer(devices, &samples(count)).render_keeping(keeping, &mut go_on);
+    let last = kept.last().expect("what is kept at the end").clone();
+    assert_eq!(rendering.unwrap_or_else(|e| panic!("{e}")).sums, last);
+    [kept.swap_remove(0), last]
+}
+
 #[test]
 fn what_is_kept_is_gone_on_from_by_one_or_by_several() {
-    /// Enough to take longer than all it takes to keep some.
-    const COUNT: u32 = 2000;
     for devices in kinds() {
-        let options = samples(COUNT);
+        // Enough to take longer than all it takes to keep some, also where others take the processor away.
+        let mut renders = [2_000, 8_000, 32_000]
+            .into_iter()
+            .map(|count| (count, kept(&devices, count)));
+        let (count, [early, last]) = renders
+            .find(|(count, [early, _])| early.samples() < u64::from(*count))
+            .expect("samples that are kept before the end");
+        let options = samples(count);
         let reference = whole(&devices[..1], &options).sums;
-        let mut kept: Vec<FilmFile> = Vec::new();
-        let mut keep = |film: &FilmFile| {
-            kept.push(film.clone());
-            Ok(())
-        };
-        let keeping = Keeping {
-            start: None,
-            every: Duration::from_nanos(1),
-            keep: &mut keep,
-        };
-        let rendering = renderer(&devices, &options).render_keeping(keeping, &mut go_on);
-        assert_eq!(rendering.unwrap_or_else(|e| panic!("{e}")).sums, reference);
-        assert_eq!(kept.last(), Some(&reference));
-        assert!(kept.len() > 1, "nothing was kept meanwhile");
-        let early = kept[0].clone();
-        assert!(early.samples() < COUNT.into());
+        assert_eq!(last, reference);
         for devices in [&devices[..1], &devices[..]] {
             let keeping = Keeping {
                 start: Some(early.clone()),
@@ -148,7 +156,7 @@ fn what_is_kept_is_gone_on_from_by_one_or_by_several() {
             let rendering = renderer(devices, &options).render_keeping(keeping, &mut go_on);
             let rendering = rendering.unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(rendering.sums, reference);
-            assert_eq!(rendering.report.paths, 16 * 8 * u64::from(COUNT));
+            assert_eq!(rendering.report.paths, 16 * 8 * u64::from(count));
             assert_eq!(u64::from(rendering.report.resumed_samples), early.samples());
         }
     }
