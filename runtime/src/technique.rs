@@ -96,6 +96,16 @@ choices! {
         Structures = "aos",
     }
 
+    /// Whether paths move to other slots of the pool.
+    SlotOrder {
+        /// As in `work` where materials have several queues, else as in `fixed`
+        Auto = "auto",
+        /// The logic kernel puts the paths of a workgroup in the order of the queues that they go to
+        Work = "work",
+        /// A path keeps its slot
+        Fixed = "fixed",
+    }
+
     /// When threads of a megakernel whose path has ended begin another (Laine et al. 2013,
     /// section 4.1).
     Regeneration {
@@ -203,6 +213,8 @@ pub struct Technique {
     pub append: Append,
     /// How path state lies in memory.
     pub state: StateLayout,
+    /// Whether paths move to other slots.
+    pub slot_order: SlotOrder,
     /// When threads of a megakernel begin another path.
     pub regeneration: Regeneration,
     /// What rays are cast through.
@@ -264,6 +276,7 @@ mod tests {
         check_names::<Sampler>();
         check_names::<Append>();
         check_names::<StateLayout>();
+        check_names::<SlotOrder>();
         check_names::<Regeneration>();
         check_names::<Traversal>();
         check_names::<Tree>();

@@ -307,6 +307,7 @@ pub(super) mod tests {
                     materials: (0..5).map(hits).collect(),
                     logic_seconds: 1e-4,
                     other_seconds: 1e-3,
+                    in_order: false,
                 },
                 materials: (0..5)
                     .map(|m| Material {

@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
     Append, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
-    Stack, StateLayout, Technique, Traversal, Tree,
+    SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
 };
 
 /// Every choice of [`Technique`].
@@ -20,6 +20,9 @@ pub(super) struct TechniqueArgs {
     /// Memory layout of path state
     #[arg(long, value_name = "NAME", default_value = default_name::<StateLayout>(), value_parser = named::<StateLayout>())]
     state: StateLayout,
+    /// Whether paths move to other slots of the pool
+    #[arg(long, value_name = "NAME", default_value = default_name::<SlotOrder>(), value_parser = named::<SlotOrder>())]
+    slot_order: SlotOrder,
     /// When threads of a megakernel begin another path
     #[arg(long, value_name = "NAME", default_value = default_name::<Regeneration>(), value_parser = named::<Regeneration>())]
     regeneration: Regeneration,
@@ -67,6 +70,7 @@ impl TechniqueArgs {
             sampler: self.sampler,
             append: self.append,
             state: self.state,
+            slot_order: self.slot_order,
             regeneration: self.regeneration,
             profile: self.profile,
             workgroup: self.workgroup,

@@ -216,6 +216,7 @@ mod tests {
                 }],
                 logic_seconds: 0.1,
                 other_seconds: 0.2,
+                in_order: false,
             },
             materials: vec![Material {
                 name: "paint".into(),

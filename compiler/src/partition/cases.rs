@@ -80,6 +80,7 @@ impl Case {
             materials,
             logic_seconds: 8e-5,
             other_seconds: 0.0,
+            in_order: false,
         };
         Self {
             costs,

@@ -18,7 +18,7 @@
 //!   subgroup in which it is present, with as few lanes as it has there, one after the other.
 //! - `density` is the share of neighbouring slots that the kernel works on. Where they are apart, hits
 //!   read lines of memory for themselves alone: `apart` is 0 if all slots of a line of 16 are worked
-//!   on, and 1 if one is.
+//!   on, and 1 if one is. It is 0 for queues where paths lie in the order of these.
 //! - Side by side, materials that do not fit the caches of instructions together push each other out.
 //! - A logic kernel with inline materials has their registers, and so fewer threads at a time.
 //!
@@ -227,6 +227,11 @@ impl Calibrated<'_> {
             };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);
+            let density = if self.workload.in_order && form != Form::Inline {
+                1.0
+            } else {
+                density
+            };
             let scattered = weights.scatter * apart(density);
             m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
@@ -365,6 +370,7 @@ mod tests {
             materials: vec![hits("a"), hits("b")],
             logic_seconds: 1e-4,
             other_seconds: 0.0,
+            in_order: false,
         }
     }
 
@@ -413,6 +419,27 @@ mod tests {
         near(found.memory, 262_144.0 * bytes);
         // A queue makes full subgroups of them all the same.
         near(found.issue, 8192.0 * 215e-12);
+    }
+
+    #[test]
+    fn where_paths_lie_in_order_only_inline_hits_are_apart() {
+        let costs = [cost(80, 3000, [ISSUED; LANES.len()]), None];
+        let profile = profile();
+        let of = |in_order, form| {
+            let workload = Workload {
+                in_order,
+                ..workload(32)
+            };
+            let model = Calibrated {
+                costs: &costs,
+                workload: &workload,
+                profile: &profile,
+            };
+            model.predict(form, &[0]).memory
+        };
+        near(of(true, Form::Own), 262_144.0 * 168.0 * 1e-13);
+        assert!(of(true, Form::Own) < of(false, Form::Own));
+        near(of(true, Form::Inline), of(false, Form::Inline));
     }
 
     #[test]

@@ -21,6 +21,10 @@ pub struct Workload {
     /// Seconds that everything else takes but material kernels: new paths, rays, what lies between
     /// kernels; 0 if not measured.
     pub other_seconds: f64,
+    /// Whether paths lie in the order of their queues, so that what a queue's kernel reads is dense however few slots
+    /// hit its materials.
+    #[serde(default)]
+    pub in_order: bool,
 }
 
 /// How paths hit a material.

@@ -41,10 +41,12 @@ impl Composer<'_> {
     /// Writes the text of the kernel that comes `index`-th in an iteration.
     pub(crate) fn compose(&self, index: usize, desc: KernelDesc) -> Kernel {
         let (stages, members) = (&desc.stages, &desc.members);
-        let storage = if self.layout.wavefront {
-            Storage::Memory(self.technique.state)
-        } else {
+        let storage = if !self.layout.wavefront {
             Storage::Registers
+        } else if desc.moves {
+            Storage::Moving(self.technique.state)
+        } else {
+            Storage::Memory(self.technique.state)
         };
         let mut text = self.constants();
         text += &state::accessors(self.layout.needs, stages, storage);

@@ -9,8 +9,13 @@ use crate::kernels::check::check;
 use crate::kernels::queues::{Counters, Queues};
 use crate::kernels::stages::{STAGES, Stage};
 use crate::kernels::state;
-use crate::technique::{RayData, Technique};
+use crate::technique::{Append, RayData, SlotOrder, Technique};
 use crate::world::needs::{Decision, Need, Needs};
+
+/// With one queue of materials its paths lie densely enough where they are (docs/measurements.md).
+const QUEUES_WORTH_MOVING: usize = 2;
+/// With more a workgroup has few paths for each, and counting them takes the memory that it has.
+const MOST_MOVING_QUEUES: usize = 256;
 
 /// What the kernels of one plan share.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +85,31 @@ impl PlanLayout {
         } else {
             RayData::Slots
         };
-        Technique { ray_data, ..asked }
+        let slot_order = if self.moves_paths(asked) {
+            SlotOrder::Work
+        } else {
+            SlotOrder::Fixed
+        };
+        Technique {
+            ray_data,
+            slot_order,
+            ..asked
+        }
+    }
+
+    /// Whether the logic kernel moves paths to other slots. Its threads wait for each other then, as they do where a
+    /// workgroup reserves its places in queues together.
+    pub(crate) fn moves_paths(&self, technique: Technique) -> bool {
+        let queues = self.queues.materials;
+        let wanted = match technique.slot_order {
+            SlotOrder::Auto => queues >= QUEUES_WORTH_MOVING,
+            SlotOrder::Work => true,
+            SlotOrder::Fixed => false,
+        };
+        wanted
+            && self.wavefront
+            && technique.append == Append::Workgroup
+            && queues <= MOST_MOVING_QUEUES
     }
 
     /// Words that the queues take for each slot of the pool.

@@ -68,6 +68,8 @@ pub(crate) struct KernelDesc {
     pub members: Vec<usize>,
     /// How many threads it gets.
     pub source: DispatchSource,
+    /// Whether paths move to other slots in it.
+    pub moves: bool,
     /// WGSL of its requests and entry point.
     pub shell: String,
 }
@@ -87,6 +89,7 @@ impl KernelDesc {
             stages,
             members: Vec::new(),
             source,
+            moves: false,
             shell,
         }
     }

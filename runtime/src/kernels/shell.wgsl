@@ -42,10 +42,20 @@ fn main(
     let in_range = item < POOL_SIZE;
 #endif
     if in_range {
+#if moves
+        take_up(slot);
+#endif
         run_stage(slot, item);
     }
 #if counts_hits
     count_hits(lane);
+#endif
+#if moves
+    slot = settle(index * WORKGROUP_SIZE, lane, in_range);
+    // A new path brings a state of its own.
+    if in_range && wanted_work != QUEUE_NEW_PATH {
+        put_down(slot);
+    }
 #endif
 #if pushes
     push_requests(lane, slot);

@@ -35,6 +35,8 @@ pub(crate) struct Shell {
     pub binned: Option<usize>,
     /// What it pushes to queues.
     pub pushes: Pushes,
+    /// Whether paths move to other slots in it.
+    pub moves: bool,
     /// Whether it traces rays.
     pub traverses: bool,
     /// Whether it counts hits of each material.
@@ -78,6 +80,8 @@ pub(crate) struct EntryPoint {
     pub slots: bool,
     /// Whether it appends to queues.
     pub pushes: bool,
+    /// Whether paths move to other slots before that.
+    pub moves: bool,
     /// WGSL of the places of rays that paths keep, if they do.
     pub keeps: Option<String>,
     /// Whether it counts hits of each material.
@@ -104,6 +108,7 @@ impl EntryPoint {
             ("binned", self.binned),
             ("slots", self.slots),
             ("pushes", self.pushes),
+            ("moves", self.moves),
             ("keeps", self.keeps.is_some()),
             ("counts_hits", self.counts_hits),
             ("subgroups", self.subgroups),
@@ -160,6 +165,7 @@ impl Composer<'_> {
             binned: shell.binned.is_some(),
             slots: !(shell.traverses && requests),
             pushes,
+            moves: shell.moves,
             keeps: (requests && shell.pushes.has_rays()).then(|| self.ray_places()),
             counts_hits: shell.counts_hits,
             subgroups: pushes && self.technique.append == Append::Subgroup,
@@ -177,6 +183,9 @@ impl Composer<'_> {
         }
         if shell.pushes.sorts {
             out += &self.material_queue();
+        }
+        if shell.moves {
+            out += include_str!("settle.wgsl");
         }
         if shell.counts_hits {
             out += &self.hits();

@@ -60,15 +60,19 @@ impl Composer<'_> {
                 material.call("slot", "item", "wanted_instance")
             );
         }
+        let pushes = self.pushes(&stages, &members);
+        let moves = pushes.sorts && self.layout.moves_paths(self.technique);
         let shell = self.shell(&Shell {
             run,
-            pushes: self.pushes(&stages, &members),
+            pushes,
+            moves,
             counts_hits: found.is_some() && self.layout.counters.hits > 0,
             ..Shell::default()
         });
         KernelDesc {
             form: inline.first().map(|kernel| kernel.form),
             members,
+            moves,
             ..KernelDesc::plain(stage.name, stages, DispatchSource::Pool, shell)
         }
     }

@@ -165,6 +165,7 @@ impl<'a> Lab<'a> {
                 &inputs.parts.surface,
                 &inputs.materials,
                 &layout,
+                inputs.technique,
                 sizes.pool,
             ),
             inputs,

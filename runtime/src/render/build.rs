@@ -394,6 +394,7 @@ impl ReportInputs {
                 &composer.parts.surface,
                 composer.materials,
                 &composer.layout,
+                composer.technique,
                 composer.sizes.pool,
             ),
             compile_seconds: 0.0,

@@ -9,6 +9,7 @@ use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Kernel;
 use crate::kernels::state;
 use crate::render::status::Status;
+use crate::technique::Technique;
 use crate::wgsl::ShaderPart;
 use crate::world::World;
 use crate::world::needs::Need;
@@ -24,6 +25,7 @@ pub(crate) fn before_rendering(
     surface: &ShaderPart,
     materials: &[MaterialInfo],
     layout: &PlanLayout,
+    technique: Technique,
     pool: u32,
 ) -> Workload {
     let unbound = &world.parts.unbound;
@@ -41,6 +43,7 @@ pub(crate) fn before_rendering(
         materials: materials.iter().enumerate().map(hits).collect(),
         logic_seconds: 0.0,
         other_seconds: 0.0,
+        in_order: layout.moves_paths(technique),
     }
 }
 

@@ -8,7 +8,9 @@ use crate::gpu::stub::{gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
-use impasto_runtime::technique::{Append, Choice, RayData, Regeneration, StateLayout, Technique};
+use impasto_runtime::technique::{
+    Append, Choice, RayData, Regeneration, SlotOrder, StateLayout, Technique,
+};
 
 fn run(strategy: Strategy, technique: Technique) -> Rendering {
     // A pool smaller than the picture, so that slots take path after path.
@@ -71,6 +73,40 @@ fn rays_may_lie_in_buffers_of_their_own() {
 #[test]
 fn path_state_may_lie_in_either_order() {
     assert_equal::<StateLayout>(Strategy::OWN, |t, value| t.state = value);
+}
+
+#[test]
+fn paths_may_keep_their_slots() {
+    for strategy in [Strategy::OWN, Strategy::MIXED, Strategy::INLINE] {
+        assert_equal::<SlotOrder>(strategy, |t, value| t.slot_order = value);
+    }
+    for layout in [StateLayout::Pairs, StateLayout::Structures] {
+        assert_equal::<SlotOrder>(Strategy::OWN, |t, value| {
+            t.state = layout;
+            t.slot_order = value;
+        });
+    }
+    assert_equal::<SlotOrder>(Strategy::INLINE, |t, value| {
+        t.ray_data = RayData::Requests;
+        t.slot_order = value;
+    });
+}
+
+/// Threads that append on their own do not wait for each other, so that none may take another's slot.
+#[test]
+fn paths_move_only_where_workgroups_append_together() {
+    for (append, order) in [
+        (Append::Workgroup, SlotOrder::Work),
+        (Append::Subgroup, SlotOrder::Fixed),
+        (Append::Thread, SlotOrder::Fixed),
+    ] {
+        let technique = Technique {
+            append,
+            ..Technique::default()
+        };
+        let rendering = run(Strategy::OWN, technique);
+        assert_eq!(rendering.report.technique.slot_order, order, "{append:?}");
+    }
 }
 
 #[test]

@@ -116,6 +116,7 @@ fn measurement() -> Measurement {
             materials: workload.map(hits).into(),
             logic_seconds: 4e-5,
             other_seconds: 6e-5,
+            in_order: false,
         },
         materials: workload
             .map(|(name, ..)| Material {

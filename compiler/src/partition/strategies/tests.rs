@@ -56,6 +56,7 @@ fn workload() -> Workload {
         materials: names().iter().map(hits).collect(),
         logic_seconds: 0.0,
         other_seconds: 0.0,
+        in_order: false,
     }
 }
 

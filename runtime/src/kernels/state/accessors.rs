@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 use super::{Field, Type, Use, fields};
-use crate::kernels::stages::Stage;
+use crate::kernels::stages::{STAGES, Stage, Work};
 use crate::technique::StateLayout;
 use crate::world::needs::Needs;
 
@@ -16,6 +16,9 @@ pub(crate) enum Storage {
     Memory(StateLayout),
     /// Private variables; a slot is ignored.
     Registers,
+    /// The buffer, of which a path's words are held in private variables from `take_up` until `put_down`, which may be
+    /// at another slot.
+    Moving(StateLayout),
 }
 
 /// Structures and accessors for the uses of fields that `stages` access; nothing else is declared, so
@@ -24,7 +27,17 @@ pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> St
     let mut out = String::new();
     let count = fields(needs).count();
     for (region, field) in fields(needs).enumerate() {
-        let place = place(field, region, count, storage);
+        let holds = match storage {
+            Storage::Memory(_) => false,
+            Storage::Registers => true,
+            Storage::Moving(_) => moves(field, needs, stages),
+        };
+        let place = match storage {
+            Storage::Memory(layout) | Storage::Moving(layout) if !holds => {
+                place(region, count, layout)
+            }
+            _ => held(field),
+        };
         let mut accessed = String::new();
         for u in field.uses(needs) {
             let read = stages.iter().any(|s| s.loads(u.name, needs));
@@ -39,19 +52,69 @@ pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> St
                 accessed += &store(u, &place);
             }
         }
-        if !accessed.is_empty() && storage == Storage::Registers {
+        let moving = holds && storage != Storage::Registers;
+        if holds && (moving || !accessed.is_empty()) {
             let _ = writeln!(out, "var<private> {place}: vec4<u32>;");
         }
         out += &accessed;
     }
+    if let Storage::Moving(layout) = storage {
+        out += &moving(needs, stages, layout);
+    }
     out
 }
 
-/// Where the words of a field are, the `region`-th of `count`.
-fn place(field: &Field, region: usize, count: usize, storage: Storage) -> String {
-    match storage {
-        Storage::Memory(StateLayout::Arrays) => format!("state[{region}u * POOL_SIZE + slot]"),
-        Storage::Memory(StateLayout::Pairs) => {
+/// Whether a field goes with a path from the slot where `stages` found it to the one where those find it that they ask
+/// for: these load it, or they leave something in it. The places of rays are known, and stored, after the move.
+fn moves(field: &Field, needs: Needs, stages: &[&Stage]) -> bool {
+    let left = |u: &Use| stages.iter().any(|s| s.stores(u.name, needs)) && u.name != "requests";
+    let mut uses = field.uses(needs);
+    uses.any(|u| is_awaited(u, needs, stages) || left(u))
+}
+
+/// Whether a stage loads a use that `stages` ask for. One that begins a path asks for nothing that was.
+fn is_awaited(u: &Use, needs: Needs, stages: &[&Stage]) -> bool {
+    let asked = |s: &&Stage| stages.iter().any(|by| s.work.from().contains(&by.name));
+    let next = STAGES.iter().filter(asked).filter(|s| needs.met(s.need));
+    let mut next = next.filter(|s| !matches!(s.work, Work::Begin { .. }));
+    next.any(|s| s.loads(u.name, needs))
+}
+
+/// `take_up`, which reads what moves, and `put_down`, which writes it. Words that mean nothing are left alone. All
+/// threads of a workgroup must have taken up their paths before one puts its own down.
+fn moving(needs: Needs, stages: &[&Stage], layout: StateLayout) -> String {
+    let count = fields(needs).count();
+    let (mut take, mut put) = (String::new(), String::new());
+    let moved = fields(needs).enumerate();
+    for (region, field) in moved.filter(|(_, field)| moves(field, needs, stages)) {
+        let (held, place) = (held(field), place(region, count, layout));
+        let condition = field.flag.map_or_else(String::new, |flag| {
+            format!("if (load_radiance(slot).flags & {flag}) != 0u ")
+        });
+        let line = |to: &str, from: &str| match field.flag {
+            None => format!("    {to} = {from};\n"),
+            Some(_) => format!("    {condition}{{ {to} = {from}; }}\n"),
+        };
+        let is_loaded =
+            |u: &Use| is_awaited(u, needs, stages) || stages.iter().any(|s| s.loads(u.name, needs));
+        if field.uses(needs).any(is_loaded) {
+            take += &line(&held, &place);
+        }
+        put += &line(&place, &held);
+    }
+    format!("fn take_up(slot: u32) {{\n{take}}}\n\nfn put_down(slot: u32) {{\n{put}}}\n")
+}
+
+/// The variable that holds the words of a field.
+fn held(field: &Field) -> String {
+    format!("state_{}", field.name())
+}
+
+/// Where the words of a field are in the buffer, the `region`-th of `count`.
+fn place(region: usize, count: usize, layout: StateLayout) -> String {
+    match layout {
+        StateLayout::Arrays => format!("state[{region}u * POOL_SIZE + slot]"),
+        StateLayout::Pairs => {
             let (first, half) = (region - region % 2, region % 2);
             if first + 1 < count {
                 format!("state[{first}u * POOL_SIZE + 2u * slot + {half}u]")
@@ -59,8 +122,7 @@ fn place(field: &Field, region: usize, count: usize, storage: Storage) -> String
                 format!("state[{first}u * POOL_SIZE + slot]")
             }
         }
-        Storage::Memory(StateLayout::Structures) => format!("state[{count}u * slot + {region}u]"),
-        Storage::Registers => format!("state_{}", field.name()),
+        StateLayout::Structures => format!("state[{count}u * slot + {region}u]"),
     }
 }
 

@@ -32,6 +32,8 @@ pub(crate) enum Type {
 pub(crate) struct Field {
     /// What the words mean, in the order of an iteration.
     pub uses: &'static [Use],
+    /// The flag of `radiance` without which the words mean nothing between two stages, if one says so.
+    pub flag: Option<&'static str>,
 }
 
 /// A meaning of a field's words.

@@ -47,6 +47,7 @@ pub(crate) const FIELDS: [Field; 15] = [
                 need: SHARED_ORIGINS,
             },
         ],
+        flag: None,
     },
     Field {
         // Until the ray is cast, the direction in which it begins; then that in which it arrives, which is
@@ -56,6 +57,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("direction", Vec3), ("sample", U32)],
             need: ALWAYS,
         }],
+        flag: None,
     },
     Field {
         uses: &[
@@ -73,6 +75,7 @@ pub(crate) const FIELDS: [Field; 15] = [
                 need: SLOT_SHADOWS,
             },
         ],
+        flag: None,
     },
     Field {
         uses: &[
@@ -91,6 +94,7 @@ pub(crate) const FIELDS: [Field; 15] = [
                 need: SHADOW_RAYS,
             },
         ],
+        flag: None,
     },
     Field {
         // Radiance gathered so far; the flags are declared in `constants`.
@@ -99,6 +103,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("radiance", Vec3), ("flags", U32)],
             need: ALWAYS,
         }],
+        flag: None,
     },
     Field {
         uses: &[
@@ -116,6 +121,7 @@ pub(crate) const FIELDS: [Field; 15] = [
                 need: SHADOW_RAYS,
             },
         ],
+        flag: Some("PATH_LIT"),
     },
     Field {
         // Where the shadow ray begins if that may be on another side than where the extension ray does.
@@ -124,6 +130,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("origin", Vec3), ("pixel", U32)],
             need: OWN_SHADOW_ORIGINS,
         }],
+        flag: Some("PATH_LIT"),
     },
     Field {
         // The places of its rays in buffers of their own, where their results will be.
@@ -137,6 +144,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             ],
             need: when(&[Need::Requests]),
         }],
+        flag: None,
     },
     Field {
         // The cone that its ray stands for: how wide it is where the ray begins, in metres, and by how
@@ -151,6 +159,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             ],
             need: when(&[Need::RayCones]),
         }],
+        flag: None,
     },
     Field {
         // The group of the light that was sampled, until what it brings is gathered.
@@ -164,6 +173,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             ],
             need: when(&[Need::LightGroups, Need::ShadowRays]),
         }],
+        flag: Some("PATH_LIT"),
     },
     Field {
         // The media it is in; see `world/media.wgsl`.
@@ -172,6 +182,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("stack", Words)],
             need: when(&[Need::Media]),
         }],
+        flag: None,
     },
     Field {
         // What it meets below the surface that it entered last: the share of light that scattering leaves, and the
@@ -181,6 +192,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("albedo", Vec3), ("anisotropy", F32)],
             need: when(&[Need::Subsurface]),
         }],
+        flag: Some("PATH_BELOW"),
     },
     Field {
         // How often it meets something there, and the instance of a material that it entered through.
@@ -189,6 +201,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("extinction", Vec3), ("instance", U32)],
             need: when(&[Need::Subsurface]),
         }],
+        flag: Some("PATH_BELOW"),
     },
     Field {
         // With which probabilities its walk was drawn in each channel as light goes, and the primitive that it
@@ -198,6 +211,7 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("shares", Vec3), ("entered", U32)],
             need: when(&[Need::Subsurface]),
         }],
+        flag: Some("PATH_BELOW"),
     },
     Field {
         // The same of walks that are pulled back, and how far the walk has come: 0 before it, see
@@ -207,5 +221,6 @@ pub(crate) const FIELDS: [Field; 15] = [
             components: &[("shares", Vec3), ("status", U32)],
             need: when(&[Need::Subsurface]),
         }],
+        flag: Some("PATH_BELOW"),
     },
 ];
