@@ -98,7 +98,7 @@ choices! {
 
     /// Whether paths move to other slots of the pool.
     SlotOrder {
-        /// As in `work` where materials have several queues, else as in `fixed`
+        /// As in `work` where a plan has several materials, else as in `fixed`
         Auto = "auto",
         /// The logic kernel puts the paths of a workgroup in the order of the queues that they go to
         Work = "work",

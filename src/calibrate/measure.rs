@@ -5,6 +5,7 @@ use std::time::Instant;
 use impasto_compiler::{MemoryLoader, Program};
 use impasto_runtime::gpu::Gpu;
 use impasto_runtime::lab::LabOptions;
+use impasto_runtime::technique::{SlotOrder, Technique};
 
 use super::room::{self, Coherence};
 use super::sources::{Palette, palettes};
@@ -106,6 +107,11 @@ fn one(
         pool: Some(pool),
         repetitions: effort.repetitions,
         statistics: true,
+        // Paths that move bring neighbours of one kind together, and the palettes are made to have all kinds.
+        technique: Technique {
+            slot_order: SlotOrder::Fixed,
+            ..Technique::default()
+        },
         ..LabOptions::default()
     };
     let materials = SceneMaterials::new(scene, &program, COST_SAMPLES);

@@ -12,9 +12,10 @@ use crate::kernels::state;
 use crate::technique::{Append, RayData, SlotOrder, Technique};
 use crate::world::needs::{Decision, Need, Needs};
 
-/// With one queue of materials its paths lie densely enough where they are (docs/measurements.md).
-const QUEUES_WORTH_MOVING: usize = 2;
-/// With more a workgroup has few paths for each, and counting them takes the memory that it has.
+/// Paths that hit one material lie densely enough where they are (docs/measurements.md). It is not the queues that
+/// count, since then plans for a scene would differ in which neighbours hit the same.
+const MATERIALS_WORTH_MOVING: usize = 2;
+/// With more queues a workgroup has few paths for each, and counting them takes the memory that it has.
 const MOST_MOVING_QUEUES: usize = 256;
 
 /// What the kernels of one plan share.
@@ -28,6 +29,8 @@ pub(crate) struct PlanLayout {
     pub counters: Counters,
     /// Whether stages are kernels of their own.
     pub wavefront: bool,
+    /// How many materials the plan evaluates.
+    pub materials: usize,
 }
 
 impl PlanLayout {
@@ -70,6 +73,7 @@ impl PlanLayout {
             queues,
             counters,
             wavefront,
+            materials: plan.kernels.iter().map(|k| k.materials.len()).sum(),
         })
     }
 
@@ -100,16 +104,15 @@ impl PlanLayout {
     /// Whether the logic kernel moves paths to other slots. Its threads wait for each other then, as they do where a
     /// workgroup reserves its places in queues together.
     pub(crate) fn moves_paths(&self, technique: Technique) -> bool {
-        let queues = self.queues.materials;
         let wanted = match technique.slot_order {
-            SlotOrder::Auto => queues >= QUEUES_WORTH_MOVING,
+            SlotOrder::Auto => self.materials >= MATERIALS_WORTH_MOVING,
             SlotOrder::Work => true,
             SlotOrder::Fixed => false,
         };
         wanted
             && self.wavefront
             && technique.append == Append::Workgroup
-            && queues <= MOST_MOVING_QUEUES
+            && self.queues.materials <= MOST_MOVING_QUEUES
     }
 
     /// Words that the queues take for each slot of the pool.
