@@ -67,36 +67,58 @@ fn overhead(bench: &Bench) -> Result<String> {
     ))
 }
 
+/// A fault that comes after what it is to interrupt shows nothing. Machines get faster once others leave them alone, so
+/// it is tried again with four times the samples.
+fn in_time(fault: impl Fn(&str, u32) -> Result<Option<String>>) -> Result<String> {
+    for (name, times) in [("in_time", 1), ("in_time_again", 4)] {
+        if let Some(shown) = fault(name, times)? {
+            return Ok(shown);
+        }
+    }
+    Err("what was to be interrupted was done before, with four times the samples as well".into())
+}
+
 /// Two frames of three parts; the node of one is unplugged in the middle, and the controller is started again.
 fn crash(bench: &Bench) -> Result<String> {
-    let samples = 3 * bench.seconds(3);
-    let job = bench.job("crash", "1-2", samples, 3, &[])?;
+    in_time(|name, times| crash_in_time(bench, &format!("crash_{name}"), times))
+}
+
+fn crash_in_time(bench: &Bench, name: &str, times: u32) -> Result<Option<String>> {
+    let samples = 3 * times * bench.seconds(3);
+    let job = bench.job(name, "1-2", samples, 3, &[])?;
     submit(bench, &job)?;
-    bench.refused(&["farm", "submit", "crash"], 2, "is in the queue already")?;
+    bench.refused(&["farm", "submit", name], 2, "is in the queue already")?;
     let node = bench.node_of(&job, 2, 1)?;
     bench.cluster.crash(&node)?;
     bench.cluster.restart_controller()?;
     bench.finish()?;
     bench.compare(&job, 1..=2, samples)?;
     let log = bench.log(&job, "render-2-1");
-    let other = log.lines().filter(|line| line.starts_with("===")).count();
-    if other < 2 || !log.contains("going on from the") {
+    let attempts = log.lines().filter(|line| line.starts_with("===")).count();
+    if attempts < 2 {
+        return Ok(None);
+    }
+    if !log.contains("going on from the") {
         return Err(format!("the task did not go on from its checkpoint: {log}"));
     }
     let from = log
         .lines()
         .rfind(|line| line.contains("going on from the"))
         .unwrap_or_default();
-    Ok(format!(
+    Ok(Some(format!(
         "{node} was lost in mid-part and the controller started again; {}",
         from.split(" of `").next().unwrap_or(from)
-    ))
+    )))
 }
 
 /// A node's daemon is gone, and its task renders on beside the retry.
 fn orphan(bench: &Bench) -> Result<String> {
-    let samples = bench.seconds(22);
-    let job = bench.job("orphan", "3", samples, 1, &[])?;
+    in_time(|name, times| orphan_in_time(bench, &format!("orphan_{name}"), times))
+}
+
+fn orphan_in_time(bench: &Bench, name: &str, times: u32) -> Result<Option<String>> {
+    let samples = times * bench.seconds(22);
+    let job = bench.job(name, "3", samples, 1, &[])?;
     submit(bench, &job)?;
     let node = bench.node_of(&job, 1, 1)?;
     bench.cluster.kill(&node)?;
@@ -114,16 +136,19 @@ fn orphan(bench: &Bench) -> Result<String> {
         .collect();
     // A machine that got faster meanwhile: the engine's second try found nothing to do.
     if engine.contains("render-1-1: done before") {
-        return Ok(format!(
+        return Ok(Some(format!(
             "{node} was given up, its orphan was done before the retry began, and the bytes are right"
-        ));
+        )));
+    }
+    if log().matches("===").count() < 2 {
+        return Ok(None);
     }
     if !engine.contains("rendering beside it") {
         return Err(format!("nobody rendered beside the orphan: {engine}"));
     }
-    Ok(format!(
+    Ok(Some(format!(
         "{node} was given up, its orphan and the retry rendered side by side, and the bytes are right"
-    ))
+    )))
 }
 
 /// A job is cancelled and submitted again.
