@@ -28,7 +28,7 @@ pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Pl
         profile,
     };
     let rest = workload.logic_seconds + workload.other_seconds;
-    let begin = groups(chosen);
+    let begin = chosen.groups();
     let limit = MARGIN * (rest + total(&model, &begin));
     let mut known = vec![chosen.clone()];
     let mut found = Vec::new();
@@ -52,11 +52,6 @@ pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Pl
     found
 }
 
-fn groups(plan: &Plan) -> Groups {
-    let kernels = plan.kernels.iter();
-    kernels.map(|k| (k.form, k.materials.clone())).collect()
-}
-
 /// What the search finds where some forms are not allowed, and the plans of strategies that the model can compare.
 fn other_forms(inputs: &PlanInputs<'_>, model: &Calibrated<'_>) -> Vec<Groups> {
     let without = [
@@ -73,7 +68,7 @@ fn other_forms(inputs: &PlanInputs<'_>, model: &Calibrated<'_>) -> Vec<Groups> {
         Automatic.search(&problem, model)
     });
     let strategies = Strategy::comparable().filter_map(|strategy| strategy.plan(inputs).ok());
-    let all = searched.chain(strategies.map(|plan| groups(&plan)));
+    let all = searched.chain(strategies.map(|plan| plan.groups()));
     all.filter(|groups| !groups.is_empty()).collect()
 }
 
@@ -178,7 +173,7 @@ mod tests {
             weights.launch *= if seed % 3 == 0 { 4.0 } else { 0.5 };
             weights.code *= if seed % 4 < 2 { 0.2 } else { 3.0 };
             let (model, rest) = (truth.model(), truth.workload.logic_seconds);
-            let takes = |plan: &Plan| rest + total(&model, &groups(plan));
+            let takes = |plan: &Plan| rest + total(&model, &plan.groups());
             let best = with_inputs(&truth, |inputs| takes(&chosen(inputs)));
             with_inputs(&case, |inputs| {
                 let first = chosen(inputs);
@@ -203,9 +198,9 @@ mod tests {
             let first = chosen(inputs);
             let model = case.model();
             let rest = case.workload.logic_seconds;
-            let limit = MARGIN * (rest + total(&model, &groups(&first)));
+            let limit = MARGIN * (rest + total(&model, &first.groups()));
             for plan in candidates(inputs, &first, 100) {
-                assert!(rest + total(&model, &groups(&plan)) <= limit);
+                assert!(rest + total(&model, &plan.groups()) <= limit);
             }
             let unknown = PlanInputs {
                 profile: None,

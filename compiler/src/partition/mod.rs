@@ -94,12 +94,16 @@ impl Plan {
         }
     }
 
-    /// Whether another has the same kernels, whatever they are called.
+    /// The form and the materials of each kernel, in its order.
+    pub fn groups(&self) -> Groups {
+        let kernels = self.kernels.iter();
+        kernels.map(|k| (k.form, k.materials.clone())).collect()
+    }
+
+    /// Whether another has the same kernels, whatever they are called and in whichever order they come.
     pub fn does_as(&self, other: &Self) -> bool {
         let kernels = |plan: &Self| {
-            let kernels = plan.kernels.iter();
-            let mut kernels: Vec<(Form, Vec<usize>)> =
-                kernels.map(|k| (k.form, k.materials.clone())).collect();
+            let mut kernels = plan.groups();
             kernels.sort();
             kernels
         };

@@ -198,12 +198,7 @@ impl Job {
     }
 }
 
-/// Whether two plans have the same kernels.
+/// Whether two plans have the same kernels in the same order, on which queues depend.
 fn does_the_same(a: &Plan, b: &Plan) -> bool {
-    let kernels = |plan: &Plan| {
-        let kernels = plan.kernels.iter();
-        let kernels: Vec<_> = kernels.map(|k| (k.form, k.materials.clone())).collect();
-        kernels
-    };
-    a.organisation == b.organisation && kernels(a) == kernels(b) && a.unused == b.unused
+    a.organisation == b.organisation && a.groups() == b.groups() && a.unused == b.unused
 }

@@ -124,11 +124,7 @@ pub fn explain(subject: &Subject) -> Result<Explanation, PlanError> {
             error.hint("`impasto render --strategy mega --report FILE` says what one takes")
         );
     }
-    let groups: Groups = plan
-        .kernels
-        .iter()
-        .map(|k| (k.form, k.materials.clone()))
-        .collect();
+    let groups = plan.groups();
     let seconds = total(model, &groups);
     let workload = model.workload;
     let name = |m: usize| names[m].clone();

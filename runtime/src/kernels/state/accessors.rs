@@ -52,8 +52,8 @@ pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> St
                 accessed += &store(u, &place);
             }
         }
-        let moving = holds && storage != Storage::Registers;
-        if holds && (moving || !accessed.is_empty()) {
+        // What moves is held even if no stage here asks for it.
+        if holds && (storage != Storage::Registers || !accessed.is_empty()) {
             let _ = writeln!(out, "var<private> {place}: vec4<u32>;");
         }
         out += &accessed;
@@ -88,12 +88,11 @@ fn moving(needs: Needs, stages: &[&Stage], layout: StateLayout) -> String {
     let moved = fields(needs).enumerate();
     for (region, field) in moved.filter(|(_, field)| moves(field, needs, stages)) {
         let (held, place) = (held(field), place(region, count, layout));
-        let condition = field.flag.map_or_else(String::new, |flag| {
-            format!("if (load_radiance(slot).flags & {flag}) != 0u ")
-        });
         let line = |to: &str, from: &str| match field.flag {
             None => format!("    {to} = {from};\n"),
-            Some(_) => format!("    {condition}{{ {to} = {from}; }}\n"),
+            Some(flag) => {
+                format!("    if (load_radiance(slot).flags & {flag}) != 0u {{ {to} = {from}; }}\n")
+            }
         };
         let is_loaded =
             |u: &Use| is_awaited(u, needs, stages) || stages.iter().any(|s| s.loads(u.name, needs));
