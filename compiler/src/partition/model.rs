@@ -220,18 +220,15 @@ impl Calibrated<'_> {
         };
         let all = density(members);
         let one = |m: &Member<'_>| {
-            let density = if form.diverges() {
+            let density = if self.workload.in_order && form != Form::Inline {
+                1.0
+            } else if form.diverges() {
                 all
             } else {
                 density(std::slice::from_ref(m))
             };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);
-            let density = if self.workload.in_order && form != Form::Inline {
-                1.0
-            } else {
-                density
-            };
             let scattered = weights.scatter * apart(density);
             m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
