@@ -6,6 +6,10 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
+from geometry import load_obj, transformed
+
 
 @dataclass
 class Impasto:
@@ -100,4 +104,68 @@ def bound_material(scene: dict, name: str, mtl: dict, impasto: Impasto) -> dict:
         raise SystemExit(f"nothing is bound to `{name}`")
     texts = {k: source_text(v, mtl.get(name, {})) for k, v in binding.get("params", {}).items()}
     texts = {k: v for k, v in texts.items() if v is not None}
-    return impasto.material(scene["base"] / binding["file"], binding.get("material"), texts)
+    file = binding["file"]
+    # A module of the library is no file.
+    file = Path(file) if file.startswith("std::") else scene["base"] / file
+    return impasto.material(file, binding.get("material"), texts)
+
+
+def meshes(scene: dict, impasto: Impasto):
+    """Every mesh of a scene: triangles in world space, and the material that is bound to them."""
+    loaded: dict[Path, tuple] = {}
+    for spec in scene["geometry"]:
+        path = scene["base"] / spec["obj"]
+        if path not in loaded:
+            parts, libraries = load_obj(path)
+            mtl = {}
+            for library in libraries:
+                mtl |= load_mtl(library)
+            loaded[path] = (parts, mtl)
+        parts, mtl = loaded[path]
+        places = spec.get("placements", [{}])
+        if isinstance(places, str) or "matrix" in spec or any("matrix" in place for place in places):
+            raise SystemExit(f"{path}: files of placements and matrices are not taken over")
+        for place in places:
+            for part, mesh in parts.items():
+                name = place.get("material", spec.get("material", part.split("\0")[0]))
+                placed = transformed(transformed(mesh, spec), place)
+                yield placed, bound_material(scene, name, mtl, impasto)
+
+
+def colour(value) -> list[float]:
+    """A color of a scene file, which may be one number."""
+    return [float(value)] * 3 if isinstance(value, (int, float)) else [float(x) for x in value]
+
+
+TRANSMISSIVE = {"smooth_dielectric", "dielectric"}
+
+GLOSSY = {"blinn_phong", "metal", "generalized_schlick", "coating"}
+"""Lobes of rough facets whose color is their own."""
+
+
+def alpha(lobe: dict) -> float:
+    """The roughness of a lobe as renderers' facets have it. Blinn-Phong's lobes are as wide as Beckmann's."""
+    given = arguments(lobe)
+    if lobe["bsdf"] == "blinn_phong":
+        return float(np.sqrt(2.0 / (given["exponent"] + 2.0)))
+    return given.get("roughness", 0.0) ** 2
+
+
+def arguments(lobe: dict) -> dict:
+    return {a["name"]: a["value"] for a in lobe["arguments"]}
+
+
+def share(lobe: dict) -> float:
+    """How much of white light a lobe sends back."""
+    return float(np.max(np.array(lobe["weight"]) * np.array(lobe["albedo"])))
+
+
+def picture_file(material: dict, scene: dict) -> Path | None:
+    """The picture of a material that reads exactly one."""
+    paths = [v for v in material["parameters"].values() if isinstance(v, str)]
+    if len(paths) != 1:
+        return None
+    for base in (scene["base"], Path(material["file"]).parent):
+        if (base / paths[0]).is_file():
+            return base / paths[0]
+    return None

@@ -1,9 +1,7 @@
 """How far two pictures are apart, beside their noise; and how noise falls with time."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
-import mitsuba as mi
 import numpy as np
 
 BLOCK = 8
@@ -12,12 +10,6 @@ so that a bias shows."""
 
 TOLERANCE = 0.01
 """Largest root mean square of relative differences that is taken for none."""
-
-
-def read(path: Path) -> np.ndarray:
-    """The linear RGB values of a picture."""
-    bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
-    return np.array(bitmap, dtype=np.float64)
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:
@@ -86,10 +78,8 @@ class Efficiency:
     samples: int
     mse: float
     relative_mse: float
-
-    def seconds_to(self, relative_mse: float) -> float:
-        """Time until the relative error is so small, which falls with the number of samples."""
-        return self.seconds * self.relative_mse / relative_mse
+    mean: float
+    """Of all pictures and channels."""
 
 
 def efficiency(pictures: list[np.ndarray], seconds: list[float], samples: int) -> Efficiency:
@@ -114,4 +104,5 @@ def efficiency(pictures: list[np.ndarray], seconds: list[float], samples: int) -
         samples=samples,
         mse=float(np.mean(mse)),
         relative_mse=float(np.mean(relative)),
+        mean=float(total.mean() / n),
     )

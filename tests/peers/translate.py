@@ -6,8 +6,8 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 
-from geometry import load_obj, transformed, write_ply
-from impasto import Impasto, bound_material, load_mtl
+from geometry import write_ply
+from impasto import GLOSSY, TRANSMISSIVE, Impasto, alpha, arguments, colour, meshes, picture_file, share
 
 NEAREST = """Each material becomes its lobes at one point, seen from 37 degrees: patterns, noise and
 flakes become constants; a picture on a diffuse lobe stays. Layered lobes become a `blendbsdf`
@@ -54,28 +54,6 @@ def load(dictionary: dict) -> "mi.Scene":
     return mi.load_dict({k: v for k, v in dictionary.items() if not k.startswith("_")})
 
 
-def meshes(scene: dict, impasto: Impasto):
-    """Every mesh of a scene: triangles in world space, and the material that is bound to them."""
-    loaded: dict[Path, tuple] = {}
-    for spec in scene["geometry"]:
-        path = scene["base"] / spec["obj"]
-        if path not in loaded:
-            parts, libraries = load_obj(path)
-            mtl = {}
-            for library in libraries:
-                mtl |= load_mtl(library)
-            loaded[path] = (parts, mtl)
-        parts, mtl = loaded[path]
-        places = spec.get("placements", [{}])
-        if isinstance(places, str) or "matrix" in spec or any("matrix" in place for place in places):
-            raise SystemExit(f"{path}: files of placements and matrices are not taken over")
-        for place in places:
-            for part, mesh in parts.items():
-                name = place.get("material", spec.get("material", part.split("\0")[0]))
-                placed = transformed(transformed(mesh, spec), place)
-                yield placed, bound_material(scene, name, mtl, impasto)
-
-
 def rgb(value) -> dict:
     return {"type": "rgb", "value": [float(x) for x in value]}
 
@@ -112,10 +90,6 @@ def camera(spec: dict, width: int, height: int) -> dict:
     return out
 
 
-def colour(value) -> list[float]:
-    return [float(value)] * 3 if isinstance(value, (int, float)) else [float(x) for x in value]
-
-
 def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
     """The shapes and emitters of a light; `center` and `reach` are of the geometry."""
     if spec["kind"] == "quad":
@@ -129,8 +103,7 @@ def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
         gap = 1e-4 * max(np.linalg.norm(u), np.linalg.norm(v))
         normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
         return [
-            rectangle(corner + side * gap * normal, *edges, radiance)
-            for side, edges in [(1, (u, v)), (-1, (v, u))]
+            rectangle(corner + side * gap * normal, *edges, radiance) for side, edges in [(1, (u, v)), (-1, (v, u))]
         ]
     to_light = np.array(spec["to_light"], float)
     to_light /= np.linalg.norm(to_light)
@@ -226,32 +199,26 @@ def bsdf(material: dict, scene: dict) -> dict:
     return {"type": "twosided", "nested": result}
 
 
-def share(lobe: dict) -> float:
-    return float(np.max(np.array(lobe["weight"]) * np.array(lobe["albedo"])))
-
-
 NEARLY_SMOOTH = 0.01
 """The alpha of mirrors that are part of a blend."""
-
-TRANSMISSIVE = {"smooth_dielectric", "dielectric"}
 
 
 def plain(lobe: dict, color: np.ndarray, material: dict, scene: dict) -> dict:
     """One lobe, whose light is multiplied by `color`."""
     kind = lobe["bsdf"]
-    given = {a["name"]: a["value"] for a in lobe["arguments"]}
+    given = arguments(lobe)
     if kind in ("smooth_dielectric", "dielectric"):
         out = {"type": "dielectric", "int_ior": given["ior"], "ext_ior": 1.0}
         if "tint" in given:
             out["specular_transmittance"] = rgb(given["tint"])
         if kind == "dielectric" and given["roughness"] > 0:
-            out |= {"type": "roughdielectric", "distribution": "ggx", "alpha": given["roughness"] ** 2}
+            out |= {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha(lobe)}
         return out
     if kind in ("conductor", "single_conductor"):
         return {
             "type": "roughconductor",
             "distribution": "ggx",
-            "alpha": given["roughness"] ** 2,
+            "alpha": alpha(lobe),
             "eta": rgb(given["ior"]),
             "k": rgb(given["extinction"]),
             "specular_reflectance": rgb(np.minimum(color, 1.0)),
@@ -259,24 +226,17 @@ def plain(lobe: dict, color: np.ndarray, material: dict, scene: dict) -> dict:
     albedo = np.minimum(color * np.array(lobe["albedo"]), 1.0)
     if kind in ("specular", "mirror", "smooth_conductor"):
         return {"type": "conductor", "material": "none", "specular_reflectance": rgb(albedo)}
-    if kind in ("blinn_phong", "metal", "generalized_schlick"):
-        alpha = np.sqrt(2.0 / (given["exponent"] + 2.0)) if "exponent" in given else given["roughness"] ** 2
+    if kind in GLOSSY:
         return {
             "type": "roughconductor",
-            "distribution": "beckmann" if "exponent" in given else "ggx",
+            "distribution": "beckmann" if kind == "blinn_phong" else "ggx",
             "material": "none",
-            "alpha": float(alpha),
+            "alpha": max(alpha(lobe), 1e-3),
             "specular_reflectance": rgb(albedo),
         }
     return {"type": "diffuse", "reflectance": picture(material, scene) or rgb(albedo)}
 
 
 def picture(material: dict, scene: dict) -> dict | None:
-    """The picture of a material that reads exactly one."""
-    paths = [v for v in material["parameters"].values() if isinstance(v, str)]
-    if len(paths) != 1:
-        return None
-    for base in (scene["base"], Path(material["file"]).parent):
-        if (base / paths[0]).is_file():
-            return {"type": "bitmap", "filename": str(base / paths[0]), "wrap_mode": "repeat"}
-    return None
+    path = picture_file(material, scene)
+    return path and {"type": "bitmap", "filename": str(path), "wrap_mode": "repeat"}
