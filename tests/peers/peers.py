@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Impasto beside Mitsuba 3 (README.md says how to run it).
+"""Impasto beside Mitsuba 3 and Blender's Cycles (README.md says how to run it).
 
-`compare` renders scenes of plain BSDFs with both and asks whether the pictures are the
-same but for noise. `race` renders scenes with both on one GPU and writes how fast
+`compare` renders scenes of plain BSDFs with Impasto and Mitsuba and asks whether the pictures are the
+same but for noise. `race` renders scenes with Impasto and either of the two on one GPU and writes how fast
 they are, and how long they take to equal error.
 """
 
@@ -32,7 +32,9 @@ def main() -> int:
     racing.add_argument("--pictures", type=int, default=6, help="pictures with seeds of their own")
     racing.add_argument("--option", action="append", default=[], help="for `impasto render`, repeatable")
     racing.add_argument("--out", type=Path, default=Path("peers"), help="writes OUT.json and OUT.md")
-    racing.add_argument("--peer", choices=["mitsuba"], default="mitsuba")
+    racing.add_argument("--peer", choices=["mitsuba", "cycles"], default="mitsuba")
+    racing.add_argument("--cycles", default="python3.11", help="a Python that has bpy [python3.11]")
+    racing.add_argument("--cycles-device", default="CUDA", help="CUDA, OPTIX, HIP or CPU [CUDA]")
     racing.add_argument("--mode", action="append", help="of the peer, repeatable [all that README.md names]")
     for command in (comparing, racing):
         command.add_argument("--impasto", default=str(ROOT / "target/release/impasto"), help="the command")

@@ -21,7 +21,7 @@ EQUAL_ERROR = 0.01
 
 def race(args: Namespace) -> int:
     impasto = Impasto(args.impasto)
-    peer = {"mitsuba": Mitsuba}[args.peer](args)
+    peer = {"mitsuba": Mitsuba, "cycles": Cycles}[args.peer](args)
     if unknown := set(peer.modes) - set(peer.all_modes):
         raise SystemExit(f"modes are {', '.join(peer.all_modes)}, not {', '.join(unknown)}")
     results = []
@@ -85,6 +85,34 @@ class Mitsuba:
             yield mode, lambda mode=mode: asdict(time_mitsuba(loaded, mode, self.args))
 
 
+class Cycles:
+    def __init__(self, args: Namespace):
+        from blender import MODES, NEAREST
+
+        self.all_modes = tuple(MODES)
+        self.args, self.modes, self.nearest = args, args.mode or self.all_modes, NEAREST
+        self.facts = {"cycles_device": args.cycles_device}
+
+    @property
+    def title(self) -> str:
+        return f"Cycles of Blender {self.facts.get('blender', '')} (`{self.args.cycles_device}`)"
+
+    def timed(self, scene: dict, impasto: Impasto, size: tuple[int, int]) -> Timed:
+        from blender import time_cycles, translate
+
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            job = translate(scene, impasto, size, folder)
+
+            def one(mode: str) -> dict:
+                found, facts = time_cycles(job, folder, mode, self.args)
+                self.facts["blender"] = facts["version"]
+                return asdict(found) | {"devices": facts["devices"], "times": facts["times"]}
+
+            for mode in self.modes:
+                yield mode, lambda mode=mode: one(mode)
+
+
 def time_mitsuba(scene, mode: str, args: Namespace) -> Efficiency:
     """Time is of a picture that was rendered before, so that kernels are compiled, from the call until
     the device is idle. A wavefront evaluates its loops step by step, a megakernel records them."""
@@ -120,7 +148,7 @@ def time_mitsuba(scene, mode: str, args: Namespace) -> Efficiency:
 # ---- Results -------------------------------------------------------------------------------------
 
 
-def write_results(args: Namespace, peer: Mitsuba, results: list[dict]) -> None:
+def write_results(args: Namespace, peer: Mitsuba | Cycles, results: list[dict]) -> None:
     facts = peer.facts | {"spp": args.spp, "options": args.option}
     text = json.dumps(facts | {"equal_error": EQUAL_ERROR, "scenes": results}, indent=2)
     args.out.with_suffix(".json").write_text(text + "\n")
