@@ -22,12 +22,12 @@ stays."""
 
 MODES = {
     "plain": {},
-    "light_tree": {"use_light_tree": True},
     "spatial_splits": {"debug_use_spatial_splits": True},
     "late_roulette": {"min_light_bounces": 7},
+    "light_tree": {"use_light_tree": True},
 }
 """What may make Cycles faster or less noisy and keeps it unbiased: properties of `scene.cycles`. Cycles plays roulette
-from the first bounce on; `late_roulette` is about what Impasto and Mitsuba do unless a scene says otherwise."""
+from the start; `late_roulette` is about what Impasto and Mitsuba do unless a scene says otherwise."""
 
 
 def time_cycles(job: dict, folder: Path, mode: str, args) -> tuple[Efficiency, dict]:

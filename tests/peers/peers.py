@@ -32,6 +32,7 @@ def main() -> int:
     racing.add_argument("--pictures", type=int, default=6, help="pictures with seeds of their own")
     racing.add_argument("--option", action="append", default=[], help="for `impasto render`, repeatable")
     racing.add_argument("--out", type=Path, default=Path("peers"), help="writes OUT.json and OUT.md")
+    racing.add_argument("--add", action="store_true", help="keep the other scenes of OUT.json")
     racing.add_argument("--peer", choices=["mitsuba", "cycles"], default="mitsuba")
     racing.add_argument("--cycles", default="python3.11", help="a Python that has bpy [python3.11]")
     racing.add_argument("--cycles-device", default="CUDA", help="CUDA, OPTIX, HIP or CPU [CUDA]")

@@ -24,12 +24,13 @@ def race(args: Namespace) -> int:
     peer = {"mitsuba": Mitsuba, "cycles": Cycles}[args.peer](args)
     if unknown := set(peer.modes) - set(peer.all_modes):
         raise SystemExit(f"modes are {', '.join(peer.all_modes)}, not {', '.join(unknown)}")
-    results = []
+    results = kept_results(args)
     for path in args.scenes:
         scene = load_scene(path)
         film = scene["film"]
         size = args.size or (film["width"], film["height"])
         name = scene.get("name", path.parent.name)
+        results = [entry for entry in results if entry["scene"] != name]
         print(f"{name}: impasto", file=sys.stderr, flush=True)
         ours, device = time_impasto(impasto, path, size, args)
         entry = {"scene": name, "width": size[0], "height": size[1], "device": device, "impasto": asdict(ours)}
@@ -43,6 +44,12 @@ def race(args: Namespace) -> int:
             write_results(args, peer, results)
     print(args.out.with_suffix(".md").read_text())
     return 0
+
+
+def kept_results(args: Namespace) -> list[dict]:
+    """The scenes of an earlier race, to which this one adds."""
+    before = args.out.with_suffix(".json")
+    return json.loads(before.read_text())["scenes"] if args.add and before.is_file() else []
 
 
 def time_impasto(impasto: Impasto, path: Path, size: tuple[int, int], args: Namespace) -> tuple[Efficiency, str]:
@@ -165,7 +172,7 @@ def write_results(args: Namespace, peer: Mitsuba | Cycles, results: list[dict]) 
     for entry in results:
         rows = {"Impasto": entry["impasto"]}
         rows |= {f"{label}, {words(m)}": entry[f"{args.peer}_{m}"] for m in peer.modes if f"{args.peer}_{m}" in entry}
-        best = max((row["mpaths_per_second"] for name, row in rows.items() if name != "Impasto"), default=float("nan"))
+        best = max((row["mpaths_per_second"] for row in list(rows.values())[1:]), default=float("nan"))
         for name, row in rows.items():
             lines.append(f"| {entry['scene']} | {name} | {cells(row, best, entry['impasto']['mean'])} |")
         for mode in peer.modes:
