@@ -3,14 +3,13 @@ gives. What differs is named by `NEAREST`."""
 
 import json
 import subprocess
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 import exr
 from geometry import Mesh
-from impasto import GLOSSY, TRANSMISSIVE, Impasto, alpha, arguments, colour, meshes, picture_file, share
+from impasto import GLOSSY, TRANSMISSIVE, Impasto, alpha, arguments, colour, meshes, picture_file, principled, share
 from measure import Efficiency, efficiency
 
 RENDER = Path(__file__).resolve().parent / "cycles_render.py"
@@ -204,8 +203,15 @@ def nodes(lobes: list[dict]) -> list[dict]:
     clear = [lobe for lobe in lobes if lobe["bsdf"] in TRANSMISSIVE]
     if clear:
         return [plain(clear[0], np.ones(3))]
-    if [lobe["bsdf"] for lobe in lobes] in (["coating", "oren_nayar_diffuse"], ["coating", "diffuse"]):
-        return [principled(*lobes)]
+    if model := principled(lobes):
+        inputs = {
+            "Base Color": rgba(model["color"]),
+            "Roughness": model["roughness"],
+            "IOR": model["ior"],
+            "Specular Tint": rgba(model["tint"]),
+            "Diffuse Roughness": model["diffuse_roughness"],
+        }
+        return [{"node": "ShaderNodeBsdfPrincipled", "color": "Base Color", "inputs": inputs}]
     shares = [share(lobe) for lobe in lobes]
     total = sum(shares)
     return [
@@ -213,23 +219,6 @@ def nodes(lobes: list[dict]) -> list[dict]:
         for lobe, s in zip(lobes, shares, strict=True)
         if s > 1e-4
     ]
-
-
-def principled(gloss: dict, ground: dict) -> dict:
-    """A gloss over a diffuse lobe, whose color is what it has where the gloss lets all light through."""
-    passed = 1.0 - np.array(gloss["weight"]) * np.array(gloss["albedo"])
-    above, below = arguments(gloss), arguments(ground)
-    return {
-        "node": "ShaderNodeBsdfPrincipled",
-        "color": "Base Color",
-        "inputs": {
-            "Base Color": rgba(np.array(ground["weight"]) * np.array(ground["albedo"]) / passed),
-            "Roughness": above["roughness"],
-            "IOR": above["ior"],
-            "Specular Tint": rgba(above["tint"]),
-            "Diffuse Roughness": below.get("roughness", 0.0),
-        },
-    }
 
 
 def plain(lobe: dict, weight: np.ndarray) -> dict:

@@ -160,6 +160,23 @@ def share(lobe: dict) -> float:
     return float(np.max(np.array(lobe["weight"]) * np.array(lobe["albedo"])))
 
 
+def principled(lobes: list[dict]) -> dict | None:
+    """The inputs of a principled model, where lobes are a gloss over a diffuse one as OpenPBR has them. `color` is what
+    the diffuse lobe has where the gloss lets all light through."""
+    if [lobe["bsdf"] for lobe in lobes] not in (["coating", "oren_nayar_diffuse"], ["coating", "diffuse"]):
+        return None
+    gloss, ground = lobes
+    passed = 1.0 - np.array(gloss["weight"]) * np.array(gloss["albedo"])
+    above = arguments(gloss)
+    return {
+        "color": np.array(ground["weight"]) * np.array(ground["albedo"]) / passed,
+        "roughness": above["roughness"],
+        "ior": above["ior"],
+        "tint": above["tint"],
+        "diffuse_roughness": arguments(ground).get("roughness", 0.0),
+    }
+
+
 def picture_file(material: dict, scene: dict) -> Path | None:
     """The picture of a material that reads exactly one."""
     paths = [v for v in material["parameters"].values() if isinstance(v, str)]

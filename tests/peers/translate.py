@@ -7,11 +7,12 @@ import mitsuba as mi
 import numpy as np
 
 from geometry import write_ply
-from impasto import GLOSSY, TRANSMISSIVE, Impasto, alpha, arguments, colour, meshes, picture_file, share
+from impasto import GLOSSY, TRANSMISSIVE, Impasto, alpha, arguments, colour, meshes, picture_file, principled, share
 
 NEAREST = """Each material becomes its lobes at one point, seen from 37 degrees: patterns, noise and
-flakes become constants; a picture on a diffuse lobe stays. Layered lobes become a `blendbsdf`
-weighted by their shares. Blinn-Phong lobes become rough conductors of the same width."""
+flakes become constants; a picture on a diffuse lobe stays. A gloss over a diffuse lobe, as OpenPBR has it,
+becomes `principled`. Other layered lobes become a `blendbsdf` weighted by their shares. Blinn-Phong lobes
+become rough conductors of the same width."""
 
 
 def translate(scene: dict, impasto: Impasto, size: tuple[int, int] | None = None) -> dict:
@@ -98,8 +99,8 @@ def lights(spec: dict, center: np.ndarray, reach: float) -> list[dict]:
         radiance = colour(spec["radiance"])
         if not spec.get("two_sided"):
             return [rectangle(corner, u, v, radiance)]
-        # Mitsuba's rectangles emit from one side. Two in the same place would be hit from behind as often as from the front,
-        # and be black there, so each lies a little before the other's back.
+        # Mitsuba's rectangles emit from one side. Two in the same place would be hit from behind as often as from
+        # the front, and be black there, so each lies a little before the other's back.
         gap = 1e-4 * max(np.linalg.norm(u), np.linalg.norm(v))
         normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
         return [
@@ -182,6 +183,10 @@ def bsdf(material: dict, scene: dict) -> dict:
     for lobe, _ in lobes:
         if lobe["bsdf"] in TRANSMISSIVE:
             return plain(lobe, np.ones(3), material, scene)
+    if model := principled(material["lobes"]):
+        color = picture(material, scene) or rgb(model["color"])
+        nested = {"type": "principled", "base_color": color, "roughness": model["roughness"], "eta": model["ior"]}
+        return {"type": "twosided", "nested": nested}
     total = sum(s for _, s in lobes)
     result, covered = None, 0.0
     for lobe, s in lobes:
