@@ -65,7 +65,7 @@ fn other_forms(inputs: &PlanInputs<'_>, model: &Calibrated<'_>) -> Vec<Groups> {
     let searched = without.into_iter().map(|without| {
         let mut problem = inputs.problem();
         problem.forms.retain(|form| !without.contains(form));
-        Automatic.search(&problem, model)
+        Automatic.search(&problem, &model.prepared())
     });
     let strategies = Strategy::comparable().filter_map(|strategy| strategy.plan(inputs).ok());
     let all = searched.chain(strategies.map(|plan| plan.groups()));

@@ -47,7 +47,7 @@ enum Queues {
 }
 
 /// Every form, in the order of the enum.
-const FORMS: [FormRow; 4] = [
+const FORMS: [FormRow; Form::COUNT] = [
     FormRow {
         form: Form::Own,
         name: "own",
@@ -79,6 +79,9 @@ const FORMS: [FormRow; 4] = [
 ];
 
 impl Form {
+    /// How many forms there are.
+    pub(super) const COUNT: usize = 4;
+
     /// Every form.
     pub fn all() -> impl DoubleEndedIterator<Item = Form> {
         FORMS.iter().map(|row| row.form)

@@ -89,10 +89,31 @@ impl TimeModel for Calibrated<'_> {
     }
 }
 
+/// What is asked of many kernels: all that does not depend on the other members of a kernel is worked
+/// out once. Its answers are those of [`Calibrated`] to the last bit.
+pub(super) struct Prepared<'a> {
+    model: Calibrated<'a>,
+    /// Each material of the workload, evaluated alone.
+    alone: Vec<Member<'a>>,
+}
+
+impl TimeModel for Prepared<'_> {
+    fn seconds(&self, form: Form, members: &[usize]) -> f64 {
+        let alone = |m: &usize| self.alone.get(*m).copied();
+        let members = self.model.together(form, members.iter().filter_map(alone));
+        self.model.prediction(form, &members).weighed()
+    }
+}
+
 /// A member of a kernel: its cost and hits, and how they fall into subgroups.
+#[derive(Clone, Copy)]
 struct Member<'a> {
     cost: Option<&'a Cost>,
     hits: &'a Hits,
+    /// Those of its hits.
+    draws: f64,
+    /// How much of a line of memory each hit reads for itself where the kernel works on these hits alone.
+    apart: f64,
     /// Hits in an iteration.
     count: f64,
     /// Subgroups that evaluate it.
@@ -108,16 +129,28 @@ struct Member<'a> {
 impl Calibrated<'_> {
     /// The seconds of a kernel, in parts.
     pub fn predict(&self, form: Form, members: &[usize]) -> Prediction {
+        self.prediction(form, &self.members(form, members))
+    }
+
+    /// The same model for a search.
+    pub(super) fn prepared(&self) -> Prepared<'_> {
+        let all = 0..self.workload.materials.len();
+        Prepared {
+            model: *self,
+            alone: all.filter_map(|m| self.alone(m)).collect(),
+        }
+    }
+
+    fn prediction(&self, form: Form, members: &[Member<'_>]) -> Prediction {
         let weights = &self.profile.weights;
-        let members = self.members(form, members);
-        let crowding = self.crowding(form, &members);
-        let issue = crowding * self.issue(&members);
-        let memory = self.memory(form, &members);
-        let latency = crowding * weights.latency * longest(form, &members);
+        let crowding = self.crowding(form, members);
+        let issue = crowding * self.issue(members);
+        let memory = self.memory(form, members);
+        let latency = crowding * weights.latency * longest(form, members);
         let k = weights.overlap.max(1.0);
         let busy = norm([issue, memory, latency], k);
         let (launch, logic) = match form {
-            Form::Inline => (0.0, self.logic(&members)),
+            Form::Inline => (0.0, self.logic(members)),
             _ => (weights.launch, 0.0),
         };
         let total = launch + busy + logic;
@@ -144,52 +177,66 @@ impl Calibrated<'_> {
     }
 
     fn members(&self, form: Form, members: &[usize]) -> Vec<Member<'_>> {
-        let hits = |m: &usize| self.workload.materials.get(*m);
-        // Inline materials are met by the subgroups of the logic kernel, which has work for all slots.
-        let side_by_side = match (form.diverges(), form.has_queue()) {
-            (false, _) => None,
-            (true, true) => Some(members.iter().filter_map(hits).map(|h| h.share).sum()),
-            (true, false) => Some(1.0),
-        };
-        let member = |m: &usize| {
-            let hits = hits(m)?;
-            let cost = self.costs.get(*m).and_then(Option::as_ref);
-            Some(self.member(cost, hits, side_by_side))
-        };
-        members.iter().filter_map(member).collect()
+        self.together(form, members.iter().filter_map(|m| self.alone(*m)))
     }
 
-    /// A member of a kernel that evaluates it alone, or beside others that together are hit by
-    /// `side_by_side` of the slots.
-    fn member<'a>(
-        &self,
-        cost: Option<&'a Cost>,
-        hits: &'a Hits,
-        side_by_side: Option<f64>,
-    ) -> Member<'a> {
+    /// A material in a kernel that evaluates it alone.
+    fn alone(&self, material: usize) -> Option<Member<'_>> {
+        let hits = self.workload.materials.get(material)?;
+        let cost = self.costs.get(material).and_then(Option::as_ref);
         let width = f64::from(self.profile.subgroup.max(1));
-        let pool = f64::from(self.workload.pool);
-        let count = pool * hits.share;
-        let (subgroups, lanes, present) = match side_by_side {
-            None => (count / width, width, 1.0),
-            Some(all) => {
-                let all = all.max(f64::MIN_POSITIVE);
-                let draws = (hits.draws() * width / f64::from(BLOCK)).max(1.0);
-                let present = 1.0 - (1.0 - (hits.share / all).min(1.0)).powf(draws);
-                let subgroups = pool * all / width * present;
-                let lanes = count / subgroups.max(f64::MIN_POSITIVE);
-                (subgroups, lanes.clamp(1.0, width), present)
-            }
-        };
-        Member {
+        let count = f64::from(self.workload.pool) * hits.share;
+        let mut member = Member {
             cost,
             hits,
+            draws: hits.draws(),
+            apart: 0.0,
             count,
-            subgroups,
-            lanes,
-            present,
-            issued: cost.map(|c| c.issued_by(lanes)).unwrap_or_default(),
+            subgroups: count / width,
+            lanes: width,
+            present: 1.0,
+            issued: cost.map(|c| c.issued_by(width)).unwrap_or_default(),
+        };
+        member.apart = apart(density(std::slice::from_ref(&member)));
+        Some(member)
+    }
+
+    /// Materials in one kernel of `form`.
+    fn together<'a>(
+        &self,
+        form: Form,
+        members: impl Iterator<Item = Member<'a>>,
+    ) -> Vec<Member<'a>> {
+        let mut members: Vec<Member<'_>> = members.collect();
+        if form.diverges() {
+            // Inline materials are met by the subgroups of the logic kernel, which has work for all slots.
+            let all = if form.has_queue() {
+                members.iter().map(|m| m.hits.share).sum()
+            } else {
+                1.0
+            };
+            for member in &mut members {
+                self.put_beside(member, all);
+            }
         }
+        members
+    }
+
+    /// Puts a member beside others that together are hit by `all` of the slots.
+    fn put_beside(&self, member: &mut Member<'_>, all: f64) {
+        let width = f64::from(self.profile.subgroup.max(1));
+        let all: f64 = all.max(f64::MIN_POSITIVE);
+        let draws = (member.draws * width / f64::from(BLOCK)).max(1.0);
+        let present = 1.0 - (1.0 - (member.hits.share / all).min(1.0)).powf(draws);
+        let subgroups = f64::from(self.workload.pool) * all / width * present;
+        let lanes = member.count / subgroups.max(f64::MIN_POSITIVE);
+        member.present = present;
+        member.subgroups = subgroups;
+        member.lanes = lanes.clamp(1.0, width);
+        member.issued = member
+            .cost
+            .map(|c| c.issued_by(member.lanes))
+            .unwrap_or_default();
     }
 
     /// Seconds in which all subgroups issue their operations, if their code is at hand.
@@ -218,18 +265,16 @@ impl Calibrated<'_> {
             Form::Inline => weights.inline_loads,
             _ => 1.0,
         };
-        let all = density(members);
+        // The same for all members, unless each has a queue of its own.
+        let shared = if self.workload.in_order && form != Form::Inline {
+            Some(0.0)
+        } else {
+            form.diverges().then(|| apart(density(members)))
+        };
         let one = |m: &Member<'_>| {
-            let density = if self.workload.in_order && form != Form::Inline {
-                1.0
-            } else if form.diverges() {
-                all
-            } else {
-                density(std::slice::from_ref(m))
-            };
             let state = loads * m.hits.loads + m.hits.stores;
             let own = m.cost.map_or(0.0, |cost| cost.bytes);
-            let scattered = weights.scatter * apart(density);
+            let scattered = weights.scatter * shared.unwrap_or(m.apart);
             m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
         members.iter().map(one).sum()
@@ -261,7 +306,7 @@ fn longest(form: Form, members: &[Member<'_>]) -> f64 {
 fn density(members: &[Member<'_>]) -> f64 {
     let share: f64 = members.iter().map(|m| m.hits.share).sum();
     let share = share.clamp(f64::MIN_POSITIVE, 1.0);
-    let draws: f64 = members.iter().map(|m| m.hits.share * m.hits.draws()).sum();
+    let draws: f64 = members.iter().map(|m| m.hits.share * m.draws).sum();
     let present = 1.0 - (1.0 - share).powf((draws / share).max(1.0));
     (share / present.max(f64::MIN_POSITIVE)).min(1.0)
 }
@@ -470,6 +515,30 @@ mod tests {
         assert_eq!(own.weighed(), own.total);
         assert_eq!(found.launch, 0.0);
         near(predicted(Form::Inline, &[1], 1).logic, 1e-4 * 0.2 * 0.1);
+    }
+
+    #[test]
+    fn what_a_search_asks_is_the_model_to_the_last_bit() {
+        let costs = [cost(80, 3000, [ISSUED; LANES.len()]), None];
+        let profile = profile();
+        for (draws, in_order) in [(1, false), (32, false), (32, true)] {
+            let workload = Workload {
+                in_order,
+                ..workload(draws)
+            };
+            let model = Calibrated {
+                costs: &costs,
+                workload: &workload,
+                profile: &profile,
+            };
+            for form in Form::all() {
+                for members in [&[0][..], &[1], &[0, 1]] {
+                    let [a, b] = [&model as &dyn TimeModel, &model.prepared()]
+                        .map(|model| model.seconds(form, members).to_bits());
+                    assert_eq!(a, b, "{form:?} {members:?}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -17,6 +17,7 @@
 
 use super::super::{Form, TimeModel};
 use super::moves::{Moves, State};
+use super::remembered::Remembered;
 use super::{Groups, Problem, Search, better, total};
 
 /// The heuristic search.
@@ -42,6 +43,7 @@ impl Default for Heuristic {
 
 impl Search for Heuristic {
     fn search(&self, problem: &Problem, model: &dyn TimeModel) -> Groups {
+        let model = &Remembered::new(model);
         let mut found = Found::default();
         for groups in uniform(problem) {
             found.offer(model, groups);

@@ -11,6 +11,7 @@
 mod exact;
 mod heuristic;
 mod moves;
+mod remembered;
 
 pub use exact::Exact;
 pub use heuristic::Heuristic;

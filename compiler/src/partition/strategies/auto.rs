@@ -15,5 +15,6 @@ impl Strategy {
 }
 
 fn groups(request: &Request<'_>, model: &Calibrated<'_>) -> Groups {
-    Automatic.search(&Problem::new(request.materials.iter().copied()), model)
+    let problem = Problem::new(request.materials.iter().copied());
+    Automatic.search(&problem, &model.prepared())
 }
