@@ -3,8 +3,9 @@
 //! Every token, node and IR expression carries a [`Span`], so that a diagnostic,
 //! a WGSL comment or a cost can name the line it comes from.
 
+use std::borrow::Cow;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 mod origin;
 
@@ -88,8 +89,9 @@ pub struct SourceFile {
     /// The path as the user gave it, or `std::bsdf/diffuse.impasto` for the standard library.
     pub name: String,
     /// The text.
-    pub text: String,
-    line_starts: Vec<u32>,
+    pub text: Cow<'static, str>,
+    /// Found when something asks for a line: of most files, nothing does.
+    line_starts: OnceLock<Vec<u32>>,
     /// What it was made from, and the id of the first document of that.
     made_from: Option<(Arc<Origin>, FileId)>,
 }
@@ -104,9 +106,16 @@ pub struct Written<'s> {
 }
 
 impl SourceFile {
+    fn line_starts(&self) -> &[u32] {
+        self.line_starts.get_or_init(|| {
+            let newlines = self.text.match_indices('\n').map(|(i, _)| i as u32 + 1);
+            std::iter::once(0).chain(newlines).collect()
+        })
+    }
+
     /// The line, from 0, that byte `at` is in; the last one behind the end.
     pub fn line_index(&self, at: usize) -> usize {
-        self.line_starts
+        self.line_starts()
             .partition_point(|&start| start as usize <= at)
             .saturating_sub(1)
     }
@@ -114,7 +123,7 @@ impl SourceFile {
     /// The bytes of a line, counted from 0, with its line break; empty behind the last line.
     pub fn line_range(&self, line: usize) -> Range<usize> {
         let start = |line: usize| {
-            let start = self.line_starts.get(line);
+            let start = self.line_starts().get(line);
             start.map_or(self.text.len(), |&start| start as usize)
         };
         start(line)..start(line + 1)
@@ -130,14 +139,19 @@ pub struct SourceMap {
 impl SourceMap {
     /// Adds a text and returns its id.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
-        let text = text.into();
-        // By words at a time: it goes through the whole library whatever is compiled.
-        let newlines = text.match_indices('\n').map(|(i, _)| i as u32 + 1);
-        let line_starts = std::iter::once(0).chain(newlines).collect();
+        self.add_text(name.into(), Cow::Owned(text.into()))
+    }
+
+    /// Adds a text of the library, without a copy of it.
+    pub(crate) fn add_library(&mut self, name: String, text: &'static str) -> FileId {
+        self.add_text(name, Cow::Borrowed(text))
+    }
+
+    fn add_text(&mut self, name: String, text: Cow<'static, str>) -> FileId {
         self.files.push(SourceFile {
-            name: name.into(),
+            name,
             text,
-            line_starts,
+            line_starts: OnceLock::new(),
             made_from: None,
         });
         FileId(self.files.len() as u32 - 1)
@@ -214,11 +228,9 @@ impl SourceMap {
     /// Line and column of the start of `span`, both from 1; columns count characters.
     pub fn line_column(&self, span: Span) -> (usize, usize) {
         let file = self.file(span.file);
-        let line = file
-            .line_starts
-            .partition_point(|&s| s <= span.start)
-            .max(1);
-        let start = file.line_starts[line - 1] as usize;
+        let line_starts = file.line_starts();
+        let line = line_starts.partition_point(|&s| s <= span.start).max(1);
+        let start = line_starts[line - 1] as usize;
         let end = (span.start as usize).min(file.text.len());
         let column = file.text.get(start..end).map_or(0, |s| s.chars().count()) + 1;
         (line, column)

@@ -60,7 +60,7 @@ impl Written {
     ) {
         let value = param.value.clone();
         // Escapes are the one way in which a text is not what the scene says.
-        let within = self.text[value.clone()].find(sources.file(snippet).text.as_str());
+        let within = self.text[value.clone()].find(&*sources.file(snippet).text);
         for diagnostic in diagnostics {
             if within.is_none() {
                 // What would be changed is not what the scene says.

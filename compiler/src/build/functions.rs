@@ -65,7 +65,8 @@ impl Functions {
         }
         // Callees stand before their callers.
         for id in found {
-            let mut f = self.module.functions[id.index()].clone();
+            // Nothing that it calls leads back to it.
+            let mut f = take(&mut self.module.functions[id.index()]);
             let run = if self.in_callees < MOST_COPIED {
                 passes::run_callee
             } else {
@@ -105,6 +106,20 @@ impl Functions {
         size.longest = size.longest.max(own);
         size
     }
+}
+
+/// Takes the code of a function, which leaves one that does nothing.
+fn take(f: &mut Function) -> Function {
+    let nothing = Function {
+        name: String::new(),
+        params: Vec::new(),
+        locals: Vec::new(),
+        exprs: Vec::new(),
+        body: Block::new(),
+        sites: Vec::new(),
+        ..*f
+    };
+    std::mem::replace(f, nothing)
 }
 
 /// Assignments of a block.

@@ -28,7 +28,8 @@ impl Builder {
             params,
             result: Type::Float,
             locals: Vec::new(),
-            exprs: Vec::new(),
+            // Few functions have fewer.
+            exprs: Vec::with_capacity(8),
             body: Vec::new(),
             value: ExprId(0),
             turns: 1,
@@ -172,11 +173,15 @@ impl Builder {
 
     /// An operation. The operands must fit it (the verifier checks); constants are folded.
     pub fn op(&mut self, op: Op, args: &[ExprId], span: Span) -> ExprId {
-        let types: Vec<Type> = args.iter().map(|&a| self.ty(a)).collect();
         if let Some(folded) = self.fold(op, args) {
             return self.constant(folded, self.written(args, span));
         }
-        let ty = op.result(&types).unwrap_or(types[0]);
+        // No op has more operands.
+        let mut types = [Type::Float; 3];
+        for (ty, arg) in types.iter_mut().zip(args) {
+            *ty = self.ty(*arg);
+        }
+        let ty = op.result(&types[..args.len().min(3)]).unwrap_or(types[0]);
         self.add(ExprKind::Op(op, args.to_vec()), ty, span)
     }
 

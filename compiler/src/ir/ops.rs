@@ -8,6 +8,8 @@
 mod derivative;
 mod meaning;
 
+use std::sync::OnceLock;
+
 use crate::abi::TextureSpace;
 use crate::ir::Type;
 use crate::ir::value::{Real, Value};
@@ -108,16 +110,17 @@ macro_rules! ops {
             pub const ALL: &'static [Op] = &[$(Op::$name),*];
 
             /// The op's row.
-            pub fn info(self) -> OpInfo {
+            pub fn info(self) -> &'static OpInfo {
                 use Shape::*;
                 use CostClass::*;
                 use Wgsl::*;
-                match self {
-                    $(Op::$name => OpInfo {
+                static ROWS: &[OpInfo] = &[
+                    $(OpInfo {
                         text: $text, shape: $shape, class: $class, wgsl: $wgsl, wgsl_int: $int,
                         callable: ops!(@$call),
                     }),*
-                }
+                ];
+                &ROWS[self as usize]
             }
         }
 
@@ -328,8 +331,20 @@ const HASH3: &str = "(a: T, b: T, c: T) -> i32 { return op_hash(op_hash(op_hash(
 impl Op {
     /// Ops called by `name`; several where the number of operands decides.
     pub fn by_name(name: &str) -> impl Iterator<Item = Op> + use<'_> {
-        let callable = move |op: &Op| op.info().callable && op.info().text == name;
-        Self::ALL.iter().copied().filter(callable)
+        // By their names; those of one name in the order of the table.
+        static CALLABLE: OnceLock<Vec<(&str, Op)>> = OnceLock::new();
+        let callable = CALLABLE.get_or_init(|| {
+            let all = Self::ALL.iter().map(|op| (op.info(), *op));
+            let callable = all.filter(|(info, _)| info.callable);
+            let mut named: Vec<_> = callable.map(|(info, op)| (info.text, op)).collect();
+            named.sort_by_key(|(name, _)| *name);
+            named
+        });
+        let first = callable.partition_point(|(n, _)| *n < name);
+        let named = callable[first..]
+            .iter()
+            .take_while(move |(n, _)| *n == name);
+        named.map(|(_, op)| *op)
     }
 
     /// Number of operands.
@@ -438,12 +453,13 @@ impl Op {
 
 /// The widest of float types that combine: all scalars or of one width.
 fn widest(args: &[Type]) -> Option<Type> {
-    let widths: Option<Vec<usize>> = args.iter().map(|a| a.width()).collect();
-    let widths = widths?;
-    let widest = widths.iter().copied().max()?;
-    widths
-        .iter()
-        .all(|&w| w == 1 || w == widest)
+    let mut widest = None;
+    for ty in args {
+        widest = widest.max(Some(ty.width()?));
+    }
+    let widest = widest?;
+    args.iter()
+        .all(|ty| matches!(ty.width(), Some(w) if w == 1 || w == widest))
         .then(|| Type::of_width(widest))
 }
 

@@ -88,17 +88,16 @@ pub trait Renumber {
 impl Function {
     /// Every expression that is evaluated, in the order of the text.
     pub fn evaluated(&self) -> Vec<ExprId> {
-        fn walk(block: &Block, out: &mut Vec<ExprId>) {
-            for stmt in block {
-                if let Stmt::Eval(id) = stmt {
-                    out.push(*id);
-                }
-                stmt.blocks().for_each(|inner| walk(inner, out));
-            }
-        }
-        let mut out = Vec::new();
-        walk(&self.body, &mut out);
-        out
+        let mut all = Vec::with_capacity(self.exprs.len());
+        for_each_evaluated(&self.body, &mut |id| all.push(id));
+        all
+    }
+
+    /// How many expressions are evaluated.
+    pub fn evaluated_count(&self) -> usize {
+        let mut count = 0;
+        for_each_evaluated(&self.body, &mut |_| count += 1);
+        count
     }
 
     /// The functions that are called, once for each call.
@@ -108,6 +107,17 @@ impl Function {
             _ => None,
         };
         self.evaluated().into_iter().filter_map(called)
+    }
+}
+
+fn for_each_evaluated(block: &Block, visit: &mut impl FnMut(ExprId)) {
+    for stmt in block {
+        match stmt {
+            Stmt::Eval(id) => visit(*id),
+            _ => stmt
+                .blocks()
+                .for_each(|inner| for_each_evaluated(inner, visit)),
+        }
     }
 }
 

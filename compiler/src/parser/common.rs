@@ -1,5 +1,10 @@
 //! What every part of the grammar is built from: names, lists, and going on after an error.
 //!
+//! The grammar is functions that read token by token: the next one tells which construct it is, so that no
+//! other is tried. They give `None` where they do not match, and leave it to their callers to go back.
+//! What would have been accepted is noted then, and where an optional part is left out: an error names
+//! everything that was noted at the furthest place. [`recover`] reports it.
+//!
 //! One rule keeps parsing linear in the length of the source: after the token that tells which
 //! construct it is, an expression, block or list never fails. What is missing is reported and
 //! replaced by an empty node, and nothing is read twice. The token stream has balanced brackets
@@ -9,7 +14,8 @@ use chumsky::input::{InputRef, MappedInput};
 use chumsky::prelude::*;
 
 use super::error::{Expected, SyntaxError, Want};
-use crate::ast::{ArrayType, Expr, Name, TypeName};
+use super::expr;
+use crate::ast::{ArrayType, Name, TypeName};
 use crate::lexer::{Token, doc_text};
 use crate::source::{Span, Spanned};
 
@@ -19,84 +25,118 @@ pub(super) type Tokens<'t> = MappedInput<'t, Token, Span, &'t [(Token, Span)]>;
 pub(super) type Extra = extra::Err<SyntaxError>;
 /// The input while it is read.
 pub(super) type Input<'t, 'p> = InputRef<'t, 'p, Tokens<'t>, Extra>;
-/// A parser behind a pointer, which keeps types and compile times small.
-pub(super) type Rule<'t, T> = Boxed<'t, 't, Tokens<'t>, T, Extra>;
 
 /// A parser of this grammar.
 pub(super) trait Parse<'t, T>: Parser<'t, Tokens<'t>, T, Extra> + Clone + 't {}
 impl<'t, T, P: Parser<'t, Tokens<'t>, T, Extra> + Clone + 't> Parse<'t, T> for P {}
 
-/// One token that `accept` accepts; `expected` names it in errors. Gives its place.
-pub(super) fn one<'t>(
-    expected: Expected,
-    accept: impl Fn(Token) -> bool + Copy + 't,
-) -> impl Parse<'t, Span> + Copy {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let before = inp.cursor();
-        match inp.next() {
-            Some(token) if accept(token) => Ok(inp.span_since(&before)),
-            found => Err(SyntaxError::new(inp.span_since(&before), found, expected)),
-        }
-    })
-}
-
-/// Succeeds before a token that `accept` accepts, and takes nothing.
-pub(super) fn before<'t>(
-    expected: Expected,
-    accept: impl Fn(Token) -> bool + Copy + 't,
-) -> impl Parse<'t, ()> + Copy {
+/// The parser of what `read` reads: chumsky's, for a whole source and for what recovers.
+pub(super) fn rule<'t, T: 't>(
+    read: impl Fn(&mut Input<'t, '_>) -> Option<T> + Copy + 't,
+) -> impl Parse<'t, T> + Copy {
     custom(move |inp: &mut Input<'t, '_>| {
         let start = inp.cursor();
-        match inp.peek() {
-            Some(token) if accept(token) => Ok(()),
-            _ => {
-                let found = inp.next();
-                Err(SyntaxError::new(inp.span_since(&start), found, expected))
-            }
-        }
+        // What was expected is noted already.
+        read(inp).ok_or_else(|| nothing(inp.span_since(&start)))
     })
 }
 
-/// A name.
-pub(super) fn name<'t>(text: &'t str) -> impl Parse<'t, Name> + Copy {
-    one(Expected::want(Want::Name), |t| t == Token::Ident).map(move |span| spell(text, span))
+/// Takes the next token if it is `token`.
+pub(super) fn take(inp: &mut Input<'_, '_>, token: Token) -> bool {
+    let found = inp.peek() == Some(token);
+    if found {
+        inp.skip();
+    }
+    found
 }
 
-/// A name that is a word of the grammar before a token that `follows` accepts. Fails, before it takes anything, elsewhere.
-pub(super) fn contextual<'t>(
-    text: &'t str,
-    word: &'static str,
-    follows: impl Fn(Token) -> bool + Copy + 't,
-) -> impl Parse<'t, Span> + Copy {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.save();
+/// Takes the next token, which has to be `token`.
+pub(super) fn need(inp: &mut Input<'_, '_>, token: Token) -> Option<()> {
+    if take(inp, token) {
+        return Some(());
+    }
+    note(inp, Expected::token(token));
+    None
+}
+
+/// Notes what would be accepted in the place of the next token.
+pub(super) fn note<'t>(inp: &mut Input<'t, '_>, expected: Expected) {
+    // The parser keeps the errors of what does not match, those of one place together.
+    let unmatched = custom(move |inp: &mut Input<'t, '_>| {
+        let here = inp.cursor();
         let found = inp.next();
-        let span: Span = inp.span_since(start.cursor());
-        let is_word = found == Some(Token::Ident) && text.get(span.range()) == Some(word);
-        if is_word && inp.peek().is_some_and(follows) {
-            return Ok(span);
-        }
-        inp.rewind(start);
-        Err(nothing(span))
-    })
+        Err::<(), _>(SyntaxError::new(inp.span_since(&here), found, expected))
+    });
+    let noted = inp.parse(unmatched.or_not());
+    debug_assert!(matches!(noted, Ok(None)));
 }
 
-/// A type: a name or a keyword that names a closure, and `[count]` or `[]` after it for an array.
-pub(super) fn type_name<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, TypeName> {
-    let accept = |t| matches!(t, Token::Ident | Token::Bsdf | Token::Edf);
-    let element = one(Expected::want(Want::Type), accept).map(move |span| spell(text, span));
-    let count = just(Token::LeftBracket)
-        .ignore_then(expression.or_not())
-        .then_ignore(close(Token::RightBracket))
-        .or_not();
-    element.then(count).map_with(move |(element, count), e| {
-        let span: Span = e.span();
-        let written = text.get(span.range()).unwrap_or("");
-        TypeName {
-            node: written.split_whitespace().collect(),
-            span,
-            array: count.map(|count| Box::new(ArrayType { element, count })),
-        }
+/// Reports what was noted as missing, and goes on by `by`, unless that fails.
+pub(super) fn recover<'t>(inp: &mut Input<'t, '_>, by: impl Parse<'t, ()>) -> Option<()> {
+    let missing = rule(|_: &mut Input<'t, '_>| None);
+    let gone_on = inp.parse(missing.recover_with(via_parser(by)).or_not());
+    gone_on.ok().flatten()
+}
+
+/// Reads a name.
+pub(super) fn read_name<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Name> {
+    let start = inp.cursor();
+    if !take(inp, Token::Ident) {
+        note(inp, Expected::want(Want::Name));
+        return None;
+    }
+    Some(spell(text, inp.span_since(&start)))
+}
+
+/// What `read` reads, or nothing: then it has taken nothing.
+pub(super) fn optional<'t, T>(
+    inp: &mut Input<'t, '_>,
+    read: impl FnOnce(&mut Input<'t, '_>) -> Option<T>,
+) -> Option<T> {
+    let start = inp.save();
+    let found = read(inp);
+    if found.is_none() {
+        inp.rewind(start);
+    }
+    found
+}
+
+/// Reads `///` lines.
+pub(super) fn docs<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut start = inp.cursor();
+    while need(inp, Token::DocOuter).is_some() {
+        lines.push(doc_line(text, inp.span_since(&start)));
+        start = inp.cursor();
+    }
+    lines
+}
+
+/// Reads a type: a name or a keyword that names a closure, and `[count]` or `[]` after it for an array.
+pub(super) fn type_name<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<TypeName> {
+    let start = inp.cursor();
+    let Some(Token::Ident | Token::Bsdf | Token::Edf) = inp.peek() else {
+        note(inp, Expected::want(Want::Type));
+        return None;
+    };
+    inp.skip();
+    let element = spell(text, inp.span_since(&start));
+    if !take(inp, Token::LeftBracket) {
+        note(inp, Expected::token(Token::LeftBracket));
+        return Some(TypeName {
+            node: element.node,
+            span: element.span,
+            array: None,
+        });
+    }
+    let count = expr::expression(text, inp);
+    close(inp, Token::RightBracket)?;
+    let span: Span = inp.span_since(&start);
+    let written = text.get(span.range()).unwrap_or("");
+    Some(TypeName {
+        node: written.split_whitespace().collect(),
+        span,
+        array: Some(Box::new(ArrayType { element, count })),
     })
 }
 
@@ -108,54 +148,55 @@ pub(super) fn spell(text: &str, span: Span) -> Name {
     }
 }
 
-/// `///` lines.
-pub(super) fn docs<'t>(text: &'t str) -> Rule<'t, Vec<String>> {
-    just(Token::DocOuter)
-        .map_with(move |_, e| doc_line(text, e.span()))
-        .repeated()
-        .collect()
-        .boxed()
-}
-
 pub(super) fn doc_line(text: &str, span: Span) -> String {
     doc_text(text.get(span.range()).unwrap_or("")).to_owned()
 }
 
-/// `;`. When it is missing, that is reported once and the statement ends all the same.
-pub(super) fn semicolon<'t>(text: &'t str) -> impl Parse<'t, ()> {
-    just(Token::Semicolon)
-        .ignored()
-        .recover_with(via_parser(rest_of_statement(text)))
+/// Reads `;`. When it is missing, that is reported once and the statement ends all the same.
+pub(super) fn semicolon<'t>(text: &'t str, inp: &mut Input<'t, '_>) {
+    if need(inp, Token::Semicolon).is_none() {
+        recover(inp, rest_of_statement(text));
+    }
 }
 
-/// `open item, item, ... close`, with one error an item at most.
-pub(super) fn list<'t, T: 't>(
-    open: Token,
-    item: impl Parse<'t, T>,
-    close: Token,
-) -> impl Parse<'t, Vec<T>> {
+/// Reads `open item, item, ... close`, with one error an item at most. Fails only before another token than `open`.
+pub(super) fn list<'t, T>(
+    inp: &mut Input<'t, '_>,
+    (open, close): (Token, Token),
+    item: impl Fn(&mut Input<'t, '_>) -> Option<T>,
+) -> Option<Vec<T>> {
+    need(inp, open)?;
     let ends = move |t| t == Token::Comma || t == close;
-    let expected = Expected::tokens(&[Token::Comma, close]);
-    let skipped = skip(1, ends);
-    let item = item
-        .map(Some)
-        .recover_with(via_parser(skipped.map(|()| None)))
-        .then_ignore(before(expected, ends).recover_with(via_parser(skip(0, ends))))
-        .boxed();
-    let items = item
-        .separated_by(just(Token::Comma))
-        .allow_trailing()
-        .collect::<Vec<_>>();
-    just(open)
-        .ignore_then(items)
-        .then_ignore(self::close(close))
-        .map(|items| items.into_iter().flatten().collect())
+    let mut items = Vec::new();
+    while inp.peek() != Some(close) {
+        let before = inp.save();
+        match item(inp) {
+            Some(item) => items.push(item),
+            None => {
+                inp.rewind(before);
+                if recover(inp, skip(1, ends)).is_none() {
+                    break;
+                }
+            }
+        }
+        if !inp.peek().is_some_and(ends) {
+            note(inp, Expected::tokens(&[Token::Comma, close]));
+            recover(inp, skip(0, ends));
+        }
+        if !take(inp, Token::Comma) {
+            break;
+        }
+    }
+    self::close(inp, close)?;
+    Some(items)
 }
 
-/// A closing bracket; what stands before it and does not belong there is reported and skipped.
-pub(super) fn close<'t>(close: Token) -> impl Parse<'t, ()> {
-    let to_close = skip(0, move |t| t == close).then_ignore(just(close));
-    just(close).ignored().recover_with(via_parser(to_close))
+/// Reads a closing bracket; what stands before it and does not belong there is reported and skipped.
+pub(super) fn close(inp: &mut Input<'_, '_>, close: Token) -> Option<()> {
+    if need(inp, close).is_some() {
+        return Some(());
+    }
+    recover(inp, skip(0, move |t| t == close).then_ignore(just(close)))
 }
 
 /// Skips over whole brackets to a token that ends the construct, which it does not take, or to

@@ -1,7 +1,7 @@
 //! What the grammar reports: a place and the set of what would have been accepted there.
 //!
-//! chumsky makes an error for every alternative that does not match, also in correct sources,
-//! and merges those of one place. So errors are small values and the set is a bit mask.
+//! The grammar notes what would have been accepted wherever something is left out, also in correct sources, and
+//! chumsky merges what is noted at one place. So errors are small values and the set is a bit mask.
 
 use chumsky::DefaultExpected;
 use chumsky::error::{Error, LabelError};
@@ -54,7 +54,7 @@ impl Expected {
         Self(bits.fold(0, |set, bit| set | bit))
     }
 
-    pub(super) fn with(self, other: Self) -> Self {
+    pub(super) const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 

@@ -3,7 +3,7 @@
 use chumsky::prelude::*;
 
 use super::common::{
-    Extra, Input, Parse, Rule, Tokens, before, close, list, name, nothing, on_new_line, one, spell,
+    Input, close, list, need, note, nothing, on_new_line, read_name, recover, spell, take,
 };
 use super::error::{Expected, SyntaxError, Want};
 use super::literal::literal;
@@ -13,34 +13,32 @@ use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
 
-/// The rule for expressions. It fails only before a token that starts none, and takes nothing
-/// then.
-pub(super) fn expression<'t>(text: &'t str) -> Rule<'t, Expr> {
-    recursive(|expression| {
-        let expression = expression.boxed();
-        let block = stmt::block(text, expression.clone());
-        let operand = operand(text, expression.clone(), block)
-            .recover_with(via_parser(missing()))
-            .boxed();
-        let operators = operators(text, operand, expression).boxed();
-        before(Expected::want(Want::Expression), starts).ignore_then(operators)
-    })
-    .boxed()
+/// Reads an expression. Fails only before a token that starts none.
+pub(super) fn expression<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Expr> {
+    if inp.peek().is_some_and(starts) {
+        return Some(operators(text, inp));
+    }
+    note(inp, Expected::want(Want::Expression));
+    None
 }
 
-/// An expression where one has to be; an [`ExprKind::Error`] when it is missing.
-pub(super) fn required<'t>(expression: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
-    expression.recover_with(via_parser(missing()))
+/// Reads an expression where one has to be; an [`ExprKind::Error`] when it is missing.
+pub(super) fn required<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Expr {
+    expression(text, inp).unwrap_or_else(|| missing(inp))
 }
 
-/// `if cond { ... } else if cond { ... } else { ... }`
-pub(super) fn if_expression<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> Rule<'t, (IfExpr, Span)> {
-    let arm = headed(text, required(expression), |cond| cond, block.clone());
-    let arm = arm.map_with(|(cond, then), e| (cond, then, e.span()));
+/// Reports that no expression is here, where one was noted to be missing.
+fn missing(inp: &mut Input<'_, '_>) -> Expr {
+    recover(inp, empty());
+    let here = inp.cursor();
+    Expr {
+        kind: ExprKind::Error,
+        span: inp.span_since(&here),
+    }
+}
+
+/// Reads `if cond { ... } else if cond { ... } else { ... }` from its `if`, the next token.
+pub(super) fn if_expression<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> (IfExpr, Span) {
     // Of `else a > b { ... }`, the `if` is missing.
     let forgotten = custom(move |inp: &mut Input<'t, '_>| {
         let here = inp.cursor();
@@ -49,29 +47,41 @@ pub(super) fn if_expression<'t>(
             _ => Err(nothing(inp.span_since(&here))),
         }
     });
-    let expected = Expected::tokens(&[Token::If, Token::LeftBrace]);
-    let keyword = one(expected, |t| t == Token::If).ignored();
-    let more = just(Token::Else)
-        .ignore_then(keyword.recover_with(via_parser(forgotten)))
-        .ignore_then(arm.clone())
-        .repeated()
-        .collect::<Vec<_>>();
-    let last = just(Token::Else)
-        .ignore_then(stmt::required_block(text, block))
-        .map_with(|required, e| match required {
+    let start = inp.cursor();
+    inp.skip();
+    let first = arm(text, inp);
+    let mut more = Vec::new();
+    let mut last = None;
+    while need(inp, Token::Else).is_some() {
+        if take(inp, Token::If) {
+            more.push(arm(text, inp));
+            continue;
+        }
+        if inp.peek() != Some(Token::LeftBrace) {
+            note(inp, Expected::tokens(&[Token::If, Token::LeftBrace]));
+            if recover(inp, forgotten).is_some() {
+                more.push(arm(text, inp));
+                continue;
+            }
+        }
+        last = Some(match stmt::required_block(text, inp) {
             RequiredBlock::Block(block) => block,
             RequiredBlock::Late(block, error) | RequiredBlock::Missing(block, error) => {
-                e.emit(error);
+                inp.emit(error);
                 block
             }
-        })
-        .or_not();
-    just(Token::If)
-        .ignore_then(arm)
-        .then(more)
-        .then(last)
-        .map_with(|((first, more), last), e| (chain(first, more, last), e.span()))
-        .boxed()
+        });
+        break;
+    }
+    (chain(first, more, last), inp.span_since(&start))
+}
+
+/// Reads a condition and its block.
+fn arm<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Arm {
+    let start = inp.cursor();
+    let mut cond = required(text, inp);
+    let then = body_after(text, &mut cond, inp);
+    (cond, then, inp.span_since(&start))
 }
 
 /// Can `token` start the condition of an `else if` without its `if`?
@@ -79,39 +89,29 @@ fn condition_starts(token: Token) -> bool {
     starts(token) && !matches!(token, Token::LeftBrace | Token::If)
 }
 
-/// A header that ends in an expression, and its block. When an operand is missing before the
-/// block, the block was read as that operand; it is put right here. Fails only if `header` does.
-pub(super) fn headed<'t, H: 't>(
-    text: &'t str,
-    header: impl Parse<'t, H>,
-    last: fn(&mut H) -> &mut Expr,
-    block: Rule<'t, Block>,
-) -> Rule<'t, (H, Block)> {
-    header
-        .then(stmt::required_block(text, block))
-        .map_with(move |(mut head, required), e| {
-            let (block, error) = match required {
-                RequiredBlock::Block(block) => return (head, block),
-                RequiredBlock::Late(block, error) => (block, error),
-                RequiredBlock::Missing(empty, error) => match take_block(last(&mut head)) {
-                    Some(block) => {
-                        let brace = Span {
-                            end: block.span.start + 1,
-                            ..block.span
-                        };
-                        let expected = Expected::want(Want::Expression);
-                        (
-                            block,
-                            SyntaxError::new(brace, Some(Token::LeftBrace), expected),
-                        )
-                    }
-                    None => (empty, error),
-                },
-            };
-            e.emit(error);
-            (head, block)
-        })
-        .boxed()
+/// Reads the block after a header whose last expression is `last`. When an operand is missing before the
+/// block, the block was read as that operand; it is put right here.
+pub(super) fn body_after<'t>(text: &'t str, last: &mut Expr, inp: &mut Input<'t, '_>) -> Block {
+    let (block, error) = match stmt::required_block(text, inp) {
+        RequiredBlock::Block(block) => return block,
+        RequiredBlock::Late(block, error) => (block, error),
+        RequiredBlock::Missing(empty, error) => match take_block(last) {
+            Some(block) => {
+                let brace = Span {
+                    end: block.span.start + 1,
+                    ..block.span
+                };
+                let expected = Expected::want(Want::Expression);
+                (
+                    block,
+                    SyntaxError::new(brace, Some(Token::LeftBrace), expected),
+                )
+            }
+            None => (empty, error),
+        },
+    };
+    inp.emit(error);
+    block
 }
 
 /// Takes the block that is the last operand of `value` out of it.
@@ -172,98 +172,102 @@ fn starts(token: Token) -> bool {
     )
 }
 
-fn missing<'t>() -> impl Parse<'t, Expr> {
-    empty().map_with(|(), e| Expr {
-        kind: ExprKind::Error,
-        span: e.span(),
-    })
-}
-
-fn operand<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> impl Parse<'t, Expr> {
-    let make = |kind, span| Expr { kind, span };
-    let group = just(Token::LeftParen)
-        .ignore_then(required(expression.clone()))
-        .then_ignore(close(Token::RightParen))
-        .map_with(move |inner: Expr, e| make(inner.kind, e.span()));
-    let array = list(Token::LeftBracket, expression.clone(), Token::RightBracket)
-        .map_with(move |elements, e| make(ExprKind::Array(elements), e.span()));
-    let chosen = if_expression(text, expression.clone(), block.clone())
-        .map(move |(chosen, span)| make(ExprKind::If(Box::new(chosen)), span));
-    let block = block.map(move |b| {
-        let span = b.span;
-        make(ExprKind::Block(Box::new(b)), span)
-    });
-    // Already reported by the lexer.
-    let unknown = just(Token::Unknown).map_with(move |_, e| make(ExprKind::Error, e.span()));
-    choice((
-        name_or_call(text, expression),
-        literal(text),
-        group,
-        array,
-        chosen,
-        block,
-        unknown,
-    ))
-}
-
-/// `name` or `name(a, b: c)`
-fn name_or_call<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Expr> {
-    let argument = argument_name(text)
-        .then(expression)
-        .map(|(name, value)| Arg { name, value });
-    let arguments = list(Token::LeftParen, argument, Token::RightParen).or_not();
-    name(text).then(arguments).map_with(|(name, args), e| Expr {
-        kind: match args {
-            Some(args) => ExprKind::Call { callee: name, args },
-            None => ExprKind::Name(name.node),
-        },
-        span: e.span(),
-    })
-}
-
-/// The `name:` before an argument, if it has one.
-fn argument_name<'t>(text: &'t str) -> impl Parse<'t, Option<Name>> {
-    custom(move |inp: &mut Input<'t, '_>| {
-        if inp.peek() != Some(Token::Ident) {
-            return Ok(None);
+/// Reads an operand. Fails only before a token that starts none.
+fn operand<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Expr> {
+    let start = inp.cursor();
+    let kind = match inp.peek() {
+        Some(Token::Ident) => name_or_call(text, inp)?,
+        Some(token) if LITERALS.contains(&token) => return Some(literal(text, token, inp)),
+        Some(Token::LeftParen) => {
+            inp.skip();
+            let inner = required(text, inp);
+            close(inp, Token::RightParen)?;
+            inner.kind
         }
-        let start = inp.save();
-        inp.skip();
-        let span = inp.span_since(start.cursor());
-        let mark = inp.cursor();
-        match inp.next() {
-            Some(Token::Colon) => Ok(Some(spell(text, span))),
-            Some(Token::Assign) => {
-                let at = inp.span_since(&mark);
-                let message = "unexpected `=` in a list of arguments";
-                let diagnostic = Diagnostic::new(Code::Syntax, at, message)
-                    .expected("`:`")
-                    .hint("named arguments are written `name: value`");
-                inp.emit(SyntaxError::special(at, diagnostic));
-                Ok(Some(spell(text, span)))
-            }
-            _ => {
-                inp.rewind(start);
-                Ok(None)
-            }
+        Some(Token::LeftBracket) => {
+            let brackets = (Token::LeftBracket, Token::RightBracket);
+            ExprKind::Array(list(inp, brackets, |inp| expression(text, inp))?)
         }
-    })
+        Some(Token::If) => ExprKind::If(Box::new(if_expression(text, inp).0)),
+        Some(Token::LeftBrace) => ExprKind::Block(Box::new(stmt::block(text, inp)?)),
+        // Already reported by the lexer.
+        Some(Token::Unknown) => {
+            inp.skip();
+            ExprKind::Error
+        }
+        _ => {
+            let wants = Expected::want(Want::Name).with(Expected::want(Want::Expression));
+            note(inp, Expected::tokens(&STARTS).with(wants));
+            return None;
+        }
+    };
+    let span = inp.span_since(&start);
+    Some(Expr { kind, span })
 }
 
-/// An infix operator with its binding power.
-fn operator<'t>() -> impl Parse<'t, (u16, BinaryOp)> + Copy {
-    custom(|inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let found = inp.next();
-        found.and_then(binary).ok_or_else(|| {
-            let expected = Expected::want(Want::Operator);
-            SyntaxError::new(inp.span_since(&start), found, expected)
-        })
-    })
+/// What an operand can start with, signs before it included, beside names and numbers.
+const STARTS: [Token; 10] = [
+    Token::Minus,
+    Token::Not,
+    Token::LeftParen,
+    Token::LeftBracket,
+    Token::LeftBrace,
+    Token::If,
+    Token::Str,
+    Token::True,
+    Token::False,
+    Token::Unknown,
+];
+
+/// Tokens that are literals.
+const LITERALS: [Token; 6] = [
+    Token::Int,
+    Token::Hex,
+    Token::Float,
+    Token::Str,
+    Token::True,
+    Token::False,
+];
+
+/// Reads `name` or `name(a, b: c)`.
+fn name_or_call<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<ExprKind> {
+    let name = read_name(text, inp)?;
+    if inp.peek() != Some(Token::LeftParen) {
+        return Some(ExprKind::Name(name.node));
+    }
+    let args = list(inp, (Token::LeftParen, Token::RightParen), |inp| {
+        let name = argument_name(text, inp);
+        let value = expression(text, inp)?;
+        Some(Arg { name, value })
+    })?;
+    Some(ExprKind::Call { callee: name, args })
+}
+
+/// Reads the `name:` before an argument, if it has one.
+fn argument_name<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Name> {
+    if inp.peek() != Some(Token::Ident) {
+        return None;
+    }
+    let start = inp.save();
+    inp.skip();
+    let span = inp.span_since(start.cursor());
+    let mark = inp.cursor();
+    match inp.next() {
+        Some(Token::Colon) => Some(spell(text, span)),
+        Some(Token::Assign) => {
+            let at = inp.span_since(&mark);
+            let message = "unexpected `=` in a list of arguments";
+            let diagnostic = Diagnostic::new(Code::Syntax, at, message)
+                .expected("`:`")
+                .hint("named arguments are written `name: value`");
+            inp.emit(SyntaxError::special(at, diagnostic));
+            Some(spell(text, span))
+        }
+        _ => {
+            inp.rewind(start);
+            None
+        }
+    }
 }
 
 /// An infix operator and its binding power.
@@ -293,107 +297,128 @@ pub(super) fn binary(token: Token) -> Option<(u16, BinaryOp)> {
 
 const COMPARISON: u16 = 3;
 
-/// `value op value op value`. Operators are read in a row and put in order after: asking for each
+/// Reads `value op value op value`. Operators are read in a row and put in order after: asking for each
 /// binding power at each place would take most of the time of parsing.
-fn operators<'t>(
-    text: &'t str,
-    operand: Rule<'t, Expr>,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, Expr> {
-    let value = value(text, operand, expression).boxed();
-    let more = operator()
-        .then(value.clone())
-        .repeated()
-        .collect::<Vec<_>>();
-    value.then(more).map_with(|(first, more), e| {
-        // What waits for its right side, by growing power.
-        let mut open: Vec<(Expr, (u16, BinaryOp))> = Vec::new();
-        let mut last = first;
-        for ((power, op), next) in more {
-            while let Some((left, (_, waiting))) = open.pop_if(|(_, (p, _))| *p >= power) {
-                last = combine(left, waiting, last, e);
-            }
-            open.push((last, (power, op)));
-            last = next;
+fn operators<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Expr {
+    // Sources nest as deep as `nesting` lets them.
+    stacker::maybe_grow(128 << 10, 1 << 20, || {
+        let first = value(text, inp);
+        let mut more = Vec::new();
+        while let Some(operator) = inp.peek().and_then(binary) {
+            inp.skip();
+            more.push((operator, value(text, inp)));
         }
-        for (left, (_, op)) in open.into_iter().rev() {
-            last = combine(left, op, last, e);
+        match <[_; 1]>::try_from(more) {
+            Ok([((_, op), second)]) => combine(first, op, second, inp),
+            Err(more) => in_order(first, more, inp),
         }
-        last
     })
 }
 
-/// An operand with what binds closer than infix operators: signs before it, and fields and indices
-/// after it, which bind closest.
-fn value<'t>(
-    text: &'t str,
-    operand: Rule<'t, Expr>,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, Expr> {
-    let sign = choice((
-        just(Token::Minus).to(UnaryOp::Neg),
-        just(Token::Not).to(UnaryOp::Not),
-    ));
-    let signs = sign.map_with(|op, e| (op, e.span())).repeated().collect();
-    let field_name = name(text)
-        .map(Some)
-        .recover_with(via_parser(empty().to(None)));
-    let field = just(Token::Dot).ignore_then(field_name).map(Part::Field);
-    let index = just(Token::LeftBracket)
-        .ignore_then(required(expression))
-        .then_ignore(close(Token::RightBracket))
-        .map(Part::Index);
-    let parts = choice((field, index))
-        .map_with(|part, e| (part, e.span()))
-        .repeated()
-        .collect();
-    signs
-        .then(operand)
-        .then(parts)
-        .map_with(with_signs_and_parts)
-}
-
-/// What follows an operand and names a part of it; a field's name may be missing.
-enum Part {
-    Field(Option<Name>),
-    Index(Expr),
-}
-
-type Signed = ((Vec<(UnaryOp, Span)>, Expr), Vec<(Part, Span)>);
-
-fn with_signs_and_parts<'t>(parts: Signed, e: &mut Extras<'t, '_>) -> Expr {
-    let ((signs, mut value), parts) = parts;
-    for (part, at) in parts {
-        let span = value.span.to(at);
-        let kind = match part {
-            Part::Field(Some(name)) => ExprKind::Field(Box::new(value), name),
-            Part::Field(None) => ExprKind::Error,
-            Part::Index(index) => ExprKind::Index(Box::new(value), Box::new(index)),
-        };
-        value = Expr { kind, span };
+/// Puts operators in order by their power.
+fn in_order(first: Expr, more: Vec<((u16, BinaryOp), Expr)>, inp: &mut Input<'_, '_>) -> Expr {
+    // What waits for its right side, by growing power.
+    let mut open: Vec<(Expr, (u16, BinaryOp))> = Vec::new();
+    let mut last = first;
+    for ((power, op), next) in more {
+        while let Some((left, (_, waiting))) = open.pop_if(|(_, (p, _))| *p >= power) {
+            last = combine(left, waiting, last, inp);
+        }
+        open.push((last, (power, op)));
+        last = next;
     }
-    let whole: Span = e.span();
+    for (left, (_, op)) in open.into_iter().rev() {
+        last = combine(left, op, last, inp);
+    }
+    last
+}
+
+/// Reads an operand with what binds closer than infix operators: signs before it, and fields and indices
+/// after it, which bind closest.
+fn value<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Expr {
+    let start = inp.cursor();
+    let mut signs: Vec<(UnaryOp, Span)> = Vec::new();
+    while let Some(op) = inp.peek().and_then(sign) {
+        let at = inp.cursor();
+        inp.skip();
+        signs.push((op, inp.span_since(&at)));
+    }
+    let is_word = inp.peek() == Some(Token::Ident);
+    let mut value = operand(text, inp).unwrap_or_else(|| missing(inp));
+    let is_name = is_word && matches!(value.kind, ExprKind::Name(_));
+    value = with_parts(text, value, is_name, inp);
+    if signs.is_empty() {
+        return value;
+    }
+    let end = inp.span_since(&start).end;
     for (op, at) in signs.into_iter().rev() {
         value = Expr {
             kind: ExprKind::Unary(op, Box::new(value)),
-            span: Span {
-                end: whole.end,
-                ..at
-            },
+            span: Span { end, ..at },
         };
     }
     value
 }
 
-type Extras<'t, 'p> = chumsky::input::MapExtra<'t, 'p, Tokens<'t>, Extra>;
+/// A prefix operator.
+fn sign(token: Token) -> Option<UnaryOp> {
+    match token {
+        Token::Minus => Some(UnaryOp::Neg),
+        Token::Not => Some(UnaryOp::Not),
+        _ => None,
+    }
+}
 
-fn combine<'t>(a: Expr, op: BinaryOp, b: Expr, e: &mut Extras<'t, '_>) -> Expr {
+/// Reads the fields and indices after an operand, and notes what could follow the last of them. After a name,
+/// which `is_name` tells, those are arguments as well.
+fn with_parts<'t>(text: &'t str, mut value: Expr, is_name: bool, inp: &mut Input<'t, '_>) -> Expr {
+    let mut follows = PARTS.with(Expected::want(Want::Operator));
+    if is_name {
+        follows = follows.with(Expected::token(Token::LeftParen));
+    }
+    loop {
+        let (whole, start) = (value.span, inp.cursor());
+        let next = inp.peek();
+        let kind = match next {
+            Some(Token::Dot) => {
+                inp.skip();
+                match read_name(text, inp) {
+                    Some(name) => ExprKind::Field(Box::new(value), name),
+                    None => {
+                        recover(inp, empty());
+                        ExprKind::Error
+                    }
+                }
+            }
+            Some(Token::LeftBracket) => {
+                inp.skip();
+                let index = required(text, inp);
+                close(inp, Token::RightBracket);
+                ExprKind::Index(Box::new(value), Box::new(index))
+            }
+            _ => {
+                if next.and_then(binary).is_none() {
+                    note(inp, follows);
+                }
+                return value;
+            }
+        };
+        follows = PARTS.with(Expected::want(Want::Operator));
+        let span = whole.to(inp.span_since(&start));
+        value = Expr { kind, span };
+    }
+}
+
+/// What starts a field or an index.
+const PARTS: Expected = Expected::token(Token::Dot).with(Expected::token(Token::LeftBracket));
+
+fn combine(a: Expr, op: BinaryOp, b: Expr, inp: &mut Input<'_, '_>) -> Expr {
     let span = a.span.to(b.span);
     if is_comparison(op) && is_bare_comparison(&a) {
         let message = "comparisons cannot be chained";
         let diagnostic = Diagnostic::new(Code::Syntax, span, message)
             .hint("compare in pairs, as in `a < b && b < c`");
-        e.emit(SyntaxError::special(span, diagnostic));
+        inp.emit(SyntaxError::special(span, diagnostic));
     }
     Expr {
         kind: ExprKind::Binary(op, Box::new(a), Box::new(b)),

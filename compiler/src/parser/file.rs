@@ -4,57 +4,54 @@
 use chumsky::prelude::*;
 
 use super::common::{
-    Input, Parse, Rule, doc_line, docs, list, name, nothing, one, semicolon, skip_docs, skip_one,
-    spell,
+    Input, Parse, doc_line, docs, list, need, note, nothing, optional, read_name, recover,
+    semicolon, skip_docs, skip_one, spell,
 };
 use super::error::{Expected, SyntaxError, Want};
 use super::item::{item, test};
 use super::stmt::misplaced_docs;
-use crate::ast::{Expr, Item, Module, Test, Use, UseName};
+use crate::ast::{Item, Module, Name, Test, Use, UseName};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
 
-/// A whole file.
-pub(super) fn module<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, Module> {
-    let docs = just(Token::DocInner)
-        .map_with(move |_, e| doc_line(text, e.span()))
-        .repeated()
-        .collect::<Vec<_>>();
-    let entry =
-        entry(text, expression).recover_with(via_parser(broken_entry(text).to(Entry::Broken)));
-    docs.then(entry.repeated().collect::<Vec<_>>())
-        .map_with(|(docs, entries), e| {
-            let mut module = Module {
-                docs,
-                uses: Vec::new(),
-                items: Vec::new(),
-                tests: Vec::new(),
-            };
-            for entry in entries {
-                match entry {
-                    Entry::Use(declaration) => {
-                        if !(module.items.is_empty() && module.tests.is_empty()) {
-                            let late = late_use(declaration.span);
-                            e.emit(SyntaxError::special(declaration.span, late));
-                        }
-                        module.uses.push(declaration);
-                    }
-                    Entry::Item(item) => module.items.push(*item),
-                    Entry::Test(test) => module.tests.push(*test),
-                    Entry::Broken => {}
+/// Reads a whole file.
+pub(super) fn module<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Module> {
+    let mut module = Module {
+        docs: Vec::new(),
+        uses: Vec::new(),
+        items: Vec::new(),
+        tests: Vec::new(),
+    };
+    let mut late = Vec::new();
+    let mut line = inp.cursor();
+    while need(inp, Token::DocInner).is_some() {
+        module.docs.push(doc_line(text, inp.span_since(&line)));
+        line = inp.cursor();
+    }
+    while let Some(entry) = entry(text, inp) {
+        match entry {
+            Entry::Use(declaration) => {
+                if !(module.items.is_empty() && module.tests.is_empty()) {
+                    late.push(declaration.span);
                 }
+                module.uses.push(declaration);
             }
-            module
-        })
-        .boxed()
+            Entry::Item(item) => module.items.push(*item),
+            Entry::Test(test) => module.tests.push(test),
+            Entry::Broken => {}
+        }
+    }
+    for span in late {
+        inp.emit(SyntaxError::special(span, late_use(span)));
+    }
+    Some(module)
 }
 
-#[derive(Clone)]
 enum Entry {
     Use(Use),
     Item(Box<Item>),
-    Test(Box<Test>),
+    Test(Test),
     Broken,
 }
 
@@ -63,48 +60,48 @@ fn late_use(span: Span) -> Diagnostic {
     Diagnostic::new(Code::Syntax, span, message).hint("move it to the top of the file")
 }
 
-fn entry<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Entry> {
-    let test = test(text, expression.clone()).map(|test| Entry::Test(Box::new(test)));
-    let item = item(text, expression);
-    let private = just(Token::Private).or_not().map(|word| word.is_some());
-    let item = docs(text)
-        .then(
-            private
-                .then(item)
-                .map_with(|(private, item), e| (private, item, e.span())),
-        )
-        .map(|(docs, (private, (name, kind), span))| {
-            Entry::Item(Box::new(Item {
-                docs,
-                name,
-                private,
-                kind,
-                span,
-            }))
-        });
-    choice((
-        docs(text).ignore_then(test),
-        item,
-        use_declaration(text).map(Entry::Use),
-        undocumented().to(Entry::Broken),
-    ))
-    .boxed()
+fn entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Entry> {
+    let documented_test = |inp: &mut Input<'t, '_>| {
+        while need(inp, Token::DocOuter).is_some() {}
+        test(text, inp)
+    };
+    if let Some(test) = optional(inp, documented_test) {
+        return Some(Entry::Test(test));
+    }
+    if let Some(item) = optional(inp, |inp| documented_item(text, inp)) {
+        return Some(Entry::Item(Box::new(item)));
+    }
+    if let Some(declaration) = optional(inp, |inp| use_declaration(text, inp)) {
+        return Some(Entry::Use(declaration));
+    }
+    let skipped = optional(inp, undocumented).or_else(|| recover(inp, broken_entry(text)));
+    skipped.map(|()| Entry::Broken)
 }
 
-/// Documentation at the top level that belongs to no definition.
-fn undocumented<'t>() -> impl Parse<'t, ()> + Copy {
-    custom(|inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let marker = skip_docs(inp);
-        let span = inp.span_since(&start);
-        match (marker, inp.peek()) {
-            (Some(Token::DocInner), _) | (Some(_), None | Some(Token::Use)) => {
-                inp.emit(SyntaxError::special(span, misplaced_docs(marker, span)));
-                Ok(())
-            }
-            _ => Err(nothing(span)),
-        }
+fn documented_item<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Item> {
+    let docs = docs(text, inp);
+    let start = inp.cursor();
+    let private = need(inp, Token::Private).is_some();
+    let (name, kind) = item(text, inp)?;
+    Some(Item {
+        docs,
+        name,
+        private,
+        kind,
+        span: inp.span_since(&start),
     })
+}
+
+/// Reads documentation at the top level that belongs to no definition.
+fn undocumented(inp: &mut Input<'_, '_>) -> Option<()> {
+    let start = inp.cursor();
+    let marker = skip_docs(inp)?;
+    let span = inp.span_since(&start);
+    if marker == Token::DocOuter && !matches!(inp.peek(), None | Some(Token::Use)) {
+        return None;
+    }
+    inp.emit(SyntaxError::special(span, misplaced_docs(marker, span)));
+    Some(())
 }
 
 /// Skips a broken definition, at least its first token, to the next one.
@@ -145,34 +142,58 @@ fn at_entry<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> bool {
     }
 }
 
-/// `use std::noise::{flakes, perlin as noise};`
-fn use_declaration<'t>(text: &'t str) -> impl Parse<'t, Use> {
-    // Folders of the standard library are named like the closures they hold.
-    let segment = one(Expected::want(Want::Name), |t| {
-        matches!(t, Token::Ident | Token::Bsdf | Token::Edf)
+/// Reads `use std::noise::{flakes, perlin as noise};`.
+fn use_declaration<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Use> {
+    let start = inp.cursor();
+    need(inp, Token::Use)?;
+    let step = |inp: &mut Input<'t, '_>| {
+        let segment = segment(text, inp)?;
+        need(inp, Token::PathSeparator)?;
+        Some(segment)
+    };
+    let mut path = Vec::new();
+    while let Some(segment) = optional(inp, step) {
+        path.push(segment);
+    }
+    if path.is_empty() {
+        return None;
+    }
+    let group = list(inp, (Token::LeftBrace, Token::RightBrace), |inp| {
+        let name = read_name(text, inp)?;
+        let alias = alias(text, inp);
+        Some(UseName { name, alias })
+    });
+    let names = match group {
+        Some(names) => names,
+        None => {
+            let name = segment(text, inp)?;
+            let alias = alias(text, inp);
+            vec![UseName { name, alias }]
+        }
+    };
+    semicolon(text, inp);
+    Some(Use {
+        path,
+        names,
+        span: inp.span_since(&start),
     })
-    .map(move |span| spell(text, span));
-    let alias = just(Token::As).ignore_then(name(text)).or_not();
-    let imported = name(text)
-        .then(alias)
-        .map(|(name, alias)| UseName { name, alias });
-    let group = list(Token::LeftBrace, imported, Token::RightBrace);
-    let next = just(Token::PathSeparator);
-    let single = segment
-        .then(alias)
-        .map(|(name, alias)| vec![UseName { name, alias }]);
-    let path = segment
-        .then_ignore(next)
-        .repeated()
-        .at_least(1)
-        .collect::<Vec<_>>();
-    just(Token::Use)
-        .ignore_then(path)
-        .then(choice((group, single)))
-        .then_ignore(semicolon(text))
-        .map_with(|(path, names), e| Use {
-            path,
-            names,
-            span: e.span(),
-        })
+}
+
+/// Reads a name in a path: folders of the standard library are named like the closures they hold.
+fn segment<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Name> {
+    let start = inp.cursor();
+    let Some(Token::Ident | Token::Bsdf | Token::Edf) = inp.peek() else {
+        note(inp, Expected::want(Want::Name));
+        return None;
+    };
+    inp.skip();
+    Some(spell(text, inp.span_since(&start)))
+}
+
+/// Reads `as name`, or nothing.
+fn alias<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Name> {
+    optional(inp, |inp| {
+        need(inp, Token::As)?;
+        read_name(text, inp)
+    })
 }

@@ -1,97 +1,96 @@
 //! Definitions: materials, closures, functions, structs and constants.
 
-use chumsky::prelude::*;
-
 use super::common::{
-    Parse, Rule, broken_statement, close, contextual, docs, list, name, semicolon, spell, type_name,
+    Input, broken_statement, close, docs, list, need, note, optional, read_name, recover,
+    semicolon, spell, take, type_name,
 };
-use super::error::SyntaxError;
-use super::expr::required;
+use super::error::{Expected, SyntaxError, Want};
+use super::expr::{expression, required};
 use super::stmt::{self, Piece, piece, stray_docs};
 use crate::ast::{
-    Block, Body, ClosureDef, ClosureKind, Const, Entry, Expr, Field, Function, ItemKind, Material,
+    Body, ClosureDef, ClosureKind, Const, Entry, Expr, Field, Function, ItemKind, Material,
     MaterialParam, Method, Name, Param, Stmt, Test,
 };
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
 
-/// A definition: its name and what it is.
-pub(super) fn item<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, (Name, ItemKind)> {
-    let block = stmt::block(text, expression.clone());
-    let body = body(text, expression.clone(), block.clone());
-    let parameters = parameters(text, expression.clone());
-    choice((
-        material(text, expression.clone(), block),
-        closure(text, expression.clone(), parameters.clone(), body.clone()),
-        function(text, expression.clone(), parameters, body),
-        structure(text, expression.clone()),
-        constant(text, expression),
-    ))
-}
-
-/// `test "title" { statements }`. The word is none of the language's where no title follows it.
-pub(super) fn test<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Test> {
-    let title = just(Token::Str).map_with(move |_, e| {
-        let quoted = spell(text, e.span());
-        Name {
-            node: quoted.node.trim_matches('"').to_owned(),
-            ..quoted
+/// Reads a definition: its name and what it is.
+pub(super) fn item<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    match inp.peek() {
+        Some(Token::Material) => material(text, inp),
+        Some(Token::Bsdf | Token::Delta | Token::Edf) => closure(text, inp),
+        Some(Token::Fn) => function(text, inp),
+        Some(Token::Struct) => structure(text, inp),
+        Some(Token::Const) => constant(text, inp),
+        _ => {
+            note(inp, Expected::tokens(&KEYWORDS));
+            None
         }
-    });
-    contextual(text, "test", |t| t == Token::Str)
-        .ignore_then(title)
-        .then(stmt::block(text, expression))
-        .map_with(|(title, body), e| Test {
-            title,
-            body,
-            span: e.span(),
-        })
-        .boxed()
+    }
 }
 
-#[derive(Clone)]
-enum Entered {
-    Param(MaterialParam),
-    Piece(Piece),
+/// Keywords that definitions start with.
+const KEYWORDS: [Token; 7] = [
+    Token::Material,
+    Token::Bsdf,
+    Token::Delta,
+    Token::Edf,
+    Token::Fn,
+    Token::Struct,
+    Token::Const,
+];
+
+/// Reads `test "title" { statements }`. The word is none of the language's where no title follows it.
+pub(super) fn test<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Test> {
+    let start = inp.cursor();
+    if !take(inp, Token::Ident) {
+        return None;
+    }
+    let word: Span = inp.span_since(&start);
+    let before_title = inp.cursor();
+    if text.get(word.range()) != Some("test") || !take(inp, Token::Str) {
+        return None;
+    }
+    let quoted = spell(text, inp.span_since(&before_title));
+    let title = Name {
+        node: quoted.node.trim_matches('"').to_owned(),
+        ..quoted
+    };
+    let body = stmt::block(text, inp)?;
+    Some(Test {
+        title,
+        body,
+        span: inp.span_since(&start),
+    })
 }
 
-/// `material name { params and statements }`
-fn material<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> impl Parse<'t, (Name, ItemKind)> {
-    let param = docs(text)
-        .then(material_param(text, expression.clone()))
-        .map(|(docs, param)| Entered::Param(MaterialParam { docs, ..param }));
-    let entered = choice((param, piece(text, expression, block).map(Entered::Piece)));
-    just(Token::Material)
-        .ignore_then(name(text))
-        .then_ignore(just(Token::LeftBrace))
-        .then(entered.repeated().collect::<Vec<_>>())
-        .then_ignore(close(Token::RightBrace))
-        .map_with(|(name, entries), e| {
-            let mut material = Material {
-                params: Vec::new(),
-                body: Vec::new(),
-            };
-            for entered in entries {
-                match entered {
-                    Entered::Param(param) => material.params.push(param),
-                    Entered::Piece(Piece::Value(value)) => {
-                        let lost = lost_value(&value);
-                        e.emit(SyntaxError::special(value.span, lost));
-                    }
-                    Entered::Piece(piece) => material.body.extend(stmt::statement(piece)),
-                }
-            }
-            (name, ItemKind::Material(material))
-        })
-        .boxed()
+/// Reads `material name { params and statements }` from its keyword.
+fn material<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    inp.skip();
+    let name = read_name(text, inp)?;
+    need(inp, Token::LeftBrace)?;
+    let mut material = Material {
+        params: Vec::new(),
+        body: Vec::new(),
+    };
+    let mut lost = Vec::new();
+    while inp.peek() != Some(Token::RightBrace) {
+        if let Some(param) = optional(inp, |inp| material_param(text, inp)) {
+            material.params.push(param);
+            continue;
+        }
+        match piece(text, inp) {
+            Some(Piece::Value(value)) => lost.push(value),
+            Some(piece) => material.body.extend(stmt::statement(piece)),
+            None => break,
+        }
+    }
+    close(inp, Token::RightBrace)?;
+    for value in lost {
+        inp.emit(SyntaxError::special(value.span, lost_value(&value)));
+    }
+    Some((name, ItemKind::Material(material)))
 }
 
 fn lost_value(value: &Expr) -> Diagnostic {
@@ -104,117 +103,110 @@ fn lost_value(value: &Expr) -> Diagnostic {
     .hint("assign what it scatters, as in `surface = ...;`")
 }
 
-/// `param name: type = default in low .. high { key: value };`
-fn material_param<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, MaterialParam> {
-    let range = just(Token::In)
-        .ignore_then(expression.clone())
-        .then_ignore(just(Token::Range))
-        .then(required(expression.clone()))
-        .or_not();
-    just(Token::Param)
-        .ignore_then(name(text))
-        .then_ignore(just(Token::Colon))
-        .then(type_name(text, expression.clone()))
-        .then_ignore(just(Token::Assign))
-        .then(required(expression.clone()))
-        .then(range)
-        .then(metadata(text, expression))
-        .then_ignore(semicolon(text))
-        .map_with(
-            |((((name, ty), default), range), metadata), e| MaterialParam {
-                docs: Vec::new(),
-                name,
-                ty,
-                default,
-                range,
-                metadata,
-                span: e.span(),
-            },
-        )
-        .boxed()
+/// Reads `param name: type = default in low .. high { key: value };` with its documentation.
+fn material_param<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<MaterialParam> {
+    let docs = docs(text, inp);
+    let start = inp.cursor();
+    need(inp, Token::Param)?;
+    let name = read_name(text, inp)?;
+    need(inp, Token::Colon)?;
+    let ty = type_name(text, inp)?;
+    need(inp, Token::Assign)?;
+    let default = required(text, inp);
+    let range = optional(inp, |inp| {
+        need(inp, Token::In)?;
+        let low = expression(text, inp)?;
+        need(inp, Token::Range)?;
+        Some((low, required(text, inp)))
+    });
+    let metadata = metadata(text, inp);
+    semicolon(text, inp);
+    Some(MaterialParam {
+        docs,
+        name,
+        ty,
+        default,
+        range,
+        metadata,
+        span: inp.span_since(&start),
+    })
 }
 
-/// `{ label: "IOR", soft: 1.2 .. 2.0 }`, or nothing.
-fn metadata<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, Vec<Entry>> {
-    let high = just(Token::Range)
-        .ignore_then(required(expression.clone()))
-        .or_not();
-    let entry = name(text)
-        .then_ignore(just(Token::Colon))
-        .then(expression)
-        .then(high)
-        .map(|((key, value), high)| Entry { key, value, high });
-    let entries = list(Token::LeftBrace, entry, Token::RightBrace);
-    entries.or_not().map(Option::unwrap_or_default)
+/// Reads `{ label: "IOR", soft: 1.2 .. 2.0 }`, or nothing.
+fn metadata<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Vec<Entry> {
+    let braces = (Token::LeftBrace, Token::RightBrace);
+    let entries = list(inp, braces, |inp| {
+        let key = read_name(text, inp)?;
+        need(inp, Token::Colon)?;
+        let value = expression(text, inp)?;
+        let high = need(inp, Token::Range).map(|()| required(text, inp));
+        Some(Entry { key, value, high })
+    });
+    entries.unwrap_or_default()
 }
 
-/// `(name: type = default, ...)`
-fn parameters<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, Vec<Param>> {
-    let default = just(Token::Assign)
-        .ignore_then(required(expression.clone()))
-        .or_not();
-    let param = name(text)
-        .then_ignore(just(Token::Colon))
-        .then(type_name(text, expression.clone()))
-        .then(default)
-        .map(|((name, ty), default)| Param { name, ty, default });
-    list(Token::LeftParen, param, Token::RightParen).boxed()
+/// Reads `(name: type = default, ...)`.
+fn parameters<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Vec<Param>> {
+    list(inp, (Token::LeftParen, Token::RightParen), |inp| {
+        let name = read_name(text, inp)?;
+        need(inp, Token::Colon)?;
+        let ty = type_name(text, inp)?;
+        let default = need(inp, Token::Assign).map(|()| required(text, inp));
+        Some(Param { name, ty, default })
+    })
 }
 
-/// `= value when condition;` or a block.
-fn body<'t>(text: &'t str, expression: Rule<'t, Expr>, block: Rule<'t, Block>) -> Rule<'t, Body> {
-    let when = just(Token::When)
-        .ignore_then(required(expression.clone()))
-        .or_not();
-    let short = just(Token::Assign)
-        .ignore_then(required(expression))
-        .then(when)
-        .then_ignore(semicolon(text))
-        .map(|(value, when)| Body::Expr { value, when });
-    choice((short, block.map(Body::Block))).boxed()
+/// Reads `= value when condition;` or a block.
+fn body<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Body> {
+    if need(inp, Token::Assign).is_none() {
+        return stmt::block(text, inp).map(Body::Block);
+    }
+    let value = required(text, inp);
+    let when = need(inp, Token::When).map(|()| required(text, inp));
+    semicolon(text, inp);
+    Some(Body::Expr { value, when })
 }
 
-/// `bsdf name(params) { lets methods }`
-fn closure<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    parameters: Rule<'t, Vec<Param>>,
-    body: Rule<'t, Body>,
-) -> impl Parse<'t, (Name, ItemKind)> {
-    let kind = choice((
-        just(Token::Bsdf).to(ClosureKind::Bsdf),
-        just(Token::Delta)
-            .then(just(Token::Bsdf))
-            .to(ClosureKind::DeltaBsdf),
-        just(Token::Edf).to(ClosureKind::Edf),
-    ));
-    kind.then(name(text))
-        .then(parameters)
-        .then_ignore(just(Token::LeftBrace))
-        .then(members(text, expression, body))
-        .then_ignore(close(Token::RightBrace))
-        .map_with(|(((kind, name), params), members), e| {
-            let mut closure = ClosureDef {
-                kind,
-                params,
-                lets: Vec::new(),
-                methods: Vec::new(),
-            };
-            for member in members {
-                match member {
-                    Member::Let(stmt) => {
-                        if !closure.methods.is_empty() {
-                            e.emit(SyntaxError::special(stmt.span, late_let(stmt.span)));
-                        }
-                        closure.lets.push(stmt);
-                    }
-                    Member::Method(method) => closure.methods.push(method),
-                    Member::Broken => {}
+/// Reads `bsdf name(params) { lets methods }` from its keyword.
+fn closure<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    let kind = if take(inp, Token::Edf) {
+        ClosureKind::Edf
+    } else if take(inp, Token::Delta) {
+        need(inp, Token::Bsdf)?;
+        ClosureKind::DeltaBsdf
+    } else {
+        need(inp, Token::Bsdf)?;
+        ClosureKind::Bsdf
+    };
+    let name = read_name(text, inp)?;
+    let params = parameters(text, inp)?;
+    need(inp, Token::LeftBrace)?;
+    let mut closure = ClosureDef {
+        kind,
+        params,
+        lets: Vec::new(),
+        methods: Vec::new(),
+    };
+    let mut late = Vec::new();
+    while inp.peek() != Some(Token::RightBrace)
+        && let Some(member) = member(text, inp)
+    {
+        match member {
+            Member::Let(stmt) => {
+                if !closure.methods.is_empty() {
+                    late.push(stmt.span);
                 }
+                closure.lets.push(stmt);
             }
-            (name, ItemKind::Closure(closure))
-        })
-        .boxed()
+            Member::Method(method) => closure.methods.push(method),
+            Member::Broken => {}
+        }
+    }
+    close(inp, Token::RightBrace)?;
+    for span in late {
+        inp.emit(SyntaxError::special(span, late_let(span)));
+    }
+    Some((name, ItemKind::Closure(closure)))
 }
 
 fn late_let(span: Span) -> Diagnostic {
@@ -222,89 +214,85 @@ fn late_let(span: Span) -> Diagnostic {
         .hint("move it before the methods, which all share it")
 }
 
-#[derive(Clone)]
 enum Member {
     Let(Stmt),
     Method(Method),
     Broken,
 }
 
-/// What stands between the braces of a closure.
-fn members<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    body: Rule<'t, Body>,
-) -> impl Parse<'t, Vec<Member>> {
-    let shared = stmt::binding(text, false, expression).map_with(|kind, e| {
-        let span = e.span();
-        Member::Let(Stmt { kind, span })
-    });
-    let arguments = list(Token::LeftParen, name(text), Token::RightParen);
-    let method = name(text)
-        .then(arguments)
-        .then(body)
-        .map_with(|((name, args), body), e| {
-            Member::Method(Method {
-                name,
-                args,
-                body,
-                span: e.span(),
-            })
-        });
-    choice((shared, method, stray_docs().to(Member::Broken)))
-        .recover_with(via_parser(broken_statement().to(Member::Broken)))
-        .boxed()
-        .repeated()
-        .collect()
+/// Reads one of what stands between the braces of a closure.
+fn member<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Member> {
+    let start = inp.save();
+    let found = match inp.peek() {
+        Some(Token::Let) => stmt::binding(text, inp).map(|kind| {
+            let span = inp.span_since(start.cursor());
+            Member::Let(Stmt { kind, span })
+        }),
+        Some(Token::Ident) => method(text, inp).map(Member::Method),
+        _ => stray_docs(inp).map(|()| Member::Broken),
+    };
+    if found.is_some() {
+        return found;
+    }
+    inp.rewind(start);
+    let expected = Expected::token(Token::Let).with(Expected::want(Want::Name));
+    note(inp, expected);
+    recover(inp, broken_statement()).map(|()| Member::Broken)
 }
 
-/// `fn name(params) -> type body`
-fn function<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    parameters: Rule<'t, Vec<Param>>,
-    body: Rule<'t, Body>,
-) -> impl Parse<'t, (Name, ItemKind)> {
-    just(Token::Fn)
-        .ignore_then(name(text))
-        .then(parameters)
-        .then_ignore(just(Token::Arrow))
-        .then(type_name(text, expression.clone()))
-        .then(body)
-        .map(|(((name, params), result), body)| {
-            let function = Function {
-                params,
-                result,
-                body,
-            };
-            (name, ItemKind::Function(function))
-        })
-        .boxed()
+/// Reads `pdf(wo, wi) = ...;`.
+fn method<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Method> {
+    let start = inp.cursor();
+    let name = read_name(text, inp)?;
+    let parens = (Token::LeftParen, Token::RightParen);
+    let args = list(inp, parens, |inp| read_name(text, inp))?;
+    let body = body(text, inp)?;
+    Some(Method {
+        name,
+        args,
+        body,
+        span: inp.span_since(&start),
+    })
 }
 
-/// `struct name { field: type, ... }`
-fn structure<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, (Name, ItemKind)> {
-    let field = docs(text)
-        .then(name(text))
-        .then_ignore(just(Token::Colon))
-        .then(type_name(text, expression.clone()))
-        .map(|((docs, name), ty)| Field { docs, name, ty });
-    just(Token::Struct)
-        .ignore_then(name(text))
-        .then(list(Token::LeftBrace, field, Token::RightBrace))
-        .map(|(name, fields)| (name, ItemKind::Struct(fields)))
-        .boxed()
+/// Reads `fn name(params) -> type body` from its keyword.
+fn function<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    inp.skip();
+    let name = read_name(text, inp)?;
+    let params = parameters(text, inp)?;
+    need(inp, Token::Arrow)?;
+    let result = type_name(text, inp)?;
+    let body = body(text, inp)?;
+    let function = Function {
+        params,
+        result,
+        body,
+    };
+    Some((name, ItemKind::Function(function)))
 }
 
-/// `const name: type = value;`
-fn constant<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, (Name, ItemKind)> {
-    just(Token::Const)
-        .ignore_then(name(text))
-        .then_ignore(just(Token::Colon))
-        .then(type_name(text, expression.clone()))
-        .then_ignore(just(Token::Assign))
-        .then(required(expression))
-        .then_ignore(semicolon(text))
-        .map(|((name, ty), value)| (name, ItemKind::Const(Const { ty, value })))
-        .boxed()
+/// Reads `struct name { field: type, ... }` from its keyword.
+fn structure<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    inp.skip();
+    let name = read_name(text, inp)?;
+    let fields = list(inp, (Token::LeftBrace, Token::RightBrace), |inp| {
+        let docs = docs(text, inp);
+        let name = read_name(text, inp)?;
+        need(inp, Token::Colon)?;
+        let ty = type_name(text, inp)?;
+        Some(Field { docs, name, ty })
+    })?;
+    Some((name, ItemKind::Struct(fields)))
+}
+
+/// Reads `const name: type = value;` from its keyword.
+fn constant<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<(Name, ItemKind)> {
+    inp.skip();
+    let name = read_name(text, inp)?;
+    need(inp, Token::Colon)?;
+    let ty = type_name(text, inp)?;
+    need(inp, Token::Assign)?;
+    let value = required(text, inp);
+    semicolon(text, inp);
+    Some((name, ItemKind::Const(Const { ty, value })))
 }

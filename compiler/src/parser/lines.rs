@@ -29,7 +29,11 @@ impl<'t> Lines<'t> {
     pub(super) fn advance(&mut self, span: Span) {
         let start = span.start as usize;
         let skipped = self.text.get(self.scanned..start).unwrap_or("");
-        let newline = skipped.rfind('\n');
+        let newline = match skipped {
+            // Most tokens follow each other like this.
+            "" | " " => None,
+            _ => skipped.rfind('\n'),
+        };
         self.is_first = newline.is_some() || self.scanned == 0;
         if let Some(newline) = newline {
             self.line_start = self.scanned + newline + 1;

@@ -1,26 +1,27 @@
 //! Literals: numbers with their units, strings and truth values.
 
-use chumsky::prelude::*;
-
-use super::common::{Input, Parse};
-use super::error::{Expected, SyntaxError, Want};
+use super::common::Input;
+use super::error::SyntaxError;
 use crate::ast::{Expr, ExprKind, Unit};
 use crate::diag::{Code, Diagnostic, nearest};
 use crate::lexer::{Number, Token, read_number};
 use crate::source::{Span, Spanned};
 
-/// Any literal.
-pub(super) fn literal<'t>(text: &'t str) -> impl Parse<'t, Expr> {
-    let boolean = choice((
-        just(Token::True).to(ExprKind::Bool(true)),
-        just(Token::False).to(ExprKind::Bool(false)),
-    ));
-    let string = just(Token::Str).map_with(move |_, e| string_value(text, e.span()));
-    let other = choice((string, boolean)).map_with(|kind, e| Expr {
+/// Reads the literal that starts with `token`, the next one.
+pub(super) fn literal<'t>(text: &'t str, token: Token, inp: &mut Input<'t, '_>) -> Expr {
+    let start = inp.cursor();
+    inp.skip();
+    let span = inp.span_since(&start);
+    let kind = match token {
+        Token::True => ExprKind::Bool(true),
+        Token::False => ExprKind::Bool(false),
+        Token::Str => string_value(text, span),
+        _ => number(text, token, span, inp),
+    };
+    Expr {
         kind,
-        span: e.span(),
-    });
-    choice((number(text), other))
+        span: inp.span_since(&start),
+    }
 }
 
 fn string_value(text: &str, span: Span) -> ExprKind {
@@ -29,35 +30,21 @@ fn string_value(text: &str, span: Span) -> ExprKind {
     ExprKind::Str(inner.strip_suffix('"').unwrap_or(inner).to_owned())
 }
 
-/// A number, with a unit when a name follows it.
-fn number<'t>(text: &'t str) -> impl Parse<'t, Expr> {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let found = inp.next();
-        let span = inp.span_since(&start);
-        let Some(token @ (Token::Int | Token::Hex | Token::Float)) = found else {
-            let expected = Expected::want(Want::Expression);
-            return Err(SyntaxError::new(span, found, expected));
-        };
-        // A number that has no value was reported by the lexer.
-        let slice = text.get(span.range()).unwrap_or("");
-        let number = read_number(token, slice, true).unwrap_or(Number::Int(0));
-        if let Number::Uint(value) = number {
-            let kind = ExprKind::Uint(value);
-            return Ok(Expr { kind, span });
-        }
-        let kind = match (unit(text, span, inp), number) {
-            (UnitAfter::None, Number::Int(value)) => ExprKind::Int(value),
-            (UnitAfter::None, Number::Float(value)) => ExprKind::Float(value),
-            (UnitAfter::Unknown, _) | (_, Number::Uint(_)) => ExprKind::Error,
-            (UnitAfter::Unit(unit), Number::Int(value)) => ExprKind::Quantity(value as f64, unit),
-            (UnitAfter::Unit(unit), Number::Float(value)) => ExprKind::Quantity(value, unit),
-        };
-        Ok(Expr {
-            kind,
-            span: inp.span_since(&start),
-        })
-    })
+/// The number at `span`, with a unit when a name follows it.
+fn number<'t>(text: &'t str, token: Token, span: Span, inp: &mut Input<'t, '_>) -> ExprKind {
+    // A number that has no value was reported by the lexer.
+    let slice = text.get(span.range()).unwrap_or("");
+    let number = read_number(token, slice, true).unwrap_or(Number::Int(0));
+    if let Number::Uint(value) = number {
+        return ExprKind::Uint(value);
+    }
+    match (unit(text, span, inp), number) {
+        (UnitAfter::None, Number::Int(value)) => ExprKind::Int(value),
+        (UnitAfter::None, Number::Float(value)) => ExprKind::Float(value),
+        (UnitAfter::Unknown, _) | (_, Number::Uint(_)) => ExprKind::Error,
+        (UnitAfter::Unit(unit), Number::Int(value)) => ExprKind::Quantity(value as f64, unit),
+        (UnitAfter::Unit(unit), Number::Float(value)) => ExprKind::Quantity(value, unit),
+    }
 }
 
 enum UnitAfter {

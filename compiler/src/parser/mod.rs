@@ -1,9 +1,9 @@
 //! Tokens to syntax tree.
 //!
-//! The grammar is written with chumsky, a file for each level: `file`, `item`, `stmt`, `expr`,
-//! `literal`, on what `common` provides. Before it runs, `nesting` bounds how deep the source
-//! nests and `brackets` balances its brackets; after it, `report` turns what did not match into
-//! diagnostics with the `hints`.
+//! The grammar reads chumsky's input token by token, a file for each level: `file`, `item`, `stmt`,
+//! `expr`, `literal`, on what `common` provides; chumsky keeps what was expected where, and goes on
+//! after errors. Before it runs, `nesting` bounds how deep the source nests and `brackets` balances its
+//! brackets; after it, `report` turns what did not match into diagnostics with the `hints`.
 
 mod brackets;
 mod common;
@@ -22,7 +22,7 @@ mod stmt;
 use chumsky::input::Input as _;
 use chumsky::prelude::*;
 
-use common::{Rule, Tokens};
+use common::{Input, Tokens, rule};
 pub use nesting::MAX_NESTING;
 pub use print::{print, print_expression};
 
@@ -49,7 +49,7 @@ pub fn parse(file: FileId, text: &str) -> (Module, Vec<Diagnostic>) {
 
 /// Parses one expression, such as the value a scene gives to a parameter.
 pub fn parse_expression(file: FileId, text: &str) -> (Option<Expr>, Vec<Diagnostic>) {
-    run(file, text, |_, expression| expression)
+    run(file, text, expr::expression)
 }
 
 /// How tightly an infix operator binds; `None` for other tokens.
@@ -60,22 +60,24 @@ pub(crate) fn binding_power(token: Token) -> Option<u16> {
 fn run<T>(
     file: FileId,
     text: &str,
-    grammar: impl for<'t> Fn(&'t str, Rule<'t, Expr>) -> Rule<'t, T>,
+    read: for<'t> fn(&'t str, &mut Input<'t, '_>) -> Option<T>,
 ) -> (Option<T>, Vec<Diagnostic>) {
     let (tokens, mut diagnostics) = lex(file, text);
     if let Err(diagnostic) = nesting::check_nesting(&tokens) {
         diagnostics.push(diagnostic);
         return (None, diagnostics);
     }
-    let balanced = brackets::balance(file, text, &tokens);
+    let balanced = brackets::balance(file, text, tokens);
     let tokens: &[(Token, Span)] = &balanced.tokens;
     let (value, errors) = {
         let end = Span::new(file, text.len()..text.len());
         let input: Tokens<'_> = tokens.split_token_span(end);
-        let rule = grammar(text, expr::expression(text));
-        rule.parse(input).into_output_errors()
+        let grammar = rule(move |inp| read(text, inp));
+        grammar.parse(input).into_output_errors()
     };
-    let source = report::Source::new(file, text, &balanced);
-    report::report(&source, errors, &mut diagnostics);
+    if !(errors.is_empty() && balanced.unclosed.is_empty() && balanced.stray.is_empty()) {
+        let source = report::Source::new(file, text, &balanced);
+        report::report(&source, errors, &mut diagnostics);
+    }
     (value, diagnostics)
 }

@@ -1,20 +1,17 @@
 //! Statements and blocks.
 
-use chumsky::prelude::*;
-
 use super::common::{
-    Input, Parse, Rule, before, broken_statement, close, ends_statement, name, nothing, one,
-    rest_of_statement, semicolon, skip_docs, skip_one, spell, type_name,
+    Input, broken_statement, close, ends_statement, need, note, read_name, recover,
+    rest_of_statement, rule, semicolon, skip_docs, skip_one, spell, take, type_name,
 };
-use super::error::{Expected, SyntaxError};
-use super::expr::{headed, if_expression, required};
+use super::error::{Expected, SyntaxError, Want};
+use super::expr::{body_after, expression, if_expression, required};
 use crate::ast::{BinaryOp, Block, Expr, ExprKind, IfExpr, Stmt, StmtKind, UnaryOp};
 use crate::diag::{Code, Diagnostic};
 use crate::lexer::Token;
 use crate::source::Span;
 
 /// One entry of a block.
-#[derive(Clone)]
 pub(super) enum Piece {
     /// A statement.
     Stmt(Stmt),
@@ -26,20 +23,28 @@ pub(super) enum Piece {
     Broken,
 }
 
-/// `{ statements; value }`. Fails only before another token than `{`.
-pub(super) fn block<'t>(text: &'t str, expression: Rule<'t, Expr>) -> Rule<'t, Block> {
-    recursive(|block| {
-        let piece = piece(text, expression, block.boxed());
-        just(Token::LeftBrace)
-            .ignore_then(piece.repeated().collect::<Vec<_>>())
-            .then_ignore(close(Token::RightBrace))
-            .map_with(|pieces, e| assemble(pieces, e.span()))
-    })
-    .boxed()
+/// Reads `{ statements; value }`. Fails only before another token than `{`.
+pub(super) fn block<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Block> {
+    let start = inp.cursor();
+    need(inp, Token::LeftBrace)?;
+    // Sources nest as deep as `nesting` lets them.
+    let pieces = stacker::maybe_grow(128 << 10, 1 << 20, || pieces(text, inp));
+    close(inp, Token::RightBrace)?;
+    Some(assemble(pieces, inp.span_since(&start)))
+}
+
+/// Reads statements up to the brace that closes their block.
+fn pieces<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    while inp.peek() != Some(Token::RightBrace)
+        && let Some(piece) = piece(text, inp)
+    {
+        pieces.push(piece);
+    }
+    pieces
 }
 
 /// A block where one has to be.
-#[derive(Clone)]
 pub(super) enum RequiredBlock {
     /// It is there.
     Block(Block),
@@ -49,134 +54,139 @@ pub(super) enum RequiredBlock {
     Missing(Block, SyntaxError),
 }
 
-/// A block where one has to be. Never fails.
-pub(super) fn required_block<'t>(text: &'t str, block: Rule<'t, Block>) -> Rule<'t, RequiredBlock> {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.save();
-        let error = match inp.parse(&block) {
-            Ok(block) => return Ok(RequiredBlock::Block(block)),
-            Err(error) => error,
-        };
-        inp.rewind(start.clone());
-        let span = inp.span_since(start.cursor());
-        while let Some(token) = inp.peek() {
-            if token == Token::LeftBrace {
-                return Ok(RequiredBlock::Late(inp.parse(&block)?, error));
-            }
-            if token == Token::Else || ends_statement(text, token, inp) {
-                break;
-            }
-            skip_one(inp);
+/// Reads a block where one has to be.
+pub(super) fn required_block<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> RequiredBlock {
+    let start = inp.save();
+    let error = match inp.parse(rule(move |inp| block(text, inp))) {
+        Ok(block) => return RequiredBlock::Block(block),
+        Err(error) => error,
+    };
+    inp.rewind(start.clone());
+    let span = inp.span_since(start.cursor());
+    while let Some(token) = inp.peek() {
+        if token == Token::LeftBrace
+            && let Some(block) = block(text, inp)
+        {
+            return RequiredBlock::Late(block, error);
         }
-        inp.rewind(start);
-        let empty = Block {
-            stmts: Vec::new(),
-            value: None,
-            span,
-        };
-        Ok(RequiredBlock::Missing(empty, error))
-    })
-    .boxed()
+        if token == Token::Else || ends_statement(text, token, inp) {
+            break;
+        }
+        skip_one(inp);
+    }
+    inp.rewind(start);
+    let empty = Block {
+        stmts: Vec::new(),
+        value: None,
+        span,
+    };
+    RequiredBlock::Missing(empty, error)
 }
 
-/// A statement or value. It always takes a token, and fails only before a closing bracket or the
+/// Reads a statement or value. It always takes a token, and fails only before a closing bracket or the
 /// end of the file.
-pub(super) fn piece<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> Rule<'t, Piece> {
-    let statement = choice((
-        binding(text, false, expression.clone()),
-        binding(text, true, expression.clone()),
-        for_loop(text, expression.clone(), block.clone()),
-        while_loop(text, expression.clone(), block.clone()),
-        jump(text),
-        assertion(text, expression.clone()),
-    ))
-    .map_with(|kind, e| {
-        Piece::Stmt(Stmt {
-            kind,
-            span: e.span(),
-        })
-    });
-    let branch = if_expression(text, expression.clone(), block)
-        .map(|(chosen, span)| Piece::If(chosen, span));
-    choice((
-        statement.boxed(),
-        branch,
-        expression_piece(
-            text,
-            choice((whole_material(text), expression.clone())).boxed(),
-            expression,
-        ),
-        stray_docs().to(Piece::Broken),
-    ))
-    .recover_with(via_parser(broken_statement().to(Piece::Broken)))
-    .boxed()
+pub(super) fn piece<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Piece> {
+    let start = inp.save();
+    let found = match inp.peek() {
+        Some(token) if KEYWORDS.contains(&token) => statement_piece(text, token, inp),
+        Some(Token::DocOuter | Token::DocInner) => stray_docs(inp).map(|()| Piece::Broken),
+        _ => expression_piece(text, inp),
+    };
+    if found.is_some() {
+        return found;
+    }
+    inp.rewind(start);
+    note(
+        inp,
+        Expected::tokens(&KEYWORDS).with(Expected::want(Want::Expression)),
+    );
+    recover(inp, broken_statement()).map(|()| Piece::Broken)
 }
 
-/// Documentation where nothing can be documented. Before a `param` it fails: it is not the
-/// documentation that is wrong with that.
-pub(super) fn stray_docs<'t>() -> impl Parse<'t, ()> {
-    custom(|inp: &mut Input<'t, '_>| {
-        let start = inp.cursor();
-        let last = skip_docs(inp);
-        let span = inp.span_since(&start);
-        if last.is_none() || inp.peek() == Some(Token::Param) {
-            return Err(nothing(span));
+/// Reads what starts with a keyword, the next token.
+fn statement_piece<'t>(text: &'t str, token: Token, inp: &mut Input<'t, '_>) -> Option<Piece> {
+    let start = inp.cursor();
+    let kind = match token {
+        Token::Let | Token::Var => binding(text, inp)?,
+        Token::For => for_loop(text, inp)?,
+        Token::While => while_loop(text, inp)?,
+        Token::Assert => assertion(text, inp),
+        Token::If => {
+            let (chosen, span) = if_expression(text, inp);
+            return Some(Piece::If(chosen, span));
         }
-        inp.emit(SyntaxError::special(span, misplaced_docs(last, span)));
-        Ok(())
-    })
+        _ => jump(text, inp),
+    };
+    let span = inp.span_since(&start);
+    Some(Piece::Stmt(Stmt { kind, span }))
 }
 
-pub(super) fn misplaced_docs(found: Option<Token>, span: Span) -> Diagnostic {
+/// Keywords that a statement can start with.
+const KEYWORDS: [Token; 8] = [
+    Token::Let,
+    Token::Var,
+    Token::For,
+    Token::While,
+    Token::Break,
+    Token::Continue,
+    Token::Assert,
+    Token::If,
+];
+
+/// Reads documentation where nothing can be documented. Before a `param` it fails: it is not the
+/// documentation that is wrong with that.
+pub(super) fn stray_docs(inp: &mut Input<'_, '_>) -> Option<()> {
+    let start = inp.cursor();
+    let last = skip_docs(inp)?;
+    let span = inp.span_since(&start);
+    if inp.peek() == Some(Token::Param) {
+        return None;
+    }
+    inp.emit(SyntaxError::special(span, misplaced_docs(last, span)));
+    Some(())
+}
+
+pub(super) fn misplaced_docs(found: Token, span: Span) -> Diagnostic {
     let message = "this documentation comment documents nothing";
     let hint = match found {
-        Some(Token::DocInner) => "`//!` documents the file and stands at its top; write `//` here",
+        Token::DocInner => "`//!` documents the file and stands at its top; write `//` here",
         _ => "`///` stands before a definition, a `param` or a field; write `//` here",
     };
     Diagnostic::new(Code::Syntax, span, message).hint(hint)
 }
 
-/// `let name: type = value;` or, when `mutable`, `var name: type = value;`
-pub(super) fn binding<'t>(
-    text: &'t str,
-    mutable: bool,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, StmtKind> {
-    let keyword = just(if mutable { Token::Var } else { Token::Let });
-    let ty = just(Token::Colon)
-        .ignore_then(type_name(text, expression.clone()))
-        .or_not();
-    keyword
-        .ignore_then(name(text))
-        .then(ty)
-        .then_ignore(just(Token::Assign))
-        .then(required(expression))
-        .then_ignore(semicolon(text))
-        .map(move |((name, ty), value)| StmtKind::Let {
-            mutable,
-            name,
-            ty,
-            value,
-        })
+/// Reads `let name: type = value;` or `var name: type = value;` from its keyword.
+pub(super) fn binding<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<StmtKind> {
+    let mutable = take(inp, Token::Var);
+    if !mutable {
+        need(inp, Token::Let)?;
+    }
+    let name = read_name(text, inp)?;
+    let ty = match need(inp, Token::Colon) {
+        Some(()) => Some(type_name(text, inp)?),
+        None => None,
+    };
+    need(inp, Token::Assign)?;
+    let value = required(text, inp);
+    semicolon(text, inp);
+    Some(StmtKind::Let {
+        mutable,
+        name,
+        ty,
+        value,
+    })
 }
 
-/// `for name in low .. high { ... }`
-fn for_loop<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> impl Parse<'t, StmtKind> {
-    let header = just(Token::For)
-        .ignore_then(name(text))
-        .then_ignore(just(Token::In))
-        .then(expression.clone())
-        .then_ignore(just(Token::Range))
-        .then(expression);
-    headed(text, header, |(_, high)| high, block).map(|(((name, low), high), body)| StmtKind::For {
+/// Reads `for name in low .. high { ... }` from its keyword.
+fn for_loop<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<StmtKind> {
+    inp.skip();
+    let name = read_name(text, inp)?;
+    need(inp, Token::In)?;
+    let low = expression(text, inp)?;
+    need(inp, Token::Range)?;
+    let mut high = expression(text, inp)?;
+    let body = body_after(text, &mut high, inp);
+    Some(StmtKind::For {
         name,
         low,
         high,
@@ -184,44 +194,36 @@ fn for_loop<'t>(
     })
 }
 
-/// `while cond limit count { ... }`
-fn while_loop<'t>(
-    text: &'t str,
-    expression: Rule<'t, Expr>,
-    block: Rule<'t, Block>,
-) -> impl Parse<'t, StmtKind> {
-    let limit = just(Token::Limit)
-        .ignore_then(required(expression.clone()))
-        .or_not();
-    let header = just(Token::While).ignore_then(expression).then(limit);
-    headed(
-        text,
-        header,
-        |(cond, limit)| limit.as_mut().unwrap_or(cond),
-        block,
-    )
-    .map(|((cond, limit), body)| StmtKind::While { cond, limit, body })
+/// Reads `while cond limit count { ... }` from its keyword.
+fn while_loop<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<StmtKind> {
+    inp.skip();
+    let mut cond = expression(text, inp)?;
+    let mut limit = need(inp, Token::Limit).map(|()| required(text, inp));
+    let body = body_after(text, limit.as_mut().unwrap_or(&mut cond), inp);
+    Some(StmtKind::While { cond, limit, body })
 }
 
-/// `break;`, `continue;`
-fn jump<'t>(text: &'t str) -> impl Parse<'t, StmtKind> {
-    choice((
-        just(Token::Break).to(StmtKind::Break),
-        just(Token::Continue).to(StmtKind::Continue),
-    ))
-    .then_ignore(semicolon(text))
+/// Reads `break;` or `continue;`.
+fn jump<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> StmtKind {
+    let kind = if take(inp, Token::Break) {
+        StmtKind::Break
+    } else {
+        inp.skip();
+        StmtKind::Continue
+    };
+    semicolon(text, inp);
+    kind
 }
 
-/// `assert condition;`
-fn assertion<'t>(text: &'t str, expression: Rule<'t, Expr>) -> impl Parse<'t, StmtKind> {
-    just(Token::Assert)
-        .ignore_then(required(expression))
-        .then_ignore(semicolon(text))
-        .map(StmtKind::Assert)
+/// Reads `assert condition;` from its keyword.
+fn assertion<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> StmtKind {
+    inp.skip();
+    let condition = required(text, inp);
+    semicolon(text, inp);
+    StmtKind::Assert(condition)
 }
 
 /// What follows an expression in a block.
-#[derive(Clone)]
 enum Tail {
     Assign(Option<BinaryOp>, Expr),
     Value,
@@ -229,21 +231,17 @@ enum Tail {
     Broken,
 }
 
-/// The place of `material = value;`: the name of all outputs together. Fails, before it takes
+/// Reads the place of `material = value;`: the name of all outputs together. Fails, before it takes
 /// anything, where no assignment follows.
-fn whole_material<'t>(text: &'t str) -> impl Parse<'t, Expr> {
-    custom(move |inp: &mut Input<'t, '_>| {
-        let start = inp.save();
-        let word = inp.next();
+fn whole_material<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Expr> {
+    let start = inp.save();
+    if take(inp, Token::Material) && inp.peek().is_some_and(is_assignment) {
         let span = inp.span_since(start.cursor());
-        let assigned = matches!(inp.peek(), Some(t) if is_assignment(t));
-        if word == Some(Token::Material) && assigned {
-            let kind = ExprKind::Name(spell(text, span).node);
-            return Ok(Expr { kind, span });
-        }
-        inp.rewind(start);
-        Err(nothing(span))
-    })
+        let kind = ExprKind::Name(spell(text, span).node);
+        return Some(Expr { kind, span });
+    }
+    inp.rewind(start);
+    None
 }
 
 /// Assignments that combine with the old value.
@@ -261,45 +259,56 @@ const COMPOUND: [(Token, BinaryOp); 10] = [
 ];
 
 fn is_assignment(token: Token) -> bool {
-    COMPOUND.iter().any(|(t, _)| *t == token) || token == Token::Assign
+    assignment(token).is_some()
 }
 
-/// `place = value;`, or the value of a block.
-fn expression_piece<'t>(
-    text: &'t str,
-    place: Rule<'t, Expr>,
-    expression: Rule<'t, Expr>,
-) -> impl Parse<'t, Piece> {
-    let compound = COMPOUND.map(|(token, op)| just(token).to(Some(op)));
-    let operator = choice((just(Token::Assign).to(None), choice(compound)));
-    let assign = operator
-        .then(required(expression))
-        .then_ignore(semicolon(text))
-        .map(|(op, value)| Tail::Assign(op, value));
-    let brace = Expected::token(Token::RightBrace);
-    let value = before(brace, |t| t == Token::RightBrace).to(Tail::Value);
-    let unused = one(Expected::default(), |t| t == Token::Semicolon).to(Tail::Unused);
-    let tail = choice((assign, value, unused))
-        .recover_with(via_parser(rest_of_statement(text).to(Tail::Broken)));
-    place.then(tail).map_with(|(value, tail), e| {
-        let span: Span = e.span();
-        match tail {
-            Tail::Assign(op, new) => Piece::Stmt(Stmt {
-                kind: StmtKind::Assign {
-                    place: value,
-                    op,
-                    value: new,
-                },
-                span,
-            }),
-            Tail::Value => Piece::Value(value),
-            Tail::Unused => {
-                e.emit(SyntaxError::special(value.span, unused_value(&value)));
-                Piece::Broken
-            }
-            Tail::Broken => Piece::Broken,
+/// What an assignment combines the old value by, if it does.
+fn assignment(token: Token) -> Option<Option<BinaryOp>> {
+    if token == Token::Assign {
+        return Some(None);
+    }
+    let compound = COMPOUND.iter().find(|(t, _)| *t == token);
+    compound.map(|(_, op)| Some(*op))
+}
+
+/// Reads `place = value;`, or the value of a block.
+fn expression_piece<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Option<Piece> {
+    let start = inp.cursor();
+    let place = whole_material(text, inp).or_else(|| expression(text, inp))?;
+    match tail(text, inp) {
+        Tail::Assign(op, value) => {
+            let kind = StmtKind::Assign { place, op, value };
+            let span = inp.span_since(&start);
+            Some(Piece::Stmt(Stmt { kind, span }))
         }
-    })
+        Tail::Value => Some(Piece::Value(place)),
+        Tail::Unused => {
+            inp.emit(SyntaxError::special(place.span, unused_value(&place)));
+            Some(Piece::Broken)
+        }
+        Tail::Broken => Some(Piece::Broken),
+    }
+}
+
+fn tail<'t>(text: &'t str, inp: &mut Input<'t, '_>) -> Tail {
+    let next = inp.peek();
+    if let Some(op) = next.and_then(assignment) {
+        inp.skip();
+        let value = required(text, inp);
+        semicolon(text, inp);
+        return Tail::Assign(op, value);
+    }
+    if next == Some(Token::RightBrace) {
+        return Tail::Value;
+    }
+    if take(inp, Token::Semicolon) {
+        return Tail::Unused;
+    }
+    let compound = Expected::tokens(&COMPOUND.map(|(token, _)| token));
+    let others = Expected::tokens(&[Token::Assign, Token::RightBrace]);
+    note(inp, compound.with(others));
+    recover(inp, rest_of_statement(text));
+    Tail::Broken
 }
 
 fn unused_value(value: &Expr) -> Diagnostic {

@@ -13,10 +13,16 @@ use crate::ir::ops::Op;
 use crate::ir::{Block, Const, Expr, ExprId, ExprKind, Function, Module, Stmt, Type};
 
 /// Removes common subexpressions.
-pub(super) fn cse(_: &Module, _: &Function) -> Rules {
+pub(super) fn cse(_: &Module, f: &Function) -> Rules {
+    let table = Table {
+        known: HashMap::with_capacity_and_hasher(f.exprs.len(), Hashed::default()),
+        leaves: HashMap::with_capacity_and_hasher(16, Hashed::default()),
+        undo: Vec::with_capacity(f.exprs.len()),
+        ..Table::default()
+    };
     Rules {
         forward: true,
-        table: Some(Table::default()),
+        table: Some(table),
         ..Rules::default()
     }
 }

@@ -16,13 +16,16 @@ pub fn remove(f: &mut Function) {
     let body = std::mem::take(&mut f.body);
     let live = Live::of(f, &body);
     f.body = sweep(body, &live);
-    Renumber::function(f);
+    let kept = live.exprs.iter().filter(|is_live| **is_live).count();
+    Renumber::function(f, kept);
 }
 
 /// What is read.
 struct Live {
     exprs: Vec<bool>,
     locals: Vec<bool>,
+    /// Room for expressions whose operands are to be marked.
+    marking: Vec<ExprId>,
 }
 
 impl Live {
@@ -32,6 +35,7 @@ impl Live {
         let mut live = Self {
             exprs: vec![false; f.exprs.len()],
             locals: vec![false; f.locals.len()],
+            marking: Vec::new(),
         };
         // Of variables that became live the stores are looked at, and of statements that became
         // needed what decides about them: each once.
@@ -54,15 +58,15 @@ impl Live {
         if std::mem::replace(&mut self.exprs[id.index()], true) {
             return;
         }
-        let mut exprs = vec![id];
-        while let Some(id) = exprs.pop() {
+        self.marking.push(id);
+        while let Some(id) = self.marking.pop() {
             let kind = &f.expr(id).kind;
             if let ExprKind::Load(local) = kind {
                 self.mark_local(*local, pending);
             }
             for &operand in kind.operands() {
                 if !std::mem::replace(&mut self.exprs[operand.index()], true) {
-                    exprs.push(operand);
+                    self.marking.push(operand);
                 }
             }
         }
@@ -242,12 +246,13 @@ struct Renumber<'a> {
 }
 
 impl Renumber<'_> {
-    fn function(f: &mut Function) {
+    /// Numbers a function anew, of whose expressions so many are read.
+    fn function(f: &mut Function, kept: usize) {
         let mut body = std::mem::take(&mut f.body);
         let mut this = Renumber {
             expr_ids: vec![None; f.exprs.len()],
             local_ids: vec![None; f.locals.len()],
-            exprs: Vec::new(),
+            exprs: Vec::with_capacity(kept),
             locals: Vec::new(),
             old: f,
         };

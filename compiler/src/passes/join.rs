@@ -22,6 +22,20 @@ pub fn join(f: &mut Function) -> bool {
 
 /// Joins the branches of a block, and of the blocks that result.
 fn block(f: &Function, stmts: Block, joined: &mut bool) -> Block {
+    if stmts.iter().all(|stmt| stmt.blocks().next().is_none()) {
+        return stmts;
+    }
+    let is_branch = |stmt: &&Stmt| matches!(stmt, Stmt::If(..));
+    let stmts = match stmts.iter().filter(is_branch).nth(1) {
+        Some(_) => with_joined(f, stmts, joined),
+        None => stmts,
+    };
+    let joined_in = |stmt: Stmt| stmt.map_blocks(|inner| block(f, inner, joined));
+    stmts.into_iter().map(joined_in).collect()
+}
+
+/// Joins the branches of a block that has several.
+fn with_joined(f: &Function, stmts: Block, joined: &mut bool) -> Block {
     let mut before = Before::default();
     for stmt in stmts {
         let Some(at) = earlier(f, &before.stmts, &stmt) else {
@@ -37,8 +51,7 @@ fn block(f: &Function, stmts: Block, joined: &mut bool) -> Block {
             None => before.push(stmt),
         }
     }
-    let joined_in = |stmt: Stmt| stmt.map_blocks(|inner| block(f, inner, joined));
-    before.stmts.into_iter().map(joined_in).collect()
+    before.stmts
 }
 
 /// The last branch before `stmt` on its condition.

@@ -10,11 +10,20 @@
 use super::rewrite::stored_in;
 use crate::ir::{Block, ExprId, ExprKind, Function, LocalId, Stmt};
 
-/// Moves invariant work out of loops in place.
+/// Moves invariant work out of loops in place; false if there are no loops.
 pub fn licm(f: &mut Function) -> bool {
+    if !has_loop(&f.body) {
+        return false;
+    }
     let body = std::mem::take(&mut f.body);
     f.body = block(f, &mut Flags::new(f), body);
     true
+}
+
+fn has_loop(block: &Block) -> bool {
+    block.iter().any(|stmt| {
+        matches!(stmt, Stmt::For { .. } | Stmt::While { .. }) || stmt.blocks().any(has_loop)
+    })
 }
 
 /// Rewrites a block; inner loops first, so that their invariants can go on moving out.

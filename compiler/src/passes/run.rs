@@ -231,12 +231,12 @@ fn round(passes: &[Pass], module: &Module, f: &mut Function, calls: Calls) -> u6
     let mut changed = true;
     while let [first, ..] = rest {
         let walks = rest.iter().map_while(|pass| match pass.work {
-            Work::Walk(rules) => Some(rules(module, f)),
+            Work::Walk(rules) => Some(rules),
             _ => None,
         });
-        let rules: Vec<Rules> = walks.collect();
-        let count = rules.len().max(1);
-        match (rules.into_iter().reduce(Rules::and), &first.work) {
+        let count = walks.clone().count().max(1);
+        let rules = walks.map(|rules| rules(module, f)).reduce(Rules::and);
+        match (rules, &first.work) {
             (Some(mut rules), _) => {
                 if let Some(policy) = &mut rules.inline {
                     if calls != Calls::InLine {

@@ -1,5 +1,8 @@
 //! The state of checking one function, closure method or material: scopes, and the IR builder.
 
+use std::rc::Rc;
+use std::sync::Arc;
+
 use crate::ast::{self, Name};
 use crate::diag::{Code, Diagnostic};
 use crate::ir::build::Builder;
@@ -11,6 +14,7 @@ use super::called::Whole;
 use super::inline::Expansion;
 use super::modules::ModuleId;
 use super::outputs::OUTPUTS;
+use super::purpose::Purpose;
 use super::scopes::Scopes;
 use super::test::Asserted;
 use super::tree::TreeSize;
@@ -62,7 +66,7 @@ pub enum Binding {
 /// A name in scope.
 pub struct Entry {
     /// The name.
-    pub name: String,
+    pub name: Rc<str>,
     /// What it stands for.
     pub binding: Binding,
     /// Where it was defined.
@@ -186,7 +190,7 @@ impl<'c, 'l> Body<'c, 'l> {
             let message = format!("`{}` is never used", entry.name);
             let unused = Diagnostic::new(Code::Unused, entry.span, message)
                 .hint(format!("remove it, or call it `_{}`", entry.name))
-                .replaced(entry.span, Some(&entry.name), &format!("_{}", entry.name));
+                .replaced(entry.span, Some(&*entry.name), &format!("_{}", entry.name));
             self.cx.report(unused);
         }
     }
@@ -203,7 +207,7 @@ impl<'c, 'l> Body<'c, 'l> {
             notes.bindings.insert(name.span, ty);
         }
         let entry = Entry {
-            name: name.node.clone(),
+            name: name.node.as_str().into(),
             binding,
             span: name.span,
             used: false,
@@ -226,11 +230,17 @@ impl<'c, 'l> Body<'c, 'l> {
 
     /// Names in scope, for hints.
     pub fn local_names(&self) -> Vec<String> {
-        self.scopes.entries().map(|e| e.name.clone()).collect()
+        self.scopes.entries().map(|e| e.name.to_string()).collect()
     }
 
     /// Gives a value the type that a place needs; what does not convert is reported.
-    pub fn coerce(&mut self, operand: Operand, to: Ty, span: Span, place: &str) -> Option<Operand> {
+    pub fn coerce<'p>(
+        &mut self,
+        operand: Operand,
+        to: Ty,
+        span: Span,
+        place: impl Into<Purpose<'p>>,
+    ) -> Option<Operand> {
         let from = operand.ty();
         if let (Operand::Value(id, Ty::Int), Ty::Uint) = (operand, to)
             && self.is_unsigned(id, from)
@@ -243,7 +253,7 @@ impl<'c, 'l> Body<'c, 'l> {
             return Some(array);
         }
         if !from.converts_to(to) {
-            return self.mismatch(from, to, span, place);
+            return self.mismatch(from, to, span, place.into());
         }
         let Operand::Value(id, _) = operand else {
             return Some(operand);
@@ -286,7 +296,7 @@ impl<'c, 'l> Body<'c, 'l> {
         self.builder.op(crate::ir::ops::Op::ToFloat, &[id], span)
     }
 
-    fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: &str) -> Option<T> {
+    fn mismatch<T>(&mut self, from: Ty, to: Ty, span: Span, place: Purpose<'_>) -> Option<T> {
         let (found, wanted) = (self.cx.type_text(from), self.cx.type_text(to));
         let (a_found, a_wanted) = (self.cx.a_type(from), self.cx.a_type(to));
         let number = matches!(from, Ty::Int | Ty::Uint | Ty::Float);
@@ -304,7 +314,7 @@ impl<'c, 'l> Body<'c, 'l> {
             _ => wrong,
         };
         let wrong = match (from, to) {
-            (Ty::Color, Ty::Float) if place == "`opacity`" => wrong.hint(
+            (Ty::Color, Ty::Float) if place == Purpose::Named("opacity") => wrong.hint(
                 "a filter of some color is a surface, `mix(transparent(color: tint), diffuse(0.5), 0.5)`, after \
                  `use std::bsdf::transparent;`",
             ),
@@ -419,7 +429,8 @@ impl Checker<'_> {
         }
         let types: Vec<Ty> = params.iter().map(|p| p.ty).collect();
         let id = self.lower_signature(module, item, f, &types, result, false)?;
-        self.signatures.insert(id, Signature { params, result });
+        let signature = Arc::new(Signature { params, result });
+        self.signatures.insert(id, signature);
         Some(Checked::Function(id))
     }
 

@@ -12,6 +12,7 @@ use super::body::{Body, Operand};
 use super::inputs;
 use super::matrix::FUNCTIONS;
 use super::notes::Meaning;
+use super::purpose::Purpose;
 use super::types::{NAMED, Ty};
 use super::{Checked, Param};
 use super::{test, words};
@@ -93,10 +94,8 @@ impl Body<'_, '_> {
     /// What is wrong with a call of a helper of the library that is meant for the function which other languages have
     /// by its name.
     fn taken_for_another(&self, callee: &Name, args: &[Arg]) -> Option<Diagnostic> {
-        let is_own = self.cx.modules[self.module.0]
-            .names
-            .contains_key(&callee.node);
-        if callee.node != "refract" || args.len() != 3 || is_own {
+        let own = &self.cx.modules[self.module.0].names;
+        if callee.node != "refract" || args.len() != 3 || own.contains_key(&callee.node) {
             return None;
         }
         let message = "`refract` is a helper of the library for bsdfs, and takes 2 arguments";
@@ -177,8 +176,11 @@ impl Body<'_, '_> {
                 continue;
             }
             given.filled[index] = true;
-            let what = format!("`{}` of `{}`", params[index].name, callee.node);
-            given.operands[index] = self.expr_as(&arg.value, params[index].ty, &what);
+            let what = Purpose::Argument {
+                name: &params[index].name,
+                of: &callee.node,
+            };
+            given.operands[index] = self.expr_as(&arg.value, params[index].ty, what);
             given.ok &= given.operands[index].is_some();
         }
         given
@@ -240,7 +242,7 @@ impl Body<'_, '_> {
 
     /// Values of arguments that take no names.
     pub fn positional(&mut self, callee: &str, args: &[Arg]) -> Option<Vec<(ExprId, Ty, Span)>> {
-        let mut values = Vec::new();
+        let mut values = Vec::with_capacity(args.len());
         let mut ok = true;
         for arg in args {
             if let Some(name) = &arg.name {
@@ -329,8 +331,8 @@ impl Body<'_, '_> {
             Shape::Number(_) | Shape::Select => all_ints,
             _ => false,
         };
-        let mut ids = Vec::new();
-        let mut types = Vec::new();
+        let mut ids = Vec::with_capacity(values.len());
+        let mut types = Vec::with_capacity(values.len());
         for &(id, ty, at) in values {
             let promote = !takes_ints && matches!(ty, Ty::Int | Ty::Uint) && op != Op::Select;
             ids.push(if promote {

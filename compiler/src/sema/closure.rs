@@ -94,7 +94,7 @@ impl Checker<'_> {
             methods,
             span: item.span,
         });
-        self.closure_params.push(params);
+        self.closure_params.push(params.into());
         Some(Checked::Closure(id, ty))
     }
 

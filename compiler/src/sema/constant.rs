@@ -9,6 +9,7 @@ use crate::ir::value::Value;
 
 use super::body::{Body, Operand};
 use super::modules::ModuleId;
+use super::purpose::Purpose;
 use super::types::Ty;
 use super::{Checked, Checker};
 
@@ -20,24 +21,25 @@ const FUEL_IN_ALL: u64 = 1 << 22;
 
 impl Checker<'_> {
     /// The value of a constant expression as a `ty`, which is no array; `what` names it in messages.
-    pub fn constant(
+    pub fn constant<'p>(
         &mut self,
         module: ModuleId,
         expr: &ast::Expr,
         ty: Ty,
-        what: &str,
+        what: impl Into<Purpose<'p>>,
     ) -> Option<Const> {
         self.constants(module, expr, ty, what)?.pop()
     }
 
     /// As [`Checker::constant`]; of an array, the values of its elements.
-    fn constants(
+    fn constants<'p>(
         &mut self,
         module: ModuleId,
         expr: &ast::Expr,
         ty: Ty,
-        what: &str,
+        what: impl Into<Purpose<'p>>,
     ) -> Option<Vec<Const>> {
+        let what = what.into();
         let builder = Builder::new("constant", Vec::new(), expr.span);
         let mut body = Body::new(self, module, builder);
         let Operand::Value(id, _) = body.expr_as(expr, ty, what)? else {

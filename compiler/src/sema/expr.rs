@@ -11,6 +11,7 @@ use super::Checked;
 use super::body::{Binding, Body, Operand, Place};
 use super::inputs;
 use super::notes::Meaning;
+use super::purpose::Purpose;
 use super::stmt::component;
 use super::types::Ty;
 
@@ -25,10 +26,16 @@ pub const PICTURES: [&str; 5] = ["png", "jpg", "jpeg", "exr", "hdr"];
 
 impl Body<'_, '_> {
     /// Checks an expression that must be a `ty`.
-    pub fn expr_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<Operand> {
+    pub fn expr_as<'p>(
+        &mut self,
+        expr: &Expr,
+        ty: Ty,
+        what: impl Into<Purpose<'p>>,
+    ) -> Option<Operand> {
+        let what = what.into();
         if let (ExprKind::Str(path), Ty::Texture) = (&expr.kind, ty) {
             let texture = self.texture(path);
-            if what != DEFAULT_OF_PARAMETER {
+            if what != Purpose::Words(DEFAULT_OF_PARAMETER) {
                 self.cx.literal_textures.extend(usize::try_from(texture));
             }
             return Some(Operand::Value(
@@ -66,7 +73,12 @@ impl Body<'_, '_> {
     }
 
     /// Checks an expression that must be a value of type `ty`.
-    pub fn value_as(&mut self, expr: &Expr, ty: Ty, what: &str) -> Option<ExprId> {
+    pub fn value_as<'p>(
+        &mut self,
+        expr: &Expr,
+        ty: Ty,
+        what: impl Into<Purpose<'p>>,
+    ) -> Option<ExprId> {
         match self.expr_as(expr, ty, what)? {
             Operand::Value(id, _) => Some(id),
             _ => None,
@@ -186,7 +198,9 @@ impl Body<'_, '_> {
     }
 
     fn name(&mut self, name: &str, span: Span) -> Option<Operand> {
-        if let Some(defined) = self.scopes.defined(name) {
+        if self.cx.notes.is_some()
+            && let Some(defined) = self.scopes.defined(name)
+        {
             self.note_name(span, Meaning::Local(defined));
         }
         match self.local(name) {

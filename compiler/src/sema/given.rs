@@ -13,6 +13,7 @@ use crate::written::Written;
 use super::Checker;
 use super::expr::PICTURES;
 use super::modules::{ModuleId, list};
+use super::purpose::Purpose;
 use super::types::{NAMED, Ty};
 
 impl Checker<'_> {
@@ -190,7 +191,7 @@ impl Checker<'_> {
         let expr = expr?;
         let value = match (&expr.kind, ty) {
             (ast::ExprKind::Str(path), Ty::Texture) => Const::Int(self.texture("", path)),
-            _ => self.constant(module, &expr, ty, &format!("`{}`", param.name))?,
+            _ => self.constant(module, &expr, ty, Purpose::Named(&param.name))?,
         };
         Some((value, expr.span))
     }

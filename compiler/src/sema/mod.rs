@@ -39,6 +39,7 @@ mod modules;
 pub mod notes;
 mod outputs;
 mod params;
+mod purpose;
 mod scopes;
 mod slope;
 mod stmt;
@@ -90,11 +91,11 @@ pub struct Checker<'a> {
     /// Definitions with errors of syntax, which are not checked.
     broken: BTreeSet<ItemRef>,
     /// Signatures of `ir.functions` that a call can name.
-    signatures: BTreeMap<FunctionId, Signature>,
+    signatures: BTreeMap<FunctionId, Arc<Signature>>,
     /// Surface types of the fields of `ir.structs`.
-    fields: Vec<Vec<Param>>,
+    fields: Vec<Arc<[Param]>>,
     /// Signatures of `ir.closures`.
-    closure_params: Vec<Vec<Param>>,
+    closure_params: Vec<Arc<[Param]>>,
     /// Array types, by the structs that store them.
     arrays: BTreeMap<StructId, array::Array>,
     /// Functions of arrays of any length, by what they are called with.
@@ -404,7 +405,7 @@ impl<'a> Checker<'a> {
             fields,
             span: item.span,
         });
-        self.fields.push(typed);
+        self.fields.push(typed.into());
         Some(Checked::Struct(id))
     }
 

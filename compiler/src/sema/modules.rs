@@ -281,7 +281,7 @@ impl Checker<'_> {
     /// Adds the texts of the standard library, so that each has the same id in every compilation.
     pub(super) fn add_std_sources(&mut self) {
         for file in impasto_stdlib::files() {
-            self.sources.add(std_path(file), file.text);
+            self.sources.add_library(std_path(file), file.text);
         }
     }
 

@@ -9,6 +9,7 @@ use crate::source::Span;
 
 use super::body::{Binding, Body, Operand, Place};
 use super::modules::list;
+use super::purpose::Purpose;
 use super::types::Ty;
 
 /// The name that stands for all outputs together. A keyword, so that nothing else has it.
@@ -58,7 +59,7 @@ impl Body<'_, '_> {
             return self.unknown_output(name, at);
         };
         self.directly(name, at, op)?;
-        let mut operand = self.expr_as(value, *ty, &format!("`{name}`"))?;
+        let mut operand = self.expr_as(value, *ty, Purpose::Named(name))?;
         self.first_time(name, at)?;
         if let Operand::Closure(root, _) = operand {
             self.check_tree(root, value.span)?;

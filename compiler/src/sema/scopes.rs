@@ -2,6 +2,8 @@
 //! as many as its source has room for.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+use std::rc::Rc;
 
 use super::body::{Binding, Entry};
 use crate::source::Span;
@@ -11,7 +13,28 @@ pub struct Scopes {
     /// What each brings in, innermost last; there is always one.
     entries: Vec<Vec<Entry>>,
     /// By name where its entries are, innermost last. Never iterated.
-    places: HashMap<String, Vec<Place>>,
+    places: HashMap<Rc<str>, Vec<Place>, BuildHasherDefault<NameHasher>>,
+}
+
+/// FNV-1a: names are short, and it is quick for these.
+struct NameHasher(u64);
+
+impl Default for NameHasher {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Hasher for NameHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
 }
 
 /// A scope, and a position in it.
@@ -21,7 +44,7 @@ impl Default for Scopes {
     fn default() -> Self {
         Self {
             entries: vec![Vec::new()],
-            places: HashMap::new(),
+            places: HashMap::default(),
         }
     }
 }

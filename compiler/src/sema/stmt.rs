@@ -7,6 +7,7 @@ use crate::ir::{self, Const, ExprId, ExprKind as Ir, LocalId};
 use crate::source::Span;
 
 use super::body::{Binding, Body, Operand};
+use super::purpose::Purpose;
 use super::types::{Ty, arithmetic};
 
 /// Most turns that nested loops may take together.
@@ -65,12 +66,12 @@ impl Body<'_, '_> {
             Some(ty) => Some(self.cx.open_type(self.module, ty)?),
             None => None,
         };
-        let what = format!("`{}`", name.node);
+        let what = Purpose::Named(&name.node);
         let operand = match wanted {
-            Some(ty) if ty.array().is_some() => self.expr_as(value, ty, &what)?,
+            Some(ty) if ty.array().is_some() => self.expr_as(value, ty, what)?,
             Some(ty) => {
                 let operand = self.expr(value)?;
-                self.coerce(operand, ty, value.span, &what)?
+                self.coerce(operand, ty, value.span, what)?
             }
             None => self.expr(value)?,
         };

@@ -169,7 +169,7 @@ impl Server<'_> {
         let mut related: Vec<Value> = Vec::new();
         let mut relate = |span: Span, message: &str| {
             let file = sources.file(span.file);
-            let new = || Text::new(file.text.as_str(), self.documents.encoding());
+            let new = || Text::new(&*file.text, self.documents.encoding());
             let there = texts.entry(span.file).or_insert_with(new);
             let uri = convert::uri_of(&file.name, None);
             let Some(uri) = uri else { return };

@@ -138,7 +138,7 @@ pub fn read(path: &str, loader: &mut dyn Loader) -> File {
     // Behind it come the documents that it was made from, the first by the same name.
     let own = file.sources.files().filter(|(id, _)| !id.is_library());
     let named = own.into_iter().find(|(_, f)| f.name == path);
-    let Some((id, text)) = named.map(|(id, f)| (id, f.text.clone())) else {
+    let Some((id, text)) = named.map(|(id, f)| (id, f.text.to_string())) else {
         return file;
     };
     let (ast, _) = parser::parse(id, &text);

@@ -144,7 +144,7 @@ impl Policy {
     }
 
     fn size(&mut self, module: &Module, id: FunctionId) -> u32 {
-        let count = || module.functions[id.index()].evaluated().len() as u32;
+        let count = || module.functions[id.index()].evaluated_count() as u32;
         *self.of(id).size.get_or_insert_with(count)
     }
 

@@ -99,12 +99,12 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) -> u64 {
         rules,
         out: Vec::with_capacity(body.len()),
         depth: 0,
-        alias: vec![None; exprs],
+        alias: with_room(None, exprs),
         params: Vec::new(),
         material_params: Vec::new(),
         held: Held::unknown(locals),
-        available: vec![false; exprs],
-        evaluated: Vec::new(),
+        available: with_room(false, exprs),
+        evaluated: Vec::with_capacity(exprs),
         via: None,
         interpreter: None,
         walked: 0,
@@ -114,6 +114,13 @@ pub(super) fn run(module: &Module, f: &mut Function, rules: Rules) -> u64 {
     walk.f.value = value;
     walk.f.body = walk.out;
     walk.walked
+}
+
+/// A list of `count` times `value`, with room for half as many: walks add expressions.
+fn with_room<T: Clone>(value: T, count: usize) -> Vec<T> {
+    let mut list = Vec::with_capacity(count + count / 2);
+    list.resize(count, value);
+    list
 }
 
 impl Rewriter<'_> {
