@@ -49,6 +49,8 @@ fn replay_command(example: &Example, sampler: Sampler, args: &RenderArgs) -> Str
     let [x, y] = example.pixel;
     let (sample, seed) = (example.sample, example.seed);
     let mut out = format!("impasto trace {scene} --pixel {x},{y} --sample {sample} --seed {seed}");
+    // What overflows on a GPU may not do so in double precision.
+    out += " --precision 32";
     if sampler != Sampler::default() {
         out += &format!(" --sampler {}", sampler.name());
     }
