@@ -116,13 +116,16 @@ impl DeviceArgs {
 
     /// The device that was asked for.
     pub(super) fn open(&self, global: &Global) -> Result<Device, Failure> {
+        self.open_one(global, &mut |line| global.note(line))
+    }
+
+    fn open_one(&self, global: &Global, note: &mut dyn FnMut(&str)) -> Result<Device, Failure> {
         self.check()?;
         let options = self.options(global.warner());
-        let mut note = |line: &str| global.note(line);
-        let device = Device::open_noting(&options, &mut note).map_err(super::runtime)?;
+        let device = Device::open_noting(&options, note).map_err(super::runtime)?;
         if let (Device::Gpu(gpu), Some(_)) = (&device, self.threads) {
             let name = gpu.info().name;
-            global.note(&format!(
+            note(&format!(
                 "note: `--threads` is for the processor, and {name} renders; `--device cpu` chooses the processor"
             ));
         }
@@ -147,12 +150,21 @@ impl DeviceArgs {
         several: Option<&Several>,
         global: &Global,
     ) -> Result<Vec<Device>, Failure> {
+        self.open_noting(several, global, &mut |line| global.note(line))
+    }
+
+    /// The same, and what there is to say of their choice goes to `note`.
+    pub(super) fn open_noting(
+        &self,
+        several: Option<&Several>,
+        global: &Global,
+        note: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Device>, Failure> {
         let Some(several) = several else {
-            return Ok(vec![self.open(global)?]);
+            return Ok(vec![self.open_one(global, note)?]);
         };
         self.check_several(Some(several))?;
-        let mut note = |line: &str| global.note(line);
-        let gpus = Gpu::several(several, &self.gpu.options(global.warner()), &mut note);
+        let gpus = Gpu::several(several, &self.gpu.options(global.warner()), note);
         let gpus = gpus.map_err(super::runtime)?;
         Ok(gpus
             .into_iter()

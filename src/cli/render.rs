@@ -137,14 +137,27 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let _lock = args.checkpoint.lock()?;
     let start = args.checkpoint.read()?;
     interrupt::install()?;
-    let (scene, moment) = load(args, global)?;
-    let scene = Arc::new(scene);
-    let started = Instant::now();
-    let meter = Meter::new(global);
-    meter.show(0.0, COMPILING);
-    let program = Arc::new(compile(&scene, moment, args, global)?);
-    let material_seconds = started.elapsed().as_secs_f64();
-    let devices = args.device.open_all(args.gpus.as_ref(), global)?;
+    let (read, devices) = std::thread::scope(|scope| {
+        // A driver takes long to start, and asks nothing of the scene. Nobody hears of it where that fails.
+        let devices = scope.spawn(|| {
+            let mut notes = Vec::new();
+            let mut note = |line: &str| notes.push(line.to_owned());
+            let devices = args
+                .device
+                .open_noting(args.gpus.as_ref(), global, &mut note);
+            (devices, notes)
+        });
+        (Read::of(args, global), devices.join())
+    });
+    let Read {
+        scene,
+        program,
+        meter,
+        material_seconds,
+    } = read?;
+    let (devices, notes) = devices.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    notes.iter().for_each(|note| global.note(note));
+    let devices = devices?;
     // GPUs plan alike until they know what paths hit; the processor renders alone.
     let planned = args.planned(&scene, &program, &devices[0])?;
     if devices[0].replaces_plan(&planned.plan) {
@@ -205,6 +218,32 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
         Ok(())
     } else {
         Err(Failure::Interrupted)
+    }
+}
+
+/// A scene that was read, and its materials.
+struct Read {
+    scene: Arc<Scene>,
+    program: Arc<Program>,
+    meter: Meter,
+    /// How long the materials took.
+    material_seconds: f64,
+}
+
+impl Read {
+    fn of(args: &RenderArgs, global: &Global) -> Result<Self, Failure> {
+        let (scene, moment) = load(args, global)?;
+        let scene = Arc::new(scene);
+        let started = Instant::now();
+        let meter = Meter::new(global);
+        meter.show(0.0, COMPILING);
+        let program = Arc::new(compile(&scene, moment, args, global)?);
+        Ok(Self {
+            scene,
+            program,
+            meter,
+            material_seconds: started.elapsed().as_secs_f64(),
+        })
     }
 }
 
