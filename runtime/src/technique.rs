@@ -161,6 +161,16 @@ choices! {
         Thread = "thread",
     }
 
+    /// Where rays of the camera are cast.
+    CameraRays {
+        /// As in `at-once` where a scene has few triangles, else as in `queue`
+        Auto = "auto",
+        /// By the kernel that begins a path, and a path that hits nothing ends there
+        AtOnce = "at-once",
+        /// With those of later segments
+        Queue = "queue",
+    }
+
     /// How geometry is stored that is repeated often enough to share it.
     Copies {
         /// Once, and placed by a second level of the acceleration structure
@@ -227,6 +237,8 @@ pub struct Technique {
     pub leaves: Leaves,
     /// How threads get the rays of a queue; in a megakernel each has its own.
     pub ray_fetch: RayFetch,
+    /// Where rays of the camera are cast; in a megakernel each thread casts its own.
+    pub camera_rays: CameraRays,
     /// How repeated geometry is stored.
     pub copies: Copies,
     /// Where ray casts find rays.

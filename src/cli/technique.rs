@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder, Regeneration, Sampler,
-    SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
+    Append, CameraRays, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder,
+    Regeneration, Sampler, SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
 };
 
 /// Every choice of [`Technique`].
@@ -41,6 +41,9 @@ pub(super) struct TechniqueArgs {
     /// How threads get the rays of a queue
     #[arg(long, value_name = "NAME", default_value = default_name::<RayFetch>(), value_parser = named::<RayFetch>())]
     ray_fetch: RayFetch,
+    /// Where rays of the camera are cast
+    #[arg(long, value_name = "NAME", default_value = default_name::<CameraRays>(), value_parser = named::<CameraRays>())]
+    camera_rays: CameraRays,
     /// How repeated geometry is stored
     #[arg(long, value_name = "NAME", default_value = default_name::<Copies>(), value_parser = named::<Copies>())]
     copies: Copies,
@@ -80,6 +83,7 @@ impl TechniqueArgs {
             stack: self.stack,
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,
+            camera_rays: self.camera_rays,
             copies: self.copies,
             ray_data: self.ray_data,
             ray_order: self.ray_order,

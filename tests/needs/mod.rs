@@ -114,8 +114,11 @@ fn with_everything_on_the_picture_is_the_same() {
 #[test]
 fn a_lambertian_box_under_a_quad_has_96_bytes_a_path_and_no_line_for_more() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scene = Text::default().load(folder.path());
-    let kernels = Kernels::of(&scene);
+    let text = Text {
+        technique: Technique::default(),
+        ..Text::default()
+    };
+    let kernels = Kernels::of(&text.load(folder.path()));
     assert!(kernels.path_bytes <= 96, "{}", kernels.path_bytes);
     let words = [
         "environment",

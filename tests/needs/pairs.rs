@@ -2,9 +2,9 @@
 
 use super::scenes::{
     Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY, SPHERE,
-    SPOT, TWO_SIDED, Text,
+    SPOT, TWO_SIDED, Text, queued,
 };
-use impasto::runtime::technique::{RayData, RayOrder, Technique};
+use impasto::runtime::technique::{CameraRays, RayData, RayOrder, Technique};
 
 /// Two scenes that differ in a row.
 pub struct Pair {
@@ -121,12 +121,11 @@ pairs! {
     "light from infinity", also &["distant lights with an angle"], "functions +distant_light_escape +light_escape",
         lit(&[QUAD, DIRECTION]) => lit(&[QUAD, DIRECTION, DISC]);
     "shadow rays", also &["multiple importance sampling"], "+16 bytes; kernels +shadow; functions +aim +area_density +keep_shadow \
-         +light_contribution +light_probability +light_share +load_carried +load_contribution \
-         +load_light +load_light_direction +load_shadow_direction +load_shadow_origin \
+         +light_contribution +light_probability +light_share +load_contribution \
+         +load_shadow_direction +load_shadow_origin \
          +no_light_sample +pick_light +power_heuristic +request_shadow +sample_area \
-         +sample_light +sample_quad_light +scattering_weight +shadow_request +store_carried \
-         +store_contribution +store_light +store_light_direction +store_shadow_direction \
-         +store_shadow_origin",
+         +sample_light +sample_quad_light +scattering_weight +shadow_request \
+         +store_contribution +store_shadow_direction +store_shadow_origin",
         lit(&[QUAD_BY_CHANCE]) => lit(&[QUAD]);
     "choice of a light", also &[], "functions +light_place +multiply_high +renew_word", lit(&[QUAD]) => lit(&[QUAD, SECOND_QUAD]);
     "multiple importance sampling", also &[], "functions +light_share +power_heuristic +scattering_weight",
@@ -227,7 +226,7 @@ pairs! {
          +ray_bin",
         Text::default()
         => Text {
-            technique: Technique { ray_order: RayOrder::Coarse, ..Technique::default() },
+            technique: Technique { ray_order: RayOrder::Coarse, ..queued() },
             ..Text::default()
         };
     "rays in buffers of their own", also &[], "+16 bytes; bindings +extension_hits +extension_rays +shadow_rays +shadow_results; \
@@ -236,7 +235,13 @@ pairs! {
          -store_shadow_origin",
         Text::default()
         => Text {
-            technique: Technique { ray_data: RayData::Requests, ..Technique::default() },
+            technique: Technique { ray_data: RayData::Requests, ..queued() },
+            ..Text::default()
+        };
+    "rays of the camera cast at once", also &[], "functions +trace +trace_closest",
+        Text::default()
+        => Text {
+            technique: Technique { camera_rays: CameraRays::AtOnce, ..queued() },
             ..Text::default()
         };
 }

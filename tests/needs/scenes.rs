@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impasto::runtime::technique::Technique;
+use impasto::runtime::technique::{CameraRays, Technique};
 use impasto::runtime::world::World;
 use impasto::{Program, Scene};
 
@@ -55,6 +55,14 @@ pub const DISC_BY_CHANCE: &str = "kind = \"distant\"\nto_light = [-0.2, 1, 0.3]\
 pub const SKY: &str = "[environment]\ncolor = [0.3, 0.4, 0.5]\nsample = true\n";
 pub const MAP: &str = "[environment]\nfile = \"sky.hdr\"\n";
 
+/// Rays of the camera are cast with the others: where they may be cast at once, other rows decide.
+pub fn queued() -> Technique {
+    Technique {
+        camera_rays: CameraRays::Queue,
+        ..Technique::default()
+    }
+}
+
 impl Default for Text {
     fn default() -> Self {
         Self {
@@ -66,7 +74,7 @@ impl Default for Text {
             other: None,
             corners: Corners::Plain,
             shared: None,
-            technique: Technique::default(),
+            technique: queued(),
             outputs: &[],
         }
     }

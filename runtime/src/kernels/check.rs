@@ -97,7 +97,7 @@ impl Row<'_> {
             require(asking.phase != self.stage.phase, || {
                 format!("is asked for by `{name}`, which runs in the same phase")
             })?;
-            let call = format!("request_{}(", self.stage.name);
+            let call = self.stage.call_of_request();
             require(asking.body.text.contains(&call), || {
                 format!("is asked for by `{name}`, which never calls `{call})`")
             })?;

@@ -62,7 +62,7 @@ impl Composer<'_> {
             text += &self.part(part, members);
         }
         for stage in stages {
-            text += &stage.body.wgsl(&self.flags(stage, members));
+            text += &self.body(stage, members);
         }
         text += &desc.shell;
         if mentions(&without_comments(&text), MATERIAL_OF) {
@@ -78,6 +78,11 @@ impl Composer<'_> {
             wgsl: declarations + &text,
             bindings,
         }
+    }
+
+    /// A stage's text in a kernel that evaluates `members`.
+    pub(crate) fn body(&self, stage: &Stage, members: &[usize]) -> String {
+        stage.body.wgsl(&self.flags(stage, members))
     }
 
     /// The conditions of a stage's text.

@@ -6,7 +6,12 @@ var<workgroup> group_hits: array<atomic<u32>, MATERIALS>;
 // For each block a bit a material.
 var<workgroup> block_hits: array<atomic<u32>, BLOCK_WORDS * (WORKGROUP_SIZE / BLOCK)>;
 
-// All threads of a workgroup call it.
+// Whether a workgroup counts, by its index.
+fn group_counts(group: u32) -> bool {
+    return group * GOLDEN <= MOST_COUNTING;
+}
+
+// All threads of a workgroup that counts call it.
 fn count_hits(lane: u32) {
     if wanted_instance != NOTHING {
         let material = material_of(wanted_instance);

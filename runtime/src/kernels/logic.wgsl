@@ -64,9 +64,7 @@ fn logic(slot: u32) {
 #if subsurface
         }
 #endif
-#if !shadow_rays
         store_throughput(slot, carried);
-#endif
 #endif
         if hit.primitive != NOTHING {
 #if subsurface
@@ -117,24 +115,12 @@ fn logic(slot: u32) {
 #endif
         instance = NOTHING;
     }
-#if shadow_rays
-    var bits = vec4<u32>(0u);
-    if instance != NOTHING {
-        bits = random_bits(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC));
-    }
-#endif
 #if roulette
     if instance != NOTHING && vertex >= ROULETTE_START {
         let survival = survival_probability(carried.throughput);
-#if shadow_rays
-        if unit_numbers(bits).w < survival {
-#else
-        if random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LOGIC)).w < survival {
-#endif
+        if random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LIGHT)).w < survival {
             carried.throughput /= survival;
-#if !shadow_rays
             store_throughput(slot, carried);
-#endif
         } else {
             instance = NOTHING;
         }
@@ -144,9 +130,6 @@ fn logic(slot: u32) {
     // How the first hit looks is asked of its material even if the path ends there.
     if instance == NOTHING && vertex == 1u && seen != NOTHING {
         path.flags = ((path.flags & ~PATH_LIT) | PATH_LOOKS) + 1u;
-#if shadow_rays
-        store_carried(slot, PathCarried(vec3<f32>(0.0), 0.0));
-#endif
         store_radiance(slot, path);
         request_material(seen);
         return;
@@ -160,7 +143,6 @@ fn logic(slot: u32) {
 
     path.flags = (path.flags & ~PATH_LIT) + 1u;
 #if shadow_rays
-    var light_pdf = 0.0;
 #if varying_emission
     let goes_on = vertex < MAX_DEPTH;
 #else
@@ -171,20 +153,9 @@ fn logic(slot: u32) {
 #else
     if goes_on {
 #endif
-        let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
-        let light = sample_light(position, bits);
-        if any(light.radiance > vec3<f32>(0.0)) {
-            // For the material stage to aim at.
-            path.flags |= PATH_LIT;
-            light_pdf = light.pdf;
-            store_light(slot, PathLight(light.radiance, light.distance));
-            store_light_direction(slot, PathLightDirection(light.wi, pixel));
-#if light_groups
-            store_light_group(slot, PathLightGroup(light_group(pick_light(bits).light), 0u, 0u, 0u));
-#endif
-        }
+        // For the material stage, which samples a light.
+        path.flags |= PATH_LIT;
     }
-    store_carried(slot, PathCarried(carried.throughput, light_pdf));
 #endif
     store_radiance(slot, path);
     request_material(instance);

@@ -4,16 +4,28 @@ fn material(slot: u32, instance: u32) {
     var path = load_radiance(slot);
     let hit = load_hit(slot);
     let arrived = load_ray_direction(slot);
-#if shadow_rays
-    let aimed = load_light_direction(slot);
-    let pixel = aimed.pixel;
-    let carried = load_carried(slot);
-#else
     let pixel = load_ray_origin(slot).pixel;
     let carried = load_throughput(slot);
-#endif
     let side = hit_geometric_normal(hit.primitive);
     let position = hit_position(hit.primitive, vec2<f32>(hit.u, hit.v));
+    let vertex = (path.flags & DEPTH_MASK) - 1u;
+    // To the sample of a light; of length 0 without one.
+    var wl = vec3<f32>(0.0);
+#if shadow_rays
+    let asks = (path.flags & PATH_LIT) != 0u;
+    var light: LightSample;
+    if asks {
+        let bits = random_bits(pixel, arrived.sample, vertex_draw(vertex, DRAW_LIGHT));
+        light = sample_light(position, bits);
+#if light_groups
+        store_light_group(slot, PathLightGroup(light_group(pick_light(bits).light), 0u, 0u, 0u));
+#endif
+    }
+    let lit = any(light.radiance > vec3<f32>(0.0));
+    if lit {
+        wl = light.wi;
+    }
+#endif
 #if subsurface
     // From below the surface light goes out as if it came from outside.
     let leaves = (path.flags & PATH_BELOW) != 0u;
@@ -42,7 +54,6 @@ fn material(slot: u32, instance: u32) {
     let point = surface_point(hit, exterior);
 #endif
 #endif
-    let vertex = (path.flags & DEPTH_MASK) - 1u;
     let place = vec3<u32>(pixel, arrived.sample, vertex);
 
 #if material_outputs
@@ -74,13 +85,6 @@ fn material(slot: u32, instance: u32) {
     if vertex >= MAX_DEPTH {
         store_throughput(slot, PathThroughput(vec3<f32>(0.0), 0.0));
         return;
-    }
-#endif
-    var wl = vec3<f32>(0.0);
-#if shadow_rays
-    let lit = (path.flags & PATH_LIT) != 0u;
-    if lit {
-        wl = aimed.direction;
     }
 #endif
     let u = random_numbers(pixel, arrived.sample, vertex_draw(vertex, DRAW_SCATTERING));
@@ -131,8 +135,8 @@ fn material(slot: u32, instance: u32) {
     }
 #endif
 #if shadow_rays
+    var contribution = PathContribution(vec3<f32>(0.0), 0.0);
     if lit {
-        let light = load_light(slot);
         var reach = carried.throughput * scattered.light_throughput;
 #if absorption
         // The way to the light is in one medium: boundaries, like everything, cast shadows.
@@ -143,10 +147,10 @@ fn material(slot: u32, instance: u32) {
         let start = leave_surface(position, side, wl);
         let way = aim(wl, light.distance, start - position);
 #if mis
-        let share = light_share(carried.light_pdf, scattered.light_pdf);
-        store_contribution(slot, PathContribution(reach * light.radiance * share, way.distance));
+        let share = light_share(light.pdf, scattered.light_pdf);
+        contribution = PathContribution(reach * light.radiance * share, way.distance);
 #else
-        store_contribution(slot, PathContribution(reach * light.radiance, way.distance));
+        contribution = PathContribution(reach * light.radiance, way.distance);
 #endif
         if any(reach > vec3<f32>(0.0)) {
 #if slot_shadows
@@ -162,6 +166,9 @@ fn material(slot: u32, instance: u32) {
 #endif
             request_shadow(start, hit.primitive, way.direction, way.distance);
         }
+    }
+    if asks {
+        store_contribution(slot, contribution);
     }
 #endif
 }

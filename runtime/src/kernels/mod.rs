@@ -6,6 +6,7 @@ mod check;
 pub(crate) mod compose;
 pub(crate) mod cones;
 pub mod dropped;
+pub(crate) mod hits;
 pub(crate) mod layout;
 pub(crate) mod modules;
 pub(crate) mod order;

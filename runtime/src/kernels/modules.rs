@@ -94,9 +94,9 @@ impl KernelDesc {
         }
     }
 
-    /// Whether it adds to the picture.
-    pub(crate) fn fills_film(&self) -> bool {
-        self.stages.iter().any(|stage| stage.fills_film())
+    /// Whether it decides how each path goes on.
+    pub(crate) fn decides(&self) -> bool {
+        self.stages.iter().any(|stage| stage.decides())
     }
 }
 

@@ -1,4 +1,8 @@
 // Starts a path: takes the next item of work and casts the camera's ray.
+#if camera_casts
+// Rays of neighbouring pixels meet the same nodes, so that each thread casts its own, and a path that hits
+// nothing ends here: it never has a state in memory.
+#endif
 //
 // The prepare kernel hands out work in portions, one for all slots of this iteration, so that
 // no counter is contended and more than 2^32 paths need no 64-bit arithmetic here.
@@ -22,9 +26,26 @@ fn new_path(slot: u32, item: u32) {
 #endif
     let index = run.first_sample + sample;
     let ray = camera_ray(pixel, random_numbers(pixel, index, DRAW_CAMERA));
+#if camera_casts
+    let hit = trace_closest(ray.origin, ray.direction, 3.0e38, NOTHING);
+    if hit.primitive == NOTHING {
+        var seen = vec3<f32>(0.0);
+#if escape_lights
+        seen = light_escape(ray.direction, 0.0);
+#if light_groups
+        record_escape(pixel, vec3<f32>(1.0), ray.direction, 0.0);
+#endif
+#endif
+        film_add(vec3<u32>(pixel, index, 1u), seen);
+        store_radiance(slot, PathRadiance(vec3<f32>(0.0), 0u));
+        return;
+    }
+    store_hit(slot, PathHit(hit.t, hit.u, hit.v, hit.primitive));
+#else
+    store_hit(slot, PathHit(0.0, 0.0, 0.0, NOTHING));
+#endif
     store_ray_origin(slot, PathRayOrigin(ray.origin, pixel));
     store_ray_direction(slot, PathRayDirection(ray.direction, index));
-    store_hit(slot, PathHit(0.0, 0.0, 0.0, NOTHING));
     store_throughput(slot, PathThroughput(vec3<f32>(1.0), 0.0));
     store_radiance(slot, PathRadiance(vec3<f32>(0.0), PATH_LIVE + 1u));
 #if media
@@ -35,7 +56,9 @@ fn new_path(slot: u32, item: u32) {
     let cosine = dot(ray.direction, camera.forward);
     store_cone(slot, PathCone(0.0, camera.pixel_angle * cosine * sqrt(cosine), 0u, 0u));
 #endif
+#if !camera_casts
     request_extension(ray.origin, ray.direction, NOTHING);
+#endif
 }
 #if requests
 

@@ -38,9 +38,12 @@ impl Pushes {
 impl Composer<'_> {
     /// What a kernel pushes that runs some stages, for `members` where those evaluate materials.
     pub(crate) fn pushes(&self, stages: &[&'static Stage], members: &[usize]) -> Pushes {
+        // The table lists who may ask for work; whether it does in this scene, the conditions of its text say.
         let asks = |by: &Stage, target: &Stage| {
             let from = target.work.from();
-            from.contains(&by.name) && self.needs_in(by, members).met(target.need)
+            from.contains(&by.name)
+                && self.needs_in(by, members).met(target.need)
+                && self.body(by, members).contains(&target.call_of_request())
         };
         let rows = self.layout.stages().iter();
         let targets = rows.filter(|target| stages.iter().any(|by| asks(by, target)));

@@ -48,7 +48,9 @@ fn main(
         run_stage(slot, item);
     }
 #if counts_hits
-    count_hits(lane);
+    if group_counts(index) {
+        count_hits(lane);
+    }
 #endif
 #if moves
     slot = settle(index * WORKGROUP_SIZE, lane, in_range);

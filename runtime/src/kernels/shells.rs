@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 
 use impasto_compiler::partition::Form;
-use impasto_compiler::partition::workload::BLOCK;
 
 use crate::kernels::modules::Composer;
 use crate::kernels::requests::Pushes;
@@ -22,7 +21,7 @@ pub(crate) const SUBGROUP: &str = include_str!("subgroup.wgsl");
 /// measured on an H200, as what follows (docs/measurements.md).
 const FETCH_PERCENT: u32 = 25;
 /// Triangles wait while less than this share of the lanes with a ray has any (Ylitie et al. 2017).
-const TRIANGLE_PERCENT: u32 = 35;
+const TRIANGLE_PERCENT: u32 = 22;
 
 /// What a wavefront kernel does around its stage.
 #[derive(Clone, Debug, Default)]
@@ -192,16 +191,6 @@ impl Composer<'_> {
         }
         out += &format!("fn run_stage(slot: u32, item: u32) {{ {} }}\n", shell.run);
         out + &entry.wgsl()
-    }
-
-    /// What counts hits of each material.
-    fn hits(&self) -> String {
-        let materials = self.layout.counters.hits as u32;
-        wgsl::constants_u32(&[
-            ("MATERIALS", materials),
-            ("BLOCK", BLOCK),
-            ("BLOCK_WORDS", materials.div_ceil(32)),
-        ]) + include_str!("hits.wgsl")
     }
 
     /// Constants and entry point of a kernel whose threads fetch the rays of a queue.

@@ -8,7 +8,7 @@ use impasto_compiler::partition::{Form, PlanKernel};
 use crate::kernels::modules::{Composer, DispatchSource, KernelDesc, SCAN, SCATTER};
 use crate::kernels::order;
 use crate::kernels::shells::{Consumed, EntryPoint, Shell};
-use crate::kernels::stages::{Phase, Stage, Work};
+use crate::kernels::stages::{Part, Phase, Stage, Work};
 use crate::technique::RayFetch;
 use crate::world::bvh;
 
@@ -133,7 +133,7 @@ impl Composer<'_> {
             run: format!("{};", stage.call("slot", "item", "")),
             consumes: Some(consumed),
             pushes: self.pushes(&[stage], &[]),
-            traverses: stage.casts.is_some(),
+            traverses: self.casts(stage),
             ..Shell::default()
         });
         let source = DispatchSource::Queue(queue);
@@ -151,6 +151,12 @@ impl Composer<'_> {
         } else {
             Consumed::unordered(queue)
         }
+    }
+
+    /// Whether a stage casts rays.
+    fn casts(&self, stage: &Stage) -> bool {
+        let mut parts = stage.parts.iter();
+        parts.any(|(part, need)| *part == Part::Traversal && self.layout.needs.met(*need))
     }
 
     /// Whether the threads of a stage stay, and take up one ray after another.

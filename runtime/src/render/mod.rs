@@ -382,7 +382,7 @@ impl<'g> Renderer<'g> {
         let planned = self.replan.as_ref().and_then(Replan::workload);
         planned.or_else(|| {
             let (built, before) = (&self.built, &self.facts.workload);
-            Mark::default().workload(status, &built.layout, &built.kernels, before)
+            Mark::default().workload(status, built, before)
         })
     }
 

@@ -80,12 +80,7 @@ impl Renderer<'_> {
         self.advance(0..warm, &mut status, next)?;
         let mark = Mark::of(&status);
         self.advance(warm..warm + iterations, &mut status, next)?;
-        let workload = mark.workload(
-            &status,
-            &self.built.layout,
-            &self.built.kernels,
-            &self.facts.workload,
-        );
+        let workload = mark.workload(&status, &self.built, &self.facts.workload);
         workload.ok_or_else(|| RuntimeError::Setting {
             setting: "workgroup",
             value: "what was chosen".into(),

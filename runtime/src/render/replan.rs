@@ -320,7 +320,7 @@ impl Replan {
             return Stage::Counting(mark);
         }
         let (built, before) = (&renderer.built, &renderer.facts.workload);
-        let workload = mark.workload(status, &built.layout, &built.kernels, before);
+        let workload = mark.workload(status, built, before);
         let Some(workload) = workload else {
             return Stage::Done;
         };

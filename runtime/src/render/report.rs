@@ -536,8 +536,9 @@ impl Ran<'_> {
         let counters = self.layout.counters;
         let mut out = Vec::new();
         for Kernel { desc, .. } in self.kernels {
-            let fills = desc.fills_film();
-            for row in rows(desc).chain(fills.then_some(counters.film_row())) {
+            // Samples that the film drops are counted for it once, whatever kernel added them.
+            let film = desc.decides().then_some(counters.film_row());
+            for row in rows(desc).chain(film) {
                 let material = self.materials.get(row).map(|m| m.name.as_str());
                 if let Some(found) = counters.dropped_row(&status.counters, row) {
                     out.push(Dropped::new(&desc.name, material, &found, width, seed));

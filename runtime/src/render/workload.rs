@@ -2,12 +2,13 @@
 //! writes, and what the kernels take that evaluate none.
 
 use impasto_compiler::abi::{Input, MaterialInfo};
-use impasto_compiler::partition::workload::BLOCK;
 use impasto_compiler::partition::{Hits, Workload};
 
+use crate::kernels::hits::counted;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Kernel;
 use crate::kernels::state;
+use crate::render::build::BuiltPlan;
 use crate::render::status::Status;
 use crate::technique::Technique;
 use crate::wgsl::ShaderPart;
@@ -93,29 +94,30 @@ impl Mark {
         }
     }
 
-    /// The workload of the mean iteration since then, of a plan that runs `kernels`; `before` is
-    /// what was known before rendering. `None` if hits were not counted, or nothing was rendered.
-    pub(crate) fn workload(
+    /// The workload of the mean iteration since then, of a plan that ran meanwhile; `before` is what was known
+    /// before rendering. `None` if hits were not counted, or nothing was rendered.
+    pub(super) fn workload(
         &self,
         status: &Status,
-        layout: &PlanLayout,
-        kernels: &[Kernel],
+        plan: &BuiltPlan,
         before: &Workload,
     ) -> Option<Workload> {
+        let layout = &plan.layout;
         let iterations = status.iterations.checked_sub(self.iterations)?;
         if iterations == 0 || layout.counters.hits == 0 {
             return None;
         }
         let mut workload = before.clone();
-        let slots = iterations as f64 * f64::from(before.pool);
-        let blocks = iterations as f64 * f64::from(before.pool.div_ceil(BLOCK));
+        let counted = counted(plan.sizes);
+        let slots = iterations as f64 * f64::from(counted.slots);
+        let blocks = iterations as f64 * f64::from(counted.blocks);
         for (index, hits) in workload.materials.iter_mut().enumerate() {
             let now = layout.counters.hits_of(&status.counters, index);
             let then = layout.counters.hits_of(&self.counters, index);
             hits.share = now[0].saturating_sub(then[0]) as f64 / slots;
             hits.present = now[1].saturating_sub(then[1]) as f64 / blocks;
         }
-        let seconds = self.seconds(status, kernels);
+        let seconds = self.seconds(status, &plan.kernels);
         let all = (status.gpu_seconds - self.gpu_seconds) / iterations as f64;
         workload.logic_seconds = seconds.logic / iterations as f64;
         workload.other_seconds =
@@ -130,7 +132,7 @@ impl Mark {
         let begin = begin.chain(std::iter::repeat(0.0));
         for ((kernel, end), begin) in kernels.iter().zip(&status.step_seconds).zip(begin) {
             let desc = &kernel.desc;
-            if desc.fills_film() {
+            if desc.decides() {
                 sum.logic += end - begin;
             } else if desc.form.is_some() {
                 sum.materials += end - begin;

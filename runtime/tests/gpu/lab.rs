@@ -86,7 +86,7 @@ fn neighbours_share_blocks_only_where_they_hit_the_same() {
     // Fields of 16 bytes, for light is sampled and rays are in the path's state, and a triangle.
     assert_eq!(
         (workload.materials[0].loads, workload.materials[0].stores),
-        (6.0 * 16.0 + 48.0, 6.0 * 16.0)
+        (5.0 * 16.0 + 48.0, 6.0 * 16.0)
     );
     assert!(workload.logic_seconds > 0.0 && workload.other_seconds > 0.0);
 }

@@ -367,7 +367,7 @@ fn no_draw_of_a_path_is_used_for_two_purposes() {
     };
     let vertices: Vec<Row> = (1..=DEMAND.max_depth).map(|v| [v, 0, 0, 0]).collect();
     let body = "let v = input[i].x;
-        result[i] = vec4<u32>(DRAW_CAMERA, vertex_draw(v, DRAW_LOGIC), vertex_draw(v, DRAW_SCATTERING), 0u);";
+        result[i] = vec4<u32>(DRAW_CAMERA, vertex_draw(v, DRAW_LIGHT), vertex_draw(v, DRAW_SCATTERING), 0u);";
     let rows = run(&[&part], body, &vertices, vertices.len(), vertices.len());
     let of_vertices = rows
         .iter()

@@ -4,15 +4,19 @@
 use std::fmt::Debug;
 
 use crate::gpu::plans::{room, surfaces};
-use crate::gpu::stub::{gpu, plan, render_plan, samples};
+use crate::gpu::stub::{Room, gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{
-    Append, Choice, RayData, Regeneration, SlotOrder, StateLayout, Technique,
+    Append, CameraRays, Choice, RayData, Regeneration, SlotOrder, StateLayout, Technique,
 };
 
 fn run(strategy: Strategy, technique: Technique) -> Rendering {
+    run_in(&room(), strategy, technique)
+}
+
+fn run_in(room: &Room, strategy: Strategy, technique: Technique) -> Rendering {
     // A pool smaller than the picture, so that slots take path after path.
     let options = RenderOptions {
         pool: Some(700),
@@ -21,7 +25,7 @@ fn run(strategy: Strategy, technique: Technique) -> Rendering {
     };
     let surfaces = surfaces();
     render_plan(
-        &room().world(),
+        &room.world(),
         &surfaces,
         &plan(strategy, &surfaces),
         &options,
@@ -30,11 +34,19 @@ fn run(strategy: Strategy, technique: Technique) -> Rendering {
 
 /// Renders with every value of a choice, and fails where pictures differ.
 fn assert_equal<C: Choice + Debug>(strategy: Strategy, set: impl Fn(&mut Technique, C)) {
-    let reference = run(strategy, Technique::default());
+    assert_equal_in(&room(), strategy, set);
+}
+
+fn assert_equal_in<C: Choice + Debug>(
+    room: &Room,
+    strategy: Strategy,
+    set: impl Fn(&mut Technique, C),
+) {
+    let reference = run_in(room, strategy, Technique::default());
     for (value, name, _) in C::ALL {
         let mut technique = Technique::default();
         set(&mut technique, *value);
-        let rendering = run(strategy, technique);
+        let rendering = run_in(room, strategy, technique);
         let pixels = rendering.film.pixels.iter().flatten();
         let pairs = pixels.zip(reference.film.pixels.iter().flatten());
         let astray = pairs.filter(|(a, b)| (**a - **b).abs() > 1e-5 * b.max(1.0));
@@ -90,6 +102,47 @@ fn paths_may_keep_their_slots() {
         t.ray_data = RayData::Requests;
         t.slot_order = value;
     });
+}
+
+/// In a room, and where most rays of the camera meet nothing.
+#[test]
+fn rays_of_the_camera_may_be_cast_at_once() {
+    let open = Room {
+        walls: false,
+        sky: 0.7,
+        ..room()
+    };
+    for room in [room(), open] {
+        for strategy in [Strategy::OWN, Strategy::INLINE] {
+            assert_equal_in::<CameraRays>(&room, strategy, |t, value| t.camera_rays = value);
+        }
+        assert_equal_in::<CameraRays>(&room, Strategy::OWN, |t, value| {
+            t.append = Append::Thread;
+            t.camera_rays = value;
+        });
+    }
+}
+
+/// Rays that are not the path's own are cast with the others, and one that ends there is counted once.
+#[test]
+fn rays_of_the_camera_are_cast_at_once_where_nothing_else_is_asked_of_them() {
+    let open = Room {
+        walls: false,
+        sky: 0.7,
+        ..room()
+    };
+    for (ray_data, camera_rays) in [
+        (RayData::Slots, CameraRays::AtOnce),
+        (RayData::Requests, CameraRays::Queue),
+    ] {
+        let technique = Technique {
+            ray_data,
+            ..Technique::default()
+        };
+        let rendering = run_in(&open, Strategy::OWN, technique);
+        assert_eq!(rendering.report.technique.camera_rays, camera_rays);
+        assert!(rendering.film.samples.iter().all(|count| *count == 8));
+    }
 }
 
 /// Threads that append on their own do not wait for each other, so that none may take another's slot.

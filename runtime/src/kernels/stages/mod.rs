@@ -202,9 +202,9 @@ impl Stage {
         self.has(Part::Materials)
     }
 
-    /// Whether it adds to the picture.
-    pub(crate) fn fills_film(&self) -> bool {
-        self.has(Part::Film)
+    /// Whether it decides how each path goes on.
+    pub(crate) fn decides(&self) -> bool {
+        matches!(self.work, Work::Pool)
     }
 
     fn has(&self, part: Part) -> bool {
@@ -223,6 +223,11 @@ impl Stage {
     pub(crate) fn takes_rays(&self) -> bool {
         let request = self.request();
         request.is_some_and(|request| matches!(request.entry, Entry::Ray(_)))
+    }
+
+    /// What a stage that asks for it calls.
+    pub(crate) fn call_of_request(&self) -> String {
+        format!("request_{}(", self.name)
     }
 
     /// The call of its function for a slot, the item of its queue and an instance.

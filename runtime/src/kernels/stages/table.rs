@@ -5,9 +5,11 @@ use crate::wgsl::template::template;
 use crate::world::needs::{ALWAYS, Need, When, when};
 
 const ABSORPTION: When = when(&[Need::Absorption]);
+const CAMERA_CASTS: When = when(&[Need::CameraCasts]);
 const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
+const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 const SUBSURFACE: When = when(&[Need::Subsurface]);
 const SCATTERING: When = when(&[Need::Scattering]);
 const FIRST_HIT_OUTPUTS: When = when(&[Need::FirstHitOutputs]);
@@ -17,7 +19,7 @@ const LIGHT_GROUPS: When = when(&[Need::LightGroups]);
 
 /// Every stage, in the order of an iteration.
 pub(crate) static STAGES: [Stage; 8] = [
-    // Ends or goes on with every path, and samples a light.
+    // Ends or goes on with every path.
     Stage {
         name: "logic",
         body: template!("../logic.wgsl"),
@@ -58,18 +60,7 @@ pub(crate) static STAGES: [Stage; 8] = [
                 "below_pulled",
             ],
         )],
-        stores: &[(
-            ALWAYS,
-            &[
-                "light_direction",
-                "hit",
-                "throughput",
-                "carried",
-                "radiance",
-                "light",
-                "light_group",
-            ],
-        )],
+        stores: &[(ALWAYS, &["hit", "throughput", "radiance"])],
     },
     // Starts a path.
     Stage {
@@ -81,7 +72,21 @@ pub(crate) static STAGES: [Stage; 8] = [
         work: Work::Begin { from: &["logic"] },
         before: &[],
         casts: None,
-        parts: &[(Part::Random, ALWAYS), (Part::Camera, ALWAYS)],
+        parts: &[
+            (Part::Random, ALWAYS),
+            (Part::Camera, ALWAYS),
+            (Part::Geometry, CAMERA_CASTS),
+            (Part::Traversal, CAMERA_CASTS),
+            (Part::Numbers, CAMERA_CASTS),
+            (Part::Film, CAMERA_CASTS),
+            (Part::Mis, when(&[Need::CameraCasts, Need::Mis])),
+            (Part::Lights, CAMERA_CASTS),
+            (
+                Part::Outputs,
+                when(&[Need::CameraCasts, Need::SampleOutputs]),
+            ),
+            (Part::Outputs, when(&[Need::CameraCasts, Need::LightGroups])),
+        ],
         loads: &[],
         stores: &[(
             ALWAYS,
@@ -97,7 +102,7 @@ pub(crate) static STAGES: [Stage; 8] = [
             ],
         )],
     },
-    // Evaluates the material that was hit.
+    // Samples a light, and evaluates the material that was hit.
     Stage {
         name: "material",
         body: template!("../material.wgsl"),
@@ -113,6 +118,7 @@ pub(crate) static STAGES: [Stage; 8] = [
             (Part::Geometry, ALWAYS),
             (Part::Surface, ALWAYS),
             (Part::Mis, MIS),
+            (Part::Lights, SHADOW_RAYS),
             (Part::Media, MEDIA),
             (Part::Materials, ALWAYS),
             (Part::Outputs, MATERIAL_OUTPUTS),
@@ -122,13 +128,10 @@ pub(crate) static STAGES: [Stage; 8] = [
             ALWAYS,
             &[
                 "ray_origin",
-                "light_direction",
                 "ray_direction",
                 "hit",
                 "throughput",
-                "carried",
                 "radiance",
-                "light",
                 "cone",
                 "media",
             ],
@@ -145,6 +148,7 @@ pub(crate) static STAGES: [Stage; 8] = [
                 "contribution",
                 "requests",
                 "cone",
+                "light_group",
                 "media",
                 "below",
                 "below_rates",
@@ -172,7 +176,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         name: "shadow",
         body: template!("../shadow.wgsl"),
         arguments: "slot",
-        need: when(&[Need::ShadowRays]),
+        need: SHADOW_RAYS,
         phase: Phase::Rays,
         work: Work::Queue(Request {
             from: &["material"],

@@ -33,13 +33,6 @@ pub(crate) const FIELDS: [Field; 15] = [
                 components: &[("origin", Vec3), ("pixel", U32)],
                 need: ALWAYS,
             },
-            // Where a light was sampled, the way to it: when that is asked for, where the ray began
-            // is known no longer, since the hit says where the vertex is.
-            Use {
-                name: "light_direction",
-                components: &[("direction", Vec3), ("pixel", U32)],
-                need: SHADOW_RAYS,
-            },
             // Where no material is crossed, both rays begin at the same place.
             Use {
                 name: "shadow_origin",
@@ -78,22 +71,13 @@ pub(crate) const FIELDS: [Field; 15] = [
         flag: None,
     },
     Field {
-        uses: &[
-            // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle
-            // with which the extension ray was sampled (0: a discrete direction).
-            Use {
-                name: "throughput",
-                components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
-                need: ALWAYS,
-            },
-            // What is carried to the next vertex, and the density with which a light was
-            // sampled there (0: a discrete light), once emission has been weighed by the former.
-            Use {
-                name: "carried",
-                components: &[("throughput", Vec3), ("light_pdf", F32)],
-                need: SHADOW_RAYS,
-            },
-        ],
+        // The product of f |cos| / pdf so far (0: the path ends), and the density by solid angle with which the
+        // extension ray was sampled (0: a discrete direction).
+        uses: &[Use {
+            name: "throughput",
+            components: &[("throughput", Vec3), ("bsdf_pdf", F32)],
+            need: ALWAYS,
+        }],
         flag: None,
     },
     Field {
@@ -106,21 +90,13 @@ pub(crate) const FIELDS: [Field; 15] = [
         flag: None,
     },
     Field {
-        uses: &[
-            // The sample of a light: its radiance over its density, and how far it is.
-            Use {
-                name: "light",
-                components: &[("radiance", Vec3), ("distance", F32)],
-                need: SHADOW_RAYS,
-            },
-            // What of it reaches the camera unless the shadow ray is blocked (then 0), and how far
-            // that goes.
-            Use {
-                name: "contribution",
-                components: &[("radiance", Vec3), ("distance", F32)],
-                need: SHADOW_RAYS,
-            },
-        ],
+        // What of the light that was sampled reaches the camera unless the shadow ray is blocked (then 0), and
+        // how far that goes.
+        uses: &[Use {
+            name: "contribution",
+            components: &[("radiance", Vec3), ("distance", F32)],
+            need: SHADOW_RAYS,
+        }],
         flag: Some("PATH_LIT"),
     },
     Field {

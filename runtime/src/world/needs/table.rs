@@ -4,7 +4,7 @@ use impasto_compiler::abi::Input;
 
 use super::{NeedInputs, Needs};
 use crate::film::outputs::{Ask, At};
-use crate::technique::{RayData, RayOrder};
+use crate::technique::{CameraRays, RayData, RayOrder};
 use crate::world::lights::table::light_kinds;
 use crate::world::places::{OF_PLACES, OF_SPACES};
 
@@ -97,6 +97,10 @@ macro_rules! rows {
 
 use Forcing::{Never, Unless, Whole, WholeUnless};
 use Need::*;
+
+/// With more, threads whose ray is cast wait too long for those beside them (docs/measurements.md, camera rays at
+/// once).
+const FEW_TRIANGLES: usize = 1 << 15;
 
 const ASKED: Forcing = Never("it is a technique that is asked for");
 const AOV: Forcing = Never("it is recorded if it is asked for");
@@ -342,6 +346,19 @@ rows! {
             let possible = !n.any(&[Order, Overlap, Scattering, Subsurface]);
             (asked && possible).then(|| "`--ray-data requests` asks for it".into())
         };
+    // So do rays of the camera; and what is lost on their way, the logic stage has to tell.
+    CameraCasts, "rays of the camera cast at once", "camera_casts",
+        "there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
+        on &[], draws "", ASKED, |f, n| {
+            let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
+            match f.camera_rays {
+                CameraRays::AtOnce if possible => Some("`--camera-rays at-once` asks for it".into()),
+                CameraRays::Auto if possible && f.triangles <= FEW_TRIANGLES => {
+                    Some(format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles))
+                }
+                _ => None,
+            }
+        };
 }
 
 /// The rows of materials, that a kernel has only if one of its own materials does.
@@ -368,4 +385,4 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
 ]);
 
 /// The rows of a wavefront, that a megakernel has never.
-pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests]);
+pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests, CameraCasts]);

@@ -1,0 +1,118 @@
+//! Which hits are counted for the time model of plans: those of all slots, or of some workgroups where there are
+//! many. Counting takes a barrier and atomic operations, which a large pool need not pay for each of its slots.
+
+use impasto_compiler::partition::workload::BLOCK;
+
+use crate::kernels::modules::{Composer, Sizes};
+use crate::wgsl;
+
+/// With fewer workgroups all of them count.
+const MANY_GROUPS: u32 = 4096;
+/// Of more, those count whose index times the golden ratio has a fraction below this, of 2^32. They are an eighth, and lie
+/// evenly over the pool and so over the picture (Knuth, "The Art of Computer Programming" 3, section 6.4).
+const COUNTING: u32 = 1 << 29;
+/// The golden ratio's fraction, of 2^32.
+const GOLDEN: u32 = 0x9e37_79b1;
+
+/// What is counted in an iteration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Counted {
+    /// Slots.
+    pub slots: u32,
+    /// Blocks of neighbouring ones.
+    pub blocks: u32,
+}
+
+/// What is counted of a pool.
+pub(crate) fn counted(sizes: Sizes) -> Counted {
+    let (pool, workgroup) = (sizes.pool, sizes.workgroup.max(1));
+    let groups = pool.div_ceil(workgroup);
+    let most = most_counting(groups);
+    let counting = (0..groups).filter(|group| group.wrapping_mul(GOLDEN) <= most);
+    let none = Counted {
+        slots: 0,
+        blocks: 0,
+    };
+    counting.fold(none, |sum, group| {
+        let slots = workgroup.min(pool - group * workgroup);
+        Counted {
+            slots: sum.slots + slots,
+            blocks: sum.blocks + slots.div_ceil(BLOCK),
+        }
+    })
+}
+
+/// The greatest fraction with which a workgroup counts.
+fn most_counting(groups: u32) -> u32 {
+    if groups < MANY_GROUPS {
+        u32::MAX
+    } else {
+        COUNTING - 1
+    }
+}
+
+impl Composer<'_> {
+    /// What counts hits of each material.
+    pub(crate) fn hits(&self) -> String {
+        let materials = self.layout.counters.hits as u32;
+        let groups = self.sizes.pool.div_ceil(self.sizes.workgroup.max(1));
+        wgsl::constants_u32(&[
+            ("MATERIALS", materials),
+            ("BLOCK", BLOCK),
+            ("BLOCK_WORDS", materials.div_ceil(32)),
+            ("GOLDEN", GOLDEN),
+            ("MOST_COUNTING", most_counting(groups)),
+        ]) + include_str!("hits.wgsl")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sizes(pool: u32, workgroup: u32) -> Sizes {
+        Sizes {
+            pool,
+            pools: 1,
+            workgroup,
+            threads: 1,
+            fetch_limit: 1,
+            row_groups: 1,
+        }
+    }
+
+    #[test]
+    fn small_pools_are_counted_whole_and_of_large_ones_an_eighth() {
+        let all = |slots: u32, blocks: u32| Counted { slots, blocks };
+        assert_eq!(counted(sizes(1, 256)), all(1, 1));
+        assert_eq!(counted(sizes(1000, 256)), all(1000, 32));
+        assert_eq!(counted(sizes(1 << 19, 256)), all(1 << 19, 1 << 14));
+        for (pool, workgroup) in [
+            (1 << 20, 256),
+            (1 << 23, 256),
+            (1 << 23, 64),
+            (8_000_001, 96),
+        ] {
+            let Counted { slots, blocks } = counted(sizes(pool, workgroup));
+            let share = f64::from(slots) / f64::from(pool);
+            assert!((share - 0.125).abs() < 1e-3, "{share} of {pool}");
+            assert!(blocks >= slots / BLOCK);
+        }
+    }
+
+    /// No part of a picture is counted more than others.
+    #[test]
+    fn workgroups_that_count_lie_evenly() {
+        let counts = |group: u32| group.wrapping_mul(GOLDEN) < COUNTING;
+        for stride in [1, 2, 3, 4, 7, 8, 16, 64] {
+            for first in (0..1 << 15).step_by(1 << 12) {
+                let some = (0..512).map(|i| first + i * stride);
+                let counting = some.filter(|group| counts(*group)).count();
+                assert!(
+                    (56..=72).contains(&counting),
+                    "{counting} of 512 at {first} by {stride}"
+                );
+            }
+        }
+    }
+}
