@@ -138,7 +138,8 @@ pub(super) fn run(args: &RenderArgs, global: &Global) -> Outcome {
     let start = args.checkpoint.read()?;
     interrupt::install()?;
     let (read, devices) = std::thread::scope(|scope| {
-        // A driver takes long to start, and asks nothing of the scene. Nobody hears of it where that fails.
+        // A driver takes long to start, and asks nothing of the scene. What there is to say of it waits for the scene,
+        // whose errors stand alone.
         let devices = scope.spawn(|| {
             let mut notes = Vec::new();
             let mut note = |line: &str| notes.push(line.to_owned());

@@ -43,7 +43,6 @@ pub(super) fn balance(file: FileId, text: &str, tokens: Vec<(Token, Span)>) -> B
 /// Has every bracket its partner, and does nothing stand in one that seldom stands there? Of nearly all sources
 /// that is so, and a [`Balancer`] would leave their tokens as they are.
 fn are_balanced(text: &str, tokens: &[(Token, Span)]) -> bool {
-    use Token::*;
     // The partners of open brackets; those of lists and those of blocks are told apart.
     let mut open: Vec<(Token, bool)> = Vec::new();
     let mut previous = None;
@@ -53,31 +52,42 @@ fn are_balanced(text: &str, tokens: &[(Token, Span)]) -> bool {
                 .is_some_and(|t| t.ends_with('\n'))
         };
         let in_list = open.last().is_some_and(|(_, is_list)| *is_list);
-        match token {
-            LeftBrace if in_list => return false,
-            LeftParen | LeftBracket | LeftBrace => {
-                let is_list = *token != LeftBrace || previous == Some(PathSeparator);
-                open.extend(token.closer().map(|closer| (closer, is_list)));
-            }
-            RightParen | RightBracket | RightBrace => match open.pop() {
-                Some((closer, _)) if closer == *token => {}
-                _ => return false,
-            },
-            Semicolon | Arrow | When | Let | Var | Param | For | While | Break | Continue
-                if in_list =>
-            {
+        if let Some(closer) = token.closer() {
+            let is_brace = *token == Token::LeftBrace;
+            if is_brace && in_list {
                 return false;
             }
-            Material | Bsdf | Edf | Private | Delta | Fn | Struct | Const | Use
-                if !open.is_empty() && starts_line() =>
-            {
+            open.push((closer, !is_brace || previous == Some(Token::PathSeparator)));
+        } else if token.is_closer() {
+            if open.pop().is_none_or(|(closer, _)| closer != *token) {
                 return false;
             }
-            _ => {}
+        } else if in_list && is_for_blocks(*token)
+            || !open.is_empty() && may_define(*token) && starts_line()
+        {
+            return false;
         }
         previous = Some(*token);
     }
     open.is_empty()
+}
+
+/// Does a token seldom stand in a list?
+fn is_for_blocks(token: Token) -> bool {
+    use Token::*;
+    matches!(
+        token,
+        Semicolon | Arrow | When | Let | Var | Param | For | While | Break | Continue
+    )
+}
+
+/// May a definition begin with a token?
+fn may_define(token: Token) -> bool {
+    use Token::*;
+    matches!(
+        token,
+        Material | Bsdf | Edf | Private | Delta | Fn | Struct | Const | Use
+    )
 }
 
 /// What indentation tells about braces, by the byte they start at.
@@ -210,8 +220,7 @@ impl<'t> Balancer<'t> {
             Material => self.tokens.get(index + 1).is_none_or(|t| t.0 != Assign),
             // They are types as well, and no name follows those.
             Bsdf | Edf => self.tokens.get(index + 1).is_none_or(|t| t.0 == Ident),
-            Private | Delta | Fn | Struct | Const | Use => true,
-            _ => false,
+            token => may_define(token),
         };
         keyword && !self.open.is_empty() && self.lines.is_first && self.lines.indent == 0
     }
@@ -224,11 +233,8 @@ impl<'t> Balancer<'t> {
         };
         let branches = open.branches;
         match self.tokens[index].0 {
-            Semicolon | Arrow | When | Let | Var | Param | For | While | Break | Continue => {
-                !self.closes_soon(index)
-            }
             LeftBrace => !branches && self.starts_body(index),
-            _ => false,
+            token => is_for_blocks(token) && !self.closes_soon(index),
         }
     }
 

@@ -52,9 +52,7 @@ impl Composer<'_> {
         text += &state::accessors(self.layout.needs, stages, storage);
         let mut parts: Vec<Part> = stages
             .iter()
-            .flat_map(|stage| stage.parts)
-            .filter(|(_, need)| self.layout.needs.met(*need))
-            .map(|(part, _)| *part)
+            .flat_map(|stage| stage.parts_in(self.layout.needs))
             .collect();
         parts.sort_unstable();
         parts.dedup();

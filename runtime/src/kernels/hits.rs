@@ -26,9 +26,9 @@ pub(crate) struct Counted {
 /// What is counted of a pool.
 pub(crate) fn counted(sizes: Sizes) -> Counted {
     let (pool, workgroup) = (sizes.pool, sizes.workgroup.max(1));
-    let groups = pool.div_ceil(workgroup);
-    let most = most_counting(groups);
-    let counting = (0..groups).filter(|group| group.wrapping_mul(GOLDEN) <= most);
+    let most = most_counting(sizes);
+    let groups = 0..pool.div_ceil(workgroup);
+    let counting = groups.filter(|group| group.wrapping_mul(GOLDEN) <= most);
     let none = Counted {
         slots: 0,
         blocks: 0,
@@ -43,8 +43,8 @@ pub(crate) fn counted(sizes: Sizes) -> Counted {
 }
 
 /// The greatest fraction with which a workgroup counts.
-fn most_counting(groups: u32) -> u32 {
-    if groups < MANY_GROUPS {
+fn most_counting(sizes: Sizes) -> u32 {
+    if sizes.pool.div_ceil(sizes.workgroup.max(1)) < MANY_GROUPS {
         u32::MAX
     } else {
         COUNTING - 1
@@ -55,13 +55,12 @@ impl Composer<'_> {
     /// What counts hits of each material.
     pub(crate) fn hits(&self) -> String {
         let materials = self.layout.counters.hits as u32;
-        let groups = self.sizes.pool.div_ceil(self.sizes.workgroup.max(1));
         wgsl::constants_u32(&[
             ("MATERIALS", materials),
             ("BLOCK", BLOCK),
             ("BLOCK_WORDS", materials.div_ceil(32)),
             ("GOLDEN", GOLDEN),
-            ("MOST_COUNTING", most_counting(groups)),
+            ("MOST_COUNTING", most_counting(self.sizes)),
         ]) + include_str!("hits.wgsl")
     }
 }

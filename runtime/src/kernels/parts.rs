@@ -8,11 +8,8 @@ use crate::world::needs::{Need, Needs};
 /// Fails if a part is missing that a stage asks for.
 pub(crate) fn check(parts: &KernelParts, needs: Needs) -> Result<(), RuntimeError> {
     for stage in STAGES.iter().filter(|stage| needs.met(stage.need)) {
-        let asked = stage.parts.iter().filter(|(_, need)| needs.met(*need));
-        if let Some((part, _)) = asked
-            .into_iter()
-            .find(|(part, _)| is_missing(*part, parts, needs))
-        {
+        let mut asked = stage.parts_in(needs);
+        if let Some(part) = asked.find(|part| is_missing(*part, parts, needs)) {
             return Err(RuntimeError::MissingPart {
                 part: part.name(),
                 stage: stage.name,

@@ -39,14 +39,15 @@ impl Composer<'_> {
     /// What a kernel pushes that runs some stages, for `members` where those evaluate materials.
     pub(crate) fn pushes(&self, stages: &[&'static Stage], members: &[usize]) -> Pushes {
         // The table lists who may ask for work; whether it does in this scene, the conditions of its text say.
-        let asks = |by: &Stage, target: &Stage| {
+        let bodies: Vec<_> = stages.iter().map(|s| (s, self.body(s, members))).collect();
+        let asks = |by: &Stage, body: &str, target: &Stage| {
             let from = target.work.from();
             from.contains(&by.name)
                 && self.needs_in(by, members).met(target.need)
-                && self.body(by, members).contains(&target.call_of_request())
+                && body.contains(&target.call_of_request())
         };
         let rows = self.layout.stages().iter();
-        let targets = rows.filter(|target| stages.iter().any(|by| asks(by, target)));
+        let targets = rows.filter(|target| bodies.iter().any(|(by, body)| asks(by, body, target)));
         let targets: Vec<&'static Stage> = targets.collect();
         let queues = self.layout.queues;
         let ranges = targets.iter().map(|target| queues.of_phase(target.phase));

@@ -133,7 +133,9 @@ impl Composer<'_> {
             run: format!("{};", stage.call("slot", "item", "")),
             consumes: Some(consumed),
             pushes: self.pushes(&[stage], &[]),
-            traverses: self.casts(stage),
+            traverses: stage
+                .parts_in(self.layout.needs)
+                .any(|part| part == Part::Traversal),
             ..Shell::default()
         });
         let source = DispatchSource::Queue(queue);
@@ -151,12 +153,6 @@ impl Composer<'_> {
         } else {
             Consumed::unordered(queue)
         }
-    }
-
-    /// Whether a stage casts rays.
-    fn casts(&self, stage: &Stage) -> bool {
-        let mut parts = stage.parts.iter();
-        parts.any(|(part, need)| *part == Part::Traversal && self.layout.needs.met(*need))
     }
 
     /// Whether the threads of a stage stay, and take up one ray after another.

@@ -20,7 +20,7 @@ const PATH_DRAWS: [&str; 1] = [
 
 /// Draws made at every vertex of a path.
 const VERTEX_DRAWS: [&str; 2] = [
-    // In the logic stage: choice of the light (x) and the point on it (y, z), survival (w).
+    // Of a light: its choice (x) and the point on it (y, z), in the material stage; survival (w), in the logic stage.
     "DRAW_LIGHT",
     // In the material stage: lobe (x), direction (y, z), choices within the lobe (w).
     "DRAW_SCATTERING",

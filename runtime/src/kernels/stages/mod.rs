@@ -207,6 +207,12 @@ impl Stage {
         matches!(self.work, Work::Pool)
     }
 
+    /// The texts that it needs in a scene.
+    pub(crate) fn parts_in(&self, needs: Needs) -> impl Iterator<Item = Part> {
+        let asked = self.parts.iter().filter(move |(_, need)| needs.met(*need));
+        asked.map(|(part, _)| *part)
+    }
+
     fn has(&self, part: Part) -> bool {
         self.parts.iter().any(|(p, _)| *p == part)
     }

@@ -351,13 +351,14 @@ rows! {
         "there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
         on &[], draws "", ASKED, |f, n| {
             let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
-            match f.camera_rays {
-                CameraRays::AtOnce if possible => Some("`--camera-rays at-once` asks for it".into()),
-                CameraRays::Auto if possible && f.triangles <= FEW_TRIANGLES => {
-                    Some(format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles))
-                }
-                _ => None,
-            }
+            let reason = match f.camera_rays {
+                CameraRays::AtOnce => Some("`--camera-rays at-once` asks for it".into()),
+                CameraRays::Auto => (f.triangles <= FEW_TRIANGLES).then(|| {
+                    format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles)
+                }),
+                CameraRays::Queue => None,
+            };
+            reason.filter(|_| possible)
         };
 }
 
