@@ -27,8 +27,7 @@ pub(crate) struct Counted {
 pub(crate) fn counted(sizes: Sizes) -> Counted {
     let (pool, workgroup) = (sizes.pool, sizes.workgroup.max(1));
     let most = most_counting(sizes);
-    let groups = 0..pool.div_ceil(workgroup);
-    let counting = groups.filter(|group| group.wrapping_mul(GOLDEN) <= most);
+    let counting = (0..groups(sizes)).filter(|group| group.wrapping_mul(GOLDEN) <= most);
     let none = Counted {
         slots: 0,
         blocks: 0,
@@ -42,9 +41,14 @@ pub(crate) fn counted(sizes: Sizes) -> Counted {
     })
 }
 
+/// The workgroups that a pool has.
+fn groups(sizes: Sizes) -> u32 {
+    sizes.pool.div_ceil(sizes.workgroup.max(1))
+}
+
 /// The greatest fraction with which a workgroup counts.
 fn most_counting(sizes: Sizes) -> u32 {
-    if sizes.pool.div_ceil(sizes.workgroup.max(1)) < MANY_GROUPS {
+    if groups(sizes) < MANY_GROUPS {
         u32::MAX
     } else {
         COUNTING - 1
