@@ -7,9 +7,10 @@
 //! ```text
 //! busy    = (issue^k + memory^k + latency^k)^(1/k)                          k = overlap
 //! issue   = sum over members: subgroups * operations that each issues * seconds by class * crowding
-//! memory  = sum over members: hits * (loads + stores) * (memory + scatter * apart(density))
+//! memory  = sum over members: hits * (loads + stores) * (memory + scatter * apart(density)) * waiting
 //! latency = latency * operations of the longest subgroup * crowding
 //! crowding = 1 + miss * max(0, code of all members / code - 1)     where members are side by side
+//! waiting = 1 + occupancy * most live numbers of a member / 100
 //! logic   = logic kernel * pressure * max(0, live numbers - free_registers) / 100
 //! ```
 //!
@@ -20,6 +21,8 @@
 //!   read lines of memory for themselves alone: `apart` is 0 if all slots of a line of 16 are worked
 //!   on, and 1 if one is. It is 0 for queues where paths lie in the order of these.
 //! - Side by side, materials that do not fit the caches of instructions together push each other out.
+//! - A kernel has the registers of the member that needs most. The more these are, the fewer threads there are at a
+//!   time, and the less of the waiting for memory is hidden, of the other members as well.
 //! - A logic kernel with inline materials has their registers, and so fewer threads at a time.
 //!
 //! The formulas are those of a set that were tried on measurements of an H200, which fitted best
@@ -277,17 +280,22 @@ impl Calibrated<'_> {
             let scattered = weights.scatter * shared.unwrap_or(m.apart);
             m.count * (state * (weights.memory + scattered) + own * weights.memory)
         };
-        members.iter().map(one).sum()
+        let waiting = 1.0 + weights.occupancy * most_live(members) / 100.0;
+        waiting * members.iter().map(one).sum::<f64>()
     }
 
     /// Seconds by which the logic kernel gets slower for the registers of inline materials.
     fn logic(&self, members: &[Member<'_>]) -> f64 {
         let weights = &self.profile.weights;
-        let live = members.iter().filter_map(|m| m.cost).map(|cost| cost.live);
-        let live = f64::from(live.max().unwrap_or(0));
-        let beyond = (live - weights.free_registers).max(0.0) / 100.0;
+        let beyond = (most_live(members) - weights.free_registers).max(0.0) / 100.0;
         self.workload.logic_seconds * weights.pressure * beyond
     }
+}
+
+/// The live numbers of the member with most.
+fn most_live(members: &[Member<'_>]) -> f64 {
+    let live = members.iter().filter_map(|m| m.cost).map(|cost| cost.live);
+    f64::from(live.max().unwrap_or(0))
 }
 
 /// Operations of the subgroup that takes longest. Side by side, a workgroup waits for all materials that
@@ -374,6 +382,7 @@ mod tests {
             inline_loads: 0.5,
             free_registers: 30.0,
             pressure: 0.2,
+            occupancy: 0.0,
         };
         profile
     }

@@ -61,6 +61,9 @@ pub struct Weights {
     pub free_registers: f64,
     /// By how much each further hundred of them slows that kernel down, as a share.
     pub pressure: f64,
+    /// By how much a hundred live numbers of a kernel slow its memory down, as a share.
+    #[serde(default)]
+    pub occupancy: f64,
 }
 
 /// How well a model fits what was measured.
@@ -141,7 +144,7 @@ const MAX_SUBGROUP: u32 = 128;
 
 impl Weights {
     /// Every constant with its name in files.
-    pub fn named(&self) -> [(&'static str, f64); 15] {
+    pub fn named(&self) -> [(&'static str, f64); 16] {
         [
             ("launch", self.launch),
             ("latency", self.latency),
@@ -158,6 +161,7 @@ impl Weights {
             ("inline_loads", self.inline_loads),
             ("free_registers", self.free_registers),
             ("pressure", self.pressure),
+            ("occupancy", self.occupancy),
         ]
     }
 
