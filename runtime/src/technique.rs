@@ -161,6 +161,16 @@ choices! {
         Thread = "thread",
     }
 
+    /// Which kernels cast rays, where threads take one after another.
+    RayKernels {
+        /// As in `one` where few paths are in flight, else as in `each`
+        Auto = "auto",
+        /// One for all: while the last of one kind are under way, other threads have rays of the next
+        One = "one",
+        /// One for each kind of ray
+        Each = "each",
+    }
+
     /// Where rays of the camera are cast.
     CameraRays {
         /// As in `at-once` where a scene has few triangles, else as in `queue`
@@ -237,6 +247,8 @@ pub struct Technique {
     pub leaves: Leaves,
     /// How threads get the rays of a queue; in a megakernel each has its own.
     pub ray_fetch: RayFetch,
+    /// Which kernels cast rays whose threads take one after another.
+    pub ray_kernels: RayKernels,
     /// Where rays of the camera are cast; in a megakernel each thread casts its own.
     pub camera_rays: CameraRays,
     /// How repeated geometry is stored.
@@ -295,6 +307,8 @@ mod tests {
         check_names::<Stack>();
         check_names::<Leaves>();
         check_names::<RayFetch>();
+        check_names::<RayKernels>();
+        check_names::<CameraRays>();
         check_names::<Copies>();
         check_names::<RayData>();
         check_names::<RayOrder>();

@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, CameraRays, Choice, Copies, Features, Leaves, RayData, RayFetch, RayOrder,
+    Append, CameraRays, Choice, Copies, Features, Leaves, RayData, RayFetch, RayKernels, RayOrder,
     Regeneration, Sampler, SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
 };
 
@@ -41,6 +41,9 @@ pub(super) struct TechniqueArgs {
     /// How threads get the rays of a queue
     #[arg(long, value_name = "NAME", default_value = default_name::<RayFetch>(), value_parser = named::<RayFetch>())]
     ray_fetch: RayFetch,
+    /// Which kernels cast rays whose threads take one after another
+    #[arg(long, value_name = "NAME", default_value = default_name::<RayKernels>(), value_parser = named::<RayKernels>())]
+    ray_kernels: RayKernels,
     /// Where rays of the camera are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<CameraRays>(), value_parser = named::<CameraRays>())]
     camera_rays: CameraRays,
@@ -83,6 +86,7 @@ impl TechniqueArgs {
             stack: self.stack,
             leaves: self.leaves,
             ray_fetch: self.ray_fetch,
+            ray_kernels: self.ray_kernels,
             camera_rays: self.camera_rays,
             copies: self.copies,
             ray_data: self.ray_data,

@@ -4,7 +4,7 @@ use super::scenes::{
     Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY, SPHERE,
     SPOT, TWO_SIDED, Text, queued,
 };
-use impasto::runtime::technique::{CameraRays, RayData, RayOrder, Technique};
+use impasto::runtime::technique::{CameraRays, RayData, RayKernels, RayOrder, Technique};
 
 /// Two scenes that differ in a row.
 pub struct Pair {
@@ -120,11 +120,11 @@ pairs! {
         under(SKY, lit(&[DISC])) => under(SKY, lit(&[DISC, QUAD]));
     "light from infinity", also &["distant lights with an angle"], "functions +distant_light_escape +light_escape",
         lit(&[QUAD, DIRECTION]) => lit(&[QUAD, DIRECTION, DISC]);
-    "shadow rays", also &["multiple importance sampling"], "+16 bytes; kernels +shadow; functions +aim +area_density +keep_shadow \
-         +light_contribution +light_probability +light_share +load_contribution \
+    "shadow rays", also &["multiple importance sampling"], "+16 bytes; kernels +shadow; functions +aim +area_density +end_shadow +is_shadow_decided \
+         +keep_shadow +light_contribution +light_probability +light_share +load_contribution \
          +load_shadow_direction +load_shadow_origin \
          +no_light_sample +pick_light +power_heuristic +request_shadow +sample_area \
-         +sample_light +sample_quad_light +scattering_weight +shadow_request \
+         +sample_light +sample_quad_light +scattering_weight +shadow_ray \
          +store_contribution +store_shadow_direction +store_shadow_origin",
         lit(&[QUAD_BY_CHANCE]) => lit(&[QUAD]);
     "choice of a light", also &[], "functions +light_place +multiply_high +renew_word", lit(&[QUAD]) => lit(&[QUAD, SECOND_QUAD]);
@@ -143,10 +143,12 @@ pairs! {
         thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5);")
         => thing("surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, absorption: color(3.0));");
     "media that scatter", also &[], "bindings +volume_table; functions +chosen +ended +extension +fly +free_flight +keep_flight +max_component \
-         +next_stop +path_of +ray_transmittance +scattered_cosine +scatters +trace +trace_closest +trace_to_surface +turn_bits +turned_from",
+         +next_stop +path_of +ray_transmittance +scattered_cosine +scatters +trace +trace_closest +trace_to_surface +turn_bits +turned_from \
+         -end_extension -is_extension_decided",
         thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0));")
         => thing("surface = smooth_dielectric(ior: 1.5); interior = medium(ior: 1.5, absorption: color(3.0), scattering: color(2.0));");
-    "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary",
+    "overlapping media", also &[], "functions +extension +is_false_boundary +trace +trace_closest +trace_to_boundary \
+         -end_extension -is_extension_decided",
         beside(
             "surface = smooth_dielectric(ior: 1.5 / exterior_ior); interior = medium(ior: 1.5, priority: 2);",
             "surface = smooth_dielectric(ior: 1.3 / exterior_ior); interior = medium(ior: 1.3, priority: 2);",
@@ -238,6 +240,9 @@ pairs! {
             technique: Technique { ray_data: RayData::Requests, ..queued() },
             ..Text::default()
         };
+    "all rays cast by one kernel", also &[], "+16 bytes; kernels +rays -extension -shadow",
+        Text { technique: Technique { ray_kernels: RayKernels::Each, ..queued() }, ..Text::default() }
+        => Text { technique: Technique { ray_kernels: RayKernels::One, ..queued() }, ..Text::default() };
     "rays of the camera cast at once", also &[], "functions +trace +trace_closest",
         Text::default()
         => Text {

@@ -165,7 +165,8 @@ impl Cpu {
                 DispatchSource::Once => Groups::Known(1),
                 DispatchSource::Groups(groups) => Groups::Known(groups),
                 DispatchSource::Pool => groups(sizes.pool),
-                DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => groups(sizes.threads),
+                DispatchSource::Fetched => groups(sizes.threads),
+                DispatchSource::FetchedQueues { count, .. } => groups(sizes.threads_for(count)),
                 DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
                     Groups::OfQueue(queue)
                 }

@@ -6,7 +6,7 @@ use crate::kernels::stages::{Phase, Stage, Work};
 use crate::kernels::state;
 
 /// What a stage that casts rays gives beside its own function, for threads that take up one after another.
-const RAY_FUNCTIONS: [&str; 3] = ["begin_ray", "is_decided", "end_ray"];
+const RAY_FUNCTIONS: [&str; 3] = ["NAME_ray", "is_NAME_decided", "end_NAME"];
 
 /// Fails if rows contradict each other, or a body does not do what its row says.
 pub(crate) fn check(stages: &[Stage]) -> Result<(), RuntimeError> {
@@ -50,7 +50,8 @@ impl Row<'_> {
 
     fn check_functions(&self) -> Result<(), String> {
         let of_rays = RAY_FUNCTIONS.iter().filter(|_| self.stage.casts.is_some());
-        let mut functions = std::iter::once(&self.stage.name).chain(of_rays);
+        let of_rays = of_rays.map(|name| name.replace("NAME", self.stage.name));
+        let mut functions = std::iter::once(self.stage.name.to_string()).chain(of_rays);
         let missing =
             functions.find(|name| !self.stage.body.text.contains(&format!("\nfn {name}(")));
         missing.map_or(Ok(()), |name| {

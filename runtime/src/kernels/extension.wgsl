@@ -1,8 +1,7 @@
 // Finds what a path's next segment hits.
 
 #if requests
-// A request's ray: where it begins and the primitive it begins on; its direction.
-fn extension_request(request: u32) -> array<vec4<u32>, 2> {
+fn extension_ray(request: u32) -> array<vec4<u32>, 2> {
     return array<vec4<u32>, 2>(extension_rays[2u * request], extension_rays[2u * request + 1u]);
 }
 
@@ -10,10 +9,10 @@ fn keep_hit(request: u32, hit: Hit) {
     extension_hits[request] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(hit.t, hit.u, hit.v)), hit.primitive);
 }
 #else
-fn extension_request(slot: u32) -> array<vec4<u32>, 2> {
+fn extension_ray(slot: u32) -> array<vec4<u32>, 2> {
     let origin = bitcast<vec3<u32>>(load_ray_origin(slot).origin);
     let direction = bitcast<vec3<u32>>(load_ray_direction(slot).direction);
-    return array<vec4<u32>, 2>(vec4<u32>(origin, load_hit(slot).primitive), vec4<u32>(direction, 0u));
+    return array<vec4<u32>, 2>(vec4<u32>(origin, load_hit(slot).primitive), vec4<u32>(direction, bitcast<u32>(3.0e38f)));
 }
 
 fn keep_hit(slot: u32, hit: Hit) {
@@ -22,22 +21,16 @@ fn keep_hit(slot: u32, hit: Hit) {
 #endif
 
 #if fetched
-fn begin_ray(request: u32) -> Walk {
-    let ray = extension_request(request);
-    let start = bitcast<vec3<f32>>(ray[0].xyz);
-    return begin_walk(BVH_ROOT, 0u, start, bitcast<vec3<f32>>(ray[1].xyz), 3.0e38, ray[0].w);
-}
-
-fn is_decided(hit: Hit) -> bool {
+fn is_extension_decided(hit: Hit) -> bool {
     return false;
 }
 
-fn end_ray(request: u32, hit: Hit) {
+fn end_extension(request: u32, hit: Hit) {
     keep_hit(request, hit);
 }
 #else
 fn extension(request: u32) {
-    let ray = extension_request(request);
+    let ray = extension_ray(request);
     let start = bitcast<vec3<f32>>(ray[0].xyz);
     let direction = bitcast<vec3<f32>>(ray[1].xyz);
 #if overlap

@@ -9,7 +9,7 @@ use crate::kernels::check::check;
 use crate::kernels::queues::{Counters, Queues};
 use crate::kernels::stages::{STAGES, Stage};
 use crate::kernels::state;
-use crate::technique::{Append, CameraRays, RayData, SlotOrder, Technique};
+use crate::technique::{Append, CameraRays, RayData, RayKernels, SlotOrder, Technique};
 use crate::world::needs::{Decision, Need, Needs};
 
 /// Paths that hit one material lie densely enough where they are (docs/measurements.md). It is not the queues that
@@ -89,6 +89,11 @@ impl PlanLayout {
         } else {
             RayData::Slots
         };
+        let ray_kernels = if self.needs.has(Need::JointCasts) {
+            RayKernels::One
+        } else {
+            RayKernels::Each
+        };
         let camera_rays = if self.needs.has(Need::CameraCasts) {
             CameraRays::AtOnce
         } else {
@@ -102,6 +107,7 @@ impl PlanLayout {
         Technique {
             ray_data,
             slot_order,
+            ray_kernels,
             camera_rays,
             ..asked
         }

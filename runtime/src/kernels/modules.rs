@@ -25,6 +25,8 @@ pub(crate) const PREPARE: &str = "prepare";
 pub(crate) const SCAN: &str = "scan";
 pub(crate) const SCATTER: &str = "scatter";
 pub(crate) const MEGA: &str = "mega";
+/// That of all stages whose threads fetch rays.
+pub(crate) const RAYS: &str = "rays";
 
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
@@ -36,8 +38,13 @@ pub(crate) enum DispatchSource {
     Pool,
     /// As many as fill the GPU; they fetch items until the pool's number is used up.
     Fetched,
-    /// As many as fill the GPU; they fetch items of a queue until it is used up.
-    FetchedQueue(usize),
+    /// As many as fill the GPU; they fetch items of some consecutive queues until these are used up.
+    FetchedQueues {
+        /// The first.
+        first: usize,
+        /// How many.
+        count: usize,
+    },
     /// One for every item of a queue, through indirect arguments.
     Queue(usize),
     /// Workgroups enough for each of some consecutive queues, through the arguments of the first.
@@ -132,6 +139,12 @@ impl Sizes {
     /// Slots of all pools.
     pub(crate) fn slots(self) -> u32 {
         self.pool.saturating_mul(self.pools)
+    }
+
+    /// Threads of a kernel that fetches the items of some queues.
+    pub(crate) fn threads_for(self, queues: usize) -> u32 {
+        let items = self.pool.saturating_mul(queues as u32);
+        self.threads.max(items.div_ceil(self.fetch_limit.max(1)))
     }
 }
 

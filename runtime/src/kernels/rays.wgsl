@@ -6,13 +6,13 @@ fn store_result(slot: u32, hit: Hit) {
 }
 #if fetched
 
-fn begin_ray(slot: u32) -> Walk {
-    let start = bitcast<vec4<f32>>(rays[2u * slot]);
+fn cast_ray(slot: u32) -> array<vec4<u32>, 2> {
+    let start = rays[2u * slot];
     let way = rays[2u * slot + 1u];
-    return begin_walk(BVH_ROOT, 0u, start.xyz, bitcast<vec3<f32>>(way.xyz), start.w, way.w);
+    return array<vec4<u32>, 2>(vec4<u32>(start.xyz, way.w), vec4<u32>(way.xyz, start.w));
 }
 
-fn is_decided(hit: Hit) -> bool {
+fn is_cast_decided(hit: Hit) -> bool {
 #if any_hit
     return hit.primitive != NO_PRIMITIVE;
 #else
@@ -20,7 +20,7 @@ fn is_decided(hit: Hit) -> bool {
 #endif
 }
 
-fn end_ray(slot: u32, hit: Hit) {
+fn end_cast(slot: u32, hit: Hit) {
     store_result(slot, hit);
 }
 #else

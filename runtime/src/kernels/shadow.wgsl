@@ -3,7 +3,7 @@
 
 #if requests
 // A request's ray: where it begins and the primitive it begins on; its direction and length.
-fn shadow_request(request: u32) -> array<vec4<u32>, 2> {
+fn shadow_ray(request: u32) -> array<vec4<u32>, 2> {
     return array<vec4<u32>, 2>(shadow_rays[2u * request], shadow_rays[2u * request + 1u]);
 }
 
@@ -11,7 +11,7 @@ fn keep_shadow(request: u32, blocked: bool) {
     shadow_results[request] = select(0u, 1u, blocked);
 }
 #else
-fn shadow_request(slot: u32) -> array<vec4<u32>, 2> {
+fn shadow_ray(slot: u32) -> array<vec4<u32>, 2> {
     let origin = load_shadow_origin(slot).origin;
     let ray = load_shadow_direction(slot);
     let distance = load_contribution(slot).distance;
@@ -29,22 +29,16 @@ fn keep_shadow(slot: u32, blocked: bool) {
 #endif
 
 #if fetched
-fn begin_ray(request: u32) -> Walk {
-    let ray = shadow_request(request);
-    let way = bitcast<vec4<f32>>(ray[1]);
-    return begin_walk(BVH_ROOT, 0u, bitcast<vec3<f32>>(ray[0].xyz), way.xyz, way.w, ray[0].w);
-}
-
-fn is_decided(hit: Hit) -> bool {
+fn is_shadow_decided(hit: Hit) -> bool {
     return hit.primitive != NO_PRIMITIVE;
 }
 
-fn end_ray(request: u32, hit: Hit) {
-    keep_shadow(request, is_decided(hit));
+fn end_shadow(request: u32, hit: Hit) {
+    keep_shadow(request, is_shadow_decided(hit));
 }
 #else
 fn shadow(request: u32) {
-    let ray = shadow_request(request);
+    let ray = shadow_ray(request);
     let way = bitcast<vec4<f32>>(ray[1]);
     keep_shadow(request, trace_any(bitcast<vec3<f32>>(ray[0].xyz), way.xyz, way.w, ray[0].w));
 }

@@ -9,7 +9,7 @@ use crate::kernels::modules::Composer;
 use crate::kernels::requests::Pushes;
 use crate::technique::{Append, Leaves};
 use crate::wgsl;
-use crate::wgsl::template::template;
+use crate::wgsl::template::{Words, template};
 use crate::wgsl::text::case_labels;
 use crate::world::bvh;
 use crate::world::needs::Need;
@@ -119,11 +119,20 @@ impl EntryPoint {
     }
 }
 
-/// A kernel whose threads stay, and fetch one ray of a queue after another.
+/// The rays of a stage that a kernel fetches.
 #[derive(Clone, Copy, Debug)]
+pub(crate) struct Fetched {
+    /// What the functions are named by that know of them (kernels/fetch.wgsl).
+    pub name: &'static str,
+    /// Their queue.
+    pub items: Consumed,
+}
+
+/// A kernel whose threads stay, and fetch one ray after another.
+#[derive(Clone, Debug)]
 pub(crate) struct FetchShell<'a> {
-    /// The queue of rays.
-    pub queue: u32,
+    /// The rays, those that take longest first.
+    pub casts: Vec<Fetched>,
     /// WGSL of the index of the counter of rays fetched.
     pub counter: &'a str,
     /// The rays that a thread fetches on average, at most.
@@ -136,21 +145,41 @@ pub(crate) struct FetchShell<'a> {
     pub walk_lane: bool,
 }
 
+impl Fetched {
+    /// What the text says of them, which are of the `kind`-th kind and come after those of another.
+    fn words(&self, kind: usize, before: Option<&Fetched>) -> Words {
+        let otherwise = if before.is_some() { "else " } else { "" };
+        let begin = before.map_or_else(String::new, |b| format!(" - end_of_{}", b.name));
+        vec![
+            ("name", self.name.to_string()),
+            ("kind", kind.to_string()),
+            ("queue", self.items.queue.to_string()),
+            ("region", self.items.region.to_string()),
+            ("otherwise", otherwise.to_string()),
+            ("begin", begin),
+        ]
+    }
+}
+
 impl FetchShell<'_> {
     pub(crate) fn wgsl(self) -> String {
         let flags = [
+            ("several", self.casts.len() > 1),
             ("slots", self.slots),
             ("walk_lane", self.walk_lane),
             ("together", self.together),
         ];
+        let casts = self.casts.iter().enumerate();
+        let casts =
+            casts.map(|(kind, fetched)| fetched.words(kind, self.casts.get(kind.wrapping_sub(1))));
+        let casts = [("casts", casts.collect())];
         wgsl::constants_u32(&[
-            ("CONSUMED_QUEUE", self.queue),
             ("FETCH_LIMIT", self.limit),
             ("FETCH_PERCENT", FETCH_PERCENT),
             ("TRIANGLE_PERCENT", TRIANGLE_PERCENT),
         ]) + &format!("const COUNTER_RAYS_FETCHED: u32 = {};\n", self.counter)
             + SUBGROUP
-            + &template!("fetch.wgsl").wgsl(&flags)
+            + &template!("fetch.wgsl").with_sets(&flags, &casts)
     }
 }
 
@@ -193,17 +222,18 @@ impl Composer<'_> {
         out + &entry.wgsl()
     }
 
-    /// Constants and entry point of a kernel whose threads fetch the rays of a queue.
-    pub(crate) fn fetch_shell(&self, consumed: Consumed) -> String {
+    /// Constants and entry point of a kernel whose threads fetch rays.
+    pub(crate) fn fetch_shell(&self, casts: Vec<Fetched>) -> String {
+        let first = casts.first().map_or(0, |fetched| fetched.items.queue);
         let fetch = FetchShell {
-            queue: consumed.queue as u32,
-            counter: "COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * CONSUMED_QUEUE",
+            casts,
+            counter: &format!("COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * {first}u"),
             limit: self.sizes.fetch_limit,
             slots: !self.layout.needs.has(Need::Requests),
             together: self.technique.leaves == Leaves::Together,
             walk_lane: bvh::asks_for_lane(&self.parts.bvh),
         };
-        wgsl::constant_u32("CONSUMED_REGION", consumed.region as u32) + &fetch.wgsl()
+        fetch.wgsl()
     }
 
     /// The queue of an instance's material; `NOTHING` if it is evaluated where it was found.

@@ -291,7 +291,7 @@ fn a_mistake_in_the_table_is_told_with_the_stage_it_is_in() {
             refusal("extension", |s| {
                 s.body = file("\nfn extension(slot: u32) {}\n")
             }),
-            "`extension` lacks its function `begin_ray` in its file",
+            "`extension` lacks its function `extension_ray` in its file",
         ),
         (
             refusal("bin_shadow", |s| s.name = "logic"),

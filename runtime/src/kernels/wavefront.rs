@@ -5,12 +5,13 @@ use std::ops::Range;
 
 use impasto_compiler::partition::{Form, PlanKernel};
 
-use crate::kernels::modules::{Composer, DispatchSource, KernelDesc, SCAN, SCATTER};
+use crate::kernels::modules::{Composer, DispatchSource, KernelDesc, RAYS, SCAN, SCATTER};
 use crate::kernels::order;
-use crate::kernels::shells::{Consumed, EntryPoint, Shell};
+use crate::kernels::shells::{Consumed, EntryPoint, Fetched, Shell};
 use crate::kernels::stages::{Part, Phase, Stage, Work};
 use crate::technique::RayFetch;
 use crate::world::bvh;
+use crate::world::needs::Need;
 
 impl Composer<'_> {
     /// The stages of each phase, after a kernel that prepares the queues they consume. Kernels between
@@ -25,7 +26,13 @@ impl Composer<'_> {
                 let hands_out = stages.iter().any(begins);
                 kernels.push(self.prepare(prepare, consumed, hands_out));
             }
-            kernels.extend(stages.into_iter().flat_map(|stage| self.kernels_of(stage)));
+            let joint = self.layout.needs.has(Need::JointCasts);
+            let (joint, alone): (Vec<_>, Vec<_>) =
+                stages.into_iter().partition(|s| joint && self.fetches(s));
+            if !joint.is_empty() {
+                kernels.push(self.fetching(joint));
+            }
+            kernels.extend(alone.into_iter().flat_map(|stage| self.kernels_of(stage)));
         }
         kernels
     }
@@ -125,9 +132,7 @@ impl Composer<'_> {
     fn over_queue(&self, stage: &'static Stage, queue: usize) -> KernelDesc {
         let consumed = self.consumed(stage, queue);
         if self.fetches(stage) {
-            let shell = self.fetch_shell(consumed);
-            let source = DispatchSource::FetchedQueue(queue);
-            return KernelDesc::plain(stage.name, vec![stage], source, shell);
+            return self.fetching(vec![stage]);
         }
         let shell = self.shell(&Shell {
             run: format!("{};", stage.call("slot", "item", "")),
@@ -140,6 +145,31 @@ impl Composer<'_> {
         });
         let source = DispatchSource::Queue(queue);
         KernelDesc::plain(stage.name, vec![stage], source, shell)
+    }
+
+    /// The kernel of stages whose threads stay, and take up one ray after another.
+    fn fetching(&self, mut stages: Vec<&'static Stage>) -> KernelDesc {
+        // In the order of their queues, those that every scene has come first: extension rays, which take longest.
+        stages.sort_by_key(|stage| self.layout.queues.of(stage.name).start);
+        let fetched = |stage: &&'static Stage| Fetched {
+            name: stage.name,
+            items: self.consumed(stage, self.layout.queues.of(stage.name).start),
+        };
+        let shell = self.fetch_shell(stages.iter().map(fetched).collect());
+        let queues = stages.iter().map(|stage| self.layout.queues.of(stage.name));
+        let first = queues.clone().map(|queues| queues.start).min();
+        let source = DispatchSource::FetchedQueues {
+            first: first.unwrap_or_default(),
+            count: stages.len(),
+        };
+        let role = match stages[..] {
+            [stage] => stage.name,
+            _ => RAYS,
+        };
+        KernelDesc {
+            role,
+            ..KernelDesc::plain(role, stages, source, shell)
+        }
     }
 
     /// A queue as a stage finds it: rays may have been put in order.

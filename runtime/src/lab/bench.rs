@@ -60,12 +60,22 @@ pub(super) struct Sample {
     pub counters: Vec<u32>,
 }
 
-/// Runs an iteration without restoring anything.
-pub(super) fn advance(gpu: &Gpu, run: &Run) -> Result<(), RuntimeError> {
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    run.schedule.record(&mut encoder, 1, None);
-    let index = gpu.queue.submit([encoder.finish()]);
-    gpu.wait(index)
+/// Runs iterations one after the other, restoring nothing. What the counters were after each.
+pub(super) fn advance(
+    gpu: &Gpu,
+    resources: &Resources,
+    run: &Run,
+    iterations: usize,
+) -> Result<Vec<Vec<u32>>, RuntimeError> {
+    let mut lanes = Lane::each(gpu, std::slice::from_ref(run))?;
+    let iterate = |lane: &mut Lane<'_>| {
+        lane.submit(gpu, resources, None);
+        Ok(lane.wait(gpu)?.counters)
+    };
+    let repeated = lanes
+        .iter_mut()
+        .flat_map(|lane| (0..iterations).map(|_| iterate(lane)).collect::<Vec<_>>());
+    repeated.collect()
 }
 
 /// Repeats each run, by turns with its neighbours, so that whatever slows the GPU down for a moment
@@ -123,7 +133,8 @@ impl<'r> Lane<'r> {
         runs.iter().map(lane).collect()
     }
 
-    fn submit(&mut self, gpu: &Gpu, resources: &Resources, snapshot: &Snapshot) {
+    /// From where the snapshot was taken, if there is one.
+    fn submit(&mut self, gpu: &Gpu, resources: &Resources, snapshot: Option<&Snapshot>) {
         let (run, submission) = (self.run, &mut self.submission);
         if !run.table.is_empty() {
             let table = resources.buffer(BufferId::QueueTable);
@@ -131,7 +142,9 @@ impl<'r> Lane<'r> {
                 .write_buffer(table, 0, bytemuck::cast_slice(&run.table));
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        snapshot.restore(&mut encoder, resources);
+        if let Some(snapshot) = snapshot {
+            snapshot.restore(&mut encoder, resources);
+        }
         run.schedule.record(&mut encoder, 1, submission.queries());
         submission.copy(&mut encoder, resources.counters(), self.queries);
         submission.submit(gpu, encoder, 1);
@@ -155,7 +168,7 @@ fn round(
     lanes: &mut [Lane<'_>],
 ) -> Result<Vec<Sample>, RuntimeError> {
     for lane in lanes.iter_mut() {
-        lane.submit(gpu, resources, snapshot);
+        lane.submit(gpu, resources, Some(snapshot));
     }
     lanes.iter_mut().map(|lane| lane.wait(gpu)).collect()
 }

@@ -42,8 +42,8 @@ pub struct LabOptions {
     pub pool: Option<u32>,
     /// How the work is done.
     pub technique: Technique,
-    /// Iterations before the copy is taken. Paths begin together, and are mixed after about as many
-    /// as the longest has segments.
+    /// Iterations before the copy is taken, at least. Paths begin together, and are mixed after about as many
+    /// as the longest has segments; a typical one of as many again is measured.
     pub warm_iterations: u32,
     /// How often each kernel is timed; the median counts.
     pub repetitions: u32,
@@ -134,10 +134,11 @@ impl<'a> Lab<'a> {
         let mut render = RenderOptions {
             samples: ENDLESS,
             pool: options.pool,
-            technique: options.technique.within(gpu.has_subgroups()),
+            technique: options.technique,
             ..RenderOptions::default()
         };
         settings::check(world, &render)?;
+        render.technique = pool::technique(gpu.into(), world, &render);
         let mut inputs =
             CompositionInputs::new(gpu.subgroup_size(), world, source, render.technique)?;
         let own = world.own_plan(&inputs.materials);
@@ -177,10 +178,9 @@ impl<'a> Lab<'a> {
     /// Takes the copy, and measures what is asked of every plan.
     fn begin(&mut self, own: &Plan, iterations: u32) -> Result<(), RuntimeError> {
         let run = self.whole(own)?;
+        let iterations = self.typical(own, &run, iterations.max(1) as usize)?;
         self.resources.clear(self.gpu);
-        for _ in 0..iterations.max(1) {
-            bench::advance(self.gpu, &run)?;
-        }
+        bench::advance(self.gpu, &self.resources, &run, iterations)?;
         self.snapshot.take(self.gpu, &self.resources);
         self.count_hits(own)?;
         let samples = self.time(&[run])?;
@@ -191,6 +191,20 @@ impl<'a> Lab<'a> {
         self.workload.logic_seconds = steps.first().copied().unwrap_or(0.0);
         self.workload.other_seconds = of_others.map(|(_, seconds)| seconds).sum();
         Ok(())
+    }
+
+    /// Of the iterations after the first few, and as many again, the one in which about as many paths begin as on
+    /// average. All begin together, and where most are as long as they may be, most end together for long.
+    fn typical(&self, own: &Plan, run: &Run, few: usize) -> Result<usize, RuntimeError> {
+        self.resources.clear(self.gpu);
+        let counters = bench::advance(self.gpu, &self.resources, run, 2 * few)?;
+        let queue = self.inputs.layout(own)?.queues.new_paths();
+        let begun = |words: &Vec<u32>| f64::from(run.counters.taken_of(words, queue));
+        let begun: Vec<f64> = counters[few..].iter().map(begun).collect();
+        let mean = begun.iter().sum::<f64>() / begun.len() as f64;
+        let away = |at: &usize| (begun[*at] - mean).abs();
+        let nearest = (0..begun.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        Ok(few + nearest.unwrap_or_default())
     }
 
     /// Paths in flight.

@@ -179,7 +179,7 @@ impl<'g> Renderer<'g> {
         let plan = &device.plan(asked, world, source);
         let replaced = device.replaces_plan(asked);
         let mut options = options.clone();
-        options.technique = device.technique(options.technique);
+        options.technique = pool::technique(device, world, &options);
         settings::check(world, &options)?;
         let mut inputs =
             CompositionInputs::new(device.subgroup_size(), world, source, options.technique)?;
@@ -261,7 +261,7 @@ pub fn identity<'d>(
 ) -> Result<Identity, RuntimeError> {
     let device = device.into();
     settings::check(world, options)?;
-    let technique = device.technique(options.technique);
+    let technique = pool::technique(device, world, options);
     let inputs = CompositionInputs::new(device.subgroup_size(), world, source, technique)?;
     let plan = world.own_plan(&inputs.materials);
     let layout = inputs.layout(&plan)?;
@@ -477,7 +477,8 @@ fn dispatch_size(source: DispatchSource, sizes: Sizes) -> Size {
         DispatchSource::Once => Size::Direct(1, 1),
         DispatchSource::Groups(groups) => Size::Direct(groups, 1),
         DispatchSource::Pool => threads(sizes.pool),
-        DispatchSource::Fetched | DispatchSource::FetchedQueue(_) => threads(sizes.threads),
+        DispatchSource::Fetched => threads(sizes.threads),
+        DispatchSource::FetchedQueues { count, .. } => threads(sizes.threads_for(count)),
         DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
             Size::Indirect(ARGUMENT_BYTES * queue as u64)
         }

@@ -7,7 +7,7 @@ use crate::error::RuntimeError;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
 use crate::options::{Progress, RenderOptions};
-use crate::technique::Technique;
+use crate::technique::{RayKernels, Technique};
 use crate::world::World;
 
 /// Paths in flight by default, as in Laine et al. 2013. In a megakernel they are those of one
@@ -42,6 +42,40 @@ pub(crate) const LONG: Duration = Duration::from_millis(100);
 pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
+/// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: all rays are
+/// cast by one (docs/measurements.md, all rays in one dispatch).
+const FEW_PATHS: u32 = 1 << 22;
+
+/// The technique that a device renders by, with what depends on the paths in flight.
+pub(crate) fn technique(
+    device: DeviceRef<'_>,
+    world: &World,
+    options: &RenderOptions,
+) -> Technique {
+    let technique = device.technique(options.technique);
+    let default = match device {
+        DeviceRef::Gpu(gpu) if gpu.is_software() => SOFTWARE_POOL,
+        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => LARGE_POOL,
+        _ => POOL,
+    };
+    let asked = u64::from(options.pool.unwrap_or(default));
+    let few = asked.min(paths(world, options)) <= u64::from(FEW_PATHS);
+    let ray_kernels = match technique.ray_kernels {
+        RayKernels::Auto if few => RayKernels::One,
+        other => other,
+    };
+    Technique {
+        ray_kernels,
+        ..technique
+    }
+}
+
+/// The paths of a whole render.
+fn paths(world: &World, options: &RenderOptions) -> u64 {
+    let rendered = options.pixel_count(world.width, world.height);
+    rendered.saturating_mul(u64::from(options.samples))
+}
+
 /// Chooses the pool, within what the GPU can bind.
 pub(crate) fn sizes(
     device: DeviceRef<'_>,
@@ -65,9 +99,7 @@ pub(crate) fn sizes(
     let most = device.limits().buffer_bytes;
     let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
     let default = default_pool(device, layout, state_bytes + queue_bytes);
-    let rendered = options.pixel_count(world.width, world.height);
-    let paths = rendered.saturating_mul(u64::from(options.samples));
-    let enough = u32::try_from(paths).unwrap_or(u32::MAX);
+    let enough = u32::try_from(paths(world, options)).unwrap_or(u32::MAX);
     let pool = options
         .pool
         .unwrap_or(default)

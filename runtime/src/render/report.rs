@@ -2,6 +2,8 @@
 //! as JSON; the names of fields are a promise. Reports of older versions are read as well: what they
 //! lack has its default.
 
+use std::collections::BTreeMap;
+
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
 use impasto_compiler::partition::{Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
@@ -245,16 +247,19 @@ pub struct KernelReport {
     /// Its name.
     pub name: String,
     /// The stage that it runs: `logic`, `new_path`, `material`, `shadow`, `extension`, or `bin_shadow` and
-    /// `bin_extension` of rays that are ordered; of kernels between stages `prepare`, `scan` or `scatter`;
-    /// and of a megakernel, which runs all, `mega`.
+    /// `bin_extension` of rays that are ordered; of a kernel that casts all rays `rays`; of kernels between stages
+    /// `prepare`, `scan` or `scatter`; and of a megakernel, which runs all, `mega`.
     pub stage: String,
     /// How it treats its materials (`own`, `mixed`, `binned`, `inline`); absent if it evaluates none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<impasto_compiler::partition::Form>,
     /// The names of the materials it evaluates.
     pub materials: Vec<String>,
-    /// Items it worked on: of its queue, or slots, or for a megakernel paths.
+    /// Items it worked on: of its queues, or slots, or for a megakernel paths.
     pub items: u64,
+    /// Those of each stage, if it casts the rays of several; empty otherwise.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub items_by_stage: BTreeMap<String, u64>,
     /// GPU time; 0 without timestamps.
     pub gpu_seconds: f64,
     /// In a profiling build the share of a subgroup's lanes that are at work, on average over the
@@ -263,6 +268,22 @@ pub struct KernelReport {
     pub utilisation: Option<f64>,
     /// Samples that its materials gave a value that is no finite number, or below zero.
     pub nonfinite_samples: u64,
+}
+
+impl KernelReport {
+    /// The items of a stage; `None` if it does not run that.
+    pub fn items_of(&self, stage: &str) -> Option<u64> {
+        let alone = (self.stage == stage).then_some(self.items);
+        alone.or_else(|| self.items_by_stage.get(stage).copied())
+    }
+}
+
+impl Report {
+    /// The items of a stage in all kernels; `None` if none runs it. A megakernel does not tell stages apart.
+    pub fn items_of(&self, stage: &str) -> Option<u64> {
+        let items = self.kernels.iter().filter_map(|k| k.items_of(stage));
+        items.reduce(|a, b| a + b)
+    }
 }
 
 /// How a plan was renewed while rendering.
@@ -511,16 +532,16 @@ impl Ran<'_> {
             form: desc.form,
             materials: desc.members.iter().filter_map(name).collect(),
             items: match desc.source {
-                DispatchSource::Queue(queue) | DispatchSource::FetchedQueue(queue) => {
-                    counters.items_of(&status.counters, queue)
-                }
-                DispatchSource::Queues { first, count } => (first..first + count)
+                DispatchSource::Queue(queue) => counters.items_of(&status.counters, queue),
+                DispatchSource::Queues { first, count }
+                | DispatchSource::FetchedQueues { first, count } => (first..first + count)
                     .map(|queue| counters.items_of(&status.counters, queue))
                     .sum(),
                 DispatchSource::Pool if self.layout.wavefront => iterations * u64::from(self.pool),
                 DispatchSource::Pool | DispatchSource::Fetched => paths,
                 DispatchSource::Once | DispatchSource::Groups(_) => iterations,
             },
+            items_by_stage: self.items_by_stage(desc, status),
             gpu_seconds: seconds,
             utilisation: None,
             nonfinite_samples: rows(desc)
@@ -528,6 +549,24 @@ impl Ran<'_> {
                 .map(|row| row.samples())
                 .sum(),
         }
+    }
+
+    /// The items of each stage of a kernel that fetches those of several.
+    fn items_by_stage(&self, desc: &KernelDesc, status: &Status) -> BTreeMap<String, u64> {
+        let DispatchSource::FetchedQueues { count: 2.., .. } = desc.source else {
+            return BTreeMap::new();
+        };
+        let (queues, counters) = (self.layout.queues, self.layout.counters);
+        let items = desc.stages.iter().flat_map(|stage| {
+            let of = queues.of(stage.name);
+            of.map(|queue| {
+                (
+                    stage.name.to_owned(),
+                    counters.items_of(&status.counters, queue),
+                )
+            })
+        });
+        items.collect()
     }
 
     /// What each dropped for every material, and the one that fills the film for none. The picture is

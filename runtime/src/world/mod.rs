@@ -173,6 +173,8 @@ impl World {
             materials,
             ray_order: technique.ray_order,
             ray_data: technique.ray_data,
+            ray_fetch: technique.ray_fetch,
+            ray_kernels: technique.ray_kernels,
             camera_rays: technique.camera_rays,
             triangles: self.parts.counts.placed_triangles as usize,
             outputs: OutputTraits::of(&self.outputs.layers),

@@ -4,7 +4,8 @@
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
 use impasto_runtime::technique::{
-    CameraRays, Choice, Leaves, RayFetch, RayOrder, Stack, Technique, Traversal, Tree,
+    CameraRays, Choice, Leaves, RayData, RayFetch, RayKernels, RayOrder, SlotOrder, Stack,
+    Technique, Traversal, Tree,
 };
 
 use crate::gpu::scene::{load, load_with, render, room};
@@ -67,16 +68,17 @@ fn ways() -> Vec<Technique> {
     let mut ways = Vec::new();
     for (traversal, ..) in Traversal::ALL {
         for (stack, ..) in Stack::ALL {
-            for (ray_fetch, leaves) in [
-                (RayFetch::Thread, Leaves::AtOnce),
-                (RayFetch::Persistent, Leaves::AtOnce),
-                (RayFetch::Persistent, Leaves::Together),
+            for (ray_fetch, leaves, ray_kernels) in [
+                (RayFetch::Thread, Leaves::AtOnce, RayKernels::Each),
+                (RayFetch::Persistent, Leaves::AtOnce, RayKernels::Each),
+                (RayFetch::Persistent, Leaves::Together, RayKernels::One),
             ] {
                 ways.push(Technique {
                     traversal: *traversal,
                     stack: *stack,
                     ray_fetch,
                     leaves,
+                    ray_kernels,
                     threads: Some(64),
                     ..Technique::default()
                 });
@@ -102,6 +104,49 @@ fn every_way_of_casting_finds_the_same_hits_in_a_megakernel() {
             assert_same("mega", technique, &reference);
         }
     }
+}
+
+/// Shadow rays are cast while extension rays of the same paths hit something: by one kernel as by two, whether rays
+/// are in the state or in buffers of their own, and whether paths keep their slots.
+#[test]
+fn one_kernel_casts_the_rays_of_two() {
+    let reference = picture("own", plain());
+    assert_eq!(reference.report.technique.ray_kernels, RayKernels::Each);
+    for (ray_data, ..) in RayData::ALL {
+        for (slot_order, ..) in SlotOrder::ALL {
+            for (ray_kernels, ..) in RayKernels::ALL {
+                let technique = Technique {
+                    ray_data: *ray_data,
+                    slot_order: *slot_order,
+                    ray_kernels: *ray_kernels,
+                    // Fewer than there are rays.
+                    threads: Some(64),
+                    camera_rays: CameraRays::AtOnce,
+                    ..Technique::default()
+                };
+                let rendering = assert_same("own", technique, &reference);
+                // Few paths are in flight.
+                let one = *ray_kernels != RayKernels::Each;
+                let kernels = rendering.report.kernels.iter();
+                let several = kernels.filter(|k| k.items_by_stage.len() == 2).count();
+                assert_eq!(several, usize::from(one), "{technique:?}");
+                let shadow = rendering.report.items_of("shadow");
+                assert!(shadow > Some(5000) && shadow == reference.report.items_of("shadow"));
+                if *ray_data == RayData::Slots {
+                    let extension = rendering.report.items_of("extension");
+                    assert_eq!(extension, reference.report.items_of("extension"));
+                }
+            }
+        }
+    }
+    let bytes = |ray_kernels| {
+        let technique = Technique {
+            ray_kernels,
+            ..Technique::default()
+        };
+        picture("own", technique).report.path_state_bytes
+    };
+    assert_eq!(bytes(RayKernels::One), bytes(RayKernels::Each) + 16);
 }
 
 /// Rays are sorted by kernels that exist only if that is asked for, and what they hit does not
@@ -139,6 +184,7 @@ fn rays_may_be_cast_in_another_order() {
             ..Technique::default()
         };
         let ordered = assert_same("own", technique, &reference);
+        assert_eq!(ordered.report.technique.ray_kernels, RayKernels::Each);
         let names = kernels(&ordered);
         for cast in ["shadow", "extension"] {
             for step in ["bin", "scan", "scatter"] {

@@ -322,7 +322,7 @@ fn kernels_count_their_items() {
     let (a, b) = (items(&own, "material_m"), items(&shared, "material"));
     assert!(a.abs_diff(b) < a / 100, "{a} and {b} materials evaluated");
     // Every path casts one ray, and every scattering that did not fail another.
-    let cast = items(&own, "extension");
+    let cast = own.items_of("extension").expect("extension rays");
     assert!(cast > own.paths && cast < own.paths + a);
 }
 

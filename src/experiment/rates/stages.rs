@@ -28,7 +28,7 @@ fn stage_of(kernel: &KernelReport) -> Stage {
     match kernel.name.as_str() {
         "logic" => Stage::Logic,
         "new_path" => Stage::NewPath,
-        "extension" | "shadow" => Stage::RayCasts,
+        "extension" | "shadow" | "rays" => Stage::RayCasts,
         // Sorting rays is part of casting them.
         name if ["bin_", "scan_", "scatter_"]
             .iter()

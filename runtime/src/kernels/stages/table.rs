@@ -221,7 +221,7 @@ pub(crate) static STAGES: [Stage; 8] = [
             parameters: "origin: vec3<f32>, direction: vec3<f32>, skip: u32",
             entry: Entry::Ray([
                 "vec4<u32>(bitcast<vec3<u32>>(origin), skip)",
-                "vec4<u32>(bitcast<vec3<u32>>(direction), 0u)",
+                "vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(3.0e38f))",
             ]),
         }),
         before: &[],

@@ -19,12 +19,22 @@ const SHARED_ORIGINS: When = When {
     all: &[Need::ShadowRays],
     none: &[Need::Requests, Need::CrossingShadows],
 };
+/// Those that are cast before extension rays, whose hits overwrite their directions.
+const EARLY_SHADOWS: When = When {
+    all: &[Need::ShadowRays],
+    none: &[Need::Requests, Need::JointCasts],
+};
+/// Those that are cast together with extension rays.
+const JOINT_SHADOWS: When = When {
+    all: &[Need::ShadowRays, Need::JointCasts],
+    none: &[Need::Requests],
+};
 /// Shadow rays, wherever they are.
 const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 
 /// Every field there is, in the order of memory. Those that follow each other in pairs are those that
 /// stages access together.
-pub(crate) const FIELDS: [Field; 15] = [
+pub(crate) const FIELDS: [Field; 16] = [
     Field {
         uses: &[
             // The extension ray: from the camera or the last vertex.
@@ -61,11 +71,11 @@ pub(crate) const FIELDS: [Field; 15] = [
                 components: &[("t", F32), ("u", F32), ("v", F32), ("primitive", U32)],
                 need: ALWAYS,
             },
-            // The shadow ray's direction, once the material has been evaluated at the hit.
+            // The shadow ray's direction, once the material has been evaluated at the hit, if it is cast before.
             Use {
                 name: "shadow_direction",
                 components: &[("direction", Vec3), ("primitive", U32)],
-                need: SLOT_SHADOWS,
+                need: EARLY_SHADOWS,
             },
         ],
         flag: None,
@@ -96,6 +106,16 @@ pub(crate) const FIELDS: [Field; 15] = [
             name: "contribution",
             components: &[("radiance", Vec3), ("distance", F32)],
             need: SHADOW_RAYS,
+        }],
+        flag: Some("PATH_LIT"),
+    },
+    Field {
+        // The shadow ray's direction if it is cast while extension rays hit something, and the primitive that it
+        // starts on.
+        uses: &[Use {
+            name: "shadow_direction",
+            components: &[("direction", Vec3), ("primitive", U32)],
+            need: JOINT_SHADOWS,
         }],
         flag: Some("PATH_LIT"),
     },

@@ -7,7 +7,7 @@ use crate::error::RuntimeError;
 use crate::gpu::schedule::{Schedule, Size, Step};
 use crate::gpu::submission::Submission;
 use crate::gpu::{Gpu, Timing};
-use crate::kernels::shells::{EntryPoint, FetchShell};
+use crate::kernels::shells::{Consumed, EntryPoint, FetchShell, Fetched};
 use crate::render::pool;
 use crate::scene::Scene;
 use crate::technique::{Leaves, RayFetch, Technique};
@@ -188,7 +188,10 @@ impl<'g> Caster<'g> {
         let walk_lane = bvh::asks_for_lane(&self.parts[1]);
         match self.technique.ray_fetch {
             RayFetch::Persistent => FetchShell {
-                queue: 0,
+                casts: vec![Fetched {
+                    name: "cast",
+                    items: Consumed::unordered(0),
+                }],
                 counter: &format!("{FETCHED}u"),
                 limit: fetch_limit,
                 slots: true,

@@ -59,7 +59,7 @@ mod tests {
     use impasto_compiler::abi::{Input, InputSet, MaterialInfo};
 
     use super::*;
-    use crate::technique::{CameraRays, RayData, RayOrder};
+    use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
     use crate::world::needs::{LightTraits, MediaTraits, SurfaceTraits};
 
     fn material(change: fn(&mut MaterialInfo)) -> MaterialInfo {
@@ -114,6 +114,8 @@ mod tests {
             materials,
             ray_order: RayOrder::Coarse,
             ray_data: RayData::Slots,
+            ray_fetch: RayFetch::Persistent,
+            ray_kernels: RayKernels::One,
             camera_rays: CameraRays::AtOnce,
             triangles: 1,
             outputs: Default::default(),

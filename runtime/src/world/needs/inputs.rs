@@ -5,7 +5,7 @@ use impasto_compiler::abi::{Input, MaterialInfo};
 use super::Need;
 use crate::film::layers::Layers;
 use crate::film::outputs::{Ask, At, OUTPUTS, Output};
-use crate::technique::{CameraRays, RayData, RayOrder};
+use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
 
 /// What a world's parts, its materials and the technique say.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub(crate) struct NeedInputs<'a> {
     pub materials: &'a [MaterialInfo],
     pub ray_order: RayOrder,
     pub ray_data: RayData,
+    pub ray_fetch: RayFetch,
+    pub ray_kernels: RayKernels,
     pub camera_rays: CameraRays,
     /// Those that rays can hit.
     pub triangles: usize,

@@ -4,7 +4,7 @@ use impasto_compiler::abi::Input;
 
 use super::{NeedInputs, Needs};
 use crate::film::outputs::{Ask, At};
-use crate::technique::{CameraRays, RayData, RayOrder};
+use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
 use crate::world::lights::table::light_kinds;
 use crate::world::places::{OF_PLACES, OF_SPACES};
 
@@ -346,6 +346,16 @@ rows! {
             let possible = !n.any(&[Order, Overlap, Scattering, Subsurface]);
             (asked && possible).then(|| "`--ray-data requests` asks for it".into())
         };
+    // Extension rays that cross hidden boundaries or scatter on their way are cast one a thread.
+    JointCasts, "all rays cast by one kernel", "joint_casts",
+        "few paths are in flight or `--ray-kernels one` asks for it, and threads take one ray after another",
+        on &[ShadowRays], draws "", ASKED, |f, n| {
+            let possible = n.has(ShadowRays)
+                && !n.any(&[Order, Overlap, Scattering])
+                && f.ray_fetch == RayFetch::Persistent;
+            let asked = f.ray_kernels == RayKernels::One;
+            (asked && possible).then(|| "`--ray-kernels one` asks for it, or few paths are in flight".into())
+        };
     // So do rays of the camera; and what is lost on their way, the logic stage has to tell.
     CameraCasts, "rays of the camera cast at once", "camera_casts",
         "there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
@@ -386,4 +396,4 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
 ]);
 
 /// The rows of a wavefront, that a megakernel has never.
-pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests, CameraCasts]);
+pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests, JointCasts, CameraCasts]);
