@@ -1,5 +1,6 @@
 // Finds what a path's next segment hits.
 
+// A ray: where it begins and the primitive that it begins on; its direction and how far it goes.
 #if requests
 fn extension_ray(request: u32) -> array<vec4<u32>, 2> {
     return array<vec4<u32>, 2>(extension_rays[2u * request], extension_rays[2u * request + 1u]);

@@ -1,8 +1,8 @@
 // Asks whether a light sample is seen from its vertex; one that is not reaches the path by
 // no throughput.
 
+// A ray: where it begins and the primitive that it begins on; its direction and how far it goes.
 #if requests
-// A request's ray: where it begins and the primitive it begins on; its direction and length.
 fn shadow_ray(request: u32) -> array<vec4<u32>, 2> {
     return array<vec4<u32>, 2>(shadow_rays[2u * request], shadow_rays[2u * request + 1u]);
 }

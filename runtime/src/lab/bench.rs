@@ -68,14 +68,14 @@ pub(super) fn advance(
     iterations: usize,
 ) -> Result<Vec<Vec<u32>>, RuntimeError> {
     let mut lanes = Lane::each(gpu, std::slice::from_ref(run))?;
-    let iterate = |lane: &mut Lane<'_>| {
-        lane.submit(gpu, resources, None);
-        Ok(lane.wait(gpu)?.counters)
-    };
-    let repeated = lanes
-        .iter_mut()
-        .flat_map(|lane| (0..iterations).map(|_| iterate(lane)).collect::<Vec<_>>());
-    repeated.collect()
+    let mut counters = Vec::new();
+    for lane in &mut lanes {
+        for _ in 0..iterations {
+            lane.submit(gpu, resources, None);
+            counters.push(lane.wait(gpu)?.counters);
+        }
+    }
+    Ok(counters)
 }
 
 /// Repeats each run, by turns with its neighbours, so that whatever slows the GPU down for a moment

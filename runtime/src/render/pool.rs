@@ -43,7 +43,7 @@ pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
 /// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: all rays are
-/// cast by one (docs/measurements.md, all rays in one dispatch).
+/// cast by one (docs/measurements.md, shadow and extension rays in one dispatch).
 const FEW_PATHS: u32 = 1 << 22;
 
 /// The technique that a device renders by, with what depends on the paths in flight.

@@ -160,7 +160,7 @@ pub(crate) struct Stage {
     /// The stages of its phase that it must run before.
     pub before: &'static [&'static str],
     /// If it casts rays, when its threads may stay and take up one ray after another. The body then gives
-    /// `begin_ray`, `is_decided` and `end_ray` as well.
+    /// `NAME_ray`, `is_NAME_decided` and `end_NAME` as well, NAME being the stage's.
     pub casts: Option<When>,
     /// The texts it needs, each with what must exist for it.
     pub parts: &'static [(Part, When)],
