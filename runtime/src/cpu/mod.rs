@@ -17,7 +17,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::RuntimeError;
 use crate::gpu::DeviceInfo;
-use crate::kernels::modules::{DispatchSource, Kernel, Sizes};
+use crate::kernels::modules::{Extent, Kernel, Sizes};
 use crate::kernels::validate::validate;
 use crate::world::{MaterialSource, World};
 
@@ -156,20 +156,14 @@ impl Cpu {
         sizes: Sizes,
         casts: Option<&Casts>,
     ) -> Result<Step, RuntimeError> {
-        let groups = |items: u32| Groups::Known(items.div_ceil(sizes.workgroup));
         Ok(Step {
             name: kernel.desc.name.clone(),
             kernel: self.compiled(&kernel.desc.name, &kernel.wgsl, casts.is_some())?,
             hands_out: kernel.wgsl.contains("fn hand_out_work"),
-            groups: match kernel.desc.source {
-                DispatchSource::Once => Groups::Known(1),
-                DispatchSource::Groups(groups) => Groups::Known(groups),
-                DispatchSource::Pool => groups(sizes.pool),
-                DispatchSource::Fetched => groups(sizes.threads),
-                DispatchSource::FetchedQueues { count, .. } => groups(sizes.threads_for(count)),
-                DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
-                    Groups::OfQueue(queue)
-                }
+            groups: match kernel.desc.source.extent(sizes) {
+                Extent::Groups(groups) => Groups::Known(groups),
+                Extent::Threads(count) => Groups::Known(count.div_ceil(sizes.workgroup)),
+                Extent::Queue(queue) => Groups::OfQueue(queue),
             },
         })
     }

@@ -60,6 +60,31 @@ pub(crate) enum DispatchSource {
     Once,
 }
 
+/// How large a dispatch is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// A number of workgroups.
+    Groups(u32),
+    /// Workgroups for a number of threads.
+    Threads(u32),
+    /// What the indirect arguments of a queue say.
+    Queue(usize),
+}
+
+impl DispatchSource {
+    /// How large a dispatch is over pools of some size.
+    pub(crate) fn extent(self, sizes: Sizes) -> Extent {
+        match self {
+            Self::Once => Extent::Groups(1),
+            Self::Groups(groups) => Extent::Groups(groups),
+            Self::Pool => Extent::Threads(sizes.pool),
+            Self::Fetched => Extent::Threads(sizes.threads),
+            Self::FetchedQueues { count, .. } => Extent::Threads(sizes.threads_for(count)),
+            Self::Queue(queue) | Self::Queues { first: queue, .. } => Extent::Queue(queue),
+        }
+    }
+}
+
 /// What a kernel is made of, before its text.
 #[derive(Clone, Debug)]
 pub(crate) struct KernelDesc {

@@ -149,19 +149,18 @@ impl Composer<'_> {
 
     /// The kernel of stages whose threads stay, and take up one ray after another.
     fn fetching(&self, mut stages: Vec<&'static Stage>) -> KernelDesc {
+        let queue = |stage: &&'static Stage| self.layout.queues.of(stage.name).start;
         // In the order of their queues, those that every scene has come first: extension rays, which take longest.
-        stages.sort_by_key(|stage| self.layout.queues.of(stage.name).start);
+        stages.sort_by_key(queue);
         let fetched = |stage: &&'static Stage| Fetched {
             name: stage.name,
-            items: self.consumed(stage, self.layout.queues.of(stage.name).start),
+            items: self.consumed(stage, queue(stage)),
         };
-        let shell = self.fetch_shell(stages.iter().map(fetched).collect());
-        let queues = stages.iter().map(|stage| self.layout.queues.of(stage.name));
-        let first = queues.clone().map(|queues| queues.start).min();
         let source = DispatchSource::FetchedQueues {
-            first: first.unwrap_or_default(),
+            first: stages.first().map_or(0, queue),
             count: stages.len(),
         };
+        let shell = self.fetch_shell(stages.iter().map(fetched).collect());
         let role = match stages[..] {
             [stage] => stage.name,
             _ => RAYS,

@@ -19,7 +19,7 @@ use crate::gpu::schedule::{Size, Step};
 use crate::gpu::{self, Gpu};
 use crate::kernels::buffers::ARGUMENT_BYTES;
 use crate::kernels::layout::PlanLayout;
-use crate::kernels::modules::{Composer, DispatchSource, Kernel, Sizes};
+use crate::kernels::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
 use crate::kernels::parts;
 use crate::kernels::prints::Prints;
 use crate::kernels::random::{self, Demand};
@@ -472,15 +472,9 @@ pub(crate) fn build_step(
 
 /// How many workgroups a kernel gets.
 fn dispatch_size(source: DispatchSource, sizes: Sizes) -> Size {
-    let threads = |count| Size::for_items(count, sizes.workgroup, sizes.row_groups);
-    match source {
-        DispatchSource::Once => Size::Direct(1, 1),
-        DispatchSource::Groups(groups) => Size::Direct(groups, 1),
-        DispatchSource::Pool => threads(sizes.pool),
-        DispatchSource::Fetched => threads(sizes.threads),
-        DispatchSource::FetchedQueues { count, .. } => threads(sizes.threads_for(count)),
-        DispatchSource::Queue(queue) | DispatchSource::Queues { first: queue, .. } => {
-            Size::Indirect(ARGUMENT_BYTES * queue as u64)
-        }
+    match source.extent(sizes) {
+        Extent::Groups(groups) => Size::Direct(groups, 1),
+        Extent::Threads(count) => Size::for_items(count, sizes.workgroup, sizes.row_groups),
+        Extent::Queue(queue) => Size::Indirect(ARGUMENT_BYTES * queue as u64),
     }
 }

@@ -53,12 +53,7 @@ pub(crate) fn technique(
     options: &RenderOptions,
 ) -> Technique {
     let technique = device.technique(options.technique);
-    let default = match device {
-        DeviceRef::Gpu(gpu) if gpu.is_software() => SOFTWARE_POOL,
-        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => LARGE_POOL,
-        _ => POOL,
-    };
-    let asked = u64::from(options.pool.unwrap_or(default));
+    let asked = u64::from(options.pool.unwrap_or_else(|| wavefront_pool(device)));
     let few = asked.min(paths(world, options)) <= u64::from(FEW_PATHS);
     let ray_kernels = match technique.ray_kernels {
         RayKernels::Auto if few => RayKernels::One,
@@ -157,17 +152,17 @@ pub(crate) fn dispatch_sizes(
         DeviceRef::Cpu(cpu) => u32::try_from(cpu.threads()).unwrap_or(u32::MAX),
     };
     let items = items.div_ceil(pools);
-    Ok(Sizes {
+    let sizes = Sizes {
         pool: items,
         pools,
         workgroup: workgroup_size(device, technique.workgroup)?,
-        threads: technique
-            .threads
-            .unwrap_or(THREADS)
-            .min(items)
-            .max(items.div_ceil(fetch_limit)),
+        threads: technique.threads.unwrap_or(THREADS).min(items),
         fetch_limit,
         row_groups: limits.row_groups,
+    };
+    Ok(Sizes {
+        threads: sizes.threads_for(1),
+        ..sizes
     })
 }
 
@@ -189,25 +184,31 @@ fn workgroup_size(device: DeviceRef<'_>, wanted: Option<u32>) -> Result<u32, Run
     }
 }
 
+/// The pool where none is asked for.
 fn default_pool(device: DeviceRef<'_>, layout: &PlanLayout, slot_bytes: u64) -> u32 {
-    let gpu = match device {
-        DeviceRef::Gpu(gpu) => gpu,
-        DeviceRef::Cpu(cpu) => {
-            let threads = u32::try_from(cpu.threads()).unwrap_or(u32::MAX);
-            return threads.saturating_mul(PATHS_OF_THREAD);
-        }
-    };
-    if gpu.is_software() {
-        return SOFTWARE_POOL;
-    }
-    if !gpu.has_own_memory() {
-        return POOL;
+    let wavefront = wavefront_pool(device);
+    match device {
+        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => {}
+        _ => return wavefront,
     }
     if !layout.wavefront {
         return LARGE_BATCH;
     }
     let affordable = LARGE_POOL_BYTES / slot_bytes.max(1);
-    LARGE_POOL.min(u32::try_from(affordable).unwrap_or(u32::MAX))
+    wavefront.min(u32::try_from(affordable).unwrap_or(u32::MAX))
+}
+
+/// The paths that a wavefront has in flight by default, where there is memory for them.
+fn wavefront_pool(device: DeviceRef<'_>) -> u32 {
+    match device {
+        DeviceRef::Gpu(gpu) if gpu.is_software() => SOFTWARE_POOL,
+        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => LARGE_POOL,
+        DeviceRef::Gpu(_) => POOL,
+        DeviceRef::Cpu(cpu) => {
+            let threads = u32::try_from(cpu.threads()).unwrap_or(u32::MAX);
+            threads.saturating_mul(PATHS_OF_THREAD)
+        }
+    }
 }
 
 /// How many iterations a submission has.
