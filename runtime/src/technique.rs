@@ -181,6 +181,14 @@ choices! {
         Queue = "queue",
     }
 
+    /// Which rays are cast of those that end a path.
+    LastRays {
+        /// Those that may meet a light, where all lights are small; else all
+        Lights = "lights",
+        /// Every one of them
+        All = "all",
+    }
+
     /// How geometry is stored that is repeated often enough to share it.
     Copies {
         /// Once, and placed by a second level of the acceleration structure
@@ -251,6 +259,8 @@ pub struct Technique {
     pub ray_kernels: RayKernels,
     /// Where rays of the camera are cast; in a megakernel each thread casts its own.
     pub camera_rays: CameraRays,
+    /// Which rays are cast of those that end a path.
+    pub last_rays: LastRays,
     /// How repeated geometry is stored.
     pub copies: Copies,
     /// Where ray casts find rays.
@@ -309,6 +319,7 @@ mod tests {
         check_names::<RayFetch>();
         check_names::<RayKernels>();
         check_names::<CameraRays>();
+        check_names::<LastRays>();
         check_names::<Copies>();
         check_names::<RayData>();
         check_names::<RayOrder>();

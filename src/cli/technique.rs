@@ -3,8 +3,8 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impasto::runtime::technique::{
-    Append, CameraRays, Choice, Copies, Features, Leaves, RayData, RayFetch, RayKernels, RayOrder,
-    Regeneration, Sampler, SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
+    Append, CameraRays, Choice, Copies, Features, LastRays, Leaves, RayData, RayFetch, RayKernels,
+    RayOrder, Regeneration, Sampler, SlotOrder, Stack, StateLayout, Technique, Traversal, Tree,
 };
 
 /// Every choice of [`Technique`].
@@ -47,6 +47,9 @@ pub(super) struct TechniqueArgs {
     /// Where rays of the camera are cast
     #[arg(long, value_name = "NAME", default_value = default_name::<CameraRays>(), value_parser = named::<CameraRays>())]
     camera_rays: CameraRays,
+    /// Which rays are cast of those that end a path
+    #[arg(long, value_name = "NAME", default_value = default_name::<LastRays>(), value_parser = named::<LastRays>())]
+    last_rays: LastRays,
     /// How repeated geometry is stored
     #[arg(long, value_name = "NAME", default_value = default_name::<Copies>(), value_parser = named::<Copies>())]
     copies: Copies,
@@ -88,6 +91,7 @@ impl TechniqueArgs {
             ray_fetch: self.ray_fetch,
             ray_kernels: self.ray_kernels,
             camera_rays: self.camera_rays,
+            last_rays: self.last_rays,
             copies: self.copies,
             ray_data: self.ray_data,
             ray_order: self.ray_order,

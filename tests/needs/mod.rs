@@ -10,9 +10,9 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use impasto::runtime::audit::{self, KernelText, NeedsReport};
-use impasto::runtime::technique::{Features, Technique};
+use impasto::runtime::technique::{Features, LastRays, Technique};
 use impasto::runtime::world::World;
-use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Strategy};
+use impasto::{Gpu, GpuOptions, RenderOptions, Renderer, Rendering, Strategy};
 
 mod pairs;
 mod scenes;
@@ -110,6 +110,47 @@ fn with_everything_on_the_picture_is_the_same() {
     }
 }
 
+/// Of every pair, with paths that end by their length and with some that end by roulette.
+#[test]
+fn without_last_rays_that_meet_no_light_the_picture_is_the_same() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("a GPU is needed: {e}"));
+    let mut seen = BTreeSet::new();
+    let [mut cast, mut of_all] = [0, 0];
+    for pair in &PAIRS {
+        for (text, integrator) in [
+            ((pair.without)(), "max_depth = 2\nroulette_start = 8"),
+            ((pair.with)(), "max_depth = 5\nroulette_start = 1"),
+        ] {
+            let by = |last_rays| {
+                let technique = Technique {
+                    last_rays,
+                    ..text.technique
+                };
+                Text {
+                    integrator,
+                    technique,
+                    ..text.clone()
+                }
+            };
+            if !seen.insert(format!("{:?}", by(LastRays::All))) {
+                continue;
+            }
+            let [some, all] =
+                [LastRays::Lights, LastRays::All].map(|last| rendered(&gpu, &by(last)));
+            assert_eq!(some.film.pixels, all.film.pixels, "{}", pair.row);
+            if some.report.technique.last_rays == LastRays::Lights {
+                let rays = |of: &Rendering| of.report.items_of("extension").expect("rays");
+                cast += rays(&some);
+                of_all += rays(&all);
+            }
+        }
+    }
+    assert!(
+        cast > 0 && 10 * cast < 9 * of_all,
+        "{cast} of {of_all} rays"
+    );
+}
+
 /// The issue's own measure: a box of one Lambertian material, lit by one quad.
 #[test]
 fn a_lambertian_box_under_a_quad_has_96_bytes_a_path_and_no_line_for_more() {
@@ -198,14 +239,24 @@ fn is_near(a: f32, b: f32) -> bool {
 }
 
 fn picture(gpu: &Gpu, text: &Text, features: Features) -> Vec<f32> {
+    let technique = Technique {
+        features,
+        ..text.technique
+    };
+    let text = Text {
+        technique,
+        ..text.clone()
+    };
+    let film = rendered(gpu, &text).film;
+    film.pixels.into_iter().flatten().collect()
+}
+
+fn rendered(gpu: &Gpu, text: &Text) -> Rendering {
     let folder = tempfile::tempdir().expect("a folder");
     let Loaded { scene, program, .. } = text.load(folder.path());
     let options = RenderOptions {
         samples: 4,
-        technique: Technique {
-            features,
-            ..text.technique
-        },
+        technique: text.technique,
         outputs: text.outputs(),
         ..RenderOptions::default()
     };
@@ -215,8 +266,7 @@ fn picture(gpu: &Gpu, text: &Text, features: Features) -> Vec<f32> {
     let renderer = Renderer::new(gpu, &scene, &program, &plan, &options);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     let rendering = renderer.render(&mut |_| ControlFlow::Continue(()));
-    let film = rendering.unwrap_or_else(|e| panic!("{e}")).film;
-    film.pixels.into_iter().flatten().collect()
+    rendering.unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The kernels of a scene.

@@ -4,7 +4,7 @@ use super::scenes::{
     Corners, DIRECTION, DISC, DISC_BY_CHANCE, MAP, QUAD, QUAD_BY_CHANCE, SECOND_QUAD, SKY, SPHERE,
     SPOT, TWO_SIDED, Text, queued,
 };
-use impasto::runtime::technique::{CameraRays, RayData, RayKernels, RayOrder, Technique};
+use impasto::runtime::technique::{CameraRays, LastRays, RayData, RayKernels, RayOrder, Technique};
 
 /// Two scenes that differ in a row.
 pub struct Pair {
@@ -206,7 +206,7 @@ pairs! {
         => with_uvs(thing("surface = diffuse(image(picture, uv));"));
     "choice of a lobe", also &[], "",
         thing(SHADE) => thing("surface = layer(0.2 * blinn_phong(20.0), diffuse(color(0.3)));");
-    "Russian roulette", also &[], "functions +max_component +survival_probability",
+    "Russian roulette", also &[], "functions +max_component +roulette +survival_probability",
         Text::default() => Text { integrator: "max_depth = 4\nroulette_start = 2", ..Text::default() };
     "lens", also &[], "",
         Text::default() => Text { camera: "aperture = 0.1\nfocus = 3", ..Text::default() };
@@ -247,6 +247,12 @@ pairs! {
         Text::default()
         => Text {
             technique: Technique { camera_rays: CameraRays::AtOnce, ..queued() },
+            ..Text::default()
+        };
+    "last rays towards lights only", also &[], "functions +is_last +may_meet_light",
+        Text::default()
+        => Text {
+            technique: Technique { last_rays: LastRays::Lights, ..queued() },
             ..Text::default()
         };
 }

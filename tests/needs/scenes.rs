@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impasto::runtime::technique::{CameraRays, Technique};
+use impasto::runtime::technique::{CameraRays, LastRays, Technique};
 use impasto::runtime::world::World;
 use impasto::{Program, Scene};
 
@@ -55,10 +55,12 @@ pub const DISC_BY_CHANCE: &str = "kind = \"distant\"\nto_light = [-0.2, 1, 0.3]\
 pub const SKY: &str = "[environment]\ncolor = [0.3, 0.4, 0.5]\nsample = true\n";
 pub const MAP: &str = "[environment]\nfile = \"sky.hdr\"\n";
 
-/// Rays of the camera are cast with the others: where they may be cast at once, other rows decide.
+/// Every ray is cast, and those of the camera with the others: where they may be cast at once and which need not be
+/// cast, other rows decide.
 pub fn queued() -> Technique {
     Technique {
         camera_rays: CameraRays::Queue,
+        last_rays: LastRays::All,
         ..Technique::default()
     }
 }

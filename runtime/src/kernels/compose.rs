@@ -146,6 +146,7 @@ impl Composer<'_> {
             Part::Flights => media::flights(self.layout.needs),
             Part::Traversal => parts.bvh.wgsl.clone(),
             Part::Materials => self.materials(members),
+            Part::Roulette => include_str!("roulette.wgsl").to_string(),
             Part::Fates => self.fates(),
             Part::Outputs => {
                 let layers = &world.outputs.layers;

@@ -9,7 +9,7 @@ use crate::kernels::check::check;
 use crate::kernels::queues::{Counters, Queues};
 use crate::kernels::stages::{STAGES, Stage};
 use crate::kernels::state;
-use crate::technique::{Append, CameraRays, RayData, RayKernels, SlotOrder, Technique};
+use crate::technique::{Append, CameraRays, LastRays, RayData, RayKernels, SlotOrder, Technique};
 use crate::world::needs::{Decision, Need, Needs};
 
 /// Paths that hit one material lie densely enough where they are (docs/measurements.md). It is not the queues that
@@ -99,6 +99,11 @@ impl PlanLayout {
         } else {
             CameraRays::Queue
         };
+        let last_rays = if self.needs.has(Need::LastRays) {
+            LastRays::Lights
+        } else {
+            LastRays::All
+        };
         let slot_order = if self.moves_paths(asked) {
             SlotOrder::Work
         } else {
@@ -109,6 +114,7 @@ impl PlanLayout {
             slot_order,
             ray_kernels,
             camera_rays,
+            last_rays,
             ..asked
         }
     }

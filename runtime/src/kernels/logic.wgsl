@@ -117,8 +117,8 @@ fn logic(slot: u32) {
     }
 #if roulette
     if instance != NOTHING && vertex >= ROULETTE_START {
-        let survival = survival_probability(carried.throughput);
-        if random_numbers(pixel, ray.sample, vertex_draw(vertex, DRAW_LIGHT)).w < survival {
+        let survival = roulette(carried.throughput, pixel, ray.sample, vertex);
+        if survival > 0.0 {
             carried.throughput /= survival;
             store_throughput(slot, carried);
         } else {
@@ -161,13 +161,8 @@ fn logic(slot: u32) {
     request_material(instance);
 }
 
-// At least the chance of the smallest random number, and a multiple of it: then the number
-// falls below it exactly that often, and dividing by it leaves the mean alone.
-fn survival_probability(throughput: vec3<f32>) -> f32 {
-    return ceil(min(max_component(throughput), 0.95) * 0x1p24) * 0x1p-24;
-}
-
 #if shadow_rays
+
 // What the light sample of the last vertex brings; nothing if the shadow ray was blocked.
 fn light_contribution(slot: u32) -> vec3<f32> {
 #if requests

@@ -109,7 +109,16 @@ fn material(slot: u32, instance: u32) {
     let scattered = checked_sample(evaluate_material(instance, point, wo, wl, u), instance, place);
 #endif
 
+#if last_rays
+    var weight = carried.throughput * scattered.throughput;
+    // The last ray gathers the light that it meets and nothing else.
+    if is_last(weight, pixel, arrived.sample, vertex + 1u)
+        && !may_meet_light(leave_surface(position, side, scattered.wi), scattered.wi) {
+        weight = vec3<f32>(0.0);
+    }
+#else
     let weight = carried.throughput * scattered.throughput;
+#endif
     store_throughput(slot, PathThroughput(weight, scattered.pdf));
     let goes_on = any(weight > vec3<f32>(0.0));
     if goes_on {
@@ -173,6 +182,19 @@ fn material(slot: u32, instance: u32) {
 #endif
 }
 
+#if last_rays
+// Whether the logic stage will end the path after its `vertex`-th segment, whatever that meets. What a medium
+// absorbs on the way leaves less to go on for.
+fn is_last(throughput: vec3<f32>, pixel: u32, sample: u32, vertex: u32) -> bool {
+#if roulette
+    if vertex >= ROULETTE_START && roulette(throughput, pixel, sample, vertex) == 0.0 {
+        return true;
+    }
+#endif
+    return vertex >= MAX_DEPTH;
+}
+
+#endif
 #if ray_cones
 // How fast the cone of a scattered ray widens. A ray that was chosen with a density stands for the solid angle
 // around it that it would be alone in among CONE_RAYS others (Suykens and Willems, "Path Differentials

@@ -35,6 +35,7 @@ fn is_missing(part: Part, parts: &KernelParts, needs: Needs) -> bool {
         | Part::Mis
         | Part::Flights
         | Part::Order
+        | Part::Roulette
         | Part::Fates => false,
         // A world has outputs only with what they look up.
         Part::Outputs => false,

@@ -43,6 +43,8 @@ pub(crate) enum Part {
     Order,
     /// Generated material code with what it reads.
     Materials,
+    /// Whether paths are ended at random.
+    Roulette,
     /// What is known of materials without evaluating them.
     Fates,
     /// What records outputs of the film beside the picture.
@@ -66,6 +68,7 @@ impl Part {
             Part::Traversal => "ray casts",
             Part::Order => "order of rays",
             Part::Materials => "texture lookups",
+            Part::Roulette => "Russian roulette",
             Part::Fates => "knowledge of materials",
             Part::Outputs => "outputs",
         }

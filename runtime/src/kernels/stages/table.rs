@@ -6,9 +6,12 @@ use crate::world::needs::{ALWAYS, Need, When, when};
 
 const ABSORPTION: When = when(&[Need::Absorption]);
 const CAMERA_CASTS: When = when(&[Need::CameraCasts]);
+const LAST_RAYS: When = when(&[Need::LastRays]);
+const LAST_BY_ROULETTE: When = when(&[Need::LastRays, Need::Roulette]);
 const MEDIA: When = when(&[Need::Media]);
 const MIS: When = when(&[Need::Mis]);
 const OVERLAP: When = when(&[Need::Overlap]);
+const ROULETTE: When = when(&[Need::Roulette]);
 const SHADOW_RAYS: When = when(&[Need::ShadowRays]);
 const SUBSURFACE: When = when(&[Need::Subsurface]);
 const SCATTERING: When = when(&[Need::Scattering]);
@@ -38,6 +41,7 @@ pub(crate) static STAGES: [Stage; 8] = [
             (Part::Mis, MIS),
             (Part::Lights, ALWAYS),
             (Part::Media, ABSORPTION),
+            (Part::Roulette, ROULETTE),
             (Part::Fates, ALWAYS),
             (Part::Camera, FIRST_HIT_OUTPUTS),
             (Part::Outputs, FIRST_HIT_OUTPUTS),
@@ -119,6 +123,8 @@ pub(crate) static STAGES: [Stage; 8] = [
             (Part::Surface, ALWAYS),
             (Part::Mis, MIS),
             (Part::Lights, SHADOW_RAYS),
+            (Part::Lights, LAST_RAYS),
+            (Part::Roulette, LAST_BY_ROULETTE),
             (Part::Media, MEDIA),
             (Part::Materials, ALWAYS),
             (Part::Outputs, MATERIAL_OUTPUTS),

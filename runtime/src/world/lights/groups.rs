@@ -74,7 +74,7 @@ impl Kinds {
             Source::Light(light) => index(labels.lights.get(light as usize)),
             Source::Material(material) => index(labels.materials.get(material as usize)),
         };
-        let lights = self.0.iter().flat_map(|kind| &kind.lights);
+        let lights = self.kinds.iter().flat_map(|kind| &kind.lights);
         let lights: Vec<u32> = lights.map(|light| of_light(light.source)).collect();
         let instances = (0..scene.materials.len()).map(|i| index(labels.materials.get(i)));
         let instances: Vec<u32> = instances.collect();
@@ -91,7 +91,7 @@ impl Kinds {
 
     /// The functions of kinds at infinity, with what tells their lights apart.
     fn escaping(&self) -> impl Iterator<Item = (&'static str, Option<Share>)> {
-        let kinds = self.0.iter();
+        let kinds = self.kinds.iter();
         kinds.filter_map(|kind| Some((kind.escape?, kind.share)))
     }
 

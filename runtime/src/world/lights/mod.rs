@@ -16,6 +16,7 @@ use crate::world::media::Media;
 use crate::world::needs::{LightTraits, Need, Needs};
 
 mod alias;
+mod boxes;
 pub mod distant;
 mod environment;
 pub(crate) mod groups;
@@ -29,6 +30,7 @@ mod tests;
 pub use table::{LIGHT_KINDS, LightKind, readers, sample_functions};
 
 use alias::WordAlias;
+use boxes::Boxes;
 
 /// Index in the light table of triangles that are no sampled light: beyond any table.
 pub const NO_LIGHT: u32 = u32::MAX;
@@ -72,6 +74,7 @@ impl Lights {
                 choice: true,
                 hit: true,
                 escape: true,
+                small: false,
             },
         }
     }
@@ -79,7 +82,10 @@ impl Lights {
     /// The buffers that it may read.
     pub(super) fn buffers_mut(&mut self) -> Vec<&mut BufferData> {
         match self {
-            Lights::OfScene(kinds) => kinds.0.iter_mut().flat_map(|k| &mut k.buffers).collect(),
+            Lights::OfScene(kinds) => {
+                let kinds = kinds.kinds.iter_mut();
+                kinds.flat_map(|kind| &mut kind.buffers).collect()
+            }
             Lights::ByHand { part, .. } => part.buffers.iter_mut().collect(),
         }
     }
@@ -114,8 +120,8 @@ struct Context<'a> {
     media: &'a Media,
     /// Triangle of the mesh to primitive.
     primitives: &'a [u32],
-    /// Radius of a sphere around everything: what a light at infinity shines on.
-    radius: f64,
+    /// The corners of a box around everything.
+    bounds: [Vec3; 2],
 }
 
 impl<'a> Context<'a> {
@@ -133,13 +139,14 @@ impl<'a> Context<'a> {
             instances,
             media,
             primitives,
-            radius: bounding_radius(bounds),
+            bounds,
         }
     }
 
     /// Watts that a light at infinity sends through the scene, per W/m^2 facing it.
     fn cross_section(&self) -> f64 {
-        std::f64::consts::PI * self.radius * self.radius
+        let radius = bounding_radius(self.bounds);
+        std::f64::consts::PI * radius * radius
     }
 }
 
@@ -235,7 +242,10 @@ struct Sampled {
 
 /// The kinds of lights that a scene has, from which its shader part is made.
 #[derive(Clone, Debug, Default)]
-pub struct Kinds(Vec<Kind>);
+pub struct Kinds {
+    kinds: Vec<Kind>,
+    boxes: Boxes,
+}
 
 impl Kinds {
     /// The lights of `scene`, whose triangles in the world are those of `mesh`, each with its
@@ -257,8 +267,12 @@ impl Kinds {
     fn of(table: &[LightKind], context: &Context) -> Kinds {
         let mut kinds = Kinds::default();
         for kind in table {
-            kinds.0.extend((kind.present)(context, kinds.count()));
+            kinds.kinds.extend((kind.present)(context, kinds.count()));
         }
+        let lights = kinds.kinds.iter().flat_map(|kind| &kind.lights);
+        let triangles = lights.flat_map(|light| &light.triangles);
+        let corners = triangles.map(|triangle| context.mesh.positions[*triangle as usize]);
+        kinds.boxes = Boxes::around(corners, context.bounds);
         kinds
     }
 
@@ -266,7 +280,7 @@ impl Kinds {
     /// [`NO_LIGHT`].
     pub(super) fn of_triangle(&self, triangles: usize) -> Vec<u32> {
         let mut of_triangle = vec![NO_LIGHT; triangles];
-        for (index, light) in self.0.iter().flat_map(|k| &k.lights).enumerate() {
+        for (index, light) in self.kinds.iter().flat_map(|k| &k.lights).enumerate() {
             for &triangle in &light.triangles {
                 of_triangle[triangle as usize] = index as u32;
             }
@@ -276,12 +290,12 @@ impl Kinds {
 
     /// How many lights there are.
     fn count(&self) -> u32 {
-        self.0.iter().map(|k| k.lights.len() as u32).sum()
+        self.kinds.iter().map(|k| k.lights.len() as u32).sum()
     }
 
     fn sampled(&self) -> impl Iterator<Item = (&Kind, &Sampled)> {
         let all = self
-            .0
+            .kinds
             .iter()
             .flat_map(|k| k.lights.iter().map(move |l| (k, l)));
         all.filter(|(_, light)| !light.by_chance)
@@ -290,32 +304,33 @@ impl Kinds {
     fn traits(&self) -> LightTraits {
         let chooses = self.sampled().any(|(kind, _)| kind.chooses);
         LightTraits {
-            rows: self.0.iter().flat_map(|k| k.rows.clone()).collect(),
+            rows: self.kinds.iter().flat_map(|k| k.rows.clone()).collect(),
             sampled: self.sampled().next().is_some(),
             weighted: self.sampled().any(|(_, light)| !light.is_discrete),
             far: self.sampled().any(|(kind, _)| kind.hit.is_none()),
             choice: self.count() > 1 || chooses,
-            hit: self.0.iter().any(|k| k.hit.is_some()),
-            escape: self.0.iter().any(|k| k.escape.is_some()),
+            hit: self.kinds.iter().any(|k| k.hit.is_some()),
+            escape: self.kinds.iter().any(|k| k.escape.is_some()),
+            small: self.boxes.are_small,
         }
     }
 
     /// The part with the functions that `needs` asks for. Kinds in `table` that it asks for in vain have their
     /// code and no light.
     fn written(&self, table: &[LightKind], needs: Needs) -> ShaderPart {
-        let has = |kind: &LightKind| self.0.iter().any(|k| k.sample == kind.sample);
+        let has = |kind: &LightKind| self.kinds.iter().any(|k| k.sample == kind.sample);
         let idle = table.iter().filter(|k| needs.any(k.needs) && !has(k));
         let idle = idle.map(|kind| Kind {
             idle: true,
             ..(kind.absent)(needs)
         });
-        let kinds: Vec<Kind> = self.0.iter().cloned().chain(idle).collect();
-        part(&kinds, self.count(), needs)
+        let kinds: Vec<Kind> = self.kinds.iter().cloned().chain(idle).collect();
+        part(&kinds, self.count(), &self.boxes, needs)
     }
 }
 
 /// The part of some kinds, which have `count` lights.
-fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
+fn part(kinds: &[Kind], count: u32, boxes: &Boxes, needs: Needs) -> ShaderPart {
     let flags: Vec<Flag> = needs.flags().collect();
     let mut part = ShaderPart {
         wgsl: template!("common.wgsl").wgsl(&flags),
@@ -326,7 +341,14 @@ fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
     if count > 0 || kinds.iter().any(|k| k.idle) {
         part.wgsl += &wgsl::constant_u32("LIGHT_COUNT", count.max(1));
         part.wgsl += &template!("select.wgsl").wgsl(&flags);
-        part.buffers.push(light_table(kinds));
+        let mut rows = light_table(kinds);
+        if needs.has(Need::LastRays) {
+            part.wgsl += &wgsl::constant_u32("LIGHT_BOXES", boxes.len() as u32);
+            part.wgsl += include_str!("boxes.wgsl");
+            rows.extend(boxes.rows());
+        }
+        let table = BufferData::new("light_table", "array<vec4<u32>>", &rows);
+        part.buffers.push(table);
     }
     if kinds.iter().any(|k| k.hit.is_some()) {
         part.wgsl += &template!("area.wgsl").wgsl(&flags);
@@ -343,7 +365,7 @@ fn part(kinds: &[Kind], count: u32, needs: Needs) -> ShaderPart {
 }
 
 /// Two rows of words a light; see `select.wgsl`.
-fn light_table(kinds: &[Kind]) -> BufferData {
+fn light_table(kinds: &[Kind]) -> Vec<[[u32; 4]; 2]> {
     let weights = selection_weights(kinds);
     let alias = WordAlias::new(&weights);
     let mut rows: Vec<[[u32; 4]; 2]> = kinds
@@ -363,7 +385,7 @@ fn light_table(kinds: &[Kind]) -> BufferData {
     if rows.is_empty() {
         rows.push([[0; 4]; 2]);
     }
-    BufferData::new("light_table", "array<vec4<u32>>", &rows)
+    rows
 }
 
 /// Half of the choice goes by power over all lights. The other half goes in equal parts to the

@@ -59,7 +59,7 @@ mod tests {
     use impasto_compiler::abi::{Input, InputSet, MaterialInfo};
 
     use super::*;
-    use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
+    use crate::technique::{CameraRays, LastRays, RayData, RayFetch, RayKernels, RayOrder};
     use crate::world::needs::{LightTraits, MediaTraits, SurfaceTraits};
 
     fn material(change: fn(&mut MaterialInfo)) -> MaterialInfo {
@@ -117,6 +117,7 @@ mod tests {
             ray_fetch: RayFetch::Persistent,
             ray_kernels: RayKernels::One,
             camera_rays: CameraRays::AtOnce,
+            last_rays: LastRays::Lights,
             triangles: 1,
             outputs: Default::default(),
         }

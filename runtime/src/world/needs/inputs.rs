@@ -5,7 +5,7 @@ use impasto_compiler::abi::{Input, MaterialInfo};
 use super::Need;
 use crate::film::layers::Layers;
 use crate::film::outputs::{Ask, At, OUTPUTS, Output};
-use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
+use crate::technique::{CameraRays, LastRays, RayData, RayFetch, RayKernels, RayOrder};
 
 /// What a world's parts, its materials and the technique say.
 #[derive(Clone, Debug)]
@@ -25,6 +25,7 @@ pub(crate) struct NeedInputs<'a> {
     pub ray_fetch: RayFetch,
     pub ray_kernels: RayKernels,
     pub camera_rays: CameraRays,
+    pub last_rays: LastRays,
     /// Those that rays can hit.
     pub triangles: usize,
     pub outputs: OutputTraits,
@@ -68,6 +69,8 @@ pub(crate) struct LightTraits {
     pub hit: bool,
     /// Can paths leave the scene into light?
     pub escape: bool,
+    /// Do rays rarely meet the boxes around all that have a surface?
+    pub small: bool,
 }
 
 /// What fills objects.

@@ -4,7 +4,7 @@ use impasto_compiler::abi::Input;
 
 use super::{NeedInputs, Needs};
 use crate::film::outputs::{Ask, At};
-use crate::technique::{CameraRays, RayData, RayFetch, RayKernels, RayOrder};
+use crate::technique::{CameraRays, LastRays, RayData, RayFetch, RayKernels, RayOrder};
 use crate::world::lights::table::light_kinds;
 use crate::world::places::{OF_PLACES, OF_SPACES};
 
@@ -370,6 +370,15 @@ rows! {
             };
             reason.filter(|_| possible)
         };
+    // Light that is turned on its way may still meet some, and what varies is in no table of lights.
+    LastRays, "last rays towards lights only", "last_rays",
+        "lights are small, have surfaces and emit the same everywhere, and no medium scatters light",
+        on &[HitLights], draws "", ASKED, |f, n| {
+            let possible = f.lights.small && f.max_depth > 1
+                && !n.any(&[EscapeLights, VaryingEmission, Scattering]);
+            let asked = f.last_rays == LastRays::Lights;
+            (asked && possible).then(|| "the last ray of a path gathers light of small lights only".into())
+        };
 }
 
 /// The rows of materials, that a kernel has only if one of its own materials does.
@@ -396,4 +405,5 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
 ]);
 
 /// The rows of a wavefront, that a megakernel has never.
-pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[Order, Requests, JointCasts, CameraCasts]);
+pub(crate) const OF_WAVEFRONTS: Needs =
+    Needs::of_rows(&[Order, Requests, JointCasts, CameraCasts, LastRays]);
