@@ -166,10 +166,12 @@ impl Sizes {
         self.pool.saturating_mul(self.pools)
     }
 
-    /// Threads of a kernel that fetches the items of some queues.
+    /// Threads of a kernel that fetches the items of some queues: so many that each may fetch about twice its share. Items
+    /// take unlike long, and those who have short ones must not run out of what they may fetch while others are at work.
     pub(crate) fn threads_for(self, queues: usize) -> u32 {
         let items = self.pool.saturating_mul(queues as u32);
-        self.threads.max(items.div_ceil(self.fetch_limit.max(1)))
+        self.threads
+            .max(items.div_ceil(self.fetch_limit.div_ceil(2).max(1)))
     }
 }
 

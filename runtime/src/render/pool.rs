@@ -16,8 +16,12 @@ const POOL: u32 = 1 << 20;
 /// The same for the wavefront on GPUs with memory of their own: each kernel drains the machine
 /// once an iteration, so that an H200 renders 1.4 to 1.5 times as fast as with the paper's.
 const LARGE_POOL: u32 = 1 << 23;
+/// The same for renders of many times as many paths: while a pool fills, and at the end, slots are idle.
+const LARGEST_POOL: u32 = 1 << 24;
+/// So many times.
+const MANY: u64 = 32;
 /// What a default pool may take, in bytes.
-const LARGE_POOL_BYTES: u64 = 2 << 30;
+const LARGE_POOL_BYTES: u64 = 3 << 30;
 /// Paths of a dispatch of a megakernel there: at its end threads idle.
 const LARGE_BATCH: u32 = 1 << 22;
 /// The same for GPUs in software, to stay responsive.
@@ -53,7 +57,8 @@ pub(crate) fn technique(
     options: &RenderOptions,
 ) -> Technique {
     let technique = device.technique(options.technique);
-    let asked = u64::from(options.pool.unwrap_or_else(|| wavefront_pool(device)));
+    let default = || wavefront_pool(device, world, options);
+    let asked = u64::from(options.pool.unwrap_or_else(default));
     let few = asked.min(paths(world, options)) <= u64::from(FEW_PATHS);
     let ray_kernels = match technique.ray_kernels {
         RayKernels::Auto if few => RayKernels::One,
@@ -93,11 +98,12 @@ pub(crate) fn sizes(
     }
     let most = device.limits().buffer_bytes;
     let fits = u32::try_from(most / slot_bytes).unwrap_or(u32::MAX);
-    let default = default_pool(device, layout, state_bytes + queue_bytes);
+    let wavefront = wavefront_pool(device, world, options);
+    let default = || default_pool(device, layout, wavefront, state_bytes + queue_bytes);
     let enough = u32::try_from(paths(world, options)).unwrap_or(u32::MAX);
     let pool = options
         .pool
-        .unwrap_or(default)
+        .unwrap_or_else(default)
         .min(enough)
         .min(fits)
         .clamp(1, 1 << 30);
@@ -184,9 +190,13 @@ fn workgroup_size(device: DeviceRef<'_>, wanted: Option<u32>) -> Result<u32, Run
     }
 }
 
-/// The pool where none is asked for.
-fn default_pool(device: DeviceRef<'_>, layout: &PlanLayout, slot_bytes: u64) -> u32 {
-    let wavefront = wavefront_pool(device);
+/// The pool where none is asked for, and a wavefront of any size would have `wavefront` paths.
+fn default_pool(
+    device: DeviceRef<'_>,
+    layout: &PlanLayout,
+    wavefront: u32,
+    slot_bytes: u64,
+) -> u32 {
     match device {
         DeviceRef::Gpu(gpu) if gpu.has_own_memory() => {}
         _ => return wavefront,
@@ -199,15 +209,26 @@ fn default_pool(device: DeviceRef<'_>, layout: &PlanLayout, slot_bytes: u64) -> 
 }
 
 /// The paths that a wavefront has in flight by default, where there is memory for them.
-fn wavefront_pool(device: DeviceRef<'_>) -> u32 {
+fn wavefront_pool(device: DeviceRef<'_>, world: &World, options: &RenderOptions) -> u32 {
     match device {
         DeviceRef::Gpu(gpu) if gpu.is_software() => SOFTWARE_POOL,
-        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => LARGE_POOL,
+        DeviceRef::Gpu(gpu) if gpu.has_own_memory() => {
+            large_pool(paths(world, options), options.pixels.is_some())
+        }
         DeviceRef::Gpu(_) => POOL,
         DeviceRef::Cpu(cpu) => {
             let threads = u32::try_from(cpu.threads()).unwrap_or(u32::MAX);
             threads.saturating_mul(PATHS_OF_THREAD)
         }
+    }
+}
+
+/// That of a GPU with memory of its own. Where pixels are chosen, somebody waits for iterations.
+fn large_pool(paths: u64, chooses_pixels: bool) -> u32 {
+    if paths >= MANY * u64::from(LARGEST_POOL) && !chooses_pixels {
+        LARGEST_POOL
+    } else {
+        LARGE_POOL
     }
 }
 
@@ -266,6 +287,37 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_long_renders_that_nobody_looks_at_have_the_largest_pool() {
+        let paths = 1 << 29;
+        assert_eq!(large_pool(paths, false), LARGEST_POOL);
+        assert_eq!(large_pool(paths - 1, false), LARGE_POOL);
+        assert_eq!(large_pool(u64::MAX, true), LARGE_POOL);
+    }
+
+    /// A budget that just suffices on average ends the threads that have short items.
+    #[test]
+    fn threads_may_fetch_more_than_their_share() {
+        for (pool, limit) in [
+            (LARGEST_POOL, FETCH_LIMIT),
+            (LARGE_POOL, FETCH_LIMIT),
+            (1000, SOFTWARE_FETCH_LIMIT),
+        ] {
+            for queues in 1..3u32 {
+                let sizes = Sizes {
+                    pool,
+                    pools: 1,
+                    workgroup: 256,
+                    threads: THREADS.min(pool),
+                    fetch_limit: limit,
+                    row_groups: 65_535,
+                };
+                let threads = u64::from(sizes.threads_for(queues as usize));
+                assert!(threads * u64::from(limit) >= 2 * u64::from(pool) * u64::from(queues));
+            }
+        }
+    }
 
     #[test]
     fn a_pool_is_halved_until_there_is_memory_for_it() {
