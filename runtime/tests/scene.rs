@@ -66,7 +66,7 @@ fn a_scene_has_what_its_file_says() {
         room.integrator,
         Integrator {
             max_depth: 5,
-            roulette_start: 8
+            roulette_start: 4
         }
     );
     let environment = room.environment.expect("there is one");

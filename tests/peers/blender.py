@@ -22,7 +22,7 @@ stays."""
 MODES = {
     "plain": {},
     "spatial_splits": {"debug_use_spatial_splits": True},
-    "late_roulette": {"min_light_bounces": 7},
+    "late_roulette": {"min_light_bounces": 3},
     "light_tree": {"use_light_tree": True},
 }
 """What may make Cycles faster or less noisy and keeps it unbiased: properties of `scene.cycles`. Cycles plays roulette

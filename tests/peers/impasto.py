@@ -53,7 +53,7 @@ def load_scene(path: Path) -> dict:
     scene = tomllib.loads(path.read_text())
     scene.setdefault("film", {})
     scene["film"] = {"width": 1024, "height": 768} | scene["film"]
-    scene["integrator"] = {"max_depth": 16, "roulette_start": 8} | scene.get("integrator", {})
+    scene["integrator"] = {"max_depth": 16, "roulette_start": 4} | scene.get("integrator", {})
     scene["base"] = path.resolve().parent
     return scene
 

@@ -332,7 +332,7 @@ fn film(root: &mut Table) -> Result<FilmSettings, SceneError> {
 fn integrator(root: &mut Table) -> Result<Integrator, SceneError> {
     let mut integrator = Integrator {
         max_depth: 16,
-        roulette_start: 8,
+        roulette_start: 4,
     };
     if let Some(value) = root.get("integrator") {
         let mut table = value.table("[integrator]")?;
