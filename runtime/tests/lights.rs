@@ -12,7 +12,7 @@ use crate::support::{Random, Row, floats, row};
 use glam::Vec3;
 use impasto_compiler::abi::{Emission, InstanceInfo};
 use impasto_runtime::scene::{NO_MATERIAL, Scene};
-use impasto_runtime::technique::{Technique, Tree};
+use impasto_runtime::technique::{LastRays, Technique, Tree};
 use impasto_runtime::world::lights::quad::QuadLight;
 use impasto_runtime::world::lights::sphere::{Cone, SphereLight};
 use impasto_runtime::world::{KernelParts, lights};
@@ -429,7 +429,7 @@ fn a_million_lights_are_chosen_by_their_probabilities() {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|c| center + size * c);
         push_triangle(&mut scene, corners, 0);
     }
-    let parts = parts(&scene, &[emissive([1.0; 3])]);
+    let parts = parts_without_boxes(&scene, &[emissive([1.0; 3])], Tree::default());
     let table = parts
         .lights
         .buffers
@@ -620,18 +620,23 @@ fn rows_of_lights(parts: &KernelParts) -> Vec<([u32; 8], [u32; 12])> {
     table.chunks_exact(8).map(row).collect()
 }
 
+/// Parts whose table of lights has nothing but lights.
+fn parts_without_boxes(scene: &Scene, infos: &[InstanceInfo], tree: Tree) -> KernelParts {
+    let technique = Technique {
+        tree,
+        last_rays: LastRays::All,
+        ..Technique::default()
+    };
+    kernel_parts(scene, infos, &technique).expect("the parts build")
+}
+
 /// A light is one light however many references there are to its triangle: it is in the table once, and samples
 /// find as much of it as rays do, whichever reference these meet.
 #[test]
 fn a_lamp_in_several_leaves_is_one_light() {
     let (scene, infos) = lamps_in_pieces();
-    let [whole, split] = [Tree::Whole, Tree::Split].map(|tree| {
-        let technique = Technique {
-            tree,
-            ..Technique::default()
-        };
-        kernel_parts(&scene, &infos, &technique).expect("the parts build")
-    });
+    let [whole, split] =
+        [Tree::Whole, Tree::Split].map(|tree| parts_without_boxes(&scene, &infos, tree));
     let triangles = |parts: &KernelParts| parts.geometry.buffers[0].bytes.len() / 48;
     assert!(triangles(&split) > triangles(&whole) + 6);
     let rows = rows_of_lights(&split);
