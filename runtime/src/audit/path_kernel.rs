@@ -14,7 +14,7 @@ use crate::kernels::validate::validate;
 use crate::kernels::{camera, dropped, run};
 use crate::options::RenderOptions;
 use crate::render::{CompositionInputs, settings};
-use crate::technique::{LastRays, Regeneration, Sampler, Technique};
+use crate::technique::{Regeneration, Sampler, Technique};
 use crate::wgsl::BufferData;
 use crate::world::{MaterialSource, World};
 
@@ -70,8 +70,6 @@ impl PathKernel {
         let technique = Technique {
             sampler,
             regeneration: Regeneration::Never,
-            // What a path ends at is told.
-            last_rays: LastRays::All,
             ..Technique::default()
         };
         let inputs = CompositionInputs::new(1, world, source, technique)?;

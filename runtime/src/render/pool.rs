@@ -288,6 +288,17 @@ impl Pace {
 mod tests {
     use super::*;
 
+    fn sizes(pool: u32, fetch_limit: u32) -> Sizes {
+        Sizes {
+            pool,
+            pools: 1,
+            workgroup: 256,
+            threads: THREADS.min(pool),
+            fetch_limit,
+            row_groups: 65_535,
+        }
+    }
+
     #[test]
     fn only_long_renders_that_nobody_looks_at_have_the_largest_pool() {
         let paths = 1 << 29;
@@ -305,14 +316,7 @@ mod tests {
             (1000, SOFTWARE_FETCH_LIMIT),
         ] {
             for queues in 1..3u32 {
-                let sizes = Sizes {
-                    pool,
-                    pools: 1,
-                    workgroup: 256,
-                    threads: THREADS.min(pool),
-                    fetch_limit: limit,
-                    row_groups: 65_535,
-                };
+                let sizes = sizes(pool, limit);
                 let threads = u64::from(sizes.threads_for(queues as usize));
                 assert!(threads * u64::from(limit) >= 2 * u64::from(pool) * u64::from(queues));
             }
@@ -321,17 +325,9 @@ mod tests {
 
     #[test]
     fn a_pool_is_halved_until_there_is_memory_for_it() {
-        let sizes = |pool| Sizes {
-            pool,
-            pools: 1,
-            workgroup: 256,
-            threads: THREADS.min(pool),
-            fetch_limit: FETCH_LIMIT,
-            row_groups: 65_535,
-        };
         let within = |room: u32, wanted: u32| {
             let mut asked = Vec::new();
-            let made = within_memory(sizes(wanted), &mut |sizes| {
+            let made = within_memory(sizes(wanted, FETCH_LIMIT), &mut |sizes| {
                 asked.push(sizes.pool);
                 assert!(sizes.threads <= sizes.pool);
                 assert!(sizes.threads * sizes.fetch_limit >= sizes.pool);
@@ -353,7 +349,7 @@ mod tests {
         assert_eq!(asked, [1 << 14, 1 << 13, 1 << 12]);
         // What is wrong otherwise does not get right with less.
         let mut times = 0;
-        let made: Result<(), _> = within_memory(sizes(1 << 20), &mut |_| {
+        let made: Result<(), _> = within_memory(sizes(1 << 20, FETCH_LIMIT), &mut |_| {
             times += 1;
             Err(RuntimeError::DeviceLost("gone".into()))
         });

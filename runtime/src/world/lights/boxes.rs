@@ -1,7 +1,10 @@
 //! Boxes around the lights of a scene. The last ray of a path gathers the light that it meets and nothing else: one that
 //! meets none of a few boxes need not be cast.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
+use obvhs::aabb::Aabb;
+
+use crate::world::bvh;
 
 /// Every last ray is tested with all of them.
 const MOST: usize = 8;
@@ -13,34 +16,32 @@ const WORTH_A_BOX: f32 = 0.9;
 /// of ray casts, which may meet a light just beyond its edge, are a few.
 const SLACK: f32 = 1.0 / (1 << 20) as f32;
 
-/// From corner to corner, in metres.
-type Bounds = [Vec3; 2];
-
 /// Boxes in which everything lies that shines.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Boxes {
-    /// At most [`MOST`].
-    boxes: Vec<Bounds>,
+    /// At most [`MOST`], in metres.
+    boxes: Vec<Aabb>,
     /// Whether most rays meet none.
     pub(super) are_small: bool,
 }
 
 impl Boxes {
     /// Those around some triangles in a scene that reaches from corner to corner of `scene`.
-    pub(super) fn around(triangles: impl Iterator<Item = [Vec3; 3]>, scene: Bounds) -> Self {
-        let all: Vec<Bounds> = triangles.map(|corners| bounds_of(&corners)).collect();
+    pub(super) fn around(triangles: impl Iterator<Item = [Vec3; 3]>, scene: [Vec3; 2]) -> Self {
+        let all: Vec<Aabb> = triangles.map(|corners| bvh::bounds(&corners)).collect();
         if all.is_empty() {
             return Self::default();
         }
+        let scene = Aabb::from_points(&scene.map(Vec3A::from));
+        let slack = Vec3A::splat(SLACK * scene.min.abs().max(scene.max.abs()).max_element());
         let groups = divided(all);
-        let slack = Vec3::splat(SLACK * scene[0].abs().max(scene[1].abs()).max_element());
         let boxes = groups.iter().map(|group| joined(group));
-        let boxes: Vec<Bounds> = boxes
-            .map(|[low, high]| [low - slack, high + slack])
+        let boxes: Vec<Aabb> = boxes
+            .map(|around| Aabb::new(around.min - slack, around.max + slack))
             .collect();
-        let area: f32 = boxes.iter().map(half_area).sum();
+        let area: f32 = boxes.iter().map(Aabb::half_area).sum();
         Self {
-            are_small: area <= SMALL * half_area(&scene),
+            are_small: area <= SMALL * scene.half_area(),
             boxes,
         }
     }
@@ -52,19 +53,18 @@ impl Boxes {
 
     /// Two rows of words a box, its corners; see `boxes.wgsl`.
     pub(super) fn rows(&self) -> impl Iterator<Item = [[u32; 4]; 2]> {
-        let row = |corner: &Vec3| corner.extend(0.0).to_array().map(f32::to_bits);
-        self.boxes
-            .iter()
-            .map(move |corners| [row(&corners[0]), row(&corners[1])])
+        let row = |corner: Vec3A| corner.extend(0.0).to_array().map(f32::to_bits);
+        let boxes = self.boxes.iter();
+        boxes.map(move |each| [row(each.min), row(each.max)])
     }
 }
 
 /// Boxes in groups, each of which is better in one box than in two.
-fn divided(all: Vec<Bounds>) -> Vec<Vec<Bounds>> {
+fn divided(all: Vec<Aabb>) -> Vec<Vec<Aabb>> {
     let (mut whole, mut groups) = (Vec::new(), vec![all]);
     // The largest first, as long as there may be more.
     while whole.len() + groups.len() < MOST {
-        let area = |group: &Vec<Bounds>| half_area(&joined(group));
+        let area = |group: &Vec<Aabb>| joined(group).half_area();
         let largest =
             (0..groups.len()).max_by(|a, b| area(&groups[*a]).total_cmp(&area(&groups[*b])));
         let Some(largest) = largest else { break };
@@ -78,44 +78,34 @@ fn divided(all: Vec<Bounds>) -> Vec<Vec<Bounds>> {
 }
 
 /// A group on both sides of its middle, or the group if it is no better divided.
-fn halved(group: Vec<Bounds>) -> Result<[Vec<Bounds>; 2], Vec<Bounds>> {
+fn halved(group: Vec<Aabb>) -> Result<[Vec<Aabb>; 2], Vec<Aabb>> {
     let around = joined(&group);
-    let axis = (around[1] - around[0]).max_position();
-    let doubled = |corners: &Bounds| (corners[0] + corners[1])[axis];
-    let middle = doubled(&around);
-    let (low, high): (Vec<Bounds>, Vec<Bounds>) =
-        group.iter().partition(|corners| doubled(corners) < middle);
+    let axis = around.largest_axis();
+    let middle = around.center_axis(axis);
+    let (low, high): (Vec<Aabb>, Vec<Aabb>) = group
+        .iter()
+        .partition(|each| each.center_axis(axis) < middle);
     if low.is_empty() || high.is_empty() {
         return Err(group);
     }
-    let area = half_area(&joined(&low)) + half_area(&joined(&high));
-    if area < WORTH_A_BOX * half_area(&around) {
+    let area = joined(&low).half_area() + joined(&high).half_area();
+    if area < WORTH_A_BOX * around.half_area() {
         Ok([low, high])
     } else {
         Err(group)
     }
 }
 
-fn bounds_of(points: &[Vec3]) -> Bounds {
-    let low = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-    let high = points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-    [low, high]
-}
-
-fn joined(boxes: &[Bounds]) -> Bounds {
-    bounds_of(boxes.as_flattened())
-}
-
-fn half_area([low, high]: &Bounds) -> f32 {
-    let size = *high - *low;
-    size.x * size.y + size.y * size.z + size.z * size.x
+fn joined(boxes: &[Aabb]) -> Aabb {
+    let all = boxes.iter();
+    all.fold(Aabb::empty(), |around, each| around.union(each))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const SCENE: Bounds = [Vec3::splat(-10.0), Vec3::splat(10.0)];
+    const SCENE: [Vec3; 2] = [Vec3::splat(-10.0), Vec3::splat(10.0)];
 
     /// The two triangles of a square of side 1 that faces y.
     fn square(x: f32, z: f32) -> [[Vec3; 3]; 2] {
@@ -133,8 +123,8 @@ mod tests {
         assert_eq!(boxes.len(), 3);
         assert!(boxes.are_small);
         // Each a little wider than its square, and no more.
-        for [low, high] in &boxes.boxes {
-            let size = *high - *low;
+        for each in &boxes.boxes {
+            let size = each.diagonal();
             assert!(size.x > 1.0 && size.x < 1.0001 && size.y > 0.0 && size.y < 0.0001);
         }
     }
@@ -155,8 +145,8 @@ mod tests {
         assert_eq!(boxes.len(), 2);
         assert!(boxes.are_small);
         for corner in triangles.as_flattened() {
-            let holds =
-                |[low, high]: &Bounds| corner.cmpgt(*low).all() && corner.cmplt(*high).all();
+            let corner = Vec3A::from(*corner);
+            let holds = |each: &Aabb| corner.cmpgt(each.min).all() && corner.cmplt(each.max).all();
             assert!(boxes.boxes.iter().any(holds), "{corner}");
         }
     }
