@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3, Vec3};
@@ -45,7 +46,7 @@ fn read(base: &Path, name: &str, _: f64) -> Result<Geometry, SceneError> {
         return Err(error.hint("save it as UTF-8 or ASCII text"));
     }
     let text = String::from_utf8_lossy(&bytes);
-    let mut scan = Scan::new(path);
+    let mut scan = Scan::new(path, text.len());
     for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         scan.line(index + 1, line)?;
     }
@@ -172,11 +173,12 @@ struct Scan<'p> {
 }
 
 impl<'p> Scan<'p> {
-    fn new(path: &'p Path) -> Self {
+    /// Of a file of so many bytes, of which either list may take nearly all. What they do not use is never touched.
+    fn new(path: &'p Path, bytes: usize) -> Self {
         Scan {
             path,
-            vertices: String::new(),
-            faces: String::new(),
+            vertices: String::with_capacity(bytes),
+            faces: String::with_capacity(bytes),
             counts: [0; 3],
             colored: false,
             largest: [(0, 0); 3],
@@ -323,10 +325,15 @@ impl<'p> Scan<'p> {
         for word in rest.split_whitespace() {
             let corner = self.corner(line, word)?;
             corners += 1;
-            let _ = write!(self.faces, " {}/", corner[0].unwrap_or_default());
-            for (list, separator) in [(1, "/"), (2, "")] {
-                has[list - 1] &= corner[list].is_some();
-                if let Some(index) = corner[list] {
+            has[0] &= corner[1].is_some();
+            has[1] &= corner[2].is_some();
+            self.faces.push(' ');
+            if corner.iter().all(Option::is_some) && !word.contains('-') {
+                self.faces += word;
+                continue;
+            }
+            for (index, separator) in corner.iter().zip(["/", "/", ""]) {
+                if let Some(index) = index {
                     let _ = write!(self.faces, "{index}");
                 }
                 self.faces += separator;
@@ -417,16 +424,16 @@ impl<'p> Scan<'p> {
 fn parse(scan: &Scan) -> Result<(Vec<Triangle>, usize), tobj::LoadError> {
     // The library is made up: it has a material for each index that `faces` uses.
     let names = 0..scan.materials.len();
-    let text = format!("mtllib all\n{}{}", scan.vertices, scan.faces);
-    let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &tobj::LoadOptions::default(), |_| {
-            let material = |i: usize| tobj::Material {
-                name: i.to_string(),
-                ..tobj::Material::default()
-            };
-            let by_name = names.clone().map(|i| (i.to_string(), i)).collect();
-            Ok((names.clone().map(material).collect(), by_name))
-        })?;
+    let lists = scan.vertices.as_bytes().chain(scan.faces.as_bytes());
+    let mut text = b"mtllib all\n".chain(lists);
+    let (models, _) = tobj::load_obj_buf(&mut text, &tobj::LoadOptions::default(), |_| {
+        let material = |i: usize| tobj::Material {
+            name: i.to_string(),
+            ..tobj::Material::default()
+        };
+        let by_name = names.clone().map(|i| (i.to_string(), i)).collect();
+        Ok((names.clone().map(material).collect(), by_name))
+    })?;
     let mut triangles = Vec::with_capacity(scan.attributes.len());
     let mut crossing = 0;
     for mesh in models.iter().map(|m| &m.mesh) {
