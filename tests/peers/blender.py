@@ -22,11 +22,11 @@ stays."""
 MODES = {
     "plain": {},
     "spatial_splits": {"debug_use_spatial_splits": True},
-    "late_roulette": {"min_light_bounces": 3},
+    "late_roulette": {"min_light_bounces": "roulette_start"},
     "light_tree": {"use_light_tree": True},
 }
-"""What may make Cycles faster or less noisy and keeps it unbiased: properties of `scene.cycles`. Cycles plays roulette
-from the start; `late_roulette` is about what Impasto and Mitsuba do unless a scene says otherwise."""
+"""What may make Cycles faster or less noisy and keeps it unbiased: properties of `scene.cycles`, or what of the job says them.
+Cycles plays roulette from the start; in `late_roulette` it begins with Impasto and Mitsuba."""
 
 
 def time_cycles(job: dict, folder: Path, mode: str, args) -> tuple[Efficiency, dict]:
@@ -35,7 +35,7 @@ def time_cycles(job: dict, folder: Path, mode: str, args) -> tuple[Efficiency, d
         "samples": args.spp,
         "pictures": args.pictures,
         "device": args.cycles_device,
-        "options": MODES[mode],
+        "options": {name: job.get(value, value) for name, value in MODES[mode].items()},
         "folder": str(folder),
     }
     path = folder / "job.json"
@@ -100,6 +100,8 @@ def translate(scene: dict, impasto: Impasto, size: tuple[int, int], folder: Path
         "size": size,
         # Impasto counts the segments of a path, Cycles its bounces.
         "max_bounces": scene["integrator"]["max_depth"] - 2,
+        # After as many bounces one fewer segments have ended.
+        "roulette_start": scene["integrator"]["roulette_start"] - 1,
         "camera": {
             "position": spec["position"],
             "look_at": spec["look_at"],
