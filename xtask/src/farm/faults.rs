@@ -175,7 +175,8 @@ fn term(bench: &Bench) -> Result<String> {
     let written = log
         .lines()
         .find(|line| line.starts_with("wrote"))
-        .and_then(|line| line.rsplit_once('('));
+        // Names of processors have brackets, too.
+        .and_then(|line| line.split_once(" ("));
     let kept = log.lines().find(|line| line.starts_with("going on"));
     let (Some(kept), Some((_, written))) = (kept.and_then(number), written) else {
         return Err(format!("it did not go on: {log}"));
