@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use mimalloc::MiMalloc;
 
-/// A quarter of a cold compilation is memory for small things, which this allocator gives in half the time of the system's.
+/// A quarter of a cold compilation is memory for small things, for which this allocator needs a third of
+/// the instructions of glibc's.
 #[global_allocator]
 static ALLOCATOR: MiMalloc = MiMalloc;
 
