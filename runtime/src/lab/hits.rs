@@ -6,6 +6,7 @@ use impasto_compiler::partition::{Form, Plan};
 use super::{Candidate, Lab};
 use crate::error::RuntimeError;
 use crate::kernels::buffers::BufferId;
+use crate::technique::SlotOrder;
 
 impl Lab<'_> {
     /// Counts the hits of each material, and the blocks of neighbouring slots with any.
@@ -20,8 +21,12 @@ impl Lab<'_> {
             form: Form::Own,
             members: any.materials.clone(),
         };
-        let run = self.runs(&[any])?.swap_remove(0);
-        let run = run.map_err(RuntimeError::Validation)?;
+        // Where paths are before logic puts them in the order of queues, which is where it meets them.
+        let order = self.inputs.technique.slot_order;
+        self.inputs.technique.slot_order = SlotOrder::Fixed;
+        let run = self.runs(&[any]).map(|mut runs| runs.swap_remove(0));
+        self.inputs.technique.slot_order = order;
+        let run = run?.map_err(RuntimeError::Validation)?;
         let sample = self.time(std::slice::from_ref(&run))?.swap_remove(0);
         let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
         let queues = self.inputs.layout(own)?.queues.of_kernels(own);

@@ -1,11 +1,12 @@
 //! The laboratory: kernels are timed on the hits of one iteration, whichever plan they belong to.
 
 use crate::gpu::plans::{room, surfaces};
-use crate::gpu::stub::{Materials, gpu, plan};
+use crate::gpu::stub::{Materials, gpu, plan, render_plan, samples};
 use impasto_compiler::partition::{Form, Strategy};
 use impasto_runtime::error::RuntimeError;
 use impasto_runtime::gpu::{Gpu, GpuOptions, Timing};
 use impasto_runtime::lab::{Candidate, Lab, LabOptions, Measured};
+use impasto_runtime::options::RenderOptions;
 use impasto_runtime::world::World;
 
 const POOL: u32 = 4000;
@@ -89,6 +90,28 @@ fn neighbours_share_blocks_only_where_they_hit_the_same() {
         (5.0 * 16.0 + 48.0, 6.0 * 16.0)
     );
     assert!(workload.logic_seconds > 0.0 && workload.other_seconds > 0.0);
+}
+
+#[test]
+fn neighbours_are_those_that_the_logic_kernel_meets() {
+    let (world, surfaces) = (room().world(), surfaces());
+    let rendered = render_plan(
+        &world,
+        &surfaces,
+        &plan(Strategy::OWN, &surfaces),
+        &RenderOptions {
+            count_hits: true,
+            pool: Some(POOL),
+            ..samples(64)
+        },
+    );
+    let rendered = rendered.report.workload.expect("hits were counted");
+    let of_lab = lab(&world, &surfaces);
+    for (lab, render) in of_lab.workload().materials.iter().zip(&rendered.materials) {
+        // In the order of queues a block would be of one or two materials. A render begins with neighbours that are alike.
+        assert!(lab.draws() > 0.8 * render.draws(), "{lab:?}, {render:?}");
+        assert!(lab.draws() > 4.0, "{lab:?}");
+    }
 }
 
 #[test]
