@@ -65,7 +65,7 @@ class Calibrated:
         return self._inner.seconds(form, list(members))
 
     def predict(self, form: str, members: Sequence[int]) -> dict[str, float]:
-        """The prediction in parts: launch, latency, issue, memory, logic, total, doubt; in seconds."""
+        """The prediction in parts: launch, latency, issue, memory, logic, total; in seconds."""
         parts: dict[str, float] = json.loads(self._inner.predict(form, list(members)) or "{}")
         return parts
 

@@ -27,7 +27,7 @@ const fn time(name: &'static str, meaning: &'static str) -> Constant {
 }
 
 /// Every constant of the model.
-pub const CONSTANTS: [Constant; 16] = [
+pub const CONSTANTS: [Constant; 17] = [
     time("launch", "s, a dispatch that finds nothing to do"),
     time("latency", "s, an operation that waits for the one before"),
     time("alu", "s, float arithmetic of a subgroup"),
@@ -77,6 +77,11 @@ pub const CONSTANTS: [Constant; 16] = [
         name: "occupancy",
         bounds: [1e-3, 20.0],
         meaning: "slowdown of a kernel's memory by a hundred live numbers, as a share",
+    },
+    Constant {
+        name: "inline_logic",
+        bounds: [1e-3, 20.0],
+        meaning: "slowdown of the logic kernel by any inline material, as a share",
     },
 ];
 

@@ -11,7 +11,7 @@
 //! latency = latency * operations of the longest subgroup * crowding
 //! crowding = 1 + miss * max(0, code of all members / code - 1)     where members are side by side
 //! waiting = 1 + occupancy * most live numbers of a member / 100
-//! logic   = logic kernel * pressure * max(0, live numbers - free_registers) / 100
+//! logic   = logic kernel * (inline_logic + pressure * max(0, live numbers - free_registers) / 100)
 //! ```
 //!
 //! - A kernel that evaluates one material (own, or a workgroup of binned) has hits/32 full subgroups of
@@ -23,7 +23,7 @@
 //! - Side by side, materials that do not fit the caches of instructions together push each other out.
 //! - A kernel has the registers of the member that needs most. The more these are, the fewer threads there are at a
 //!   time, and the less of the waiting for memory is hidden, of the other members as well.
-//! - A logic kernel with inline materials has their registers, and so fewer threads at a time.
+//! - A logic kernel with inline materials branches over them, and has their registers, and so fewer threads at a time.
 //!
 //! The formulas are those of a set that were tried on measurements of an H200, which fitted best
 //! and chose best (docs/measurements.md).
@@ -56,20 +56,8 @@ pub struct Prediction {
     pub logic: f64,
     /// All together; operations, memory and waiting overlap.
     pub total: f64,
-    /// What the prediction may be short of: not part of it, but of what a search compares.
-    pub doubt: f64,
 }
 
-impl Prediction {
-    /// The seconds that a search compares.
-    pub fn weighed(&self) -> f64 {
-        self.total + self.doubt
-    }
-}
-
-/// The share of the seconds of inline materials that is in doubt: their predictions err the most, and
-/// an inline material that was thought too cheap costs more than a queue that was not needed.
-const INLINE_DOUBT: f64 = 0.1;
 /// Slots whose state is in one line of memory; of 4, 8 and 16, this fits an H200 best.
 const LINE: f64 = 16.0;
 /// Subgroups of a workgroup, all of which wait for the one that takes longest.
@@ -88,7 +76,7 @@ pub struct Calibrated<'a> {
 
 impl TimeModel for Calibrated<'_> {
     fn seconds(&self, form: Form, members: &[usize]) -> f64 {
-        self.predict(form, members).weighed()
+        self.predict(form, members).total
     }
 }
 
@@ -104,7 +92,7 @@ impl TimeModel for Prepared<'_> {
     fn seconds(&self, form: Form, members: &[usize]) -> f64 {
         let alone = |m: &usize| self.alone.get(*m).copied();
         let members = self.model.together(form, members.iter().filter_map(alone));
-        self.model.prediction(form, &members).weighed()
+        self.model.prediction(form, &members).total
     }
 }
 
@@ -156,18 +144,13 @@ impl Calibrated<'_> {
             Form::Inline => (0.0, self.logic(members)),
             _ => (weights.launch, 0.0),
         };
-        let total = launch + busy + logic;
         Prediction {
             launch,
             latency,
             issue,
             memory,
             logic,
-            total,
-            doubt: match form {
-                Form::Inline => INLINE_DOUBT * total,
-                _ => 0.0,
-            },
+            total: launch + busy + logic,
         }
     }
 
@@ -284,11 +267,11 @@ impl Calibrated<'_> {
         waiting * members.iter().map(one).sum::<f64>()
     }
 
-    /// Seconds by which the logic kernel gets slower for the registers of inline materials.
+    /// Seconds by which the logic kernel gets slower since it has inline materials, and for their registers.
     fn logic(&self, members: &[Member<'_>]) -> f64 {
         let weights = &self.profile.weights;
         let beyond = (most_live(members) - weights.free_registers).max(0.0) / 100.0;
-        self.workload.logic_seconds * weights.pressure * beyond
+        self.workload.logic_seconds * (weights.inline_logic + weights.pressure * beyond)
     }
 }
 
@@ -383,6 +366,7 @@ mod tests {
             free_registers: 30.0,
             pressure: 0.2,
             occupancy: 0.0,
+            inline_logic: 0.1,
         };
         profile
     }
@@ -457,7 +441,7 @@ mod tests {
             found.total,
             5e-6 + found.issue + found.memory + found.latency,
         );
-        assert_eq!((found.launch, found.logic, found.doubt), (5e-6, 0.0, 0.0));
+        assert_eq!((found.launch, found.logic), (5e-6, 0.0));
     }
 
     #[test]
@@ -513,17 +497,15 @@ mod tests {
     fn inline_materials_cost_the_logic_kernel_registers() {
         let found = predicted(Form::Inline, &[0, 1], 1);
         // 80 live numbers are 50 more than are free.
-        near(found.logic, 1e-4 * 0.2 * 0.5);
+        near(found.logic, 1e-4 * (0.1 + 0.2 * 0.5));
         // A quarter of 32768 subgroups meets each; of 64 bytes to load, half are at hand.
         near(found.issue, 1.125 * 2.0 * 8192.0 * 215e-12);
         near(found.memory, 2.0 * 262_144.0 * (32.0 + 96.0 + 8.0) * 1e-13);
-        near(found.doubt, 0.1 * found.total);
-        // A search compares it with what it may be short of; what has a launch of its own is sure.
-        near(found.weighed(), 1.1 * found.total);
-        let own = predicted(Form::Own, &[0], 1);
-        assert_eq!(own.weighed(), own.total);
         assert_eq!(found.launch, 0.0);
-        near(predicted(Form::Inline, &[1], 1).logic, 1e-4 * 0.2 * 0.1);
+        near(
+            predicted(Form::Inline, &[1], 1).logic,
+            1e-4 * (0.1 + 0.2 * 0.1),
+        );
     }
 
     #[test]

@@ -64,6 +64,9 @@ pub struct Weights {
     /// By how much a hundred live numbers of a kernel slow its memory down, as a share.
     #[serde(default)]
     pub occupancy: f64,
+    /// By how much any inline material slows the logic kernel down, as a share.
+    #[serde(default)]
+    pub inline_logic: f64,
 }
 
 /// How well a model fits what was measured.
@@ -144,7 +147,7 @@ const MAX_SUBGROUP: u32 = 128;
 
 impl Weights {
     /// Every constant with its name in files.
-    pub fn named(&self) -> [(&'static str, f64); 16] {
+    pub fn named(&self) -> [(&'static str, f64); 17] {
         [
             ("launch", self.launch),
             ("latency", self.latency),
@@ -162,6 +165,7 @@ impl Weights {
             ("free_registers", self.free_registers),
             ("pressure", self.pressure),
             ("occupancy", self.occupancy),
+            ("inline_logic", self.inline_logic),
         ]
     }
 

@@ -1,6 +1,7 @@
 //! Timing: sequences of dispatches from the same restored state, again and again, by the GPU's
 //! timestamps.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,8 +15,13 @@ use crate::gpu::submission::Submission;
 use crate::kernels::buffers::BufferId;
 use crate::kernels::queues::Counters;
 
-/// A GPU that was idle, as while kernels were built, takes its time to get up to speed.
-const WARM_UP: Duration = Duration::from_millis(200);
+/// A GPU that was idle, as while kernels were built, takes its time to get up to speed: an H100 up to 0.3 s, the last of it
+/// at half its speed.
+const WARM_UP: Duration = Duration::from_millis(500);
+/// How much longer the longest of the repetitions that count may take than the shortest.
+const STEADY: f64 = 1.1;
+/// Repetitions are made until they are steady, or so long.
+const PATIENCE: Duration = Duration::from_secs(2);
 /// Runs that take turns. Each has buffers of its own to bring back what it counted.
 const TURNS: usize = 32;
 /// A run that takes longer is not repeated more often than [`FEW`] times.
@@ -95,21 +101,31 @@ pub(super) fn time(
         while begin.elapsed() < WARM_UP {
             first = round(gpu, resources, snapshot, &mut lanes)?;
         }
-        let long = first.iter().any(|sample| sample.total > LONG);
-        let mut samples = vec![Vec::new(); turn.len()];
-        for _ in 0..if long {
-            repetitions.min(FEW)
-        } else {
-            repetitions
-        } {
-            let round = round(gpu, resources, snapshot, &mut lanes)?;
-            for (samples, sample) in samples.iter_mut().zip(round) {
-                samples.push(sample);
+        let wanted = match first.iter().any(|sample| sample.total > LONG) {
+            true => repetitions.min(FEW),
+            false => repetitions,
+        } as usize;
+        let (begin, mut rounds) = (Instant::now(), VecDeque::new());
+        while rounds.len() < wanted || !steady(&rounds) && begin.elapsed() < PATIENCE {
+            rounds.push_back(round(gpu, resources, snapshot, &mut lanes)?);
+            if rounds.len() > wanted {
+                rounds.pop_front();
             }
         }
-        all.extend(samples);
+        let of_run = |run: usize| rounds.iter().map(|round| round[run].clone()).collect();
+        all.extend((0..turn.len()).map(of_run));
     }
     Ok(all)
+}
+
+/// Do all rounds take about as long? If the GPU's clocks rise among them, medians of some runs are of before, and of
+/// others of after.
+fn steady(rounds: &VecDeque<Vec<Sample>>) -> bool {
+    let totals = rounds
+        .iter()
+        .map(|round| round.iter().map(|sample| sample.total).sum::<f64>());
+    let least = totals.clone().fold(f64::INFINITY, f64::min);
+    totals.fold(0.0, f64::max) <= STEADY * least
 }
 
 /// A run with the buffers that bring its results back.

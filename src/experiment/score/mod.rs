@@ -239,8 +239,8 @@ fn one(subjects: &[Subject<'_>], model: &Model) -> Result<Score, String> {
         let plans = model.plans(subject.set)?;
         let lost = if plans.is_empty() {
             let predicted = model.predict(subject.set, &sets);
-            pairs.extend(subject.pairs(&predicted.times));
-            subject.lost(subject.chosen(&predicted.weighed))
+            pairs.extend(subject.pairs(&predicted));
+            subject.lost(subject.chosen(&predicted))
         } else {
             subject.least_lost(&plans)
         };

@@ -45,14 +45,6 @@ pub const BASELINES: [&str; 7] = [
     "paper",
 ];
 
-/// What a model says of the kernels of a mix, in their order.
-pub struct Predicted {
-    /// Seconds, for errors.
-    pub times: Vec<Option<f64>>,
-    /// What a search compares: seconds, and what may be in doubt.
-    pub weighed: Vec<Option<f64>>,
-}
-
 impl Model {
     /// The model that `given` names: a baseline, a device profile, or a table in a file.
     ///
@@ -159,12 +151,9 @@ impl Model {
         Ok(plans)
     }
 
-    /// What it says of a mix. Constants that a baseline has are fitted to `all` mixes.
-    pub(super) fn predict(&self, set: &Measurement, all: &[&Measurement]) -> Predicted {
-        let same = |times: Vec<Option<f64>>| Predicted {
-            weighed: times.clone(),
-            times,
-        };
+    /// The seconds that it says of the kernels of a mix, in their order. Constants that a baseline has are fitted to
+    /// `all` mixes.
+    pub(super) fn predict(&self, set: &Measurement, all: &[&Measurement]) -> Vec<Option<f64>> {
         match self {
             Self::Profile(_, profile) => {
                 let costs = costs(set);
@@ -173,37 +162,25 @@ impl Model {
                     workload: &set.workload,
                     profile,
                 };
-                let all = set.kernels.iter();
-                let all: Vec<_> = all
-                    .map(|k| model.predict(k.form, &set.members(k)))
-                    .collect();
-                Predicted {
-                    times: all.iter().map(|p| Some(p.total)).collect(),
-                    weighed: all.iter().map(|p| Some(p.weighed())).collect(),
-                }
+                let total = |k: &Kernel| model.predict(k.form, &set.members(k)).total;
+                set.kernels.iter().map(|k| Some(total(k))).collect()
             }
             Self::Table(_, table) => {
                 let key = |k: &Kernel| (set.scene.clone(), key(set, k));
-                same(
-                    set.kernels
-                        .iter()
-                        .map(|k| table.get(&key(k)).copied())
-                        .collect(),
-                )
+                let kernels = set.kernels.iter();
+                kernels.map(|k| table.get(&key(k)).copied()).collect()
             }
             Self::Constant => {
                 let kernels = all.iter().flat_map(|set| &set.kernels);
                 let one = median(kernels.map(|k| k.measured));
-                same(vec![one; set.kernels.len()])
+                vec![one; set.kernels.len()]
             }
             Self::Operations => {
                 let [launch, each] = line(all);
                 let one = |k: &Kernel| Some(launch + each * operations(set, k));
-                same(set.kernels.iter().map(one).collect())
+                set.kernels.iter().map(one).collect()
             }
-            Self::Strategy(_) | Self::Tried(..) | Self::Fitted => {
-                same(vec![None; set.kernels.len()])
-            }
+            Self::Strategy(_) | Self::Tried(..) | Self::Fitted => vec![None; set.kernels.len()],
         }
     }
 }

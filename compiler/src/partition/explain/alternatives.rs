@@ -47,7 +47,7 @@ pub(super) fn best(subject: &Subject, groups: &Groups, k: usize) -> Option<Alter
         };
         let before = sum(&mut change.old.iter().map(|g| &groups[*g]));
         let after = sum(&mut change.new.iter());
-        (after.weighed() - before.weighed(), before, after, change)
+        (after.total - before.total, before, after, change)
     });
     let least = judged.min_by(|a, b| a.0.total_cmp(&b.0));
     least.map(|(more, before, after, change)| {
@@ -181,7 +181,6 @@ fn add(a: Prediction, b: Prediction) -> Prediction {
         issue: a.issue + b.issue,
         memory: a.memory + b.memory,
         logic: a.logic + b.logic,
-        doubt: a.doubt + b.doubt,
         total: a.total + b.total,
     }
 }
@@ -195,7 +194,6 @@ fn deciding(before: &Prediction, after: &Prediction, more: f64) -> (&'static str
             ("issue", p.issue),
             ("memory", p.memory),
             ("logic", p.logic),
-            ("doubt", p.doubt),
         ]
     };
     let grown = parts(after).into_iter().zip(parts(before));
@@ -243,7 +241,6 @@ fn why(subject: &Subject, part: &str, more: f64, groups: &Groups, change: &Chang
             "the logic kernel takes their registers, and so runs fewer threads".into()
         }
         ("logic", false) => "the logic kernel has registers to spare".into(),
-        ("doubt", _) => "predictions of inline materials err the most".into(),
         ("memory", true) if new > old => "path state is read once more".into(),
         ("memory", true) => "path state that lies apart shares no reads".into(),
         ("memory", false) => "path state is at hand or lies closer".into(),

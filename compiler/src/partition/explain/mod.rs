@@ -160,7 +160,7 @@ impl Subject<'_> {
             members: members.iter().map(|m| self.member(*m)).collect(),
             predicted,
             share: if seconds > 0.0 {
-                predicted.weighed() / seconds
+                predicted.total / seconds
             } else {
                 0.0
             },

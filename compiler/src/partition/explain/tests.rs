@@ -77,7 +77,7 @@ fn alternatives_are_plans_that_take_what_is_said() {
             Strategy::INLINE,
         ] {
             let found = explained(&case, &planned(strategy, count), true);
-            let parts: f64 = found.kernels.iter().map(|k| k.predicted.weighed()).sum();
+            let parts: f64 = found.kernels.iter().map(|k| k.predicted.total).sum();
             assert!((parts / found.seconds - 1.0).abs() < 1e-9 || found.seconds == 0.0);
             assert!((seconds(&case, &found.partition) - found.seconds).abs() < 1e-12);
             for other in found.kernels.iter().filter_map(|k| k.alternative.as_ref()) {

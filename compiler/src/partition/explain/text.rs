@@ -110,7 +110,7 @@ fn write_kernel(f: &mut fmt::Formatter<'_>, kernel: &Kernel) -> fmt::Result {
     writeln!(
         f,
         "{what}: {}, {share:.0} % of the materials' time",
-        time(p.weighed())
+        time(p.total)
     )?;
     let parts = [
         ("launch", p.launch),
@@ -118,7 +118,6 @@ fn write_kernel(f: &mut fmt::Formatter<'_>, kernel: &Kernel) -> fmt::Result {
         ("issue", p.issue),
         ("memory", p.memory),
         ("logic", p.logic),
-        ("doubt", p.doubt),
     ];
     let parts = parts.iter().filter(|(_, seconds)| *seconds > 0.0);
     let parts: Vec<String> = parts
