@@ -101,9 +101,11 @@ pub(super) fn time(
         while begin.elapsed() < WARM_UP {
             first = round(gpu, resources, snapshot, &mut lanes)?;
         }
-        let wanted = match first.iter().any(|sample| sample.total > LONG) {
-            true => repetitions.min(FEW),
-            false => repetitions,
+        let long = first.iter().any(|sample| sample.total > LONG);
+        let wanted = if long {
+            repetitions.min(FEW)
+        } else {
+            repetitions
         } as usize;
         let (begin, mut rounds) = (Instant::now(), VecDeque::new());
         while rounds.len() < wanted || !steady(&rounds) && begin.elapsed() < PATIENCE {

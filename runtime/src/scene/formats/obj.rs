@@ -142,9 +142,11 @@ impl Library {
 
 /// The triangles, and how many faces cross themselves.
 fn parse(scan: &Scan) -> Result<(Vec<Triangle>, usize), tobj::LoadError> {
-    let texts = scan.vertices.iter().chain(&scan.faces);
+    // What tobj knows of vertices in use begins anew with each object, and stays small.
+    let faces = scan.faces.iter();
+    let faces = faces.flat_map(|faces| ["o piece\n".as_bytes(), faces.as_bytes()]);
     let mut text = Joined {
-        texts: texts.map(String::as_bytes),
+        texts: scan.vertices.iter().map(String::as_bytes).chain(faces),
         current: &[],
     };
     // No line names a library of materials.

@@ -81,10 +81,11 @@ impl Scan {
         let mut open: [Option<usize>; 2] = [None; 2];
         for piece in pieces {
             let first = scan.triangles.len();
-            let is_open = |of: &(_, Option<usize>)| of.1.is_none();
-            let inherited = match piece.triangles.first().is_some_and(is_open) {
-                true => scan.material(&current),
-                false => 0,
+            let begins_in_it = piece.triangles.first().is_some_and(|of| of.1.is_none());
+            let inherited = if begins_in_it {
+                scan.material(&current)
+            } else {
+                0
             };
             let names = piece.materials.iter();
             let indices: Vec<usize> = names.map(|name| scan.material(name)).collect();
@@ -182,6 +183,9 @@ impl Before {
         let mut counted = Self::default();
         for line in piece.lines() {
             counted.lines += 1;
+            if !line.trim_start().starts_with('v') {
+                continue;
+            }
             let (key, _) = key(statement(line));
             if let Some(list) = KEYS.iter().position(|k| *k == key) {
                 counted.counts[list] += 1;
