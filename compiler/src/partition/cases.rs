@@ -1,6 +1,7 @@
 //! Materials, scenes and GPUs that might exist, drawn at random: what searches and explanations are
 //! tested with.
 
+use super::profile::Weights;
 use super::{Calibrated, DeviceProfile, Hits, Requires, STRATEGIES, Strategy, Workload};
 use crate::cost::{Classes, Cost, LANES, Operations};
 use crate::random::SplitMix64;
@@ -39,10 +40,32 @@ pub(super) struct Case {
     pub(super) profile: DeviceProfile,
 }
 
+/// About those of an H200, and the same whatever is fitted to one.
+const WEIGHTS: Weights = Weights {
+    launch: 1.725_491e-5,
+    latency: 2.761_873e-9,
+    alu: 1.029_557e-12,
+    special: 5.409_07e-12,
+    integer: 9.613_232e-13,
+    texture: 1.111_469e-14,
+    turns: 1.542_542e-12,
+    memory: 1.432_44e-13,
+    scatter: 1.191_417e-12,
+    code: 1419.15,
+    miss: 0.499_694,
+    overlap: 1.162_173,
+    inline_loads: 0.032_915,
+    free_registers: 28.403_64,
+    pressure: 2.656_393,
+    occupancy: 0.935_313,
+    inline_logic: 0.0,
+};
+
 impl Case {
     pub(super) fn new(count: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut profile = DeviceProfile::named("h200").expect("it is shipped");
+        profile.weights = WEIGHTS;
         let w = &mut profile.weights;
         for constant in [
             &mut w.launch,
