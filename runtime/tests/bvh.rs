@@ -532,8 +532,8 @@ fn rays_that_leave_a_triangle_of_several_leaves_do_not_hit_it_again() {
     }
 }
 
-/// How far the normals of a mesh may be off since its corners are rounded.
-fn tilt(triangles: &[[Vec3; 3]]) -> f32 {
+/// By what angle the normals of a mesh may be off since its corners are rounded.
+fn rounded_off(triangles: &[[Vec3; 3]]) -> f32 {
     let height = |[a, b, c]: &[Vec3; 3]| {
         let longest = (b - a).length().max((c - b).length()).max((a - c).length());
         (b - a).cross(c - a).length() / longest
@@ -545,10 +545,10 @@ fn tilt(triangles: &[[Vec3; 3]]) -> f32 {
 }
 
 /// Rays from random points of a convex mesh, offset and with their primitive skipped, and whether
-/// they leave to the outside. Most directions are close to the surface, but no closer than neighbors of
-/// one flat side are to each other, of which rounding makes a mesh that is not quite convex.
+/// they leave to the outside. Most directions are close to the surface, but not so close that rounded
+/// corners decide whether they meet the next triangle of a flat side.
 fn leaving_rays(built: &Built, random: &mut Random, count: usize) -> Vec<(Ray, bool)> {
-    let least = tilt(&built.mesh.positions);
+    let least = rounded_off(&built.mesh.positions);
     let input: Vec<Row> = (0..count)
         .map(|_| {
             let (p, s, t) = (
