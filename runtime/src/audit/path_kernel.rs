@@ -11,7 +11,7 @@ use crate::film::{self, Sums};
 use crate::kernels::modules::Sizes;
 use crate::kernels::queues::{Counters, Scalar};
 use crate::kernels::validate::validate;
-use crate::kernels::{camera, dropped, run};
+use crate::kernels::{camera, dropped, run, tiles};
 use crate::options::RenderOptions;
 use crate::render::{CompositionInputs, settings};
 use crate::technique::{Regeneration, Sampler, Technique};
@@ -159,7 +159,8 @@ impl PathSample<'_> {
             "run" => words.copy_from_slice(&run::words(&self.options)),
             "counters" => {
                 words.fill(0);
-                words[self.kernel.counters.index(Scalar::WorkPixel)] = self.pixel as u32;
+                let place = tiles::place_of(self.kernel.size, self.pixel as u32);
+                words[self.kernel.counters.index(Scalar::WorkPixel)] = place;
             }
             "film" => {
                 let planes = words.chunks_exact_mut(self.kernel.pixels());

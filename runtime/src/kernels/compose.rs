@@ -18,6 +18,7 @@ use crate::kernels::run;
 use crate::kernels::stages::{Part, Stage};
 use crate::kernels::state::{self, Storage};
 use crate::kernels::surface_point;
+use crate::kernels::tiles;
 use crate::wgsl;
 use crate::wgsl::template::{Flag, template};
 use crate::wgsl::text::{mentions, predicate, reachable, without_comments};
@@ -102,6 +103,8 @@ impl Composer<'_> {
             ("WORKGROUP_SIZE", sizes.workgroup),
             ("ROW_GROUPS", sizes.row_groups),
             ("PIXELS", world.width * world.height),
+            ("TILE_WIDTH", tiles::TILE[0]),
+            ("TILE_HEIGHT", tiles::TILE[1]),
             ("MAX_DEPTH", world.max_depth),
             ("ROULETTE_START", world.roulette_start),
             ("NOTHING", u32::MAX),

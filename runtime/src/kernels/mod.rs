@@ -22,6 +22,7 @@ pub(crate) mod shells;
 pub(crate) mod stages;
 pub(crate) mod state;
 mod surface_point;
+pub(crate) mod tiles;
 pub(crate) mod validate;
 mod wavefront;
 

@@ -22,7 +22,7 @@ fn new_path(slot: u32, item: u32) {
 #if some_pixels
     let pixel = pixel_list[place % pixels];
 #else
-    let pixel = place % pixels;
+    let pixel = pixel_at(place % pixels);
 #endif
     let index = run.first_sample + sample;
     let ray = camera_ray(pixel, random_numbers(pixel, index, DRAW_CAMERA));
@@ -60,6 +60,19 @@ fn new_path(slot: u32, item: u32) {
     request_extension(ray.origin, ray.direction, NOTHING);
 #endif
 }
+#if !some_pixels
+
+// The pixel at a place in the order in which those of a sample are begun: tile by tile (tiles.rs).
+fn pixel_at(place: u32) -> u32 {
+    let top = place / (TILE_HEIGHT * WIDTH) * TILE_HEIGHT;
+    let height = select(min(TILE_HEIGHT, HEIGHT - top), TILE_HEIGHT, HEIGHT % TILE_HEIGHT == 0u);
+    let of_row = place - top * WIDTH;
+    let left = of_row / (TILE_WIDTH * height) * TILE_WIDTH;
+    let width = select(min(TILE_WIDTH, WIDTH - left), TILE_WIDTH, WIDTH % TILE_WIDTH == 0u);
+    let of_tile = of_row - left * height;
+    return (top + of_tile / width) * WIDTH + left + of_tile % width;
+}
+#endif
 #if requests
 
 // Keeps where the results of the path's ray casts will be.

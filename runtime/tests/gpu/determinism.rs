@@ -37,6 +37,36 @@ fn equal_seeds_give_equal_bits_in_pools_of_any_size() {
     }
 }
 
+/// Work is handed out by tiles, which pictures of most sizes are no whole number of.
+#[test]
+fn every_pixel_has_its_sample_in_pictures_of_any_size() {
+    for (width, height) in [
+        (1, 1),
+        (8, 4),
+        (16, 5),
+        (9, 8),
+        (7, 3),
+        (33, 31),
+        (1, 9),
+        (19, 1),
+    ] {
+        let room = Room {
+            max_depth: 1,
+            width,
+            height,
+            ..Room::default()
+        };
+        let rendering = render(
+            &room.world(),
+            &materials(&[Kind::Diffuse(0.5)]),
+            &samples(1),
+        );
+        // Every wall emits, and a pixel that was left out is black.
+        let seen = red(&rendering).filter(|value| *value >= 1.0).count();
+        assert_eq!(seen as u32, width * height, "{width} x {height}");
+    }
+}
+
 #[test]
 fn seeds_differ_in_every_pixel_and_are_uncorrelated() {
     let world = Room {
