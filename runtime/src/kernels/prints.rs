@@ -3,6 +3,7 @@
 use crate::fingerprint::{self, Fingerprint};
 use crate::kernels::camera::Words;
 use crate::kernels::modules::Composer;
+use crate::parallel;
 use crate::wgsl::BufferData;
 use crate::world::camera::wgsl as camera_rays;
 
@@ -62,11 +63,13 @@ impl Prints {
             "{:?} {:?} {:?} {:?} {:?}",
             layout.needs, parts.media.camera, parts.bounds, parts.unbound, composer.materials
         );
+        // Those of a large scene are the only ones that take time.
+        let buffers: Vec<&BufferData> = composer.scene_buffers().collect();
         Self {
             camera: camera_print(&composer.camera()),
             text: text.finish(),
             kernels: fingerprint::of(kernels.as_bytes()),
-            buffers: composer.scene_buffers().map(BufferPrint::of).collect(),
+            buffers: parallel::map(&buffers, |buffer| BufferPrint::of(buffer)),
         }
     }
 
