@@ -23,6 +23,7 @@ use crate::kernels::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
 use crate::kernels::parts;
 use crate::kernels::prints::Prints;
 use crate::kernels::random::{self, Demand};
+use crate::parallel;
 use crate::render::pool;
 use crate::render::report::MaterialReport;
 use crate::render::settings;
@@ -195,7 +196,7 @@ impl<'g> Renderer<'g> {
         let building = Building::of(composer.descs().len(), watch);
         // Buffers are no part of what compiling takes.
         let mut filling = Duration::ZERO;
-        let (kernels, work) = match device {
+        let (kernels, work, facts) = match device {
             DeviceRef::Gpu(gpu) => {
                 let begin = Instant::now();
                 let resources = pool::within_memory(sizes, &mut |sizes| {
@@ -206,27 +207,27 @@ impl<'g> Renderer<'g> {
                 let sizes = composer.sizes;
                 let build =
                     |kernel: &Kernel| building.next(|| build_step(gpu, kernel, &resources, sizes));
-                let (kernels, steps) = build_all(&composer, build)?;
+                let (built, facts) = with_facts(&composer, &options, build);
+                let (kernels, steps) = built?;
                 gpu.check()?;
-                (
-                    kernels,
-                    Work::Gpu(gpu::work::Work::new(gpu, resources, steps)),
-                )
+                let work = gpu::work::Work::new(gpu, resources, steps);
+                (kernels, Work::Gpu(work), facts)
             }
             DeviceRef::Cpu(cpu) => {
                 let casts = cpu::Casts::new(composer.parts);
                 let build =
                     |kernel: &Kernel| building.next(|| cpu.build(kernel, sizes, casts.as_ref()));
-                let (kernels, steps) = build_all(&composer, build)?;
+                let (built, facts) = with_facts(&composer, &options, build);
+                let (kernels, steps) = built?;
                 let work = cpu::Work::new(cpu, &composer, steps, casts, &options)?;
-                (kernels, Work::Cpu(work))
+                (kernels, Work::Cpu(work), facts)
             }
         };
         let wanted_pool = sizes.slots();
         let sizes = composer.sizes;
         let facts = ReportInputs {
             wanted_pool: (wanted_pool > sizes.slots()).then_some(wanted_pool),
-            ..ReportInputs::of(&composer, &options)
+            ..facts
         };
         warm_up(&work, &options, &building)?;
         Ok(Self {
@@ -445,13 +446,27 @@ fn warm_up(
     Ok(())
 }
 
+/// What [`build_all`] makes, and what is known of it, which is found out meanwhile: a large scene has much to take
+/// prints of.
+fn with_facts<S: Send>(
+    composer: &Composer<'_>,
+    options: &RenderOptions,
+    build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Sync,
+) -> (Result<Built<S>, RuntimeError>, ReportInputs) {
+    let facts = || ReportInputs::of(composer, options);
+    parallel::both(|| build_all(composer, build), facts)
+}
+
+/// Kernels, and their dispatches.
+type Built<S> = (Vec<Kernel>, Vec<S>);
+
 /// The kernels of a plan, and the dispatches that `build` makes of them, several at a time.
 pub(super) fn build_all<S: Send>(
     composer: &Composer<'_>,
     build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Sync,
-) -> Result<(Vec<Kernel>, Vec<S>), RuntimeError> {
+) -> Result<Built<S>, RuntimeError> {
     let kernels = composer.kernels();
-    let steps = crate::parallel::map(&kernels, build);
+    let steps = parallel::map(&kernels, build);
     let steps: Result<Vec<S>, RuntimeError> = steps.into_iter().collect();
     Ok((kernels, steps?))
 }

@@ -214,7 +214,7 @@ impl World {
 }
 
 /// Compiled materials, each the code of any number of instances.
-pub trait MaterialSource {
+pub trait MaterialSource: Sync {
     /// What the runtime must know of each material, in program order.
     fn infos(&self) -> Vec<MaterialInfo>;
     /// What it must know of each instance, in the order of the scene's bindings.
