@@ -8,7 +8,7 @@ use impasto_compiler::partition::{DeviceProfile, Prediction};
 use impasto_runtime::render::report::Report;
 
 use super::measured::Measured;
-use super::results::{Render, Scene};
+use super::results::{CHOSEN, Render, Scene};
 use crate::calibrate::{self, Scored};
 use crate::experiment::process::{Failed, capture};
 use crate::experiment::records::{Record, Records};
@@ -27,7 +27,7 @@ pub struct Bench<'a> {
     pub device: &'a [String],
     /// Small pictures, to try the way on any machine.
     pub quick: bool,
-    /// How long a scene should take with a pool: kernels and renders beyond that are left out.
+    /// How long a scene should take with a pool: kernels and most renders beyond that are left out.
     pub share: Duration,
     /// After how long a process is given up.
     pub limit: Duration,
@@ -143,9 +143,10 @@ impl Bench<'_> {
         let begun = Instant::now();
         let mut failed = Vec::new();
         let rounds = if self.quick { 1 } else { self.part.rounds };
-        for _ in 0..rounds {
+        for round in 0..rounds {
             for way in ways {
-                if failed.contains(&way.label) || begun.elapsed() > limit {
+                let is_due = begun.elapsed() <= limit || way.is_always_due(round);
+                if failed.contains(&way.label) || !is_due {
                     continue;
                 }
                 match self.render(case, way) {
@@ -207,6 +208,14 @@ pub fn render(
     Ok(report.map_err(|e| format!("the report is not as expected: {e}"))?)
 }
 
+impl Way {
+    /// Whether it is taken however short the time is: once, if it is one of the two without which nothing is known of
+    /// the plan beside the megakernel.
+    fn is_always_due(&self, round: u32) -> bool {
+        round == 0 && [CHOSEN, "mega"].contains(&self.label)
+    }
+}
+
 /// The ways to render a case whose chosen and best plans are known.
 fn ways(part: &Partition, case: &Case<'_>, auto: &str, best: &str) -> Vec<Way> {
     let strategy = |label: &'static str| Way {
@@ -217,7 +226,7 @@ fn ways(part: &Partition, case: &Case<'_>, auto: &str, best: &str) -> Vec<Way> {
         label,
         option: format!("--partition={text}"),
     };
-    let chosen = partition("auto's plan", auto);
+    let chosen = partition(CHOSEN, auto);
     let is_full = part.all_strategies.contains(&case.index);
     match part.renders {
         Renders::None => return Vec::new(),
@@ -284,7 +293,7 @@ impl Record {
         }
         if answer.auto != scored.auto {
             self.renders
-                .retain(|r| !["auto", "auto's plan"].contains(&r.label.as_str()));
+                .retain(|r| !["auto", CHOSEN].contains(&r.label.as_str()));
         }
         answer.auto.clone_from(&scored.auto);
         answer.profile.clone_from(&scored.profile);
@@ -393,6 +402,25 @@ mod tests {
         // Of the first scene all strategies are wanted.
         assert_eq!(labels(0, true, Renders::Some).len(), 9);
         assert_eq!(labels(0, false, Renders::Some), few);
+    }
+
+    #[test]
+    fn what_the_megakernel_is_compared_by_is_rendered_once_without_any_time() {
+        let (part, scene) = (fixture::part(), fixture::case());
+        let case = Case {
+            scene: &scene,
+            index: 0,
+            file: Path::new("x.toml"),
+            pool: 1,
+            is_first_pool: true,
+        };
+        let ways = ways(&part, &case, "own:a", "mixed:a,b");
+        let due = |round: u32| -> Vec<&str> {
+            let due = ways.iter().filter(|way| way.is_always_due(round));
+            due.map(|way| way.label).collect()
+        };
+        assert_eq!(due(0), ["auto's plan", "mega"]);
+        assert!(due(1).is_empty());
     }
 
     #[test]

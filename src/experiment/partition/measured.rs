@@ -6,7 +6,7 @@ use impasto_compiler::partition::Form;
 use impasto_runtime::lab::statistics::{median, rank_correlation};
 
 use super::plans::{Plan, Set, Times, every, kernel, members};
-use super::results::Scene;
+use super::results::{CHOSEN, Scene};
 
 /// Plans of up to so many materials are all added up.
 pub const EXHAUSTIVE: u32 = 6;
@@ -199,7 +199,7 @@ impl<'a> Measured<'a> {
 
     /// Time of whole renders in another way over time by the chosen plan.
     pub fn render_ratio(&self, label: &str) -> Option<f64> {
-        Some(self.rate("auto's plan")? / self.rate(label)?)
+        Some(self.rate(CHOSEN)? / self.rate(label)?)
     }
 
     /// Every kernel of a form, or of all. Inline materials have no kernel of their own: there it is the logic

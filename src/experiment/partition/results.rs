@@ -11,6 +11,9 @@ use super::Result;
 use crate::experiment::study;
 use crate::measure::Answer;
 
+/// The label of renders by the plan that was chosen, fixed from the start.
+pub const CHOSEN: &str = "auto's plan";
+
 /// A scene with a pool.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Scene {

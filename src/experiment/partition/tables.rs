@@ -7,6 +7,7 @@ use impasto_runtime::lab::statistics::median;
 use super::measured::{BASELINES, EXHAUSTIVE, Measured, correlation};
 use super::plots::paths;
 use super::regret::mega_regret;
+use super::results::CHOSEN;
 
 /// Scenes with so many materials say how long a large search takes.
 const MANY: u32 = 64;
@@ -227,15 +228,7 @@ pub fn differences(scenes: &[Measured]) -> String {
 /// Paths a second of whole renders.
 pub fn renders(scenes: &[Measured]) -> String {
     const WAYS: [&str; 9] = [
-        "auto's plan",
-        "best",
-        "auto",
-        "mega",
-        "own",
-        "paper",
-        "mixed",
-        "binned",
-        "inline",
+        CHOSEN, "best", "auto", "mega", "own", "paper", "mixed", "binned", "inline",
     ];
     let mut rows = String::new();
     for scene in scenes.iter().filter(|s| !s.scene.renders.is_empty()) {
