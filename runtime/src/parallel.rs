@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 /// naga parses nested expressions by recursion, which unoptimised builds need room for.
 const STACK_BYTES: usize = 32 << 20;
@@ -40,22 +40,6 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], function: impl Fn(&T) -> R + Sy
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(index, _)| *index);
     done.into_iter().map(|(_, result)| result).collect()
-}
-
-/// What two functions give, the second on another thread meanwhile; after the first where there is none.
-pub(crate) fn both<A, B: Send + Sync>(
-    first: impl FnOnce() -> A,
-    second: impl Fn() -> B + Sync,
-) -> (A, B) {
-    let other = OnceLock::new();
-    let first = std::thread::scope(|scope| {
-        let builder = std::thread::Builder::new();
-        let work = || drop(other.set(second()));
-        let spawned = builder.spawn_scoped(scope, work);
-        drop(spawned);
-        first()
-    });
-    (first, other.into_inner().unwrap_or_else(second))
 }
 
 /// Fills buffers on another thread while this one uses those that are full, in the order in which they were filled.
@@ -97,9 +81,7 @@ pub(crate) fn ahead<B: Send>(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
-    use super::{ahead, both};
+    use super::ahead;
 
     #[test]
     fn buffers_are_used_in_the_order_in_which_they_are_filled() {
@@ -120,17 +102,6 @@ mod tests {
                 assert!(next <= last.min(most) + count + 1, "{next}");
             }
         }
-    }
-
-    #[test]
-    fn each_of_both_is_done_once() {
-        let (begin, ready) = (AtomicUsize::new(0), std::sync::Barrier::new(2));
-        let count = || {
-            ready.wait();
-            begin.fetch_add(1, Ordering::Relaxed)
-        };
-        let (a, b) = both(count, count);
-        assert_eq!((a + b, begin.into_inner()), (1, 2));
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Fingerprints of what is rendered, piece by piece: what a picture is of, and which of it changed.
 
+use rayon::prelude::*;
+
 use crate::fingerprint::{self, Fingerprint};
 use crate::kernels::camera::Words;
 use crate::kernels::modules::Composer;
-use crate::parallel;
 use crate::wgsl::BufferData;
 use crate::world::camera::wgsl as camera_rays;
 
@@ -69,7 +70,7 @@ impl Prints {
             camera: camera_print(&composer.camera()),
             text: text.finish(),
             kernels: fingerprint::of(kernels.as_bytes()),
-            buffers: parallel::map(&buffers, |buffer| BufferPrint::of(buffer)),
+            buffers: buffers.into_par_iter().map(BufferPrint::of).collect(),
         }
     }
 

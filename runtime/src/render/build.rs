@@ -23,7 +23,6 @@ use crate::kernels::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
 use crate::kernels::parts;
 use crate::kernels::prints::Prints;
 use crate::kernels::random::{self, Demand};
-use crate::parallel;
 use crate::render::pool;
 use crate::render::report::MaterialReport;
 use crate::render::settings;
@@ -451,10 +450,10 @@ fn warm_up(
 fn with_facts<S: Send>(
     composer: &Composer<'_>,
     options: &RenderOptions,
-    build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Sync,
+    build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Send + Sync,
 ) -> (Result<Built<S>, RuntimeError>, ReportInputs) {
     let facts = || ReportInputs::of(composer, options);
-    parallel::both(|| build_all(composer, build), facts)
+    rayon::join(|| build_all(composer, build), facts)
 }
 
 /// Kernels, and their dispatches.
@@ -466,7 +465,7 @@ pub(super) fn build_all<S: Send>(
     build: impl Fn(&Kernel) -> Result<S, RuntimeError> + Sync,
 ) -> Result<Built<S>, RuntimeError> {
     let kernels = composer.kernels();
-    let steps = parallel::map(&kernels, build);
+    let steps = crate::parallel::map(&kernels, build);
     let steps: Result<Vec<S>, RuntimeError> = steps.into_iter().collect();
     Ok((kernels, steps?))
 }
