@@ -1,9 +1,8 @@
 //! The binary tree that every acceleration structure is made of. Whatever the boxes are, building it ends,
 //! in a time that grows little faster than their number, and its depth is bounded.
 //!
-//! Which of several triangles at one distance a ray hits depends on the tree, and so do pictures. The tree must
-//! stay what it is for ordinary scenes: that of obvhs with its `medium_build`, but for how many nodes are moved. A test
-//! compares it with that.
+//! Which of several triangles at one distance a ray hits depends on the tree, and so do pictures. So it depends on the boxes
+//! alone: not on the machine, nor on how many threads build it.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -78,23 +77,32 @@ mod tests {
     use crate::technique::Traversal;
     use crate::world::bvh::tree_over;
 
-    fn of_obvhs(boxes: &[Aabb]) -> Bvh2 {
+    /// The clusters that obvhs makes of boxes with its `medium_build`.
+    fn clusters_of_obvhs(boxes: &[Aabb]) -> Bvh2 {
         let params = BvhBuildParams::medium_build();
-        let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocBuilder::with_capacity(boxes.len()).build(
             params.ploc_search_distance,
             boxes,
             (0..boxes.len() as u32).collect(),
             params.sort_precision,
             params.search_depth_threshold,
-        );
-        ReinsertionOptimizer::default().run(&mut tree, reinsert::BATCH, None);
-        tree
+        )
+    }
+
+    /// The areas of all boxes of a tree but its leaves' and its root's.
+    fn inner_area(tree: &Bvh2) -> f64 {
+        let inner = tree.nodes.iter().skip(1).filter(|node| !node.is_leaf());
+        inner.map(|node| f64::from(node.aabb().half_area())).sum()
     }
 
     fn words(node: &Bvh2Node) -> ([u32; 6], u32, u32) {
         let [[a, b, c], [d, e, f]] =
             [node.aabb().min, node.aabb().max].map(|v| v.to_array().map(f32::to_bits));
         ([a, b, c, d, e, f], node.prim_count, node.first_index)
+    }
+
+    fn all_words(tree: &Bvh2) -> Vec<([u32; 6], u32, u32)> {
+        tree.nodes.iter().map(words).collect()
     }
 
     fn unit(random: &mut Random) -> f32 {
@@ -120,23 +128,40 @@ mod tests {
     }
 
     #[test]
-    fn ordinary_boxes_have_the_tree_of_obvhs() {
-        for (count, seed) in [
-            (1, 1),
-            (2, 2),
-            (3, 3),
-            (100, 4),
-            (5000, 5),
-            (30_000, 6),
-            (260_000, 7),
-        ] {
+    fn ordinary_boxes_have_the_clusters_of_obvhs() {
+        let counts = [1, 2, 3, 100, 5000, 30_000, 260_000];
+        for (count, seed) in counts.into_iter().zip(1..) {
             let boxes = ordinary(count, seed);
-            let (ours, theirs) = (binary_tree(&boxes), of_obvhs(&boxes));
-            let [ours_words, theirs_words] =
-                [&ours, &theirs].map(|tree| tree.nodes.iter().map(words).collect::<Vec<_>>());
-            assert!(ours_words == theirs_words, "{count} boxes");
-            assert_eq!(ours.primitive_indices, theirs.primitive_indices);
+            let trees = [cluster::tree(&boxes), clusters_of_obvhs(&boxes)];
+            let [ours, theirs] = trees.each_ref().map(all_words);
+            assert!(ours == theirs, "{count} boxes");
+            assert_eq!(trees[0].primitive_indices, trees[1].primitive_indices);
         }
+    }
+
+    /// obvhs' `medium_build` moves nodes as well; `slow_build` moves four times as many of the largest.
+    #[test]
+    fn boxes_of_ordinary_trees_are_smaller_than_those_of_obvhs() {
+        for (count, seed) in [(100, 4), (5000, 5), (30_000, 6), (260_000, 7)] {
+            let boxes = ordinary(count, seed);
+            let share = BvhBuildParams::slow_build().reinsertion_batch_ratio;
+            let mut theirs = clusters_of_obvhs(&boxes);
+            ReinsertionOptimizer::default().run(&mut theirs, share, None);
+            let [ours, theirs] = [binary_tree(&boxes), theirs].map(|tree| inner_area(&tree));
+            assert!(ours < theirs, "{count} boxes: {ours} and {theirs}");
+        }
+    }
+
+    #[test]
+    fn a_tree_does_not_depend_on_the_number_of_threads() {
+        let boxes = ordinary(30_000, 8);
+        let by = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = pool.build().expect("threads");
+            all_words(&pool.install(|| binary_tree(&boxes)))
+        };
+        let by_one = by(1);
+        assert!([2, 3, 8].into_iter().all(|threads| by(threads) == by_one));
     }
 
     /// Builds every layout over boxes: all of them are in it, once.
@@ -259,12 +284,16 @@ mod tests {
             let start = Instant::now();
             let (done, built) = mpsc::channel();
             // One that takes too long is left behind, and ends with the program.
-            std::thread::spawn(move || done.send(build(&boxes)));
-            let depth = built.recv_timeout(Duration::from_secs(20));
-            let depth = depth.unwrap_or_else(|why| panic!("{what}: {why}"));
+            std::thread::spawn(move || {
+                let clusters = depth(&cluster::tree(&boxes)).expect("every leaf is reached");
+                done.send([clusters, build(&boxes)])
+            });
+            let depths = built.recv_timeout(Duration::from_secs(20));
+            let [clusters, depth] = depths.unwrap_or_else(|why| panic!("{what}: {why}"));
             let time = start.elapsed();
-            eprintln!("{what}: {depth} deep, {time:.1?}");
-            assert!(depth <= 64, "{what}: {depth}");
+            eprintln!("{what}: {clusters} deep, {depth} once nodes were moved, {time:.1?}");
+            assert!(clusters <= 64, "{what}: {clusters}");
+            assert!(depth <= MAX_DEPTH, "{what}: {depth}");
         }
     }
 }
