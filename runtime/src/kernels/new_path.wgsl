@@ -63,6 +63,7 @@ fn new_path(slot: u32, item: u32) {
 #if !some_pixels
 
 // The pixel at a place in the order in which those of a sample are begun: tile by tile (tiles.rs).
+// Where the picture is a whole number of tiles, all divisors are constants: compilers divide by those by multiplying.
 fn pixel_at(place: u32) -> u32 {
     let top = place / (TILE_HEIGHT * WIDTH) * TILE_HEIGHT;
     let height = select(min(TILE_HEIGHT, HEIGHT - top), TILE_HEIGHT, HEIGHT % TILE_HEIGHT == 0u);

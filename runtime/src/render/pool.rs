@@ -7,7 +7,7 @@ use crate::error::RuntimeError;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
 use crate::options::{Progress, RenderOptions};
-use crate::technique::{RayKernels, Technique};
+use crate::technique::{CameraRays, RayKernels, Technique};
 use crate::world::World;
 
 /// Paths in flight by default, as in Laine et al. 2013. In a megakernel they are those of one
@@ -47,7 +47,8 @@ pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
 /// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: all rays are
-/// cast by one (docs/measurements.md, shadow and extension rays in one dispatch).
+/// cast by one (docs/measurements.md, shadow and extension rays in one dispatch), and those of the camera fill it up. With
+/// more, the camera's are cast at once (the same, "Rays of the camera cast at once, by tiles").
 const FEW_PATHS: u32 = 1 << 22;
 
 /// The technique that a device renders by, with what depends on the paths in flight.
@@ -60,12 +61,22 @@ pub(crate) fn technique(
     let default = || wavefront_pool(device, world, options);
     let asked = u64::from(options.pool.unwrap_or_else(default));
     let few = asked.min(paths(world, options)) <= u64::from(FEW_PATHS);
+    with_paths(technique, few)
+}
+
+/// A technique for few paths in flight, or for many.
+fn with_paths(technique: Technique, few: bool) -> Technique {
     let ray_kernels = match technique.ray_kernels {
         RayKernels::Auto if few => RayKernels::One,
         other => other,
     };
+    let camera_rays = match technique.camera_rays {
+        CameraRays::Auto if !few => CameraRays::AtOnce,
+        other => other,
+    };
     Technique {
         ray_kernels,
+        camera_rays,
         ..technique
     }
 }
@@ -305,6 +316,21 @@ mod tests {
         assert_eq!(large_pool(paths, false), LARGEST_POOL);
         assert_eq!(large_pool(paths - 1, false), LARGE_POOL);
         assert_eq!(large_pool(u64::MAX, true), LARGE_POOL);
+    }
+
+    #[test]
+    fn how_many_paths_are_in_flight_decides_where_rays_are_cast() {
+        let [few, many] = [true, false].map(|few| with_paths(Technique::default(), few));
+        assert_eq!(few.ray_kernels, RayKernels::One);
+        assert_eq!(few.camera_rays, CameraRays::Auto);
+        assert_eq!(many.ray_kernels, RayKernels::Auto);
+        assert_eq!(many.camera_rays, CameraRays::AtOnce);
+        let asked = Technique {
+            ray_kernels: RayKernels::Each,
+            camera_rays: CameraRays::Queue,
+            ..Technique::default()
+        };
+        assert_eq!([true, false].map(|few| with_paths(asked, few)), [asked; 2]);
     }
 
     /// A budget that just suffices on average ends the threads that have short items.

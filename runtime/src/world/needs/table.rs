@@ -98,8 +98,8 @@ macro_rules! rows {
 use Forcing::{Never, Unless, Whole, WholeUnless};
 use Need::*;
 
-/// With more, threads whose ray is cast wait too long for those beside them (docs/measurements.md, camera rays at
-/// once).
+/// With more, and few paths in flight, threads whose ray is cast wait too long for those beside them (docs/measurements.md,
+/// "Rays of the camera cast at once").
 const FEW_TRIANGLES: usize = 1 << 15;
 
 const ASKED: Forcing = Never("it is a technique that is asked for");
@@ -358,11 +358,11 @@ rows! {
         };
     // So do rays of the camera; and what is lost on their way, the logic stage has to tell.
     CameraCasts, "rays of the camera cast at once", "camera_casts",
-        "there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
+        "many paths are in flight, there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
         on &[], draws "", ASKED, |f, n| {
             let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
             let reason = match f.camera_rays {
-                CameraRays::AtOnce => Some("`--camera-rays at-once` asks for it".into()),
+                CameraRays::AtOnce => Some("`--camera-rays at-once` asks for it, or many paths are in flight".into()),
                 CameraRays::Auto => (f.triangles <= FEW_TRIANGLES).then(|| {
                     format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles)
                 }),
