@@ -177,6 +177,8 @@ choices! {
         Auto = "auto",
         /// By the kernel that begins a path, and a path that hits nothing ends there
         AtOnce = "at-once",
+        /// The same, and what they hit goes straight to its material, in the same iteration
+        Straight = "straight",
         /// With those of later segments
         Queue = "queue",
     }

@@ -249,6 +249,15 @@ pairs! {
             technique: Technique { camera_rays: CameraRays::AtOnce, ..queued() },
             ..Text::default()
         };
+    "hits of the camera's rays decided at once", also &[], "kernels +prepare_paths; functions +put_down",
+        Text {
+            technique: Technique { camera_rays: CameraRays::AtOnce, ..queued() },
+            ..Text::default()
+        }
+        => Text {
+            technique: Technique { camera_rays: CameraRays::Straight, ..queued() },
+            ..Text::default()
+        };
     "last rays towards lights only", also &[], "functions +is_last +may_meet_light",
         Text::default()
         => Text {

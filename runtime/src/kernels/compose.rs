@@ -44,8 +44,8 @@ impl Composer<'_> {
         let (stages, members) = (&desc.stages, &desc.members);
         let storage = if !self.layout.wavefront {
             Storage::Registers
-        } else if desc.moves {
-            Storage::Moving(self.technique.state)
+        } else if desc.holds {
+            Storage::Held(self.technique.state)
         } else {
             Storage::Memory(self.technique.state)
         };

@@ -94,7 +94,9 @@ impl PlanLayout {
         } else {
             RayKernels::Each
         };
-        let camera_rays = if self.needs.has(Need::CameraCasts) {
+        let camera_rays = if self.needs.has(Need::CameraDecides) {
+            CameraRays::Straight
+        } else if self.needs.has(Need::CameraCasts) {
             CameraRays::AtOnce
         } else {
             CameraRays::Queue

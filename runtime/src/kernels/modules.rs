@@ -100,8 +100,8 @@ pub(crate) struct KernelDesc {
     pub members: Vec<usize>,
     /// How many threads it gets.
     pub source: DispatchSource,
-    /// Whether paths move to other slots in it.
-    pub moves: bool,
+    /// Whether it holds the state of its paths until it is known where they go.
+    pub holds: bool,
     /// WGSL of its requests and entry point.
     pub shell: String,
 }
@@ -121,14 +121,15 @@ impl KernelDesc {
             stages,
             members: Vec::new(),
             source,
-            moves: false,
+            holds: false,
             shell,
         }
     }
 
-    /// Whether it decides how each path goes on.
+    /// Whether it decides how each path goes on, and not only how new ones do.
     pub(crate) fn decides(&self) -> bool {
-        self.stages.iter().any(|stage| stage.decides())
+        let is_of_all = !matches!(self.source, DispatchSource::Queue(_));
+        is_of_all && self.stages.iter().any(|stage| stage.decides())
     }
 }
 

@@ -59,6 +59,11 @@ fn main(
         put_down(slot);
     }
 #endif
+#if begins
+    if in_range {
+        put_down(slot);
+    }
+#endif
 #if pushes
     push_requests(lane, slot);
 #endif

@@ -36,6 +36,8 @@ pub(crate) struct Shell {
     pub pushes: Pushes,
     /// Whether paths move to other slots in it.
     pub moves: bool,
+    /// Whether paths begin in it, whose states are written at the end.
+    pub begins: bool,
     /// Whether it traces rays.
     pub traverses: bool,
     /// Whether it counts hits of each material.
@@ -81,6 +83,8 @@ pub(crate) struct EntryPoint {
     pub pushes: bool,
     /// Whether paths move to other slots before that.
     pub moves: bool,
+    /// Whether paths begin, and are put down at the end.
+    pub begins: bool,
     /// WGSL of the places of rays that paths keep, if they do.
     pub keeps: Option<String>,
     /// Whether it counts hits of each material.
@@ -108,6 +112,7 @@ impl EntryPoint {
             ("slots", self.slots),
             ("pushes", self.pushes),
             ("moves", self.moves),
+            ("begins", self.begins),
             ("keeps", self.keeps.is_some()),
             ("counts_hits", self.counts_hits),
             ("subgroups", self.subgroups),
@@ -194,6 +199,7 @@ impl Composer<'_> {
             slots: !(shell.traverses && requests),
             pushes,
             moves: shell.moves,
+            begins: shell.begins,
             keeps: (requests && shell.pushes.has_rays()).then(|| self.ray_places()),
             counts_hits: shell.counts_hits,
             subgroups: pushes && self.technique.append == Append::Subgroup,

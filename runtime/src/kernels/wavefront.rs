@@ -13,16 +13,41 @@ use crate::technique::RayFetch;
 use crate::world::bvh;
 use crate::world::needs::Need;
 
+/// What a kernel does with the hits that a stage finds in it.
+#[derive(Default)]
+struct Found {
+    /// The stage, and that of materials if any are evaluated.
+    stages: Vec<&'static Stage>,
+    /// The materials that are.
+    members: Vec<usize>,
+    /// How, if any are.
+    form: Option<Form>,
+    /// Whether hits are counted.
+    counts: bool,
+    /// WGSL after the stage's call.
+    run: String,
+}
+
 impl Composer<'_> {
     /// The stages of each phase, after a kernel that prepares the queues they consume. Kernels between
     /// two prepare kernels may run in any order, but where a row of the table says `before`.
     pub(crate) fn wavefront(&self) -> Vec<KernelDesc> {
         let mut kernels = Vec::new();
         for (phase, prepare) in Phase::ALL {
-            let stages: Vec<_> = self.stages().filter(|s| s.phase == phase).collect();
-            let consumed = self.layout.queues.of_phase(phase);
+            let mut stages: Vec<_> = self.stages().filter(|s| s.phase == phase).collect();
+            let mut consumed = self.layout.queues.of_phase(phase);
+            let begins = |s: &&Stage| matches!(s.work, Work::Begin { .. });
+            if self.layout.needs.has(Need::CameraDecides)
+                && let Some(at) = stages.iter().position(|s| begins(&s))
+            {
+                // What these ask for is worked on in the same phase.
+                let stage = stages.remove(at);
+                let own = self.layout.queues.of(stage.name);
+                consumed.start = own.end;
+                kernels.push(self.prepare("prepare_paths", own, true));
+                kernels.push(self.beginning(stage));
+            }
             if !consumed.is_empty() {
-                let begins = |s: &&Stage| matches!(s.work, Work::Begin { .. });
                 let hands_out = stages.iter().any(begins);
                 kernels.push(self.prepare(prepare, consumed, hands_out));
             }
@@ -47,41 +72,87 @@ impl Composer<'_> {
         }
     }
 
-    /// The kernel of a stage that works on all slots, which also evaluates the materials that have no queue
-    /// if it is the one that finds them.
+    /// The kernel of a stage that works on all slots.
     fn over_pool(&self, stage: &'static Stage) -> KernelDesc {
-        let mut stages = vec![stage];
+        let found = self.found_by(stage);
+        let run = format!("{};{}", stage.call("slot", "item", ""), found.run);
+        let pushes = self.pushes(&found.stages, &found.members);
+        let holds = pushes.sorts && self.layout.moves_paths(self.technique);
+        let shell = self.shell(&Shell {
+            run,
+            pushes,
+            moves: holds,
+            counts_hits: found.counts,
+            ..Shell::default()
+        });
+        KernelDesc {
+            form: found.form,
+            members: found.members,
+            holds,
+            ..KernelDesc::plain(stage.name, found.stages, DispatchSource::Pool, shell)
+        }
+    }
+
+    /// The kernel that begins paths and casts their rays, and decides at once how those go on that hit something. A slot
+    /// whose path ends there begins another in the next iteration.
+    fn beginning(&self, stage: &'static Stage) -> KernelDesc {
+        let decides = self.stages().filter(|s| s.decides());
         let mut run = format!("{};", stage.call("slot", "item", ""));
-        let found = self.stages().find(|s| {
+        let mut found = Found::default();
+        for decides in decides {
+            found = self.found_by(decides);
+            run += &format!(
+                " if (load_radiance(slot).flags & PATH_LIVE) != 0u {{ {}; }} \
+                 if wanted_work == QUEUE_NEW_PATH {{ wanted_work = NOTHING; \
+                 store_radiance(slot, PathRadiance(vec3<f32>(0.0), 0u)); }}{}",
+                decides.call("slot", "item", ""),
+                found.run
+            );
+        }
+        found.stages.insert(0, stage);
+        let queue = self.layout.queues.of(stage.name).start;
+        let shell = self.shell(&Shell {
+            run,
+            consumes: Some(Consumed::unordered(queue)),
+            pushes: self.pushes(&found.stages, &found.members),
+            begins: true,
+            traverses: true,
+            counts_hits: found.counts,
+            ..Shell::default()
+        });
+        let source = DispatchSource::Queue(queue);
+        KernelDesc {
+            form: found.form,
+            members: found.members,
+            holds: true,
+            ..KernelDesc::plain(stage.name, found.stages, source, shell)
+        }
+    }
+
+    /// What a kernel does with the hits that a stage finds in it: it evaluates the materials that have no queue.
+    fn found_by(&self, stage: &'static Stage) -> Found {
+        let evaluates = self.stages().find(|s| {
             let is_material = matches!(s.work, Work::Material { .. });
             is_material && s.work.from().contains(&stage.name)
         });
         let inline = self.plan.kernels.iter();
-        let inline = inline.filter(|k| k.form == Form::Inline && found.is_some());
+        let inline = inline.filter(|k| k.form == Form::Inline && evaluates.is_some());
         let inline: Vec<&PlanKernel> = inline.collect();
-        let members: Vec<usize> = inline.iter().flat_map(|k| k.materials.clone()).collect();
-        if let Some(material) = found.filter(|_| !members.is_empty()) {
-            stages.push(material);
-            run += &format!(
+        let mut found = Found {
+            stages: vec![stage],
+            members: inline.iter().flat_map(|k| k.materials.clone()).collect(),
+            form: inline.first().map(|kernel| kernel.form),
+            counts: evaluates.is_some() && self.layout.counters.hits > 0,
+            run: String::new(),
+        };
+        if let Some(material) = evaluates.filter(|_| !found.members.is_empty()) {
+            found.stages.push(material);
+            found.run = format!(
                 " if wanted_instance != NOTHING && wanted_work == NOTHING {{ {}; }}",
                 material.call("slot", "item", "wanted_instance")
             );
         }
-        let pushes = self.pushes(&stages, &members);
-        let moves = pushes.sorts && self.layout.moves_paths(self.technique);
-        let shell = self.shell(&Shell {
-            run,
-            pushes,
-            moves,
-            counts_hits: found.is_some() && self.layout.counters.hits > 0,
-            ..Shell::default()
-        });
-        KernelDesc {
-            form: inline.first().map(|kernel| kernel.form),
-            members,
-            moves,
-            ..KernelDesc::plain(stage.name, stages, DispatchSource::Pool, shell)
-        }
+        found
     }
 
     /// The kernels that evaluate the materials of queues.

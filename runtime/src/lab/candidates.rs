@@ -103,9 +103,11 @@ impl Lab<'_> {
         let Some(subject) = subject else {
             return Err("the plan has no such kernel".into());
         };
-        // The logic kernel, and those until the one that counts what it has queued.
+        // The kernels that queue its hits, and those until the one that counts them.
+        let prepared = descs[..subject]
+            .iter()
+            .rposition(|desc| desc.role == PREPARE);
         let subject = descs.swap_remove(subject);
-        let prepared = descs.iter().position(|desc| desc.role == PREPARE);
         descs.truncate(prepared.map_or(0, |at| at + 1));
         descs.push(subject);
         Ok(self.composed(&composer, descs, composer.queue_table()))

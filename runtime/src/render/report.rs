@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use impasto_compiler::abi::{InstanceInfo, MaterialInfo};
-use impasto_compiler::partition::{Organisation, Plan, Workload, text};
+use impasto_compiler::partition::{Form, Organisation, Plan, Workload, text};
 use serde::{Deserialize, Serialize};
 
 use crate::film::file::{Maker, Range};
@@ -588,7 +588,9 @@ impl Ran<'_> {
     }
 }
 
-/// The rows of the samples that a kernel drops at materials: it alone evaluates those.
+/// The rows of the samples that a kernel drops at materials. It alone evaluates those; of two that evaluate them inline, it
+/// is the one that decides how each path goes on.
 fn rows(desc: &KernelDesc) -> impl Iterator<Item = usize> {
-    desc.members.iter().copied()
+    let is_first = desc.form != Some(Form::Inline) || desc.decides();
+    desc.members.iter().copied().filter(move |_| is_first)
 }

@@ -123,6 +123,34 @@ fn rays_of_the_camera_may_be_cast_at_once() {
     }
 }
 
+/// A path takes an iteration less. Its state is written once, whichever way it is laid out.
+#[test]
+fn what_the_camera_sees_goes_straight_to_its_material() {
+    let run = |change: fn(&mut Technique)| {
+        let mut technique = Technique::default();
+        change(&mut technique);
+        let options = RenderOptions {
+            pool: Some(300),
+            technique,
+            ..samples(32)
+        };
+        let surfaces = surfaces();
+        let own = plan(Strategy::OWN, &surfaces);
+        render_plan(&room().world(), &surfaces, &own, &options)
+    };
+    let at_once = run(|t| t.camera_rays = CameraRays::AtOnce);
+    for straight in [
+        run(|t| t.camera_rays = CameraRays::Straight),
+        run(|t| (t.camera_rays, t.state) = (CameraRays::Straight, StateLayout::Pairs)),
+        run(|t| (t.camera_rays, t.state) = (CameraRays::Straight, StateLayout::Structures)),
+        run(|t| (t.camera_rays, t.slot_order) = (CameraRays::Straight, SlotOrder::Work)),
+    ] {
+        assert_eq!(straight.film, at_once.film);
+        let iterations = [&straight, &at_once].map(|rendering| rendering.report.iterations);
+        assert!(iterations[0] < iterations[1], "{iterations:?}");
+    }
+}
+
 /// Rays that are not the path's own are cast with the others, and one that ends there is counted once.
 #[test]
 fn rays_of_the_camera_are_cast_at_once_where_nothing_else_is_asked_of_them() {

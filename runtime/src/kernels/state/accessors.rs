@@ -16,9 +16,9 @@ pub(crate) enum Storage {
     Memory(StateLayout),
     /// Private variables; a slot is ignored.
     Registers,
-    /// The buffer, of which a path's words are held in private variables from `take_up` until `put_down`, which may be
-    /// at another slot.
-    Moving(StateLayout),
+    /// The buffer, of which a path's words are held in private variables from `take_up`, or from when it begins, until
+    /// `put_down`, which may be at another slot.
+    Held(StateLayout),
 }
 
 /// Structures and accessors for the uses of fields that `stages` access; nothing else is declared, so
@@ -30,10 +30,10 @@ pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> St
         let holds = match storage {
             Storage::Memory(_) => false,
             Storage::Registers => true,
-            Storage::Moving(_) => moves(field, needs, stages),
+            Storage::Held(_) => moves(field, needs, stages),
         };
         let place = match storage {
-            Storage::Memory(layout) | Storage::Moving(layout) if !holds => {
+            Storage::Memory(layout) | Storage::Held(layout) if !holds => {
                 place(region, count, layout)
             }
             _ => held(field),
@@ -58,7 +58,7 @@ pub(crate) fn accessors(needs: Needs, stages: &[&Stage], storage: Storage) -> St
         }
         out += &accessed;
     }
-    if let Storage::Moving(layout) = storage {
+    if let Storage::Held(layout) = storage {
         out += &moving(needs, stages, layout);
     }
     out
@@ -84,6 +84,8 @@ fn is_awaited(u: &Use, needs: Needs, stages: &[&Stage]) -> bool {
 /// threads of a workgroup must have taken up their paths before one puts its own down.
 fn moving(needs: Needs, stages: &[&Stage], layout: StateLayout) -> String {
     let count = fields(needs).count();
+    // Of a path that began and is over, that is all there is to know.
+    let begins = stages.iter().any(|s| matches!(s.work, Work::Begin { .. }));
     let (mut take, mut put) = (String::new(), String::new());
     let moved = fields(needs).enumerate();
     for (region, field) in moved.filter(|(_, field)| moves(field, needs, stages)) {
@@ -99,7 +101,12 @@ fn moving(needs: Needs, stages: &[&Stage], layout: StateLayout) -> String {
         if field.uses(needs).any(is_loaded) {
             take += &line(&held, &place);
         }
-        put += &line(&place, &held);
+        if begins && field.uses(needs).any(|u| u.name == "radiance") {
+            let is_over = "(load_radiance(slot).flags & PATH_LIVE) == 0u";
+            put = format!("    {place} = {held};\n    if {is_over} {{ return; }}\n{put}");
+        } else {
+            put += &line(&place, &held);
+        }
     }
     format!("fn take_up(slot: u32) {{\n{take}}}\n\nfn put_down(slot: u32) {{\n{put}}}\n")
 }

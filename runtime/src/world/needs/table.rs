@@ -363,12 +363,19 @@ rows! {
             let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
             let reason = match f.camera_rays {
                 CameraRays::AtOnce => Some("`--camera-rays at-once` asks for it, or many paths are in flight".into()),
+                CameraRays::Straight => Some("`--camera-rays straight` asks for it".into()),
                 CameraRays::Auto => (f.triangles <= FEW_TRIANGLES).then(|| {
                     format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles)
                 }),
                 CameraRays::Queue => None,
             };
             reason.filter(|_| possible)
+        };
+    CameraDecides, "hits of the camera's rays decided at once", "camera_decides",
+        "`--camera-rays straight` asks for it, and rays of the camera are cast at once",
+        on &[CameraCasts], draws "", ASKED, |f, n| {
+            let asked = n.has(CameraCasts) && f.camera_rays == CameraRays::Straight;
+            asked.then(|| "`--camera-rays straight` asks for it".into())
         };
     // Light that is turned on its way may still meet some, and what varies is in no table of lights.
     LastRays, "last rays towards lights only", "last_rays",
@@ -405,5 +412,11 @@ pub(crate) const OF_MATERIALS: Needs = Needs::of_rows(&[
 ]);
 
 /// The rows of a wavefront, that a megakernel has never.
-pub(crate) const OF_WAVEFRONTS: Needs =
-    Needs::of_rows(&[Order, Requests, JointCasts, CameraCasts, LastRays]);
+pub(crate) const OF_WAVEFRONTS: Needs = Needs::of_rows(&[
+    Order,
+    Requests,
+    JointCasts,
+    CameraCasts,
+    CameraDecides,
+    LastRays,
+]);
