@@ -36,9 +36,9 @@ impl Composer<'_> {
         for (phase, prepare) in Phase::ALL {
             let mut stages: Vec<_> = self.stages().filter(|s| s.phase == phase).collect();
             let mut consumed = self.layout.queues.of_phase(phase);
-            let begins = |s: &&Stage| matches!(s.work, Work::Begin { .. });
+            let begins = |s: &Stage| matches!(s.work, Work::Begin { .. });
             if self.layout.needs.has(Need::CameraDecides)
-                && let Some(at) = stages.iter().position(|s| begins(&s))
+                && let Some(at) = stages.iter().position(|s| begins(s))
             {
                 // What these ask for is worked on in the same phase.
                 let stage = stages.remove(at);
@@ -48,7 +48,7 @@ impl Composer<'_> {
                 kernels.push(self.beginning(stage));
             }
             if !consumed.is_empty() {
-                let hands_out = stages.iter().any(begins);
+                let hands_out = stages.iter().any(|s| begins(s));
                 kernels.push(self.prepare(prepare, consumed, hands_out));
             }
             let joint = self.layout.needs.has(Need::JointCasts);
@@ -96,21 +96,20 @@ impl Composer<'_> {
     /// The kernel that begins paths and casts their rays, and decides at once how those go on that hit something. A slot
     /// whose path ends there begins another in the next iteration.
     fn beginning(&self, stage: &'static Stage) -> KernelDesc {
-        let decides = self.stages().filter(|s| s.decides());
-        let mut run = format!("{};", stage.call("slot", "item", ""));
-        let mut found = Found::default();
-        for decides in decides {
-            found = self.found_by(decides);
-            run += &format!(
-                " if (load_radiance(slot).flags & PATH_LIVE) != 0u {{ {}; }} \
-                 if wanted_work == QUEUE_NEW_PATH {{ wanted_work = NOTHING; \
-                 store_radiance(slot, PathRadiance(vec3<f32>(0.0), 0u)); }}{}",
-                decides.call("slot", "item", ""),
-                found.run
-            );
-        }
-        found.stages.insert(0, stage);
         let queue = self.layout.queues.of(stage.name).start;
+        let Some(decides) = self.stages().find(|s| s.decides()) else {
+            return self.over_queue(stage, queue);
+        };
+        let mut found = self.found_by(decides);
+        let run = format!(
+            "{}; if (load_radiance(slot).flags & PATH_LIVE) != 0u {{ {}; }} \
+             if wanted_work == QUEUE_NEW_PATH {{ wanted_work = NOTHING; \
+             store_radiance(slot, PathRadiance(vec3<f32>(0.0), 0u)); }}{}",
+            stage.call("slot", "item", ""),
+            decides.call("slot", "item", ""),
+            found.run
+        );
+        found.stages.insert(0, stage);
         let shell = self.shell(&Shell {
             run,
             consumes: Some(Consumed::unordered(queue)),

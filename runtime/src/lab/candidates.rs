@@ -14,6 +14,7 @@ use crate::gpu::schedule::{Schedule, Step};
 use crate::gpu::{Gpu, KernelStatistics};
 use crate::kernels::modules::{Composer, DispatchSource, Kernel, KernelDesc, PREPARE, Sizes};
 use crate::render::build_step;
+use crate::world::needs::Need;
 
 /// Kernels built so far, by their text; or why they could not be.
 pub(super) type Cache = BTreeMap<String, Result<Step, Unmeasured>>;
@@ -93,6 +94,9 @@ impl Lab<'_> {
         let composer = self.composer(&plan, !inline);
         let composer = composer.map_err(|error| error.to_string())?;
         let mut descs = composer.descs();
+        if inline && composer.layout.needs.has(Need::CameraDecides) {
+            return Err("it would be a part of two kernels: `--camera-rays straight`".into());
+        }
         if inline {
             descs.truncate(1);
             return Ok(self.composed(&composer, descs, Vec::new()));
