@@ -167,7 +167,7 @@ fn whatever_takes_over_renders_the_same_picture() {
 /// is reported is what was done.
 #[test]
 fn plans_that_are_tried_render_the_same_picture() {
-    let options = options(600);
+    let options = options(1500);
     let whole = render(&mut renderer(&options));
     let plans = || {
         vec![
@@ -232,7 +232,7 @@ fn plans_that_are_tried_render_the_same_picture() {
 /// Inline materials have no queues: what they were tried for comes to the same picture, too.
 #[test]
 fn inline_materials_may_be_tried() {
-    let options = options(600);
+    let options = options(1500);
     let whole = render(&mut renderer(&options));
     let inline = || custom(&[(Form::Inline, &[0, 1, 2, 3])]);
     let partly = || custom(&[(Form::Inline, &[0, 2]), (Form::Binned, &[1, 3])]);
