@@ -14,7 +14,6 @@ use crate::world::bvh;
 use crate::world::needs::Need;
 
 /// What a kernel does with the hits that a stage finds in it.
-#[derive(Default)]
 struct Found {
     /// The stage, and that of materials if any are evaluated.
     stages: Vec<&'static Stage>,
@@ -36,19 +35,22 @@ impl Composer<'_> {
         for (phase, prepare) in Phase::ALL {
             let mut stages: Vec<_> = self.stages().filter(|s| s.phase == phase).collect();
             let mut consumed = self.layout.queues.of_phase(phase);
-            let begins = |s: &Stage| matches!(s.work, Work::Begin { .. });
+            let begins = stages
+                .iter()
+                .position(|s| matches!(s.work, Work::Begin { .. }));
+            let mut hands_out = begins.is_some();
             if self.layout.needs.has(Need::CameraDecides)
-                && let Some(at) = stages.iter().position(|s| begins(s))
+                && let Some(at) = begins
             {
                 // What these ask for is worked on in the same phase.
                 let stage = stages.remove(at);
                 let own = self.layout.queues.of(stage.name);
                 consumed.start = own.end;
-                kernels.push(self.prepare("prepare_paths", own, true));
+                kernels.push(self.prepare("prepare_paths", own, hands_out));
                 kernels.push(self.beginning(stage));
+                hands_out = false;
             }
             if !consumed.is_empty() {
-                let hands_out = stages.iter().any(|s| begins(s));
                 kernels.push(self.prepare(prepare, consumed, hands_out));
             }
             let joint = self.layout.needs.has(Need::JointCasts);

@@ -93,10 +93,10 @@ impl Lab<'_> {
         let inline = candidate.form == Form::Inline;
         let composer = self.composer(&plan, !inline);
         let composer = composer.map_err(|error| error.to_string())?;
-        let mut descs = composer.descs();
         if inline && composer.layout.needs.has(Need::CameraDecides) {
             return Err("it would be a part of two kernels: `--camera-rays straight`".into());
         }
+        let mut descs = composer.descs();
         if inline {
             descs.truncate(1);
             return Ok(self.composed(&composer, descs, Vec::new()));

@@ -23,12 +23,16 @@ fn run_in(room: &Room, strategy: Strategy, technique: Technique) -> Rendering {
         technique,
         ..samples(8)
     };
+    run_with(room, strategy, &options)
+}
+
+fn run_with(room: &Room, strategy: Strategy, options: &RenderOptions) -> Rendering {
     let surfaces = surfaces();
     render_plan(
         &room.world(),
         &surfaces,
         &plan(strategy, &surfaces),
-        &options,
+        options,
     )
 }
 
@@ -134,9 +138,7 @@ fn what_the_camera_sees_goes_straight_to_its_material() {
             technique,
             ..samples(32)
         };
-        let surfaces = surfaces();
-        let own = plan(Strategy::OWN, &surfaces);
-        render_plan(&room().world(), &surfaces, &own, &options)
+        run_with(&room(), Strategy::OWN, &options)
     };
     let at_once = run(|t| t.camera_rays = CameraRays::AtOnce);
     for straight in [

@@ -358,7 +358,7 @@ rows! {
         };
     // So do rays of the camera; and what is lost on their way, the logic stage has to tell.
     CameraCasts, "rays of the camera cast at once", "camera_casts",
-        "many paths are in flight, there are few triangles or `--camera-rays at-once` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
+        "many paths are in flight, there are few triangles or `--camera-rays at-once` or `straight` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
         on &[], draws "", ASKED, |f, n| {
             let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
             let reason = match f.camera_rays {
