@@ -173,7 +173,7 @@ choices! {
 
     /// Where rays of the camera are cast.
     CameraRays {
-        /// As in `at-once` where many paths are in flight or a scene has few triangles, else as in `queue`
+        /// As in `straight`, on the processor as in `at-once`
         Auto = "auto",
         /// By the kernel that begins a path, and a path that hits nothing ends there
         AtOnce = "at-once",

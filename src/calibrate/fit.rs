@@ -305,6 +305,7 @@ pub(super) mod tests {
                 workload: Workload {
                     pool,
                     materials: (0..5).map(hits).collect(),
+                    begun: 0.0,
                     logic_seconds: 1e-4,
                     other_seconds: 1e-3,
                     in_order: false,

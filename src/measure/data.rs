@@ -214,6 +214,7 @@ mod tests {
                     loads: 1.0,
                     stores: 2.0,
                 }],
+                begun: 0.0,
                 logic_seconds: 0.1,
                 other_seconds: 0.2,
                 in_order: false,

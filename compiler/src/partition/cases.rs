@@ -101,6 +101,7 @@ impl Case {
         let workload = Workload {
             pool: 1 << 20,
             materials,
+            begun: 0.0,
             logic_seconds: 8e-5,
             other_seconds: 0.0,
             in_order: false,

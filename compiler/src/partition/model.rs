@@ -195,11 +195,12 @@ impl Calibrated<'_> {
     ) -> Vec<Member<'a>> {
         let mut members: Vec<Member<'_>> = members.collect();
         if form.diverges() {
-            // Inline materials are met by the subgroups of the logic kernel, which has work for all slots.
+            // Inline materials are met by the subgroups of the logic kernel, which has work for all slots, and of
+            // the kernel that begins paths if it decides about them.
             let all = if form.has_queue() {
                 members.iter().map(|m| m.hits.share).sum()
             } else {
-                1.0
+                1.0 + self.workload.begun
             };
             for member in &mut members {
                 self.put_beside(member, all);
@@ -403,6 +404,7 @@ mod tests {
         Workload {
             pool: POOL,
             materials: vec![hits("a"), hits("b")],
+            begun: 0.0,
             logic_seconds: 1e-4,
             other_seconds: 0.0,
             in_order: false,

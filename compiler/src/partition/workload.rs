@@ -16,10 +16,13 @@ pub struct Workload {
     pub pool: u32,
     /// Of each material of the program, in its order.
     pub materials: Vec<Hits>,
-    /// Seconds that the logic stage takes when it evaluates no material; 0 if not measured.
+    /// Paths that begin in an iteration over slots, if the kernel that begins them decides how they go on; else 0.
+    #[serde(default)]
+    pub begun: f64,
+    /// Seconds of the kernels that decide how paths go on, if they evaluate no material; 0 if not measured.
     pub logic_seconds: f64,
-    /// Seconds that everything else takes but material kernels: new paths, rays, what lies between
-    /// kernels; 0 if not measured.
+    /// Seconds that everything else takes but material kernels: rays, what lies between kernels, and new paths
+    /// if others decide about these; 0 if not measured.
     pub other_seconds: f64,
     /// Whether paths lie in the order of their queues, so that what a queue's kernel reads is dense however few slots
     /// hit its materials.
@@ -49,12 +52,28 @@ impl Hits {
     /// How many independent draws a block of slots amounts to: 32 where neighbours hit whatever they hit
     /// independently, 1 where all hit the same. `present` = 1 - (1 - `share`)^draws.
     pub fn draws(&self) -> f64 {
-        let most = f64::from(BLOCK);
-        if self.share <= 0.0 || self.share >= 1.0 || self.present >= 1.0 {
-            return if self.share >= 1.0 { 1.0 } else { most };
-        }
-        ((1.0 - self.present).ln() / (1.0 - self.share).ln()).clamp(1.0, most)
+        draws(self.share, self.present)
     }
+
+    /// Takes in what was counted in an iteration: hits over slots, and the share of blocks with any of the threads that
+    /// look for hits, which are [`begun`](Workload::begun) for a slot more than slots.
+    pub fn count(&mut self, share: f64, met: f64, begun: f64) {
+        self.share = share;
+        self.present = if begun > 0.0 {
+            1.0 - (1.0 - share.min(1.0)).powf(draws(share / (1.0 + begun), met))
+        } else {
+            met
+        };
+    }
+}
+
+/// The draws of hits by a `share` of threads, of whose blocks a part is `met`.
+fn draws(share: f64, met: f64) -> f64 {
+    let most = f64::from(BLOCK);
+    if share <= 0.0 || share >= 1.0 || met >= 1.0 {
+        return if share >= 1.0 { 1.0 } else { most };
+    }
+    ((1.0 - met).ln() / (1.0 - share).ln()).clamp(1.0, most)
 }
 
 /// What makes a new file.
@@ -117,11 +136,12 @@ impl Workload {
         }
         let bytes = self.materials.iter();
         let bytes = bytes.flat_map(|h| [("loads", h.loads), ("stores", h.stores)]);
-        let seconds = [
+        let scene = [
+            ("begun", self.begun),
             ("logic_seconds", self.logic_seconds),
             ("other_seconds", self.other_seconds),
         ];
-        let mut others = bytes.chain(seconds);
+        let mut others = bytes.chain(scene);
         let wrong = others.find(|(_, value)| !value.is_finite() || *value < 0.0);
         wrong.map(|(name, value)| format!("`{name}` is {value}"))
     }

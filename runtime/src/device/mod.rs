@@ -11,7 +11,7 @@ use impasto_compiler::partition::{Plan, Strategy};
 use crate::cpu::{Cpu, CpuOptions};
 use crate::error::RuntimeError;
 use crate::gpu::{DeviceInfo, Gpu, GpuOptions};
-use crate::technique::{Append, Technique};
+use crate::technique::{Append, CameraRays, Technique};
 use crate::world::{MaterialSource, World};
 
 pub(crate) use work::{Submission, Work};
@@ -192,9 +192,13 @@ impl DeviceRef<'_> {
         let possible = wanted.within(self.has_subgroups());
         match self {
             DeviceRef::Gpu(_) => possible,
-            // Threads of a workgroup come one after another, and wait for nobody.
+            // Threads of a workgroup come one after another, and wait for nobody. Nor does anybody wait for the next iteration.
             DeviceRef::Cpu(_) => Technique {
                 append: Append::Thread,
+                camera_rays: match possible.camera_rays {
+                    CameraRays::Auto => CameraRays::AtOnce,
+                    asked => asked,
+                },
                 ..possible
             },
         }

@@ -126,10 +126,14 @@ impl KernelDesc {
         }
     }
 
-    /// Whether it decides how each path goes on, and not only how new ones do.
+    /// Whether it decides how paths go on.
     pub(crate) fn decides(&self) -> bool {
-        let is_of_all = !matches!(self.source, DispatchSource::Queue(_));
-        is_of_all && self.stages.iter().any(|stage| stage.decides())
+        self.stages.iter().any(|stage| stage.decides())
+    }
+
+    /// Whether it does so for each path, and not only for those that it begins.
+    pub(crate) fn decides_on_all(&self) -> bool {
+        self.decides() && !matches!(self.source, DispatchSource::Queue(_))
     }
 }
 

@@ -34,6 +34,8 @@ pub(super) struct Run {
     pub schedule: Arc<Schedule>,
     /// Which of them is of interest.
     pub subject: usize,
+    /// Those that decide how paths go on.
+    pub deciding: Vec<usize>,
     /// The queue of each material, if its logic kernel asks for it.
     pub table: Vec<u32>,
     /// Where its counters are.
@@ -189,6 +191,14 @@ fn round(
         lane.submit(gpu, resources, Some(snapshot));
     }
     lanes.iter_mut().map(|lane| lane.wait(gpu)).collect()
+}
+
+impl Sample {
+    /// Seconds of the dispatches that decide how paths go on.
+    pub(super) fn logic(&self, run: &Run) -> f64 {
+        let steps = run.deciding.iter().filter_map(|at| self.steps.get(*at));
+        steps.sum()
+    }
 }
 
 /// The median of each step.

@@ -14,7 +14,6 @@ use crate::gpu::schedule::{Schedule, Step};
 use crate::gpu::{Gpu, KernelStatistics};
 use crate::kernels::modules::{Composer, DispatchSource, Kernel, KernelDesc, PREPARE, Sizes};
 use crate::render::build_step;
-use crate::world::needs::Need;
 
 /// Kernels built so far, by their text; or why they could not be.
 pub(super) type Cache = BTreeMap<String, Result<Step, Unmeasured>>;
@@ -59,12 +58,11 @@ impl Lab<'_> {
         })
     }
 
-    /// The logic kernel alone, of a kernel a material.
+    /// The kernels alone that decide how paths go on, of a kernel a material.
     pub(super) fn bare_logic(&mut self) -> Result<Run, RuntimeError> {
         let plan = self.own_plan();
         let composer = self.composer(&plan, false)?;
-        let logic = composer.descs().swap_remove(0);
-        let composed = self.composed(&composer, vec![logic], Vec::new());
+        let composed = self.composed(&composer, deciding(composer.descs()), Vec::new());
         self.build(composed.kernels.clone())?;
         let run = self.finish(composed);
         run.map_err(RuntimeError::Validation)
@@ -93,13 +91,9 @@ impl Lab<'_> {
         let inline = candidate.form == Form::Inline;
         let composer = self.composer(&plan, !inline);
         let composer = composer.map_err(|error| error.to_string())?;
-        if inline && composer.layout.needs.has(Need::CameraDecides) {
-            return Err("it would be a part of two kernels: `--camera-rays straight`".into());
-        }
         let mut descs = composer.descs();
         if inline {
-            descs.truncate(1);
-            return Ok(self.composed(&composer, descs, Vec::new()));
+            return Ok(self.composed(&composer, deciding(descs), Vec::new()));
         }
         let subject = descs.iter().position(|desc| {
             desc.form == Some(candidate.form) && desc.members == candidate.members
@@ -157,6 +151,7 @@ impl Lab<'_> {
         table: Vec<u32>,
     ) -> Composed {
         let subject = descs.len() - 1;
+        let of_logic = descs.iter().enumerate().filter(|(_, desc)| desc.decides());
         let run = Run {
             schedule: Arc::new(Schedule {
                 steps: Vec::new(),
@@ -164,9 +159,11 @@ impl Lab<'_> {
                 timing: self.gpu.timing,
             }),
             subject,
+            deciding: of_logic.map(|(at, _)| at).collect(),
             table,
             counters: composer.layout.counters,
             queues: match descs[subject].source {
+                DispatchSource::Queue(_) if descs[subject].decides() => Vec::new(),
                 DispatchSource::Queue(queue) => vec![queue],
                 DispatchSource::Queues { first, count } => (first..first + count).collect(),
                 _ => Vec::new(),
@@ -214,6 +211,13 @@ impl Lab<'_> {
             ..composed.run
         })
     }
+}
+
+/// The kernels of an iteration up to the last that decides how paths go on.
+fn deciding(mut descs: Vec<KernelDesc>) -> Vec<KernelDesc> {
+    let last = descs.iter().rposition(KernelDesc::decides);
+    descs.truncate(last.map_or(0, |at| at + 1));
+    descs
 }
 
 impl Composer<'_> {

@@ -7,12 +7,11 @@ use super::{Candidate, Lab};
 use crate::error::RuntimeError;
 use crate::kernels::buffers::BufferId;
 use crate::technique::SlotOrder;
+use crate::world::needs::Need;
 
 impl Lab<'_> {
-    /// Counts the hits of each material, and the blocks of neighbouring slots with any.
+    /// Counts the hits of each material, and the blocks with any of neighbouring threads that look for hits.
     pub(super) fn count_hits(&mut self, own: &Plan) -> Result<(), RuntimeError> {
-        let pool = f64::from(self.sizes.pool);
-        let blocks = self.sizes.pool.div_ceil(BLOCK) as usize;
         // Any kernel will do: all queues are filled before it.
         let Some(any) = own.kernels.first() else {
             return Ok(());
@@ -29,20 +28,36 @@ impl Lab<'_> {
         let run = run?.map_err(RuntimeError::Validation)?;
         let sample = self.time(std::slice::from_ref(&run))?.swap_remove(0);
         let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
-        let queues = self.inputs.layout(own)?.queues.of_kernels(own);
-        for (kernel, queues) in own.kernels.iter().zip(queues) {
-            let (material, queue) = (kernel.materials[0], queues.start);
-            let taken = run.counters.taken_of(counters, queue);
-            let mut met = vec![false; blocks];
-            for slot in self.read_queue(queue, taken)? {
-                if let Some(block) = met.get_mut((slot / BLOCK) as usize) {
-                    *block = true;
-                }
+        let layout = self.inputs.layout(own)?;
+        let read = |queue| self.read_queue(queue, run.counters.taken_of(counters, queue));
+        let begun = match layout.needs.has(Need::CameraDecides) {
+            true => read(layout.queues.new_paths())?,
+            false => Vec::new(),
+        };
+        // The threads that look for hits: one a slot, and behind these one for each path that begins.
+        let pool = self.sizes.pool;
+        let first = pool.next_multiple_of(BLOCK);
+        let mut threads: Vec<u32> = (0..pool).collect();
+        for (thread, slot) in (first..).zip(&begun) {
+            if let Some(of_slot) = threads.get_mut(*slot as usize) {
+                *of_slot = thread;
             }
-            let present = met.iter().filter(|met| **met).count();
-            let hits = &mut self.workload.materials[material];
-            hits.share = f64::from(taken) / pool;
-            hits.present = present as f64 / blocks as f64;
+        }
+        let blocks = (first as usize + begun.len()).div_ceil(BLOCK as usize);
+        let share = |some: &[u32]| some.len() as f64 / f64::from(pool);
+        let mut counted = Vec::new();
+        for (kernel, queues) in own.kernels.iter().zip(layout.queues.of_kernels(own)) {
+            let slots = read(queues.start)?;
+            let mut met = vec![false; blocks];
+            for thread in slots.iter().filter_map(|slot| threads.get(*slot as usize)) {
+                met[(thread / BLOCK) as usize] = true;
+            }
+            let met = met.iter().filter(|met| **met).count() as f64 / blocks as f64;
+            counted.push((kernel.materials[0], share(&slots), met));
+        }
+        self.workload.begun = share(&begun);
+        for (material, share, met) in counted {
+            self.workload.materials[material].count(share, met, self.workload.begun);
         }
         Ok(())
     }

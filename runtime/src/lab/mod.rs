@@ -76,14 +76,14 @@ pub struct Candidate {
 /// What a kernel took.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// Median GPU seconds. Of inline materials those by which they make the logic kernel slower than it
-    /// is with a kernel a material; it may be below zero.
+    /// Median GPU seconds. Of inline materials those by which they make the kernels slower that decide how paths go on than
+    /// these are with a kernel a material; it may be below zero.
     pub seconds: f64,
     /// Half of the distance between the quartiles, in seconds.
     pub spread: f64,
     /// Items that it worked on; slots of the pool for the logic kernel.
     pub items: u64,
-    /// Median GPU seconds of the logic kernel that filled its queues, or that it is part of.
+    /// Median GPU seconds of the kernels that filled its queues, or that it is part of.
     pub logic_seconds: f64,
     /// What the driver says of it, if it was asked and answers.
     pub statistics: Option<KernelStatistics>,
@@ -183,13 +183,14 @@ impl<'a> Lab<'a> {
         bench::advance(self.gpu, &self.resources, &run, iterations)?;
         self.snapshot.take(self.gpu, &self.resources);
         self.count_hits(own)?;
-        let samples = self.time(&[run])?;
+        let samples = self.time(std::slice::from_ref(&run))?;
+        let logic = samples[0].iter().map(|sample| sample.logic(&run));
+        self.workload.logic_seconds = median(logic).unwrap_or_default();
         let steps = bench::medians(&samples[0]);
         let descs = self.descs(own)?;
-        let of_others = descs.iter().zip(&steps).skip(1);
-        let of_others = of_others.filter(|(desc, _)| desc.form.is_none());
-        self.workload.logic_seconds = steps.first().copied().unwrap_or(0.0);
-        self.workload.other_seconds = of_others.map(|(_, seconds)| seconds).sum();
+        let others = descs.iter().zip(&steps);
+        let others = others.filter(|(desc, _)| desc.form.is_none() && !desc.decides());
+        self.workload.other_seconds = others.map(|(_, seconds)| seconds).sum();
         Ok(())
     }
 
@@ -229,10 +230,11 @@ impl<'a> Lab<'a> {
     ) -> Result<Vec<Result<Measured, Unmeasured>>, RuntimeError> {
         let mut runs = self.runs(candidates)?;
         // Inline materials are what they add to this.
-        runs.push(Ok(self.bare_logic()?));
+        let bare = self.bare_logic()?;
+        runs.push(Ok(bare.clone()));
         let mut samples = self.time_those(&runs)?;
-        let bare = samples.pop().and_then(Result::ok).unwrap_or_default();
-        let bare = median(bare.iter().map(|sample| sample.steps[0])).unwrap_or_default();
+        let of_bare = samples.pop().and_then(Result::ok).unwrap_or_default();
+        let bare = median(of_bare.iter().map(|sample| sample.logic(&bare))).unwrap_or_default();
         let told = self.tell(candidates);
         let results = candidates.iter().zip(told).zip(runs.iter().zip(samples));
         let measured = results.map(|((candidate, statistics), (run, samples))| {
@@ -335,15 +337,16 @@ impl<'a> Lab<'a> {
 }
 
 fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> Measured {
-    let step = |index: usize| move |sample: &Sample| sample.steps.get(index).copied();
-    let at = run.subject;
-    let times = || samples.iter().filter_map(step(at));
-    let logic_seconds = median(samples.iter().filter_map(step(0))).unwrap_or_default();
+    let logic = |sample: &Sample| sample.logic(run);
+    let inline = candidate.form == Form::Inline;
+    let time = |sample: &Sample| match inline {
+        true => Some(logic(sample) - bare),
+        false => sample.steps.get(run.subject).copied(),
+    };
+    let times = || samples.iter().filter_map(time);
+    let logic_seconds = median(samples.iter().map(logic)).unwrap_or_default();
     Measured {
-        seconds: match candidate.form {
-            Form::Inline => logic_seconds - bare,
-            _ => median(times()).unwrap_or_default(),
-        },
+        seconds: median(times()).unwrap_or_default(),
         spread: spread(times()).unwrap_or_default(),
         items: samples
             .last()

@@ -7,7 +7,7 @@ use crate::error::RuntimeError;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::modules::Sizes;
 use crate::options::{Progress, RenderOptions};
-use crate::technique::{CameraRays, RayKernels, Technique};
+use crate::technique::{RayKernels, Technique};
 use crate::world::World;
 
 /// Paths in flight by default, as in Laine et al. 2013. In a megakernel they are those of one
@@ -46,9 +46,8 @@ pub(crate) const LONG: Duration = Duration::from_millis(100);
 pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
-/// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: all rays are
-/// cast by one (docs/measurements.md, shadow and extension rays in one dispatch), and those of the camera fill it up. With
-/// more, the camera's are cast at once (the same, "Rays of the camera cast at once, by tiles").
+/// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: rays of all
+/// kinds are cast by one (docs/measurements.md, shadow and extension rays in one dispatch).
 const FEW_PATHS: u32 = 1 << 22;
 
 /// The technique that a device renders by, with what depends on the paths in flight.
@@ -70,13 +69,8 @@ fn with_paths(technique: Technique, few: bool) -> Technique {
         RayKernels::Auto if few => RayKernels::One,
         other => other,
     };
-    let camera_rays = match technique.camera_rays {
-        CameraRays::Auto if !few => CameraRays::AtOnce,
-        other => other,
-    };
     Technique {
         ray_kernels,
-        camera_rays,
         ..technique
     }
 }
@@ -319,15 +313,12 @@ mod tests {
     }
 
     #[test]
-    fn how_many_paths_are_in_flight_decides_where_rays_are_cast() {
+    fn how_many_paths_are_in_flight_decides_which_kernels_cast_rays() {
         let [few, many] = [true, false].map(|few| with_paths(Technique::default(), few));
         assert_eq!(few.ray_kernels, RayKernels::One);
-        assert_eq!(few.camera_rays, CameraRays::Auto);
         assert_eq!(many.ray_kernels, RayKernels::Auto);
-        assert_eq!(many.camera_rays, CameraRays::AtOnce);
         let asked = Technique {
             ray_kernels: RayKernels::Each,
-            camera_rays: CameraRays::Queue,
             ..Technique::default()
         };
         assert_eq!([true, false].map(|few| with_paths(asked, few)), [asked; 2]);

@@ -115,7 +115,7 @@ impl std::fmt::Debug for Replan {
 #[derive(Debug)]
 pub(super) struct Change {
     report: ReplanReport,
-    /// GPU seconds of the logic kernel in an iteration of the old plan.
+    /// GPU seconds of the kernels that decide how paths go on, in an iteration of the old plan.
     logic_seconds: f64,
     /// Those that count as the present plan's and are not.
     logic_before: f64,
@@ -221,7 +221,7 @@ impl Renderer<'_> {
     fn change(&self, made: &Made, status: &Status, elapsed: Duration) -> Change {
         let string = |plan| partition(plan, &self.facts.materials);
         let iterations = status.iterations - status.before.iterations;
-        let logic = status.step_seconds.first().copied().unwrap_or(0.0);
+        let logic = self.logic_seconds(status);
         Change {
             report: ReplanReport {
                 at_iteration: status.iterations,
@@ -240,6 +240,11 @@ impl Renderer<'_> {
             logic_before: logic,
             since: status.iterations,
         }
+    }
+
+    /// GPU seconds of the present plan's kernels that decide how paths go on.
+    fn logic_seconds(&self, status: &Status) -> f64 {
+        Mark::default().seconds(status, &self.built.kernels).logic
     }
 
     /// Makes the present plan's counters go on from those of the `old` one.
@@ -268,7 +273,7 @@ impl Renderer<'_> {
         let since = status.iterations - change.since;
         let inline = self.built.plan.kernels.iter();
         let inline = inline.filter(|k| k.form == Form::Inline).count();
-        let logic = status.step_seconds.first().copied().unwrap_or(0.0);
+        let logic = self.logic_seconds(status);
         if report.kept.is_none() && inline == 0 && since > 0 && logic > 0.0 {
             let now = (logic - change.logic_before) / since as f64;
             let saved = (change.logic_seconds - now).max(0.0);

@@ -576,7 +576,7 @@ impl Ran<'_> {
         let mut out = Vec::new();
         for Kernel { desc, .. } in self.kernels {
             // Samples that the film drops are counted for it once, whatever kernel added them.
-            let film = desc.decides().then_some(counters.film_row());
+            let film = desc.decides_on_all().then_some(counters.film_row());
             for row in rows(desc).chain(film) {
                 let material = self.materials.get(row).map(|m| m.name.as_str());
                 if let Some(found) = counters.dropped_row(&status.counters, row) {
@@ -591,6 +591,6 @@ impl Ran<'_> {
 /// The rows of the samples that a kernel drops at materials. It alone evaluates those; of two that evaluate them inline, it
 /// is the one that decides how each path goes on.
 fn rows(desc: &KernelDesc) -> impl Iterator<Item = usize> {
-    let is_first = desc.form != Some(Form::Inline) || desc.decides();
+    let is_first = desc.form != Some(Form::Inline) || desc.decides_on_all();
     desc.members.iter().copied().filter(move |_| is_first)
 }

@@ -42,6 +42,7 @@ pub(crate) fn before_rendering(
     Workload {
         pool,
         materials: materials.iter().enumerate().map(hits).collect(),
+        begun: 0.0,
         logic_seconds: 0.0,
         other_seconds: 0.0,
         in_order: layout.moves_paths(technique),
@@ -109,24 +110,36 @@ impl Mark {
         }
         let mut workload = before.clone();
         let counted = counted(plan.sizes);
-        let slots = iterations as f64 * f64::from(counted.slots);
-        let blocks = iterations as f64 * f64::from(counted.blocks);
+        let iterations = iterations as f64;
+        let slots = iterations * f64::from(counted.slots);
+        workload.begun = self.begun(status, plan) / (iterations * f64::from(workload.pool));
+        let blocks = iterations * f64::from(counted.blocks) * (1.0 + workload.begun);
         for (index, hits) in workload.materials.iter_mut().enumerate() {
             let now = layout.counters.hits_of(&status.counters, index);
             let then = layout.counters.hits_of(&self.counters, index);
-            hits.share = now[0].saturating_sub(then[0]) as f64 / slots;
-            hits.present = now[1].saturating_sub(then[1]) as f64 / blocks;
+            let [hit, met] = [0, 1].map(|of| now[of].saturating_sub(then[of]) as f64);
+            hits.count(hit / slots, met / blocks, workload.begun);
         }
         let seconds = self.seconds(status, &plan.kernels);
-        let all = (status.gpu_seconds - self.gpu_seconds) / iterations as f64;
-        workload.logic_seconds = seconds.logic / iterations as f64;
-        workload.other_seconds =
-            (all - (seconds.logic + seconds.materials) / iterations as f64).max(0.0);
+        let all = (status.gpu_seconds - self.gpu_seconds) / iterations;
+        workload.logic_seconds = seconds.logic / iterations;
+        workload.other_seconds = (all - (seconds.logic + seconds.materials) / iterations).max(0.0);
         Some(workload)
     }
 
-    /// GPU seconds since then of the logic kernel, and of those that evaluate materials.
-    fn seconds(&self, status: &Status, kernels: &[Kernel]) -> Seconds {
+    /// Paths that began since then in the kernel that also decides how they go on.
+    fn begun(&self, status: &Status, plan: &BuiltPlan) -> f64 {
+        let layout = &plan.layout;
+        if !layout.needs.has(Need::CameraDecides) {
+            return 0.0;
+        }
+        let queue = layout.queues.new_paths();
+        let asked = |words: &[u32]| layout.counters.items_of(words, queue);
+        asked(&status.counters).saturating_sub(asked(&self.counters)) as f64
+    }
+
+    /// GPU seconds since then of the kernels that decide how paths go on, and of those that evaluate materials.
+    pub(super) fn seconds(&self, status: &Status, kernels: &[Kernel]) -> Seconds {
         let mut sum = Seconds::default();
         let begin = self.step_seconds.iter().copied();
         let begin = begin.chain(std::iter::repeat(0.0));
@@ -142,8 +155,11 @@ impl Mark {
     }
 }
 
+/// GPU seconds of kernels.
 #[derive(Default)]
-struct Seconds {
-    logic: f64,
-    materials: f64,
+pub(super) struct Seconds {
+    /// That decide how paths go on.
+    pub logic: f64,
+    /// That evaluate materials, and do not.
+    pub materials: f64,
 }

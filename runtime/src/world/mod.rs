@@ -177,7 +177,6 @@ impl World {
             ray_kernels: technique.ray_kernels,
             camera_rays: technique.camera_rays,
             last_rays: technique.last_rays,
-            triangles: self.parts.counts.placed_triangles as usize,
             outputs: OutputTraits::of(&self.outputs.layers),
         }
     }

@@ -114,6 +114,7 @@ fn measurement() -> Measurement {
         workload: Workload {
             pool: 1 << 20,
             materials: workload.map(hits).into(),
+            begun: 0.0,
             logic_seconds: 4e-5,
             other_seconds: 6e-5,
             in_order: false,

@@ -54,6 +54,7 @@ fn workload() -> Workload {
     Workload {
         pool: 1 << 20,
         materials: names().iter().map(hits).collect(),
+        begun: 0.0,
         logic_seconds: 0.0,
         other_seconds: 0.0,
         in_order: false,

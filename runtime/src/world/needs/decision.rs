@@ -118,7 +118,6 @@ mod tests {
             ray_kernels: RayKernels::One,
             camera_rays: CameraRays::AtOnce,
             last_rays: LastRays::Lights,
-            triangles: 1,
             outputs: Default::default(),
         }
     }

@@ -26,8 +26,6 @@ pub(crate) struct NeedInputs<'a> {
     pub ray_kernels: RayKernels,
     pub camera_rays: CameraRays,
     pub last_rays: LastRays,
-    /// Those that rays can hit.
-    pub triangles: usize,
     pub outputs: OutputTraits,
 }
 

@@ -98,10 +98,6 @@ macro_rules! rows {
 use Forcing::{Never, Unless, Whole, WholeUnless};
 use Need::*;
 
-/// With more, and few paths in flight, threads whose ray is cast wait too long for those beside them (docs/measurements.md,
-/// "Rays of the camera cast at once").
-const FEW_TRIANGLES: usize = 1 << 15;
-
 const ASKED: Forcing = Never("it is a technique that is asked for");
 const AOV: Forcing = Never("it is recorded if it is asked for");
 
@@ -358,24 +354,17 @@ rows! {
         };
     // So do rays of the camera; and what is lost on their way, the logic stage has to tell.
     CameraCasts, "rays of the camera cast at once", "camera_casts",
-        "many paths are in flight, there are few triangles or `--camera-rays at-once` or `straight` asks for it, and rays neither have an order nor are in buffers of their own nor meet anything on their way",
+        "rays neither have an order nor are in buffers of their own nor meet anything on their way, and `--camera-rays queue` is not asked for",
         on &[], draws "", ASKED, |f, n| {
             let possible = !n.any(&[Order, Requests, Absorption, Overlap, Scattering]);
-            let reason = match f.camera_rays {
-                CameraRays::AtOnce => Some("`--camera-rays at-once` asks for it, or many paths are in flight".into()),
-                CameraRays::Straight => Some("`--camera-rays straight` asks for it".into()),
-                CameraRays::Auto => (f.triangles <= FEW_TRIANGLES).then(|| {
-                    format!("threads with a ray each wait little for each other where there are {} triangles", f.triangles)
-                }),
-                CameraRays::Queue => None,
-            };
-            reason.filter(|_| possible)
+            let asked = f.camera_rays != CameraRays::Queue;
+            (asked && possible).then(|| "nothing but what they hit is asked of rays".into())
         };
     CameraDecides, "hits of the camera's rays decided at once", "camera_decides",
-        "`--camera-rays straight` asks for it, and rays of the camera are cast at once",
+        "rays of the camera are cast at once, and nothing asks for `--camera-rays at-once`, as processors do",
         on &[CameraCasts], draws "", ASKED, |f, n| {
-            let asked = n.has(CameraCasts) && f.camera_rays == CameraRays::Straight;
-            asked.then(|| "`--camera-rays straight` asks for it".into())
+            let asked = n.has(CameraCasts) && f.camera_rays != CameraRays::AtOnce;
+            asked.then(|| "the kernel that casts rays of the camera knows what they hit".into())
         };
     // Light that is turned on its way may still meet some, and what varies is in no table of lights.
     LastRays, "last rays towards lights only", "last_rays",
