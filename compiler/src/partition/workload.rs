@@ -219,4 +219,29 @@ mod tests {
             (32.0, 1.0)
         );
     }
+
+    /// Neighbours are as alike as those of the threads that looked for hits, of which there may be more than slots.
+    #[test]
+    fn what_is_counted_of_threads_holds_for_slots() {
+        let mut hits = Hits {
+            material: String::new(),
+            on_surface: true,
+            share: 0.0,
+            present: 0.0,
+            loads: 64.0,
+            stores: 96.0,
+        };
+        let met = |draws: i32| 1.0 - (1.0 - 0.3f64 / 1.5).powi(draws);
+        for draws in [1, 5, 32] {
+            hits.count(0.3, met(draws), 0.5);
+            assert!((hits.draws() - f64::from(draws)).abs() < 1e-6, "{hits:?}");
+            assert!((hits.present - (1.0 - 0.7f64.powi(draws))).abs() < 1e-9);
+        }
+        // All slots hit it, be it by two threads each.
+        hits.count(1.0, 0.5, 1.0);
+        assert_eq!((hits.share, hits.present), (1.0, 1.0));
+        // Logic alone looks for hits: what was met is what there is.
+        hits.count(0.3, 0.4, 0.0);
+        assert_eq!((hits.share, hits.present), (0.3, 0.4));
+    }
 }

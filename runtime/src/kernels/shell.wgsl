@@ -14,6 +14,23 @@ fn main(
 #if walk_lane
     walk_lane = lane;
 #endif
+#if clears
+    // Where stacks are in workgroup memory, none of it begins as zeros.
+#if joins
+    for (var index = lane; index < PUSHED_QUEUES; index += WORKGROUP_SIZE) {
+        atomicStore(&group_count[index], 0u);
+    }
+#endif
+#if counts_hits
+    for (var index = lane; index < MATERIALS; index += WORKGROUP_SIZE) {
+        atomicStore(&group_hits[index], 0u);
+    }
+    for (var index = lane; index < BLOCK_WORDS * (WORKGROUP_SIZE / BLOCK); index += WORKGROUP_SIZE) {
+        atomicStore(&block_hits[index], 0u);
+    }
+#endif
+    workgroupBarrier();
+#endif
     let index = group.y * ROW_GROUPS + group.x;
 #if binned
     find_bin(index, lane);

@@ -81,6 +81,8 @@ pub(crate) struct EntryPoint {
     pub slots: bool,
     /// Whether it appends to queues.
     pub pushes: bool,
+    /// Whether the threads of a workgroup do that together.
+    pub joins: bool,
     /// Whether paths move to other slots before that.
     pub moves: bool,
     /// Whether paths begin, and are put down at the end.
@@ -106,11 +108,14 @@ impl EntryPoint {
     }
 
     pub(crate) fn wgsl(self) -> String {
+        let clears = self.walk_lane && (self.joins || self.counts_hits);
         let flags = [
             ("queued", self.queued),
             ("binned", self.binned),
             ("slots", self.slots),
             ("pushes", self.pushes),
+            ("joins", self.joins),
+            ("clears", clears),
             ("moves", self.moves),
             ("begins", self.begins),
             ("keeps", self.keeps.is_some()),
@@ -198,6 +203,7 @@ impl Composer<'_> {
             binned: shell.binned.is_some(),
             slots: !(shell.traverses && requests),
             pushes,
+            joins: pushes && self.technique.append == Append::Workgroup,
             moves: shell.moves,
             begins: shell.begins,
             keeps: (requests && shell.pushes.has_rays()).then(|| self.ray_places()),

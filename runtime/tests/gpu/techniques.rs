@@ -162,7 +162,7 @@ fn rays_of_the_camera_are_cast_at_once_where_nothing_else_is_asked_of_them() {
         ..room()
     };
     for (ray_data, camera_rays) in [
-        (RayData::Slots, CameraRays::AtOnce),
+        (RayData::Slots, CameraRays::Straight),
         (RayData::Requests, CameraRays::Queue),
     ] {
         let technique = Technique {
