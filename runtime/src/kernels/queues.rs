@@ -139,6 +139,8 @@ pub(crate) enum Scalar {
     /// The first pixel and sample for the slots that start paths in this iteration.
     WorkPixel,
     WorkSample,
+    /// Items behind those handed out that threads have taken up themselves.
+    Again,
     /// Items of the work handed out that threads of a megakernel have fetched.
     Fetched,
     /// Slots that found no work left.
@@ -149,13 +151,14 @@ pub(crate) enum Scalar {
     LostPaths,
 }
 
-const SCALARS: [(Scalar, &str); 10] = [
+const SCALARS: [(Scalar, &str); 11] = [
     (Scalar::Overflow, "OVERFLOW"),
     (Scalar::FilmClamped, "FILM_CLAMPED"),
     (Scalar::NextPixel, "NEXT_PIXEL"),
     (Scalar::NextSample, "NEXT_SAMPLE"),
     (Scalar::WorkPixel, "WORK_PIXEL"),
     (Scalar::WorkSample, "WORK_SAMPLE"),
+    (Scalar::Again, "AGAIN"),
     (Scalar::Fetched, "FETCHED"),
     (Scalar::Retired, "RETIRED"),
     (Scalar::MediaOverflow, "MEDIA_OVERFLOW"),

@@ -8,8 +8,9 @@ use crate::gpu::stub::{Room, gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
+use impasto_runtime::render::report::Report;
 use impasto_runtime::technique::{
-    Append, CameraRays, Choice, RayData, Regeneration, SlotOrder, StateLayout, Technique,
+    Append, CameraRays, Choice, RayData, Regeneration, SlotOrder, Stack, StateLayout, Technique,
 };
 
 fn run(strategy: Strategy, technique: Technique) -> Rendering {
@@ -150,6 +151,47 @@ fn what_the_camera_sees_goes_straight_to_its_material() {
         assert_eq!(straight.film, at_once.film);
         let iterations = [&straight, &at_once].map(|rendering| rendering.report.iterations);
         assert!(iterations[0] < iterations[1], "{iterations:?}");
+    }
+}
+
+/// Where most of the camera's rays meet nothing, slots do not wait for the next iteration to be of use.
+#[test]
+fn threads_whose_path_ends_at_once_begin_others() {
+    let open = Room {
+        walls: false,
+        sky: 0.7,
+        ..room()
+    };
+    let run = |change: fn(&mut Technique)| {
+        let mut technique = Technique::default();
+        change(&mut technique);
+        let options = RenderOptions {
+            pool: Some(300),
+            count_hits: true,
+            technique,
+            ..samples(32)
+        };
+        run_with(&open, Strategy::OWN, &options)
+    };
+    let straight = run(|t| t.camera_rays = CameraRays::Straight);
+    for again in [
+        run(|t| t.camera_rays = CameraRays::Again),
+        run(|t| (t.camera_rays, t.state) = (CameraRays::Again, StateLayout::Pairs)),
+        run(|t| (t.camera_rays, t.slot_order) = (CameraRays::Again, SlotOrder::Work)),
+        run(|t| (t.camera_rays, t.append) = (CameraRays::Again, Append::Subgroup)),
+        run(|t| (t.camera_rays, t.stack) = (CameraRays::Again, Stack::Workgroup)),
+    ] {
+        assert_eq!(again.report.technique.camera_rays, CameraRays::Again);
+        assert_eq!(again.film, straight.film);
+        assert!(again.film.samples.iter().all(|count| *count == 32));
+        let [all, fewer] = [&straight, &again].map(|rendering| &rendering.report);
+        assert!(fewer.iterations < all.iterations);
+        // What threads took up themselves is counted with what slots asked for.
+        let items = |report: &Report| {
+            let kernel = report.kernels.iter().find(|k| k.name == "new_path");
+            kernel.expect("paths begin").items
+        };
+        assert_eq!(items(fewer), items(all));
     }
 }
 
