@@ -386,8 +386,8 @@ mod tests {
             hits: 0,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
-        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
-        assert_eq!(counters.dropped(), 10 + 3 * 6);
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
+        assert_eq!(counters.dropped(), 11 + 3 * 6);
         let rows = dropped::ROW_WORDS * 5;
         assert_eq!(counters.lanes(0), counters.dropped() + rows);
         assert!(counters.pushed() >= counters.lanes(2));
