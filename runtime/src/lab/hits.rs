@@ -30,9 +30,10 @@ impl Lab<'_> {
         let counters = sample.last().map_or(&[][..], |s| &s.counters[..]);
         let layout = self.inputs.layout(own)?;
         let read = |queue| self.read_queue(queue, run.counters.taken_of(counters, queue));
-        let begun = match layout.needs.has(Need::CameraDecides) {
-            true => read(layout.queues.new_paths())?,
-            false => Vec::new(),
+        let begun = if layout.needs.has(Need::CameraDecides) {
+            read(layout.queues.new_paths())?
+        } else {
+            Vec::new()
         };
         // The threads that look for hits: one a slot, and behind these one for each path that begins.
         let pool = self.sizes.pool;

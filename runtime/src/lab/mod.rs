@@ -339,9 +339,11 @@ impl<'a> Lab<'a> {
 fn measured(candidate: &Candidate, run: &Run, samples: &[Sample], bare: f64) -> Measured {
     let logic = |sample: &Sample| sample.logic(run);
     let inline = candidate.form == Form::Inline;
-    let time = |sample: &Sample| match inline {
-        true => Some(logic(sample) - bare),
-        false => sample.steps.get(run.subject).copied(),
+    let time = |sample: &Sample| {
+        if inline {
+            return Some(logic(sample) - bare);
+        }
+        sample.steps.get(run.subject).copied()
     };
     let times = || samples.iter().filter_map(time);
     let logic_seconds = median(samples.iter().map(logic)).unwrap_or_default();
