@@ -60,7 +60,9 @@ impl Hits {
     pub fn count(&mut self, share: f64, met: f64, begun: f64) {
         self.share = share;
         self.present = if begun > 0.0 {
-            1.0 - (1.0 - share.min(1.0)).powf(draws(share / (1.0 + begun), met))
+            let present = 1.0 - (1.0 - share.min(1.0)).powf(draws(share / (1.0 + begun), met));
+            // No more digits than files are read back with.
+            (1e15 * present).round() / 1e15
         } else {
             met
         };
@@ -236,6 +238,9 @@ mod tests {
             hits.count(0.3, met(draws), 0.5);
             assert!((hits.draws() - f64::from(draws)).abs() < 1e-6, "{hits:?}");
             assert!((hits.present - (1.0 - 0.7f64.powi(draws))).abs() < 1e-9);
+            let kept = serde_json::to_string(&hits).expect("plain data");
+            let read: Hits = serde_json::from_str(&kept).expect("what was kept");
+            assert_eq!(read, hits);
         }
         // All slots hit it, be it by two threads each.
         hits.count(1.0, 0.5, 1.0);
