@@ -58,14 +58,6 @@ fn main(
 #if !queued
     let in_range = item < POOL_SIZE;
 #endif
-#if !again
-    if in_range {
-#if moves
-        take_up(slot);
-#endif
-        run_stage(slot, item);
-    }
-#endif
 #if again
     // Items behind those handed out are anybody's.
     let handed_out = atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
@@ -94,6 +86,13 @@ fn main(
         }
         begin = subgroupShuffle(begin, first);
         place = handed_out + begin + lanes_before(idle, subgroup_lane);
+    }
+#else
+    if in_range {
+#if moves
+        take_up(slot);
+#endif
+        run_stage(slot, item);
     }
 #endif
 #if counts_hits

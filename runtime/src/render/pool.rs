@@ -46,8 +46,8 @@ pub(crate) const LONG: Duration = Duration::from_millis(100);
 pub(crate) const MAX_ITERATIONS: u32 = 64;
 const LAST_ITERATIONS: u64 = 8;
 
-/// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: rays of all
-/// kinds are cast by one (docs/measurements.md, shadow and extension rays in one dispatch).
+/// With as many paths in flight or fewer, the ends of dispatches are a good part of a wavefront's time: one casts
+/// both shadow and extension rays (docs/measurements.md, "Shadow and extension rays in one dispatch").
 const FEW_PATHS: u32 = 1 << 22;
 
 /// The technique that a device renders by, with what depends on the paths in flight.

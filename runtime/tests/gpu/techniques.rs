@@ -27,6 +27,28 @@ fn run_in(room: &Room, strategy: Strategy, technique: Technique) -> Rendering {
     run_with(room, strategy, &options)
 }
 
+/// By the default technique but for a change, with fewer slots than there are paths at a time.
+fn run_in_few_slots(room: &Room, change: fn(&mut Technique)) -> Rendering {
+    let mut technique = Technique::default();
+    change(&mut technique);
+    let options = RenderOptions {
+        pool: Some(300),
+        count_hits: true,
+        technique,
+        ..samples(32)
+    };
+    run_with(room, Strategy::OWN, &options)
+}
+
+/// The room without walls, under a sky.
+fn open_room() -> Room {
+    Room {
+        walls: false,
+        sky: 0.7,
+        ..room()
+    }
+}
+
 fn run_with(room: &Room, strategy: Strategy, options: &RenderOptions) -> Rendering {
     let surfaces = surfaces();
     render_plan(
@@ -131,16 +153,8 @@ fn rays_of_the_camera_may_be_cast_at_once() {
 /// A path takes an iteration less. Its state is written once, whichever way it is laid out.
 #[test]
 fn what_the_camera_sees_goes_straight_to_its_material() {
-    let run = |change: fn(&mut Technique)| {
-        let mut technique = Technique::default();
-        change(&mut technique);
-        let options = RenderOptions {
-            pool: Some(300),
-            technique,
-            ..samples(32)
-        };
-        run_with(&room(), Strategy::OWN, &options)
-    };
+    let room = room();
+    let run = |change| run_in_few_slots(&room, change);
     let at_once = run(|t| t.camera_rays = CameraRays::AtOnce);
     for straight in [
         run(|t| t.camera_rays = CameraRays::Straight),
@@ -157,22 +171,8 @@ fn what_the_camera_sees_goes_straight_to_its_material() {
 /// Where most of the camera's rays meet nothing, slots do not wait for the next iteration to be of use.
 #[test]
 fn threads_whose_path_ends_at_once_begin_others() {
-    let open = Room {
-        walls: false,
-        sky: 0.7,
-        ..room()
-    };
-    let run = |change: fn(&mut Technique)| {
-        let mut technique = Technique::default();
-        change(&mut technique);
-        let options = RenderOptions {
-            pool: Some(300),
-            count_hits: true,
-            technique,
-            ..samples(32)
-        };
-        run_with(&open, Strategy::OWN, &options)
-    };
+    let open = open_room();
+    let run = |change| run_in_few_slots(&open, change);
     let straight = run(|t| t.camera_rays = CameraRays::Straight);
     for again in [
         run(|t| t.camera_rays = CameraRays::Again),
@@ -198,11 +198,7 @@ fn threads_whose_path_ends_at_once_begin_others() {
 /// Rays that are not the path's own are cast with the others, and one that ends there is counted once.
 #[test]
 fn rays_of_the_camera_are_cast_at_once_where_nothing_else_is_asked_of_them() {
-    let open = Room {
-        walls: false,
-        sky: 0.7,
-        ..room()
-    };
+    let open = open_room();
     for (ray_data, camera_rays) in [
         (RayData::Slots, CameraRays::Straight),
         (RayData::Requests, CameraRays::Queue),
