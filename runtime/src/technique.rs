@@ -179,8 +179,6 @@ choices! {
         AtOnce = "at-once",
         /// The same, and what they hit goes straight to its material, in the same iteration
         Straight = "straight",
-        /// The same, and threads whose path ends there begin others, where most of a subgroup do
-        Again = "again",
         /// With those of later segments
         Queue = "queue",
     }
@@ -289,10 +287,6 @@ impl Technique {
             },
             regeneration: Regeneration::Never,
             ray_fetch: RayFetch::Thread,
-            camera_rays: match self.camera_rays {
-                CameraRays::Again => CameraRays::Straight,
-                other => other,
-            },
             profile: false,
             ..self
         }

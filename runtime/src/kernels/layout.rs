@@ -94,9 +94,7 @@ impl PlanLayout {
         } else {
             RayKernels::Each
         };
-        let camera_rays = if self.begins_again(asked) {
-            CameraRays::Again
-        } else if self.needs.has(Need::CameraDecides) {
+        let camera_rays = if self.needs.has(Need::CameraDecides) {
             CameraRays::Straight
         } else if self.needs.has(Need::CameraCasts) {
             CameraRays::AtOnce
@@ -135,11 +133,6 @@ impl PlanLayout {
             && self.wavefront
             && technique.append == Append::Workgroup
             && self.queues.materials <= MOST_MOVING_QUEUES
-    }
-
-    /// Whether threads whose path ends where it begins take up others.
-    pub(crate) fn begins_again(&self, technique: Technique) -> bool {
-        self.needs.has(Need::CameraDecides) && technique.camera_rays == CameraRays::Again
     }
 
     /// Words that the queues take for each slot of the pool.

@@ -279,7 +279,6 @@ impl Composer<'_> {
             ("binned", !binned.is_empty()),
             ("work", hands_out),
             ("regenerates", self.regenerates()),
-            ("again", self.layout.begins_again(self.technique)),
             ("fetched", fetched),
             ("some_pixels", self.layout.needs.has(Need::SomePixels)),
         ];

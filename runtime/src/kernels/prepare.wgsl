@@ -30,18 +30,14 @@ fn consume(queue: u32) -> u32 {
     if pushed > items {
         atomicAdd(&counters[COUNTER_OVERFLOW], pushed - items);
     }
-    count_items(queue, items);
-#if fetched
-    atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
-#endif
-    return (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
-}
-
-fn count_items(queue: u32, items: u32) {
     let before = atomicAdd(&counters[COUNTER_ITEMS + 2u * queue], items);
     if before > 0xffffffffu - items {
         atomicAdd(&counters[COUNTER_ITEMS + 2u * queue + 1u], 1u);
     }
+#if fetched
+    atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
+#endif
+    return (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
 }
 
 // Writes the arguments of the kernel whose first queue it is: rows of groups, since a dimension
@@ -95,27 +91,18 @@ fn place_groups(lane: u32) {
 #endif
 
 #if work
-// Moves the start of unclaimed work past what the slots asking for it will take.
+// Moves the start of unclaimed work past what the slots asking for it will take. Counters
+// stop at the end, so that asking again and again cannot wrap them.
 fn hand_out_work() {
 #if queues
     let asking = atomicLoad(&counters[COUNTER_TAKEN + QUEUE_NEW_PATH]);
 #else
     let asking = POOL_SIZE;
 #endif
-#if again
-    // What threads took up themselves counts as if slots had asked for it.
-    count_items(QUEUE_NEW_PATH, claim(atomicExchange(&counters[COUNTER_AGAIN], 0u)));
-#endif
-    atomicStore(&counters[COUNTER_WORK_PIXEL], atomicLoad(&counters[COUNTER_NEXT_PIXEL]));
-    atomicStore(&counters[COUNTER_WORK_SAMPLE], atomicLoad(&counters[COUNTER_NEXT_SAMPLE]));
-    atomicAdd(&counters[COUNTER_RETIRED], asking - claim(asking));
-}
-
-// Moves that start on; how many of those asking get work. Counters stop at the end, so that asking again and
-// again cannot wrap them.
-fn claim(asking: u32) -> u32 {
     let pixel = atomicLoad(&counters[COUNTER_NEXT_PIXEL]);
     let sample = atomicLoad(&counters[COUNTER_NEXT_SAMPLE]);
+    atomicStore(&counters[COUNTER_WORK_PIXEL], pixel);
+    atomicStore(&counters[COUNTER_WORK_SAMPLE], sample);
 #if some_pixels
     let pixels = run.pixels;
 #else
@@ -126,11 +113,11 @@ fn claim(asking: u32) -> u32 {
     if place / pixels >= left {
         atomicStore(&counters[COUNTER_NEXT_PIXEL], 0u);
         atomicStore(&counters[COUNTER_NEXT_SAMPLE], run.samples);
-        return claimed(left, pixel, pixels, asking);
+        atomicAdd(&counters[COUNTER_RETIRED], asking - claimed(left, pixel, pixels, asking));
+    } else {
+        atomicStore(&counters[COUNTER_NEXT_PIXEL], place % pixels);
+        atomicStore(&counters[COUNTER_NEXT_SAMPLE], sample + place / pixels);
     }
-    atomicStore(&counters[COUNTER_NEXT_PIXEL], place % pixels);
-    atomicStore(&counters[COUNTER_NEXT_SAMPLE], sample + place / pixels);
-    return asking;
 }
 
 // How many of those asking still get work, when `left` samples of each of `pixels` are left and the

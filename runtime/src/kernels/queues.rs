@@ -139,8 +139,6 @@ pub(crate) enum Scalar {
     /// The first pixel and sample for the slots that start paths in this iteration.
     WorkPixel,
     WorkSample,
-    /// Items behind those handed out that threads have taken up themselves.
-    Again,
     /// Items of the work handed out that threads of a megakernel have fetched.
     Fetched,
     /// Slots that found no work left.
@@ -151,14 +149,13 @@ pub(crate) enum Scalar {
     LostPaths,
 }
 
-const SCALARS: [(Scalar, &str); 11] = [
+const SCALARS: [(Scalar, &str); 10] = [
     (Scalar::Overflow, "OVERFLOW"),
     (Scalar::FilmClamped, "FILM_CLAMPED"),
     (Scalar::NextPixel, "NEXT_PIXEL"),
     (Scalar::NextSample, "NEXT_SAMPLE"),
     (Scalar::WorkPixel, "WORK_PIXEL"),
     (Scalar::WorkSample, "WORK_SAMPLE"),
-    (Scalar::Again, "AGAIN"),
     (Scalar::Fetched, "FETCHED"),
     (Scalar::Retired, "RETIRED"),
     (Scalar::MediaOverflow, "MEDIA_OVERFLOW"),
@@ -386,8 +383,8 @@ mod tests {
             hits: 0,
         };
         let mut words: Vec<u32> = (0..counters.len() as u32).collect();
-        assert_eq!(counters.scalar(&words, Scalar::Retired), 8);
-        assert_eq!(counters.dropped(), 11 + 3 * 6);
+        assert_eq!(counters.scalar(&words, Scalar::Retired), 7);
+        assert_eq!(counters.dropped(), 10 + 3 * 6);
         let rows = dropped::ROW_WORDS * 5;
         assert_eq!(counters.lanes(0), counters.dropped() + rows);
         assert!(counters.pushed() >= counters.lanes(2));

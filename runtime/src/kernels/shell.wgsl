@@ -58,43 +58,12 @@ fn main(
 #if !queued
     let in_range = item < POOL_SIZE;
 #endif
-#if again
-    // Items behind those handed out are anybody's.
-    let handed_out = atomicLoad(&counters[COUNTER_TAKEN + CONSUMED_QUEUE]);
-    var place = item;
-    var runs = in_range;
-    for (var turn = 0u; ; turn++) {
-        if runs {
-            run_stage(slot, place);
-            if turn > 0u && (load_radiance(slot).flags & PATH_RETIRED) != 0u {
-                // There are none any more, which the slot is told when it asks for one.
-                store_radiance(slot, PathRadiance(vec3<f32>(0.0), 0u));
-            }
-        }
-        // Stages diverge; here the threads come together again.
-        subgroupBarrier();
-        runs = in_range && (load_radiance(slot).flags & (PATH_LIVE | PATH_RETIRED)) == 0u;
-        let idle = subgroupBallot(runs);
-        let few = 100u * lane_count(idle) < AGAIN_PERCENT * lane_count(subgroupBallot(true));
-        if few || turn + 1u == MOST_BEGUN {
-            break;
-        }
-        let first = first_lane(idle);
-        var begin = 0u;
-        if subgroup_lane == first {
-            begin = atomicAdd(&counters[COUNTER_AGAIN], lane_count(idle));
-        }
-        begin = subgroupShuffle(begin, first);
-        place = handed_out + begin + lanes_before(idle, subgroup_lane);
-    }
-#else
     if in_range {
 #if moves
         take_up(slot);
 #endif
         run_stage(slot, item);
     }
-#endif
 #if counts_hits
     if group_counts(index) {
         count_hits(lane);

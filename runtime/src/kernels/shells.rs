@@ -23,11 +23,6 @@ const FETCH_PERCENT: u32 = 25;
 /// Triangles wait while less than this share of the lanes with a ray has any (Ylitie et al. 2017).
 const TRIANGLE_PERCENT: u32 = 22;
 
-/// A thread begins at most so many paths in an iteration, if those before end at once.
-const MOST_BEGUN: u32 = 4;
-/// It begins another if at least this share of the subgroup's lanes do.
-const AGAIN_PERCENT: u32 = 50;
-
 /// What a wavefront kernel does around its stage.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shell {
@@ -92,8 +87,6 @@ pub(crate) struct EntryPoint {
     pub moves: bool,
     /// Whether paths begin, and are put down at the end.
     pub begins: bool,
-    /// Whether threads whose path ends at once begin others.
-    pub again: bool,
     /// WGSL of the places of rays that paths keep, if they do.
     pub keeps: Option<String>,
     /// Whether it counts hits of each material.
@@ -125,7 +118,6 @@ impl EntryPoint {
             ("clears", clears),
             ("moves", self.moves),
             ("begins", self.begins),
-            ("again", self.again),
             ("keeps", self.keeps.is_some()),
             ("counts_hits", self.counts_hits),
             ("subgroups", self.subgroups),
@@ -206,8 +198,6 @@ impl Composer<'_> {
     pub(crate) fn shell(&self, shell: &Shell) -> String {
         let pushes = !shell.pushes.is_empty();
         let requests = self.layout.needs.has(Need::Requests);
-        let again = shell.begins && self.layout.begins_again(self.technique);
-        let joins_subgroups = pushes && self.technique.append == Append::Subgroup;
         let entry = EntryPoint {
             queued: shell.consumes.is_some(),
             binned: shell.binned.is_some(),
@@ -216,10 +206,9 @@ impl Composer<'_> {
             joins: pushes && self.technique.append == Append::Workgroup,
             moves: shell.moves,
             begins: shell.begins,
-            again,
             keeps: (requests && shell.pushes.has_rays()).then(|| self.ray_places()),
             counts_hits: shell.counts_hits,
-            subgroups: again || joins_subgroups,
+            subgroups: pushes && self.technique.append == Append::Subgroup,
             walk_lane: shell.traverses && bvh::asks_for_lane(&self.parts.bvh),
         };
         let mut out = self.layout.queues.constants();
@@ -234,15 +223,6 @@ impl Composer<'_> {
         }
         if shell.pushes.sorts {
             out += &self.material_queue();
-        }
-        if again {
-            out += &wgsl::constants_u32(&[
-                ("MOST_BEGUN", MOST_BEGUN),
-                ("AGAIN_PERCENT", AGAIN_PERCENT),
-            ]);
-        }
-        if again && !joins_subgroups {
-            out += SUBGROUP;
         }
         if shell.moves {
             out += include_str!("settle.wgsl");

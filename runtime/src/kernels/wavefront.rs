@@ -96,7 +96,7 @@ impl Composer<'_> {
     }
 
     /// The kernel that begins paths and casts their rays, and decides at once how those go on that hit something. A slot
-    /// whose path ends there begins another in the next iteration, if its thread does not at once.
+    /// whose path ends there begins another in the next iteration.
     fn beginning(&self, stage: &'static Stage) -> KernelDesc {
         let queue = self.layout.queues.of(stage.name).start;
         let Some(decides) = self.stages().find(|s| s.decides()) else {

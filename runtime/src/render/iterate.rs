@@ -87,9 +87,8 @@ impl Renderer<'_> {
     fn cut(&self, pass: &mut Pass, status: &Status, watcher: &mut dyn Watcher) {
         let built = &self.built;
         let scalar = |s| built.layout.counters.scalar(&status.counters, s);
-        let of_next = u64::from(scalar(Scalar::NextPixel)) + u64::from(scalar(Scalar::Again));
-        let begun = u64::from(scalar(Scalar::NextSample)) + of_next.div_ceil(self.pixels().max(1));
-        let begun = u32::try_from(begun).map_or(pass.samples, |begun| begun.min(pass.samples));
+        let begun = scalar(Scalar::NextSample) + u32::from(scalar(Scalar::NextPixel) > 0);
+        let begun = begun.min(pass.samples);
         let keep = watcher.keep(begun, pass.samples);
         pass.samples = keep.clamp(begun, pass.samples);
         built.work.set_run(&pass.options(&self.options));

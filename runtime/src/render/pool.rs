@@ -19,7 +19,7 @@ const LARGE_POOL: u32 = 1 << 23;
 /// The same for renders of many times as many paths: while a pool fills, and at the end, slots are idle.
 const LARGEST_POOL: u32 = 1 << 24;
 /// So many times.
-const MANY: u64 = 32;
+const MANY: u64 = 24;
 /// What a default pool may take, in bytes.
 const LARGE_POOL_BYTES: u64 = 3 << 30;
 /// Paths of a dispatch of a megakernel there: at its end threads idle.
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn only_long_renders_that_nobody_looks_at_have_the_largest_pool() {
-        let paths = 1 << 29;
+        let paths = 24 << 24;
         assert_eq!(large_pool(paths, false), LARGEST_POOL);
         assert_eq!(large_pool(paths - 1, false), LARGE_POOL);
         assert_eq!(large_pool(u64::MAX, true), LARGE_POOL);

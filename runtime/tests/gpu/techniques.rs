@@ -8,9 +8,8 @@ use crate::gpu::stub::{Room, gpu, plan, render_plan, samples};
 use impasto_compiler::partition::Strategy;
 use impasto_runtime::options::RenderOptions;
 use impasto_runtime::render::Rendering;
-use impasto_runtime::render::report::Report;
 use impasto_runtime::technique::{
-    Append, CameraRays, Choice, RayData, Regeneration, SlotOrder, Stack, StateLayout, Technique,
+    Append, CameraRays, Choice, RayData, Regeneration, SlotOrder, StateLayout, Technique,
 };
 
 fn run(strategy: Strategy, technique: Technique) -> Rendering {
@@ -25,28 +24,6 @@ fn run_in(room: &Room, strategy: Strategy, technique: Technique) -> Rendering {
         ..samples(8)
     };
     run_with(room, strategy, &options)
-}
-
-/// By the default technique but for a change, with fewer slots than there are paths at a time.
-fn run_in_few_slots(room: &Room, change: fn(&mut Technique)) -> Rendering {
-    let mut technique = Technique::default();
-    change(&mut technique);
-    let options = RenderOptions {
-        pool: Some(300),
-        count_hits: true,
-        technique,
-        ..samples(32)
-    };
-    run_with(room, Strategy::OWN, &options)
-}
-
-/// The room without walls, under a sky.
-fn open_room() -> Room {
-    Room {
-        walls: false,
-        sky: 0.7,
-        ..room()
-    }
 }
 
 fn run_with(room: &Room, strategy: Strategy, options: &RenderOptions) -> Rendering {
@@ -153,8 +130,16 @@ fn rays_of_the_camera_may_be_cast_at_once() {
 /// A path takes an iteration less. Its state is written once, whichever way it is laid out.
 #[test]
 fn what_the_camera_sees_goes_straight_to_its_material() {
-    let room = room();
-    let run = |change| run_in_few_slots(&room, change);
+    let run = |change: fn(&mut Technique)| {
+        let mut technique = Technique::default();
+        change(&mut technique);
+        let options = RenderOptions {
+            pool: Some(300),
+            technique,
+            ..samples(32)
+        };
+        run_with(&room(), Strategy::OWN, &options)
+    };
     let at_once = run(|t| t.camera_rays = CameraRays::AtOnce);
     for straight in [
         run(|t| t.camera_rays = CameraRays::Straight),
@@ -168,37 +153,14 @@ fn what_the_camera_sees_goes_straight_to_its_material() {
     }
 }
 
-/// Where most of the camera's rays meet nothing, slots do not wait for the next iteration to be of use.
-#[test]
-fn threads_whose_path_ends_at_once_begin_others() {
-    let open = open_room();
-    let run = |change| run_in_few_slots(&open, change);
-    let straight = run(|t| t.camera_rays = CameraRays::Straight);
-    for again in [
-        run(|t| t.camera_rays = CameraRays::Again),
-        run(|t| (t.camera_rays, t.state) = (CameraRays::Again, StateLayout::Pairs)),
-        run(|t| (t.camera_rays, t.slot_order) = (CameraRays::Again, SlotOrder::Work)),
-        run(|t| (t.camera_rays, t.append) = (CameraRays::Again, Append::Subgroup)),
-        run(|t| (t.camera_rays, t.stack) = (CameraRays::Again, Stack::Workgroup)),
-    ] {
-        assert_eq!(again.report.technique.camera_rays, CameraRays::Again);
-        assert_eq!(again.film, straight.film);
-        assert!(again.film.samples.iter().all(|count| *count == 32));
-        let [all, fewer] = [&straight, &again].map(|rendering| &rendering.report);
-        assert!(fewer.iterations < all.iterations);
-        // What threads took up themselves is counted with what slots asked for.
-        let items = |report: &Report| {
-            let kernel = report.kernels.iter().find(|k| k.name == "new_path");
-            kernel.expect("paths begin").items
-        };
-        assert_eq!(items(fewer), items(all));
-    }
-}
-
 /// Rays that are not the path's own are cast with the others, and one that ends there is counted once.
 #[test]
 fn rays_of_the_camera_are_cast_at_once_where_nothing_else_is_asked_of_them() {
-    let open = open_room();
+    let open = Room {
+        walls: false,
+        sky: 0.7,
+        ..room()
+    };
     for (ray_data, camera_rays) in [
         (RayData::Slots, CameraRays::Straight),
         (RayData::Requests, CameraRays::Queue),
