@@ -25,7 +25,7 @@ use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::explain::{Explanation, Subject, explain};
 use impasto_compiler::partition::{
     Calibrated, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel, Requires,
-    Strategy, Workload, candidates,
+    Strategy, Workload, candidates, in_wide_workgroups,
 };
 use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{NOBODY, Planner, Watch, profile_workload};
@@ -151,7 +151,10 @@ impl Planning {
             // The first goes on while the others are searched.
             let others = std::iter::once_with(move || {
                 let trials = if is_doubted { self.trials } else { 0 };
-                candidates(&materials.inputs(&workload, &self.profile), &chosen, trials)
+                let inputs = materials.inputs(&workload, &self.profile);
+                let wide = in_wide_workgroups(&inputs, &chosen).filter(|_| trials > 0);
+                let others = candidates(&inputs, &chosen, trials);
+                wide.into_iter().chain(others).collect::<Vec<Plan>>()
             });
             Ok(Box::new(std::iter::once(plan).chain(others.flatten())))
         })

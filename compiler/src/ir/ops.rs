@@ -303,14 +303,13 @@ ops! {
         |a| hash(a, 3), zero;
     ToFloat "to_float" operator IntToFloat, Integer(1), Builtin("f32"), None,
         |a| to_float(a, f64::from), zero;
-    ToInt "to_int" operator FloatToInt, Integer(1),
-        Helper("to_int", "(x: T) -> i32 { return i32(clamp(x, -2147483648.0, 2147483520.0)); }"), None,
+    ToInt "to_int" operator FloatToInt, Integer(1), Builtin("i32"), None,
         |a| to_int(a, |x| x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32), zero;
     UnsignedToFloat "unsigned_to_float" operator IntToFloat, Integer(1),
         Helper("unsigned_to_float", "(i: T) -> f32 { return f32(bitcast<u32>(i)); }"), None,
         |a| to_float(a, |i| f64::from(i as u32)), zero;
     ToUnsigned "to_unsigned" operator FloatToInt, Integer(1),
-        Helper("to_unsigned", "(x: T) -> i32 { return bitcast<i32>(u32(clamp(x, 0.0, 4294967040.0))); }"), None,
+        Helper("to_unsigned", "(x: T) -> i32 { return bitcast<i32>(u32(x)); }"), None,
         |a| to_int(a, |x| x.clamp(0.0, 4_294_967_040.0) as u32 as i32), zero;
     UnitFloat "unit_float" function IntToFloat, Integer(2),
         Helper("unit_float", "(i: T) -> f32 { return f32(bitcast<u32>(i) >> 8u) * 5.9604645e-8; }"), None,

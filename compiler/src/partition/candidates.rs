@@ -6,13 +6,20 @@
 //! the place of a single material. docs/measurements.md has what trials of so many of each gain.
 
 use super::search::{ordered, total};
-use super::{Automatic, Calibrated, Form, Groups, Plan, PlanInputs, Search, Strategy};
+use super::{Automatic, Calibrated, Form, Groups, Plan, PlanInputs, PlanKernel, Search, Strategy};
 
 /// A candidate is predicted to take at most so many times the iteration of the best: a trial must not cost more than it may gain.
 const MARGIN: f64 = 1.25;
 
 /// Kernels of which every material is tried in the place of every other: of more, there would be too many.
 const FEW: usize = 16;
+
+/// Threads of a workgroup with which a driver may hold more of them at once: by 384, an H200 has 12 or 24 subgroups of a kernel in
+/// flight, by 256 also 16. Its driver gives a thread 80 registers for 24 of them where it stays at 100 for 16, which serves some
+/// kernels and not others (docs/measurements.md, "Workgroups that suit their kernels").
+const WIDE: u32 = 384;
+/// So many numbers are alive at once in materials of which that is to be expected.
+const MANY_LIVE: u32 = 70;
 
 /// Plans that may turn out to be faster than `chosen`, at most `most` of either kind, the likeliest of each kind first. None where
 /// costs, workload or profile are not known.
@@ -50,6 +57,21 @@ pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Pl
         }
     }
     found
+}
+
+/// The `chosen` plan with workgroups of [`WIDE`] for the kernels whose threads need many registers; `None` where no kernel does, or
+/// costs are not known.
+pub fn in_wide_workgroups(inputs: &PlanInputs<'_>, chosen: &Plan) -> Option<Plan> {
+    let costs = inputs.costs?;
+    let live = |m: &usize| costs.get(*m)?.as_ref().map(|cost| cost.live);
+    let needs_many = |kernel: &PlanKernel| {
+        kernel.form.has_queue() && kernel.materials.iter().filter_map(live).max() >= Some(MANY_LIVE)
+    };
+    let mut plan = chosen.clone();
+    let mut wide = plan.kernels.iter_mut().filter(|k| needs_many(k)).peekable();
+    wide.peek()?;
+    wide.for_each(|kernel| kernel.workgroup = Some(WIDE));
+    Some(plan)
 }
 
 /// What the search finds where some forms are not allowed, and the plans of strategies that the model can compare.
@@ -159,6 +181,39 @@ mod tests {
                 }
             });
         }
+    }
+
+    /// Kernels that are inline have no workgroups of their own.
+    #[test]
+    fn kernels_that_need_many_registers_may_have_wide_workgroups() {
+        let mut case = Case::new(3, 5);
+        for (cost, live) in case.costs.iter_mut().zip([MANY_LIVE, MANY_LIVE - 1, 200]) {
+            cost.as_mut().expect("it is known").live = live;
+        }
+        with_inputs(&case, |inputs| {
+            let groups = |of: &[(Form, &[usize])]| {
+                let groups = of.iter().map(|(form, members)| (*form, members.to_vec()));
+                inputs.plan("auto", groups.collect())
+            };
+            let wide = |of: &[(Form, &[usize])]| {
+                let plan = groups(of);
+                let wide = in_wide_workgroups(inputs, &plan)?;
+                assert_eq!(wide.groups(), plan.groups());
+                assert!(!wide.does_as(&plan));
+                Some(wide.kernels.iter().map(|k| k.workgroup).collect::<Vec<_>>())
+            };
+            let own = [(Form::Own, &[0][..]), (Form::Own, &[1]), (Form::Own, &[2])];
+            assert_eq!(wide(&own), Some(vec![Some(WIDE), None, Some(WIDE)]));
+            let mixed = [(Form::Mixed, &[0, 1][..]), (Form::Inline, &[2])];
+            assert_eq!(wide(&mixed), Some(vec![Some(WIDE), None]));
+            let few = [(Form::Own, &[1][..]), (Form::Inline, &[0, 2])];
+            assert_eq!(wide(&few), None);
+            let unknown = PlanInputs {
+                costs: None,
+                ..*inputs
+            };
+            assert_eq!(in_wide_workgroups(&unknown, &groups(&own)), None);
+        });
     }
 
     /// A GPU that runs some forms otherwise than the model thinks: trials find what it is fastest at.

@@ -1,11 +1,16 @@
 //! What makes a plan one that can be run.
 
+use std::ops::RangeInclusive;
+
 use super::error::list;
 use super::{Form, Organisation, Plan, PlanError, PlanKernel};
 
+/// The threads that workgroups have on GPUs that have the largest.
+const WORKGROUPS: RangeInclusive<u32> = 1..=1024;
+
 impl Plan {
     /// Holds the plan to its rules for a program of `materials` materials: each is in exactly one kernel
-    /// or unused; no kernel is empty; an own kernel has one member; at most one kernel is inline; a
+    /// or unused; no kernel is empty; an own kernel has one member; at most one kernel is inline, and has no workgroups of its own; a
     /// megakernel is the only one, and inline.
     ///
     /// # Errors
@@ -101,7 +106,18 @@ fn check_kernel(kernel: &PlanKernel) -> Result<(), PlanError> {
         let several = list(Form::queued_of_members(members).map(Form::name));
         return Err(PlanError::new(message).hint(format!("{several} take several")));
     }
-    Ok(())
+    match kernel.workgroup {
+        Some(_) if !kernel.form.has_queue() => {
+            let message = format!("kernel `{name}` is inline and has workgroups of its own");
+            Err(PlanError::new(message).hint("what is inline is part of other kernels"))
+        }
+        Some(threads) if !WORKGROUPS.contains(&threads) => {
+            let message = format!("kernel `{name}` has workgroups of {threads} threads");
+            let (least, most) = (WORKGROUPS.start(), WORKGROUPS.end());
+            Err(PlanError::new(message).hint(format!("they have {least} to {most}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

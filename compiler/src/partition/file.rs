@@ -31,6 +31,8 @@ struct Kernel {
     name: Option<String>,
     form: Form,
     materials: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    workgroup: Option<u32>,
 }
 
 /// What a file of any version has.
@@ -51,6 +53,7 @@ pub fn write(plan: &Plan, names: &[String]) -> String {
         name: Some(kernel.name.clone()),
         form: kernel.form,
         materials: named(&kernel.materials),
+        workgroup: kernel.workgroup,
     };
     let file = File {
         version: VERSION,
@@ -108,12 +111,14 @@ fn resolve(file: File, names: &[String]) -> Plan {
     let indices = |members: &[String]| -> Vec<usize> {
         members.iter().filter_map(|n| find(n, names).ok()).collect()
     };
-    let given: Vec<Option<String>> = file.kernels.iter().map(|k| k.name.clone()).collect();
+    let given = file.kernels.iter();
+    let given: Vec<_> = given.map(|k| (k.name.clone(), k.workgroup)).collect();
     let groups = file.kernels.iter().map(|k| (k.form, indices(&k.materials)));
     let mut plan = Plan::wavefront(file.strategy, groups, indices(&file.unused), names);
     plan.organisation = file.organisation;
-    for (kernel, name) in plan.kernels.iter_mut().zip(given) {
+    for (kernel, (name, workgroup)) in plan.kernels.iter_mut().zip(given) {
         kernel.name = name.unwrap_or(std::mem::take(&mut kernel.name));
+        kernel.workgroup = workgroup;
     }
     super::number_equal_names(&mut plan.kernels);
     plan
@@ -144,6 +149,9 @@ mod tests {
     #[test]
     fn what_is_written_reads_back() {
         assert_eq!(read(&write(&plan(), &names()), &names()), Ok(plan()));
+        let mut wide = plan();
+        wide.kernels[1].workgroup = Some(384);
+        assert_eq!(read(&write(&wide, &names()), &names()), Ok(wide));
         let names = names();
         for strategy in by_names() {
             let plan = strategy.plan(&PlanInputs::of_names(&names)).expect("names");

@@ -22,7 +22,7 @@ mod strategy;
 pub mod text;
 pub mod workload;
 
-pub use candidates::candidates;
+pub use candidates::{candidates, in_wide_workgroups};
 pub use error::PlanError;
 pub use form::Form;
 pub use inputs::PlanInputs;
@@ -52,6 +52,9 @@ pub struct PlanKernel {
     pub form: Form,
     /// Indices of the materials it evaluates, ascending.
     pub materials: Vec<usize>,
+    /// Threads of a workgroup, where it is not to have as many as other kernels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub workgroup: Option<u32>,
 }
 
 /// Which kernels a renderer runs. Every material of the program is in exactly one of them, or else
@@ -103,7 +106,8 @@ impl Plan {
     /// Whether another has the same kernels, whatever they are called and in whichever order they come.
     pub fn does_as(&self, other: &Self) -> bool {
         let kernels = |plan: &Self| {
-            let mut kernels = plan.groups();
+            let kernels = plan.kernels.iter();
+            let mut kernels: Vec<_> = kernels.map(PlanKernel::what_it_does).collect();
             kernels.sort();
             kernels
         };
@@ -153,6 +157,12 @@ impl PlanKernel {
             name: format!("material_{name}"),
             form,
             materials,
+            workgroup: None,
         }
+    }
+
+    /// All that it does, whatever it is called.
+    pub fn what_it_does(&self) -> (Form, Vec<usize>, Option<u32>) {
+        (self.form, self.materials.clone(), self.workgroup)
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Groups are separated by `|`, the materials of a group by `,`. A form and `:` may stand before;
 //! without one, a single material is own and several are mixed. `*` stands for all materials
-//! that are named nowhere; `own:*` gives each of them a kernel of its own.
+//! that are named nowhere; `own:*` gives each of them a kernel of its own. `own/384:paint` has
+//! workgroups of 384 threads.
 
 use super::error::list;
 use super::{Form, Plan, PlanError};
@@ -44,7 +45,13 @@ pub fn parse(text: &str, names: &[String], unused: &[usize]) -> Result<Plan, Pla
     }
     one_inline(&kernels)?;
     let left = unused.iter().copied().filter(|m| kernel_of[*m].is_none());
-    Ok(Plan::wavefront(STRATEGY, kernels, left.collect(), names))
+    let groups = kernels.iter().map(|k| (k.form, k.materials.clone()));
+    let mut plan = Plan::wavefront(STRATEGY, groups, left.collect(), names);
+    for (kernel, described) in plan.kernels.iter_mut().zip(kernels) {
+        kernel.workgroup = described.workgroup;
+    }
+    plan.check_named(names)?;
+    Ok(plan)
 }
 
 /// A plan's kernels as a string that [`parse`] takes. What is unused is left out, and a
@@ -53,7 +60,9 @@ pub fn print(plan: &Plan, names: &[String]) -> String {
     let name = |m: &usize| names.get(*m).map_or("?", String::as_str);
     let groups = plan.kernels.iter().map(|kernel| {
         let members: Vec<&str> = kernel.materials.iter().map(name).collect();
-        format!("{}:{}", kernel.form.name(), members.join(","))
+        let workgroup = kernel.workgroup.map(|threads| format!("/{threads}"));
+        let workgroup = workgroup.unwrap_or_default();
+        format!("{}{workgroup}:{}", kernel.form.name(), members.join(","))
     });
     groups.collect::<Vec<_>>().join("|")
 }
@@ -63,6 +72,7 @@ struct Group<'t> {
     /// Counted from 1.
     number: usize,
     form: Option<Form>,
+    workgroup: Option<u32>,
     names: Vec<&'t str>,
     /// How often it says `*`.
     rest: usize,
@@ -71,9 +81,17 @@ struct Group<'t> {
 impl<'t> Group<'t> {
     fn parse(number: usize, text: &'t str) -> Result<Self, PlanError> {
         let (form, members) = match text.split_once(':') {
-            Some((form, members)) => (Some(parse_form(number, form.trim())?), members),
+            Some((form, members)) => (Some(form), members),
             None => (None, text),
         };
+        let (form, workgroup) = match form.map(|form| form.split_once('/').ok_or(form)) {
+            Some(Ok((form, threads))) => (Some(form), Some(parse_threads(number, threads)?)),
+            Some(Err(form)) => (Some(form), None),
+            None => (None, None),
+        };
+        let form = form
+            .map(|form| parse_form(number, form.trim()))
+            .transpose()?;
         if members.trim().is_empty() {
             let error = PlanError::new(format!("group {number} of the partition is empty"));
             return Err(error.hint("groups are separated by `|`, as in `a,b|binned:c,d|inline:*`"));
@@ -88,6 +106,7 @@ impl<'t> Group<'t> {
         Ok(Self {
             number,
             form,
+            workgroup,
             names,
             rest,
         })
@@ -98,8 +117,13 @@ impl<'t> Group<'t> {
         &self,
         mut members: Vec<usize>,
         rest: &[usize],
-        kernels: &mut Vec<(Form, Vec<usize>)>,
+        kernels: &mut Vec<Described>,
     ) -> Result<(), PlanError> {
+        let described = |form, materials| Described {
+            form,
+            materials,
+            workgroup: self.workgroup,
+        };
         let only_rest = members.is_empty();
         if self.rest > 0 {
             members.extend(rest);
@@ -108,7 +132,7 @@ impl<'t> Group<'t> {
             // `*` for what there is no more of.
             (_, 0) => return Ok(()),
             (Some(Form::Own), _) if only_rest => {
-                kernels.extend(members.into_iter().map(|m| (Form::Own, vec![m])));
+                kernels.extend(members.into_iter().map(|m| described(Form::Own, vec![m])));
                 return Ok(());
             }
             (Some(Form::Own), 2..) => {
@@ -132,9 +156,23 @@ impl<'t> Group<'t> {
             (None, 1) => Form::Own,
             (None, _) => Form::Mixed,
         };
-        kernels.push((form, members));
+        kernels.push(described(form, members));
         Ok(())
     }
+}
+
+/// A kernel that a group describes.
+struct Described {
+    form: Form,
+    materials: Vec<usize>,
+    workgroup: Option<u32>,
+}
+
+fn parse_threads(number: usize, text: &str) -> Result<u32, PlanError> {
+    text.trim().parse().map_err(|_| {
+        let message = format!("group {number} of the partition has workgroups of `{text}`");
+        PlanError::new(message).hint("a number of threads stands after `/`, as in `own/384:a`")
+    })
 }
 
 fn parse_form(number: usize, name: &str) -> Result<Form, PlanError> {
@@ -183,8 +221,8 @@ pub(super) fn find(name: &str, names: &[String]) -> Result<usize, String> {
         })
 }
 
-fn one_inline(kernels: &[(Form, Vec<usize>)]) -> Result<(), PlanError> {
-    match kernels.iter().filter(|(f, _)| !f.has_queue()).count() {
+fn one_inline(kernels: &[Described]) -> Result<(), PlanError> {
+    match kernels.iter().filter(|k| !k.form.has_queue()).count() {
         0 | 1 => Ok(()),
         _ => Err(PlanError::new("the partition has several inline groups")
             .hint("what is inline is part of one kernel, logic: make them one group, as in `inline:a,b`")),
@@ -235,6 +273,10 @@ mod tests {
         reads(
             "wood|paint,glass,wall|*",
             "own:wood|mixed:paint,glass,wall|own:gold",
+        );
+        reads(
+            "own/384:wood|mixed / 64 :paint,glass|own/32:*",
+            "own/384:wood|mixed/64:paint,glass|own/32:wall|own/32:gold",
         );
     }
 
@@ -287,6 +329,23 @@ mod tests {
             "`inline:a,b`",
         );
         refused("*|binned:*", "`*` stands twice", "one group");
+        refused(
+            "own/many:paint|*",
+            "group 1 of the partition has workgroups of `many`",
+            "`own/384:a`",
+        );
+        refused("own/-1:paint|*", "workgroups of `-1`", "`own/384:a`");
+        refused("own/0:paint|*", "has workgroups of 0 threads", "1 to 1024");
+        refused(
+            "own/1025:paint|*",
+            "workgroups of 1025 threads",
+            "1 to 1024",
+        );
+        refused(
+            "inline/64:paint|*",
+            "is inline and has workgroups of its own",
+            "part of other kernels",
+        );
         refused("*,*", "`*` stands twice", "one group");
     }
 
@@ -314,14 +373,17 @@ mod tests {
                 };
                 kernels.push((form, members));
             }
-            let plan = Plan::wavefront(STRATEGY, kernels, Vec::new(), &names());
+            let mut plan = Plan::wavefront(STRATEGY, kernels, Vec::new(), &names());
+            for (at, kernel) in plan.kernels.iter_mut().enumerate() {
+                kernel.workgroup = (at % 2 == 1 && kernel.form.has_queue()).then_some(96);
+            }
             prop_assert_eq!(plan.check(5), Ok(()));
             let back = parse(&print(&plan, &names()), &names(), &[]);
             prop_assert_eq!(back, Ok(plan));
         }
 
         #[test]
-        fn no_text_makes_it_panic(text in "[paintglswod,|:* ]{0,40}") {
+        fn no_text_makes_it_panic(text in "[paintglswod,|:*/1 ]{0,40}") {
             if let Ok(plan) = parse(&text, &names(), &[]) {
                 prop_assert_eq!(plan.check(5), Ok(()));
             }

@@ -27,6 +27,7 @@ const SIZES: Sizes = Sizes {
     pool: 1 << 20,
     pools: 1,
     workgroup: 128,
+    suited: false,
     threads: 1 << 16,
     fetch_limit: 64,
     row_groups: 1 << 14,

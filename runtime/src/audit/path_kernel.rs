@@ -23,6 +23,7 @@ const SIZES: Sizes = Sizes {
     pool: 1,
     pools: 1,
     workgroup: 1,
+    suited: false,
     threads: 1,
     fetch_limit: 1,
     row_groups: 1,

@@ -162,7 +162,9 @@ impl Cpu {
             hands_out: kernel.wgsl.contains("fn hand_out_work"),
             groups: match kernel.desc.source.extent(sizes) {
                 Extent::Groups(groups) => Groups::Known(groups),
-                Extent::Threads(count) => Groups::Known(count.div_ceil(sizes.workgroup)),
+                Extent::Threads(count) => {
+                    Groups::Known(count.div_ceil(sizes.workgroup_of(&kernel.desc)))
+                }
                 Extent::Queue(queue) => Groups::OfQueue(queue),
             },
         })

@@ -49,7 +49,7 @@ impl Composer<'_> {
         } else {
             Storage::Memory(self.technique.state)
         };
-        let mut text = self.constants();
+        let mut text = self.constants(&desc);
         text += &state::accessors(self.layout.needs, stages, storage);
         let mut parts: Vec<Part> = stages
             .iter()
@@ -96,11 +96,11 @@ impl Composer<'_> {
         needs.flags().chain(derived).collect()
     }
 
-    fn constants(&self) -> String {
+    fn constants(&self, desc: &KernelDesc) -> String {
         let (world, sizes) = (self.world, self.sizes);
         let mut out = wgsl::constants_u32(&[
             ("POOL_SIZE", sizes.pool),
-            ("WORKGROUP_SIZE", sizes.workgroup),
+            ("WORKGROUP_SIZE", sizes.workgroup_of(desc)),
             ("ROW_GROUPS", sizes.row_groups),
             ("PIXELS", world.width * world.height),
             ("TILE_WIDTH", tiles::TILE[0]),

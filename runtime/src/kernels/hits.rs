@@ -23,11 +23,11 @@ pub(crate) struct Counted {
     pub blocks: u32,
 }
 
-/// What is counted of a pool.
-pub(crate) fn counted(sizes: Sizes) -> Counted {
-    let (pool, workgroup) = (sizes.pool, sizes.workgroup.max(1));
+/// What a kernel counts of a pool whose workgroups have so many threads.
+pub(crate) fn counted(sizes: Sizes, workgroup: u32) -> Counted {
+    let (pool, workgroup) = (sizes.pool, workgroup.max(1));
     let most = most_counting(sizes);
-    let counting = (0..groups(sizes)).filter(|group| group.wrapping_mul(GOLDEN) <= most);
+    let counting = (0..pool.div_ceil(workgroup)).filter(|group| group.wrapping_mul(GOLDEN) <= most);
     let none = Counted {
         slots: 0,
         blocks: 0,
@@ -41,14 +41,9 @@ pub(crate) fn counted(sizes: Sizes) -> Counted {
     })
 }
 
-/// The workgroups that a pool has.
-fn groups(sizes: Sizes) -> u32 {
-    sizes.pool.div_ceil(sizes.workgroup.max(1))
-}
-
-/// The greatest fraction with which a workgroup counts.
+/// The greatest fraction with which a workgroup counts, the same in all kernels that do.
 fn most_counting(sizes: Sizes) -> u32 {
-    if groups(sizes) < MANY_GROUPS {
+    if sizes.pool.div_ceil(sizes.workgroup.max(1)) < MANY_GROUPS {
         u32::MAX
     } else {
         COUNTING - 1
@@ -78,6 +73,7 @@ mod tests {
             pool,
             pools: 1,
             workgroup,
+            suited: false,
             threads: 1,
             fetch_limit: 1,
             row_groups: 1,
@@ -87,16 +83,21 @@ mod tests {
     #[test]
     fn small_pools_are_counted_whole_and_of_large_ones_an_eighth() {
         let all = |slots: u32, blocks: u32| Counted { slots, blocks };
-        assert_eq!(counted(sizes(1, 256)), all(1, 1));
-        assert_eq!(counted(sizes(1000, 256)), all(1000, 32));
-        assert_eq!(counted(sizes(1 << 19, 256)), all(1 << 19, 1 << 14));
-        for (pool, workgroup) in [
-            (1 << 20, 256),
-            (1 << 23, 256),
-            (1 << 23, 64),
-            (8_000_001, 96),
+        for workgroup in [256, 384] {
+            assert_eq!(counted(sizes(1, 256), workgroup), all(1, 1));
+            assert_eq!(counted(sizes(1000, 256), workgroup), all(1000, 32));
+            let half = counted(sizes(1 << 19, 256), workgroup);
+            assert_eq!(half, all(1 << 19, 1 << 14));
+        }
+        for (pool, most, workgroup) in [
+            (1 << 20, 256, 256),
+            (1 << 20, 256, 384),
+            (1 << 23, 256, 256),
+            (1 << 23, 256, 384),
+            (1 << 23, 64, 64),
+            (8_000_001, 96, 96),
         ] {
-            let Counted { slots, blocks } = counted(sizes(pool, workgroup));
+            let Counted { slots, blocks } = counted(sizes(pool, most), workgroup);
             let share = f64::from(slots) / f64::from(pool);
             assert!((share - 0.125).abs() < 1e-3, "{share} of {pool}");
             assert!(blocks >= slots / BLOCK);

@@ -11,7 +11,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::kernels::compose::Binding;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::shells::SUBGROUP;
-use crate::kernels::stages::Stage;
+use crate::kernels::stages::{STAGES, Stage};
 use crate::technique::{Regeneration, Technique};
 use crate::wgsl;
 use crate::wgsl::template::template;
@@ -30,6 +30,9 @@ pub(crate) const RAYS: &str = "rays";
 
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
+
+/// Threads of a workgroup of the megakernel (docs/measurements.md, "Workgroups that suit their kernels").
+const MEGA_WORKGROUP: u32 = 512;
 
 /// Where the items come from that a kernel works on, which decides how many threads it gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +105,8 @@ pub(crate) struct KernelDesc {
     pub source: DispatchSource,
     /// Whether it holds the state of its paths until it is known where they go.
     pub holds: bool,
+    /// Threads of a workgroup that suit it on GPUs; `None` for those that suit most kernels.
+    pub workgroup: Option<u32>,
     /// WGSL of its requests and entry point.
     pub shell: String,
 }
@@ -117,6 +122,7 @@ impl KernelDesc {
         Self {
             name: name.to_string(),
             role: stages.first().map_or(PREPARE, |stage| stage.name),
+            workgroup: stages.first().and_then(|stage| stage.workgroup),
             form: None,
             stages,
             members: Vec::new(),
@@ -155,8 +161,10 @@ pub(crate) struct Sizes {
     pub pool: u32,
     /// Pools: each thread of the processor has its own.
     pub pools: u32,
-    /// Threads of a workgroup.
+    /// Threads of a workgroup of most kernels.
     pub workgroup: u32,
+    /// Whether kernels have workgroups that suit them; otherwise all have that many threads.
+    pub suited: bool,
     /// Threads that fill the GPU, for kernels whose threads fetch one item after another.
     pub threads: u32,
     /// Items that such a thread may fetch, which bounds the work of a dispatch.
@@ -169,6 +177,22 @@ impl Sizes {
     /// Slots of all pools.
     pub(crate) fn slots(self) -> u32 {
         self.pool.saturating_mul(self.pools)
+    }
+
+    /// Threads of a workgroup of a kernel.
+    pub(crate) fn workgroup_of(self, desc: &KernelDesc) -> u32 {
+        desc.workgroup
+            .filter(|_| self.suited)
+            .unwrap_or(self.workgroup)
+    }
+
+    /// The most threads that a workgroup of a stage's kernel has.
+    pub(crate) fn largest_workgroup(self) -> u32 {
+        let suited = STAGES.iter().filter_map(|stage| stage.workgroup);
+        let suited = suited.filter(|_| self.suited);
+        suited
+            .max()
+            .map_or(self.workgroup, |most| most.max(self.workgroup))
     }
 
     /// Threads of a kernel that fetches the items of some queues: so many that each may fetch about twice its share. Items
@@ -222,6 +246,10 @@ impl Composer<'_> {
         for desc in &mut descs {
             desc.name = unused_name(&desc.name, &taken);
             taken.insert(desc.name.clone());
+        }
+        let threads = threads_on(&descs, self.sizes);
+        for desc in descs.iter_mut().filter(|desc| desc.role == PREPARE) {
+            desc.shell += &threads;
         }
         descs
     }
@@ -320,6 +348,7 @@ impl Composer<'_> {
             role: MEGA,
             form: Some(Form::Inline),
             members: self.planned(),
+            workgroup: Some(MEGA_WORKGROUP),
             ..KernelDesc::plain("mega", self.stages().collect(), source, shell)
         }
     }
@@ -335,6 +364,27 @@ fn unused_name(name: &str, taken: &BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}_{number}"));
     let mut names = std::iter::once(name.to_string()).chain(numbered);
     names.find(|n| !taken.contains(n)).unwrap_or_default()
+}
+
+/// The WGSL function that gives the threads of a workgroup of the kernel that works on a queue.
+fn threads_on(descs: &[KernelDesc], sizes: Sizes) -> String {
+    let mut out = "fn threads_on(queue: u32) -> u32 {\n".to_string();
+    for desc in descs {
+        let (first, count) = match desc.source {
+            DispatchSource::Queue(queue) => (queue, 1),
+            DispatchSource::Queues { first, count } => (first, count),
+            _ => continue,
+        };
+        let threads = sizes.workgroup_of(desc);
+        if threads != sizes.workgroup {
+            let end = first + count;
+            let _ = writeln!(
+                out,
+                "    if queue >= {first}u && queue < {end}u {{ return {threads}u; }}"
+            );
+        }
+    }
+    out + "    return WORKGROUP_SIZE;\n}\n"
 }
 
 /// The WGSL function that gives the first queue of the kernel that works on a queue, where

@@ -37,7 +37,8 @@ fn consume(queue: u32) -> u32 {
 #if fetched
     atomicStore(&counters[COUNTER_FETCHED_OF + COUNTER_PUSHED_STRIDE * queue], 0u);
 #endif
-    return (items + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+    let threads = threads_on(queue);
+    return (items + threads - 1u) / threads;
 }
 
 // Writes the arguments of the kernel whose first queue it is: rows of groups, since a dimension

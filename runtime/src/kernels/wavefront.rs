@@ -88,6 +88,8 @@ impl Composer<'_> {
             ..Shell::default()
         });
         KernelDesc {
+            // Inline materials need registers, which most of them have by workgroups of the usual size.
+            workgroup: stage.workgroup.filter(|_| found.members.is_empty()),
             form: found.form,
             members: found.members,
             holds,
@@ -187,6 +189,7 @@ impl Composer<'_> {
             _ => DispatchSource::Queues { first, count },
         };
         KernelDesc {
+            workgroup: planned.workgroup,
             form: Some(planned.form),
             members: planned.materials.clone(),
             ..KernelDesc::plain(&planned.name, vec![stage], source, shell)

@@ -19,7 +19,7 @@ use crate::gpu::schedule::{Size, Step};
 use crate::gpu::{self, Gpu};
 use crate::kernels::buffers::ARGUMENT_BYTES;
 use crate::kernels::layout::PlanLayout;
-use crate::kernels::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
+use crate::kernels::modules::{Composer, Extent, Kernel, KernelDesc, Sizes};
 use crate::kernels::parts;
 use crate::kernels::prints::Prints;
 use crate::kernels::random::{self, Demand};
@@ -410,7 +410,10 @@ impl ReportInputs {
 /// How many materials hits are counted of: all, or none where there is no logic kernel, blocks of slots
 /// do not fill workgroups, or a workgroup's memory is too small.
 fn counted_materials(device: DeviceRef<'_>, composer: &Composer<'_>) -> usize {
-    let (materials, workgroup) = (composer.materials.len() as u64, composer.sizes.workgroup);
+    let (materials, workgroup) = (
+        composer.materials.len() as u64,
+        composer.sizes.largest_workgroup(),
+    );
     let blocks = u64::from(workgroup / BLOCK);
     let appending = 2 * composer.layout.queues.count() as u64;
     let words = materials + blocks * materials.div_ceil(32) + appending;
@@ -479,20 +482,24 @@ pub(crate) fn build_step(
     sizes: Sizes,
 ) -> Result<Step, RuntimeError> {
     let name = &kernel.desc.name;
+    let most = DeviceRef::from(gpu).limits().workgroup_threads;
+    pool::possible_workgroup(sizes.workgroup_of(&kernel.desc), most)?;
     let layout = resources.bind_group_layout(gpu, kernel)?;
     Ok(Step {
         name: name.clone(),
         pipeline: gpu.pipeline(name, &kernel.wgsl, &layout)?,
         bind_group: resources.bind_group(gpu, kernel, &layout),
-        size: dispatch_size(kernel.desc.source, sizes),
+        size: dispatch_size(&kernel.desc, sizes),
     })
 }
 
 /// How many workgroups a kernel gets.
-fn dispatch_size(source: DispatchSource, sizes: Sizes) -> Size {
-    match source.extent(sizes) {
+fn dispatch_size(desc: &KernelDesc, sizes: Sizes) -> Size {
+    match desc.source.extent(sizes) {
         Extent::Groups(groups) => Size::Direct(groups, 1),
-        Extent::Threads(count) => Size::for_items(count, sizes.workgroup, sizes.row_groups),
+        Extent::Threads(count) => {
+            Size::for_items(count, sizes.workgroup_of(desc), sizes.row_groups)
+        }
         Extent::Queue(queue) => Size::Indirect(ARGUMENT_BYTES * queue as u64),
     }
 }

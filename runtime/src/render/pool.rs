@@ -28,6 +28,8 @@ const LARGE_BATCH: u32 = 1 << 22;
 const SOFTWARE_POOL: u32 = 1 << 16;
 /// Threads of a workgroup (docs/measurements.md).
 const WORKGROUP: u32 = 256;
+/// A GPU that does not have such large ones has the same for all kernels.
+const LARGEST_WORKGROUP: u32 = 512;
 /// Threads that fetch their work: about as many as an H200 holds at once.
 const THREADS: u32 = 1 << 18;
 /// Items that each of them may fetch; with few threads and large pools a dispatch takes long.
@@ -167,6 +169,9 @@ pub(crate) fn dispatch_sizes(
         pool: items,
         pools,
         workgroup: workgroup_size(device, technique.workgroup)?,
+        suited: matches!(device, DeviceRef::Gpu(_))
+            && technique.workgroup.is_none()
+            && limits.workgroup_threads >= LARGEST_WORKGROUP,
         threads: technique.threads.unwrap_or(THREADS).min(items),
         fetch_limit,
         row_groups: limits.row_groups,
@@ -184,15 +189,21 @@ fn workgroup_size(device: DeviceRef<'_>, wanted: Option<u32>) -> Result<u32, Run
         DeviceRef::Gpu(_) => WORKGROUP,
         DeviceRef::Cpu(_) => PORTION,
     };
-    match wanted {
-        Some(threads) if threads == 0 || threads > most => Err(RuntimeError::Setting {
-            setting: "workgroup",
-            value: threads.to_string(),
-            expected: format!("1 to {most} threads"),
-        }),
-        Some(threads) => Ok(threads),
-        None => Ok(default.min(most)),
+    wanted.map_or(Ok(default.min(most)), |threads| {
+        possible_workgroup(threads, most)
+    })
+}
+
+/// That number of threads, if the GPU's workgroups may have so many.
+pub(super) fn possible_workgroup(threads: u32, most: u32) -> Result<u32, RuntimeError> {
+    if (1..=most).contains(&threads) {
+        return Ok(threads);
     }
+    Err(RuntimeError::Setting {
+        setting: "workgroup",
+        value: threads.to_string(),
+        expected: format!("1 to {most} threads"),
+    })
 }
 
 /// The pool where none is asked for, and a wavefront of any size would have `wavefront` paths.
@@ -298,6 +309,7 @@ mod tests {
             pool,
             pools: 1,
             workgroup: 256,
+            suited: false,
             threads: THREADS.min(pool),
             fetch_limit,
             row_groups: 65_535,

@@ -309,7 +309,7 @@ impl Replan {
             Stage::Counting(mark) => self.count(mark, renderer, status, left),
             Stage::Working(job) => worked(job, false),
             Stage::Trying(mut trials) => {
-                let tried = trials.advance(status, left, settings.wait);
+                let tried = trials.advance(status, &renderer.built.plan, left, settings.wait);
                 self.stage = Stage::Trying(trials);
                 return tried;
             }

@@ -6,6 +6,8 @@
 
 use std::sync::mpsc::TryRecvError;
 
+use impasto_compiler::partition::Plan;
+
 use super::background::{Jobbing, Made, Outcome};
 use super::build::BuiltPlan;
 use crate::render::status::Status;
@@ -16,6 +18,8 @@ const NOTABLE: f64 = 0.005;
 /// A trial begins if so many times the time that it takes is left of the render: since no candidate is expected to take 1.25 times
 /// as long, each trial costs it at most 0.4 %.
 const LEFT: f64 = 64.0;
+/// The same of a plan that has the kernels of the one that runs, by other workgroups: it is not expected to take 1.06 times as long.
+const LEFT_OF_SAME: f64 = 16.0;
 
 /// Plans that wait to be tried beside the one that runs.
 #[derive(Debug)]
@@ -75,6 +79,14 @@ pub(super) struct Tried {
     pub is_kept: bool,
 }
 
+impl Trial {
+    /// Whether it may gain more than it costs beside the `present` plan, where so many times its time is left.
+    fn is_worth(&self, present: &Plan, left: f64) -> bool {
+        let has_the_same = self.other.plan.groups() == present.groups();
+        left >= if has_the_same { LEFT_OF_SAME } else { LEFT }
+    }
+}
+
 impl Trials {
     /// Of what a job makes, beside a plan that begins to run now.
     pub(super) fn new(job: Jobbing, least: Least, status: &Status) -> Self {
@@ -94,16 +106,28 @@ impl Trials {
         };
     }
 
-    /// Goes on, now that more is known and `left` seconds of the render are; with `wait` not before the next plan is built. What
-    /// became of a trial, if one ended.
-    pub(super) fn advance(&mut self, status: &Status, left: f64, wait: bool) -> Option<Tried> {
+    /// Goes on beside the `present` plan, now that more is known and `left` seconds of the render are; with `wait` not before the
+    /// next plan is built. What became of a trial, if one ended.
+    pub(super) fn advance(
+        &mut self,
+        status: &Status,
+        present: &Plan,
+        left: f64,
+        wait: bool,
+    ) -> Option<Tried> {
         let seconds = self.stopwatch.seconds(status, self.least)?;
         let (stage, tried) = match std::mem::replace(&mut self.stage, Stage::Over) {
-            Stage::Timing if left < LEFT * self.least.time(seconds) => {
-                self.job.cancel();
-                (Stage::Over, None)
+            Stage::Timing => {
+                let trials_left = left / self.least.time(seconds);
+                let next = (trials_left >= LEFT_OF_SAME).then(|| self.next(seconds, wait));
+                match next {
+                    Some((Stage::Due(trial), _)) if !trial.is_worth(present, trials_left) => {
+                        (self.over(), None)
+                    }
+                    Some(next) => next,
+                    None => (self.over(), None),
+                }
             }
-            Stage::Timing => self.next(seconds, wait),
             Stage::Running(trial) => {
                 let is_kept = seconds < trial.least * (1.0 - NOTABLE);
                 let tried = Tried {
@@ -122,6 +146,12 @@ impl Trials {
         };
         self.stage = stage;
         tried
+    }
+
+    /// No further plan is made.
+    fn over(&self) -> Stage {
+        self.job.cancel();
+        Stage::Over
     }
 
     /// The next plan, beside one of which an iteration takes `least` seconds.

@@ -109,7 +109,10 @@ impl Mark {
             return None;
         }
         let mut workload = before.clone();
-        let counted = counted(plan.sizes);
+        let over_pool = plan.kernels.iter().find(|k| k.desc.decides_on_all());
+        let workgroup =
+            over_pool.map_or(plan.sizes.workgroup, |k| plan.sizes.workgroup_of(&k.desc));
+        let counted = counted(plan.sizes, workgroup);
         let iterations = iterations as f64;
         let slots = iterations * f64::from(counted.slots);
         workload.begun = self.begun(status, plan) / (iterations * f64::from(workload.pool));

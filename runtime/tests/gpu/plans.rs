@@ -38,6 +38,7 @@ pub fn custom(kernels: &[(Form, &[usize])]) -> Plan {
         name: format!("material_{index}"),
         form: *form,
         materials: members.to_vec(),
+        workgroup: None,
     };
     Plan {
         strategy: "custom".into(),
@@ -170,6 +171,35 @@ fn every_assignment_renders_the_same_paths() {
         }
     }
     assert_eq!(tried, 94);
+}
+
+/// The prepare kernel gives each queue as many workgroups as its own kernel needs.
+#[test]
+fn kernels_may_have_workgroups_of_their_own() {
+    let kernels = [
+        (Form::Own, &[0][..]),
+        (Form::Binned, &[1, 3]),
+        (Form::Own, &[2]),
+    ];
+    let (reference, report) = run(&custom(&kernels));
+    let expected = evaluations(&report);
+    for workgroups in [
+        [Some(1), Some(33), None],
+        [Some(384), None, Some(64)],
+        [None, Some(1024), Some(512)],
+    ] {
+        let mut plan = custom(&kernels);
+        for (kernel, workgroup) in plan.kernels.iter_mut().zip(workgroups) {
+            kernel.workgroup = workgroup;
+        }
+        let (film, report) = run(&plan);
+        assert_equal_but_for_rounding(&film, &reference);
+        let found = evaluations(&report);
+        assert!(
+            found.abs_diff(expected) <= expected / 100,
+            "{workgroups:?}: {found} and {expected}"
+        );
+    }
 }
 
 /// Queues of unequal length and more than the threads that prepare dispatches, workgroups from

@@ -163,6 +163,14 @@ fn whatever_takes_over_renders_the_same_picture() {
     }
 }
 
+/// The plan with other workgroups for every second kernel.
+fn wide(mut plan: Plan) -> Plan {
+    for kernel in plan.kernels.iter_mut().step_by(2) {
+        kernel.workgroup = Some(384);
+    }
+    plan
+}
+
 /// Whatever is tried, and whatever turns out to be faster: the picture has the same bits, everything is counted once, and what
 /// is reported is what was done.
 #[test]
@@ -173,8 +181,9 @@ fn plans_that_are_tried_render_the_same_picture() {
         vec![
             custom(&[(Form::Mixed, &[0, 1, 2, 3])]),
             custom(&[(Form::Own, &[0]), (Form::Mixed, &[1, 2, 3])]),
-            // What the render began with.
+            // What the render began with, and the same by other workgroups.
             plan(Strategy::OWN, &surfaces()),
+            wide(plan(Strategy::OWN, &surfaces())),
             // It lacks materials.
             custom(&[(Form::Own, &[0])]),
             custom(&[
@@ -196,6 +205,7 @@ fn plans_that_are_tried_render_the_same_picture() {
         [
             "own:m0|mixed:m1,m2,m3",
             "own:m0|own:m1|own:m2|own:m3",
+            "own/384:m0|own:m1|own/384:m2|own:m3",
             "own:m0",
             "binned:m1,m3|own:m0|own:m2"
         ]

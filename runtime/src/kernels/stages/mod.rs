@@ -160,6 +160,8 @@ pub(crate) struct Stage {
     pub phase: Phase,
     /// What it works on.
     pub work: Work,
+    /// Threads of a workgroup that suit its kernel on GPUs; `None` for those that suit most kernels.
+    pub workgroup: Option<u32>,
     /// The stages of its phase that it must run before.
     pub before: &'static [&'static str],
     /// If it casts rays, when its threads may stay and take up one ray after another. The body then gives

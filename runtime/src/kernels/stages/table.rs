@@ -30,6 +30,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         need: ALWAYS,
         phase: Phase::Logic,
         work: Work::Pool,
+        workgroup: Some(384),
         before: &[],
         casts: None,
         parts: &[
@@ -74,6 +75,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         need: ALWAYS,
         phase: Phase::Materials,
         work: Work::Begin { from: &["logic"] },
+        workgroup: Some(128),
         before: &[],
         casts: None,
         parts: &[
@@ -114,6 +116,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         need: ALWAYS,
         phase: Phase::Materials,
         work: Work::Material { from: &["logic"] },
+        workgroup: None,
         before: &[],
         casts: None,
         parts: &[
@@ -170,6 +173,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         need: when(&[Need::Order, Need::ShadowRays]),
         phase: Phase::Rays,
         work: Work::Sort { of: "shadow" },
+        workgroup: None,
         before: &["shadow"],
         casts: None,
         parts: &[(Part::Order, ALWAYS)],
@@ -192,6 +196,7 @@ pub(crate) static STAGES: [Stage; 8] = [
                 "vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(distance))",
             ]),
         }),
+        workgroup: None,
         before: &["extension", "below"],
         casts: Some(ALWAYS),
         parts: &[(Part::Geometry, ALWAYS), (Part::Traversal, ALWAYS)],
@@ -209,6 +214,7 @@ pub(crate) static STAGES: [Stage; 8] = [
         need: when(&[Need::Order]),
         phase: Phase::Rays,
         work: Work::Sort { of: "extension" },
+        workgroup: None,
         before: &["extension"],
         casts: None,
         parts: &[(Part::Order, ALWAYS)],
@@ -230,6 +236,7 @@ pub(crate) static STAGES: [Stage; 8] = [
                 "vec4<u32>(bitcast<vec3<u32>>(direction), bitcast<u32>(3.0e38f))",
             ]),
         }),
+        workgroup: None,
         before: &[],
         // Boundaries that are crossed, and light that is turned, would have to be seen to in the midst
         // of a cast.
@@ -274,6 +281,7 @@ pub(crate) static STAGES: [Stage; 8] = [
             parameters: "",
             entry: Entry::Slot,
         }),
+        workgroup: None,
         before: &[],
         casts: None,
         parts: &[
