@@ -240,9 +240,10 @@ fn soft(r: f64) -> f64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::measure::{Adapter, Data, Material};
+    use crate::measure::{Adapter, Data, Material, candidates, sample_for_fit};
     use impasto_compiler::cost::{Classes, Inputs, LANES, Operations};
     use impasto_compiler::partition::{Hits, Workload};
+    use impasto_runtime::lab::Candidate;
 
     fn cost(numbers: &mut Inputs) -> Cost {
         let mut some = |most: f64| (most * numbers.unit()).ceil();
@@ -279,6 +280,17 @@ pub(super) mod tests {
 
     /// Scenes whose kernels take exactly what the model says by `truth`.
     pub(crate) fn measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
+        kernels_measured_by(truth, &sample_for_fit(&MATERIALS, true))
+    }
+
+    /// The same with every kernel that the materials may have.
+    pub(crate) fn all_measured_by(truth: &DeviceProfile) -> Vec<Measurement> {
+        kernels_measured_by(truth, &candidates(&MATERIALS))
+    }
+
+    const MATERIALS: [usize; 5] = [0, 1, 2, 3, 4];
+
+    fn kernels_measured_by(truth: &DeviceProfile, kernels: &[Candidate]) -> Vec<Measurement> {
         let mut numbers = Inputs::new(7);
         let scene = |(index, pool): (usize, u32)| {
             let name = |m: usize| format!("m{index}{m}");
@@ -326,8 +338,7 @@ pub(super) mod tests {
                 workload: &set.workload,
                 profile: truth,
             };
-            let all: Vec<usize> = (0..5).collect();
-            let kernel = |c: impasto_runtime::lab::Candidate| Kernel {
+            let kernel = |c: &Candidate| Kernel {
                 form: c.form,
                 members: c.members.iter().map(|m| name(*m)).collect(),
                 measured: model.predict(c.form, &c.members).total,
@@ -338,8 +349,7 @@ pub(super) mod tests {
                 registers: None,
                 binary_bytes: None,
             };
-            let kernels = crate::measure::sample_for_fit(&all, true);
-            set.kernels = kernels.into_iter().map(kernel).collect();
+            set.kernels = kernels.iter().map(kernel).collect();
             set
         };
         let pools = [1 << 18, 1 << 18, 1 << 22, 1 << 22];

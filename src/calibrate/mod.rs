@@ -14,7 +14,7 @@ mod sources;
 
 pub use errors::Errors;
 #[cfg(test)]
-pub(crate) use fit::tests::measured_by;
+pub(crate) use fit::tests::{all_measured_by, measured_by};
 pub use fit::{Fitted, Residual, fit};
 pub use measure::{Effort, Step, measure};
 pub use registers::{Registers, registers};

@@ -3,7 +3,7 @@
 use impasto_compiler::partition::DeviceProfile;
 
 use super::*;
-use crate::calibrate::measured_by;
+use crate::calibrate::{all_measured_by, measured_by};
 use crate::experiment::records::Stamp;
 
 fn truth() -> DeviceProfile {
@@ -241,7 +241,7 @@ fn trials_lose_less_than_the_model() {
     let mut other = truth();
     other.weights.pressure = 8.0;
     other.weights.launch *= 5.0;
-    let sets = measured_by(&other);
+    let sets = all_measured_by(&other);
     let names = ["h200", "h200+4", "own", "mixed", "binned", "inline"];
     let models = names.map(|name| Model::parse(name).expect("a model"));
     let scores = score(&sets, &models).expect("scored");
