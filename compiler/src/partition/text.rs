@@ -84,14 +84,13 @@ impl<'t> Group<'t> {
             Some((form, members)) => (Some(form), members),
             None => (None, text),
         };
-        let (form, workgroup) = match form.map(|form| form.split_once('/').ok_or(form)) {
-            Some(Ok((form, threads))) => (Some(form), Some(parse_threads(number, threads)?)),
-            Some(Err(form)) => (Some(form), None),
-            None => (None, None),
+        let (form, threads) = match form.and_then(|form| form.split_once('/')) {
+            Some((form, threads)) => (Some(form), Some(threads)),
+            None => (form, None),
         };
-        let form = form
-            .map(|form| parse_form(number, form.trim()))
-            .transpose()?;
+        let form = form.map(|form| parse_form(number, form.trim()));
+        let workgroup = threads.map(|threads| parse_threads(number, threads));
+        let (form, workgroup) = (form.transpose()?, workgroup.transpose()?);
         if members.trim().is_empty() {
             let error = PlanError::new(format!("group {number} of the partition is empty"));
             return Err(error.hint("groups are separated by `|`, as in `a,b|binned:c,d|inline:*`"));

@@ -31,8 +31,9 @@ pub(crate) const RAYS: &str = "rays";
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
 
-/// Threads of a workgroup of the megakernel (docs/measurements.md, "Workgroups that suit their kernels").
-const MEGA_WORKGROUP: u32 = 512;
+/// Threads of a workgroup of the megakernel, more than suit any other kernel (docs/measurements.md, "Workgroups that suit their
+/// kernels").
+pub(crate) const MEGA_WORKGROUP: u32 = 512;
 
 /// Where the items come from that a kernel works on, which decides how many threads it gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! A stage more is a file and a row: the kernels of tables with one added, composed and validated. The table
 //! in use is held against its files, and tables with a mistake must be refused by name.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use impasto_compiler::partition::{Form, Plan};
@@ -8,7 +9,7 @@ use impasto_compiler::{Loader, MaterialRequest, Parameters, Program, compile, li
 
 use super::check::check;
 use super::layout::PlanLayout;
-use super::modules::{Composer, DispatchSource, Kernel, Sizes};
+use super::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
 use super::random::{self, Demand};
 use super::stages::{Entry, Part, Phase, Request, STAGES, Stage, Work};
 use crate::technique::{Append, RayData, Regeneration, Technique};
@@ -171,12 +172,28 @@ impl Room {
             random: &random::part(technique.sampler, Demand::of(world, decision.natural)),
         };
         let kernels = composer.kernels();
+        check_workgroups(&composer, &kernels);
         for kernel in &kernels {
             let valid = crate::kernels::validate::validate(&kernel.desc.name, &kernel.wgsl);
             valid.unwrap_or_else(|e| panic!("{e}"));
             check_sizes(&composer, kernel);
         }
         kernels
+    }
+}
+
+/// A queue has one size of dispatches, whichever kernels work on it.
+fn check_workgroups(composer: &Composer<'_>, kernels: &[Kernel]) {
+    let indirect = kernels.iter().filter_map(|kernel| {
+        let threads = composer.sizes.workgroup_of(&kernel.desc);
+        match kernel.desc.source.extent(composer.sizes) {
+            Extent::Queue(queue) => Some((queue, threads)),
+            _ => None,
+        }
+    });
+    let mut of_queues = BTreeMap::new();
+    for (queue, threads) in indirect {
+        assert_eq!(*of_queues.entry(queue).or_insert(threads), threads);
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::device::DeviceRef;
 use crate::error::RuntimeError;
 use crate::kernels::layout::PlanLayout;
-use crate::kernels::modules::Sizes;
+use crate::kernels::modules::{MEGA_WORKGROUP, Sizes};
 use crate::options::{Progress, RenderOptions};
 use crate::technique::{RayKernels, Technique};
 use crate::world::World;
@@ -28,8 +28,6 @@ const LARGE_BATCH: u32 = 1 << 22;
 const SOFTWARE_POOL: u32 = 1 << 16;
 /// Threads of a workgroup (docs/measurements.md).
 const WORKGROUP: u32 = 256;
-/// A GPU that does not have such large ones has the same for all kernels.
-const LARGEST_WORKGROUP: u32 = 512;
 /// Threads that fetch their work: about as many as an H200 holds at once.
 const THREADS: u32 = 1 << 18;
 /// Items that each of them may fetch; with few threads and large pools a dispatch takes long.
@@ -171,7 +169,7 @@ pub(crate) fn dispatch_sizes(
         workgroup: workgroup_size(device, technique.workgroup)?,
         suited: matches!(device, DeviceRef::Gpu(_))
             && technique.workgroup.is_none()
-            && limits.workgroup_threads >= LARGEST_WORKGROUP,
+            && limits.workgroup_threads >= MEGA_WORKGROUP,
         threads: technique.threads.unwrap_or(THREADS).min(items),
         fetch_limit,
         row_groups: limits.row_groups,
