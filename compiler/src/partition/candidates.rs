@@ -59,8 +59,8 @@ pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Pl
     found
 }
 
-/// The `chosen` plan with workgroups of [`WIDE`] for the kernels whose threads need many registers; `None` where no kernel does, or
-/// costs are not known.
+/// The `chosen` plan with workgroups of 384 threads for the kernels whose threads need many registers; `None` where no kernel does,
+/// or costs are not known.
 pub fn in_wide_workgroups(inputs: &PlanInputs<'_>, chosen: &Plan) -> Option<Plan> {
     let costs = inputs.costs?;
     let live = |m: &usize| costs.get(*m)?.as_ref().map(|cost| cost.live);
