@@ -111,17 +111,20 @@ fn resolve(file: File, names: &[String]) -> Plan {
     let indices = |members: &[String]| -> Vec<usize> {
         members.iter().filter_map(|n| find(n, names).ok()).collect()
     };
-    let given = file.kernels.iter();
-    let given: Vec<_> = given.map(|k| (k.name.clone(), k.workgroup)).collect();
-    let groups = file.kernels.iter().map(|k| (k.form, indices(&k.materials)));
-    let mut plan = Plan::wavefront(file.strategy, groups, indices(&file.unused), names);
-    plan.organisation = file.organisation;
-    for (kernel, (name, workgroup)) in plan.kernels.iter_mut().zip(given) {
-        kernel.name = name.unwrap_or(std::mem::take(&mut kernel.name));
-        kernel.workgroup = workgroup;
+    let unused = indices(&file.unused);
+    let kernels = file.kernels.into_iter().map(|given| {
+        let kernel = PlanKernel::new(given.form, indices(&given.materials), names);
+        PlanKernel {
+            name: given.name.unwrap_or(kernel.name),
+            workgroup: given.workgroup,
+            ..kernel
+        }
+    });
+    let plan = Plan::of_kernels(file.strategy, kernels.collect(), unused);
+    Plan {
+        organisation: file.organisation,
+        ..plan
     }
-    super::number_equal_names(&mut plan.kernels);
-    plan
 }
 
 #[cfg(test)]

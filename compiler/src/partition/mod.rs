@@ -78,15 +78,21 @@ impl Plan {
     pub fn wavefront(
         strategy: impl Into<String>,
         groups: impl IntoIterator<Item = (Form, Vec<usize>)>,
-        mut unused: Vec<usize>,
+        unused: Vec<usize>,
         names: &[String],
     ) -> Plan {
         let groups = groups.into_iter();
-        let kernels = groups.map(|(form, mut materials)| {
-            materials.sort_unstable();
-            PlanKernel::new(form, materials, names)
-        });
-        let mut kernels: Vec<PlanKernel> = kernels.collect();
+        let kernels = groups.map(|(form, materials)| PlanKernel::new(form, materials, names));
+        Self::of_kernels(strategy, kernels.collect(), unused)
+    }
+
+    /// A wavefront of some kernels, in this order; the materials `unused` have none. Equal names of kernels are told apart
+    /// by a number.
+    pub(crate) fn of_kernels(
+        strategy: impl Into<String>,
+        mut kernels: Vec<PlanKernel>,
+        mut unused: Vec<usize>,
+    ) -> Plan {
         number_equal_names(&mut kernels);
         unused.sort_unstable();
         Plan {
@@ -143,8 +149,9 @@ fn number_equal_names(kernels: &mut [PlanKernel]) {
 }
 
 impl PlanKernel {
-    /// A kernel over `materials`, ascending, called after the only one or after its form.
-    pub fn new(form: Form, materials: Vec<usize>, names: &[String]) -> Self {
+    /// A kernel over `materials`, called after the only one or after its form.
+    pub fn new(form: Form, mut materials: Vec<usize>, names: &[String]) -> Self {
+        materials.sort_unstable();
         let only = match materials[..] {
             [only] => names.get(only).map(String::as_str),
             _ => None,

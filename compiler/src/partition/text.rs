@@ -6,7 +6,7 @@
 //! workgroups of 384 threads.
 
 use super::error::list;
-use super::{Form, Plan, PlanError};
+use super::{Form, Plan, PlanError, PlanKernel};
 use crate::diag::nearest;
 
 /// The strategy that plans made from strings say they have.
@@ -41,15 +41,11 @@ pub fn parse(text: &str, names: &[String], unused: &[usize]) -> Result<Plan, Pla
     let mut kernels = Vec::new();
     for group in &groups {
         let named = (0..names.len()).filter(|m| kernel_of[*m] == Some(group.number));
-        group.kernels(named.collect(), &rest, &mut kernels)?;
+        kernels.extend(group.kernels(named.collect(), &rest, names)?);
     }
     one_inline(&kernels)?;
     let left = unused.iter().copied().filter(|m| kernel_of[*m].is_none());
-    let groups = kernels.iter().map(|k| (k.form, k.materials.clone()));
-    let mut plan = Plan::wavefront(STRATEGY, groups, left.collect(), names);
-    for (kernel, described) in plan.kernels.iter_mut().zip(kernels) {
-        kernel.workgroup = described.workgroup;
-    }
+    let plan = Plan::of_kernels(STRATEGY, kernels, left.collect());
     plan.check_named(names)?;
     Ok(plan)
 }
@@ -116,12 +112,11 @@ impl<'t> Group<'t> {
         &self,
         mut members: Vec<usize>,
         rest: &[usize],
-        kernels: &mut Vec<Described>,
-    ) -> Result<(), PlanError> {
-        let described = |form, materials| Described {
-            form,
-            materials,
+        names: &[String],
+    ) -> Result<Vec<PlanKernel>, PlanError> {
+        let kernel = |form, materials| PlanKernel {
             workgroup: self.workgroup,
+            ..PlanKernel::new(form, materials, names)
         };
         let only_rest = members.is_empty();
         if self.rest > 0 {
@@ -129,10 +124,10 @@ impl<'t> Group<'t> {
         }
         let form = match (self.form, members.len()) {
             // `*` for what there is no more of.
-            (_, 0) => return Ok(()),
+            (_, 0) => return Ok(Vec::new()),
             (Some(Form::Own), _) if only_rest => {
-                kernels.extend(members.into_iter().map(|m| described(Form::Own, vec![m])));
-                return Ok(());
+                let each = members.into_iter().map(|m| kernel(Form::Own, vec![m]));
+                return Ok(each.collect());
             }
             (Some(Form::Own), 2..) => {
                 let all = self
@@ -155,16 +150,8 @@ impl<'t> Group<'t> {
             (None, 1) => Form::Own,
             (None, _) => Form::Mixed,
         };
-        kernels.push(described(form, members));
-        Ok(())
+        Ok(vec![kernel(form, members)])
     }
-}
-
-/// A kernel that a group describes.
-struct Described {
-    form: Form,
-    materials: Vec<usize>,
-    workgroup: Option<u32>,
 }
 
 fn parse_threads(number: usize, text: &str) -> Result<u32, PlanError> {
@@ -220,7 +207,7 @@ pub(super) fn find(name: &str, names: &[String]) -> Result<usize, String> {
         })
 }
 
-fn one_inline(kernels: &[Described]) -> Result<(), PlanError> {
+fn one_inline(kernels: &[PlanKernel]) -> Result<(), PlanError> {
     match kernels.iter().filter(|k| !k.form.has_queue()).count() {
         0 | 1 => Ok(()),
         _ => Err(PlanError::new("the partition has several inline groups")

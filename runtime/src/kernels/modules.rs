@@ -191,9 +191,7 @@ impl Sizes {
     pub(crate) fn largest_workgroup(self) -> u32 {
         let suited = STAGES.iter().filter_map(|stage| stage.workgroup);
         let suited = suited.filter(|_| self.suited);
-        suited
-            .max()
-            .map_or(self.workgroup, |most| most.max(self.workgroup))
+        suited.fold(self.workgroup, u32::max)
     }
 
     /// Threads of a kernel that fetches the items of some queues: so many that each may fetch about twice its share. Items

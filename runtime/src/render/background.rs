@@ -200,9 +200,6 @@ impl Job {
 
 /// Whether two plans have the same kernels in the same order, on which queues depend.
 fn does_the_same(a: &Plan, b: &Plan) -> bool {
-    let kernels = |plan: &Plan| -> Vec<_> {
-        let kernels = plan.kernels.iter();
-        kernels.map(PlanKernel::what_it_does).collect()
-    };
-    a.organisation == b.organisation && kernels(a) == kernels(b) && a.unused == b.unused
+    let [of_a, of_b] = [a, b].map(|plan| plan.kernels.iter().map(PlanKernel::what_it_does));
+    a.organisation == b.organisation && of_a.eq(of_b) && a.unused == b.unused
 }
