@@ -62,7 +62,7 @@ pub(super) struct ExperimentArgs {
     /// What is measured, as pages should call it [default: the commit of the checkout, or the version]
     #[arg(long, value_name = "TEXT")]
     commit: Option<String>,
-    /// Score a model on measured mixes, without a GPU: a device profile, one with trials (`h200+4`), a table of
+    /// Score a model on measured mixes, without a GPU: a device profile, one with trials (`h200+8`), a table of
     /// predictions (CSV or JSON), or a baseline; repeat the option for several
     #[arg(long, value_name = "MODEL", conflicts_with_all = ["page", "farm", "measure", "publish"])]
     score: Vec<String>,

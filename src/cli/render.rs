@@ -73,8 +73,8 @@ pub(super) struct RenderArgs {
     /// `impasto calibrate`; by default the one that fits the GPU best
     #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath)]
     pub(super) device_profile: Option<String>,
-    /// How many plans of either kind the automatic plan is tried against while rendering (docs/plan.md): 4 by default, and 0
-    /// on a GPU in software
+    /// How many plans the automatic plan is tried against while rendering (docs/plan.md): 8 by default, and 0 on a GPU in
+    /// software
     #[arg(long, value_name = "N")]
     trials: Option<usize>,
     /// Where to write the report, as JSON (see docs/report.md)

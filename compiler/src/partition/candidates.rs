@@ -1,18 +1,25 @@
 //! Plans that are worth a trial beside the one that the time model finds fastest.
 //!
-//! The model errs by some percent, and more where materials are inline, so that among plans that it finds about as fast a
-//! measurement decides. Some candidates differ from the chosen plan in what the model is least sure of: whether anything is
-//! inline, and which forms kernels with queues have. Strategies that people would try by hand are among them. Others differ in
-//! the place of a single material. docs/measurements.md has what trials of so many of each gain.
+//! The model errs by about a tenth of a kernel's time, so that among plans that it finds about as fast a measurement decides. Of
+//! kernels that two plans share the error is the same. So the more of the time of an iteration the kernels have in which a plan
+//! differs from the chosen one, the less is known of it, and the more it may gain. Plans are tried in the order of what is
+//! expected of them. docs/measurements.md, "Trials by what they promise", has what so many of them gain.
 
 use super::search::{ordered, total};
-use super::{Automatic, Calibrated, Form, Groups, Plan, PlanInputs, PlanKernel, Search, Strategy};
+use super::{Automatic, Calibrated, Form, Groups, Plan, PlanInputs, Search, Strategy, TimeModel};
 
-/// A candidate is predicted to take at most so many times the iteration of the best: a trial must not cost more than it may gain.
-const MARGIN: f64 = 1.25;
+/// What the model errs by, as a share of a kernel's time: one standard deviation.
+const ERROR: f64 = 0.1;
+/// The same of what another number of threads changes, of which the model knows nothing.
+const ERROR_OF_THREADS: f64 = 0.2;
+
+/// A candidate is expected to gain at least this share of an iteration.
+const LEAST_GAIN: f64 = 1e-4;
 
 /// Kernels of which every material is tried in the place of every other: of more, there would be too many.
 const FEW: usize = 16;
+/// Materials of a kernel that is cut in two in every way: of one more, there are twice as many.
+const CUT: usize = 8;
 
 /// Threads of a workgroup with which a driver may hold more of them at once: by 384, an H200 has 12 or 24 subgroups of a kernel in
 /// flight, by 256 also 16. Its driver gives a thread 80 registers for 24 of them where it stays at 100 for 16, which serves some
@@ -21,57 +28,164 @@ const WIDE: u32 = 384;
 /// So many numbers are alive at once in materials of which that is to be expected.
 const MANY_LIVE: u32 = 70;
 
-/// Plans that may turn out to be faster than `chosen`, at most `most` of either kind, the likeliest of each kind first. None where
+/// A plan that is worth a trial beside another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The plan.
+    pub plan: Plan,
+    /// What is expected of it beside the other.
+    pub expected: Expected,
+}
+
+/// What is expected of a plan beside another: the time of an iteration, in times of one by the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected {
+    /// The mean.
+    pub ratio: f64,
+    /// The standard deviation.
+    pub error: f64,
+}
+
+impl Expected {
+    /// The share of an iteration that it saves on average, where it goes on only if it is faster: of a logistic distribution, which
+    /// is nearly normal.
+    pub fn gain(self) -> f64 {
+        let scale = self.error.max(f64::MIN_POSITIVE) * 3.0_f64.sqrt() / std::f64::consts::PI;
+        let faster = (1.0 - self.ratio) / scale;
+        scale * (faster.max(0.0) + (-faster.abs()).exp().ln_1p())
+    }
+
+    /// The share of an iteration that each iteration of a trial costs on average, by plans that turn out to be slower.
+    pub fn loss(self) -> f64 {
+        self.gain() + self.ratio - 1.0
+    }
+
+    /// Orders what promises more before what promises less.
+    pub fn by_gain(&self, other: &Self) -> std::cmp::Ordering {
+        other.gain().total_cmp(&self.gain())
+    }
+
+    /// The same beside a third plan, an iteration of which takes `ratio` times one of the other.
+    #[must_use]
+    pub fn beside(self, ratio: f64) -> Self {
+        Self {
+            ratio: self.ratio / ratio,
+            error: self.error / ratio,
+        }
+    }
+}
+
+/// Plans that may turn out to be faster than `chosen`, at most `most`, in the order of what they are expected to gain. None where
 /// costs, workload or profile are not known.
-pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Plan> {
-    let (Some(costs), Some(workload), Some(profile)) =
-        (inputs.costs, inputs.workload, inputs.profile)
-    else {
+///
+/// Up to half of them are what searches find where some forms are not allowed, and plans of strategies that people would try by
+/// hand: where the model errs about a form, it does so in all kernels of that form. The others differ from the chosen plan in the
+/// place of one material, or have one kernel cut in two.
+pub fn candidates(inputs: &PlanInputs<'_>, chosen: &Plan, most: usize) -> Vec<Candidate> {
+    let Some(present) = Present::new(inputs, chosen) else {
         return Vec::new();
     };
-    let model = Calibrated {
-        costs,
-        workload,
-        profile,
-    };
-    let rest = workload.logic_seconds + workload.other_seconds;
-    let begin = chosen.groups();
-    let limit = MARGIN * (rest + total(&model, &begin));
-    let mut known = vec![chosen.clone()];
-    let mut found = Vec::new();
-    for kind in [other_forms(inputs, &model), moved(&begin)] {
-        let timed = kind
-            .into_iter()
-            .map(|groups| (rest + total(&model, &groups), groups));
-        let mut timed: Vec<(f64, Groups)> =
-            timed.filter(|(seconds, _)| *seconds <= limit).collect();
-        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut left = most;
-        for (_, groups) in timed {
+    let far = other_forms(inputs, &present.model);
+    let near = [moved(&present.groups), cut(&present.groups)].concat();
+    let mut found: Vec<Candidate> = Vec::new();
+    for (kind, up_to) in [(far, most / 2), (near, most)] {
+        for (expected, groups) in present.promising(kind) {
+            if found.len() == up_to {
+                break;
+            }
             let plan = inputs.plan(&chosen.strategy, ordered(groups));
-            if left > 0 && !known.iter().any(|other| plan.does_as(other)) {
-                left -= 1;
-                known.push(plan.clone());
-                found.push(plan);
+            let is_known = |known: &Candidate| known.plan.does_as(&plan);
+            if !plan.does_as(chosen) && !found.iter().any(is_known) {
+                found.push(Candidate { plan, expected });
             }
         }
     }
+    found.sort_by(|a, b| a.expected.by_gain(&b.expected));
     found
 }
 
 /// The `chosen` plan with workgroups of 384 threads for the kernels whose threads need many registers; `None` where no kernel does,
-/// or costs are not known.
-pub fn in_wide_workgroups(inputs: &PlanInputs<'_>, chosen: &Plan) -> Option<Plan> {
-    let costs = inputs.costs?;
+/// or nothing is known.
+pub fn in_wide_workgroups(inputs: &PlanInputs<'_>, chosen: &Plan) -> Option<Candidate> {
+    let present = Present::new(inputs, chosen)?;
+    let costs = present.model.costs;
     let live = |m: &usize| costs.get(*m)?.as_ref().map(|cost| cost.live);
-    let needs_many = |kernel: &PlanKernel| {
-        kernel.form.has_queue() && kernel.materials.iter().filter_map(live).max() >= Some(MANY_LIVE)
+    let needs_many = |(form, members): &&(Form, Vec<usize>)| {
+        form.has_queue() && members.iter().filter_map(live).max() >= Some(MANY_LIVE)
     };
+    let seconds = present.seconds(present.groups.iter().filter(needs_many));
+    if seconds.is_empty() {
+        return None;
+    }
     let mut plan = chosen.clone();
-    let mut wide = plan.kernels.iter_mut().filter(|k| needs_many(k)).peekable();
-    wide.peek()?;
-    wide.for_each(|kernel| kernel.workgroup = Some(WIDE));
-    Some(plan)
+    for (kernel, group) in plan.kernels.iter_mut().zip(&present.groups) {
+        if needs_many(&group) {
+            kernel.workgroup = Some(WIDE);
+        }
+    }
+    let error = ERROR_OF_THREADS * present.spread(seconds.iter());
+    let expected = Expected { ratio: 1.0, error };
+    Some(Candidate { plan, expected })
+}
+
+/// The plan that others are held against.
+struct Present<'a> {
+    model: Calibrated<'a>,
+    groups: Groups,
+    /// Seconds of an iteration.
+    seconds: f64,
+}
+
+impl<'a> Present<'a> {
+    fn new(inputs: &PlanInputs<'a>, chosen: &Plan) -> Option<Self> {
+        let (costs, workload, profile) = (inputs.costs?, inputs.workload?, inputs.profile?);
+        let model = Calibrated {
+            costs,
+            workload,
+            profile,
+        };
+        let groups = chosen.groups();
+        let rest = workload.logic_seconds + workload.other_seconds;
+        let seconds = rest + total(&model, &groups);
+        Some(Self {
+            model,
+            groups,
+            seconds,
+        })
+    }
+
+    /// Those of some plans that promise something, in the order of what they are expected to gain.
+    fn promising(&self, plans: Vec<Groups>) -> Vec<(Expected, Groups)> {
+        let expected = plans
+            .into_iter()
+            .map(|groups| (self.expected(&groups), groups));
+        let mut all: Vec<_> = expected
+            .filter(|(expected, _)| expected.gain() >= LEAST_GAIN)
+            .collect();
+        all.sort_by(|(a, _), (b, _)| a.by_gain(b));
+        all
+    }
+
+    /// What is expected of a plan of other kernels: those that both have take the same.
+    fn expected(&self, groups: &Groups) -> Expected {
+        let [mine, others] = [(&self.groups, groups), (groups, &self.groups)]
+            .map(|(of, beside)| self.seconds(of.iter().filter(|kernel| !beside.contains(kernel))));
+        let more = others.iter().sum::<f64>() - mine.iter().sum::<f64>();
+        Expected {
+            ratio: 1.0 + more / self.seconds,
+            error: ERROR * self.spread(mine.iter().chain(&others)),
+        }
+    }
+
+    fn seconds<'g>(&self, kernels: impl Iterator<Item = &'g (Form, Vec<usize>)>) -> Vec<f64> {
+        let seconds = kernels.map(|(form, members)| self.model.seconds(*form, members));
+        seconds.collect()
+    }
+
+    /// By how much of an iteration the time of kernels errs that take so many seconds and err by all of them, each for itself.
+    fn spread<'s>(&self, seconds: impl Iterator<Item = &'s f64>) -> f64 {
+        seconds.map(|s| s * s).sum::<f64>().sqrt() / self.seconds
+    }
 }
 
 /// What the search finds where some forms are not allowed, and the plans of strategies that the model can compare.
@@ -139,6 +253,46 @@ fn places(groups: &Groups, k: usize, m: usize) -> Vec<Groups> {
     all
 }
 
+/// The plans in which one kernel is two: its materials are divided in every way, and either part has every form.
+fn cut(groups: &Groups) -> Vec<Groups> {
+    let mut all = Vec::new();
+    for (k, (_, members)) in groups.iter().enumerate() {
+        if !(2..=CUT).contains(&members.len()) {
+            continue;
+        }
+        let rest: Groups = [&groups[..k], &groups[k + 1..]].concat();
+        for [one, other] in parts(members) {
+            for form in Form::of_members(one.len()) {
+                for beside in Form::of_members(other.len()) {
+                    let kernels = rest.iter().cloned();
+                    let two = [(form, one.clone()), (beside, other.clone())];
+                    let new: Groups = kernels.chain(two).collect();
+                    let inline = new.iter().filter(|(form, _)| *form == Form::Inline);
+                    if inline.count() <= 1 {
+                        all.push(new);
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Every way to divide materials in two, once.
+fn parts(members: &[usize]) -> Vec<[Vec<usize>; 2]> {
+    let divided = |set: usize| {
+        let part = |bit| {
+            let all = members.iter().enumerate();
+            all.filter(|(at, _)| set >> at & 1 == bit)
+                .map(|(_, m)| *m)
+                .collect()
+        };
+        [part(0), part(1)]
+    };
+    // The last member is in the first part.
+    (1..1 << (members.len() - 1)).map(divided).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::cases::Case;
@@ -167,8 +321,11 @@ mod tests {
             with_inputs(&case, |inputs| {
                 let first = chosen(inputs);
                 let mut plans = vec![first.clone()];
-                plans.extend(candidates(inputs, &first, 4));
-                assert!(plans.len() <= 1 + 2 * 4, "{count}: {}", plans.len());
+                let others = candidates(inputs, &first, 8);
+                let gains: Vec<f64> = others.iter().map(|c| c.expected.gain()).collect();
+                assert!(gains.is_sorted_by(|a, b| a >= b), "{gains:?}");
+                plans.extend(others.into_iter().map(|c| c.plan));
+                assert!(plans.len() <= 1 + 8, "{count}: {}", plans.len());
                 assert!(plans.len() > usize::from(count > 1), "{count}");
                 for (at, plan) in plans.iter().enumerate() {
                     let kernels = plan.kernels.iter();
@@ -197,7 +354,14 @@ mod tests {
             };
             let wide = |of: &[(Form, &[usize])]| {
                 let plan = groups(of);
-                let wide = in_wide_workgroups(inputs, &plan)?;
+                let Candidate {
+                    plan: wide,
+                    expected,
+                } = in_wide_workgroups(inputs, &plan)?;
+                assert!(
+                    expected.ratio == 1.0 && expected.error > 0.0,
+                    "{expected:?}"
+                );
                 assert_eq!(wide.groups(), plan.groups());
                 assert!(!wide.does_as(&plan));
                 Some(wide.kernels.iter().map(|k| k.workgroup).collect::<Vec<_>>())
@@ -232,8 +396,11 @@ mod tests {
             let best = with_inputs(&truth, |inputs| takes(&chosen(inputs)));
             with_inputs(&case, |inputs| {
                 let first = chosen(inputs);
-                let tried = candidates(inputs, &first, 4);
-                let fastest = tried.iter().map(&takes).fold(takes(&first), f64::min);
+                let tried = candidates(inputs, &first, 8);
+                let fastest = tried
+                    .iter()
+                    .map(|c| takes(&c.plan))
+                    .fold(takes(&first), f64::min);
                 lost += takes(&first) / best - 1.0;
                 lost_with_trials += fastest / best - 1.0;
             });
@@ -247,15 +414,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_slower_is_not_tried_and_nothing_where_nothing_is_known() {
+    fn what_promises_nothing_is_not_tried_and_nothing_where_nothing_is_known() {
         let case = Case::new(6, 7);
         with_inputs(&case, |inputs| {
             let first = chosen(inputs);
             let model = case.model();
             let rest = case.workload.logic_seconds;
-            let limit = MARGIN * (rest + total(&model, &first.groups()));
-            for plan in candidates(inputs, &first, 100) {
-                assert!(rest + total(&model, &plan.groups()) <= limit);
+            let seconds = |plan: &Plan| rest + total(&model, &plan.groups());
+            for candidate in candidates(inputs, &first, 100) {
+                let ratio = seconds(&candidate.plan) / seconds(&first);
+                let expected = candidate.expected;
+                assert!(
+                    (expected.ratio - ratio).abs() < 1e-9,
+                    "{expected:?} {ratio}"
+                );
+                assert!(expected.gain() >= LEAST_GAIN, "{expected:?}");
             }
             let unknown = PlanInputs {
                 profile: None,
@@ -264,5 +437,48 @@ mod tests {
             assert!(candidates(&unknown, &first, 4).is_empty());
             assert!(candidates(inputs, &first, 0).is_empty());
         });
+    }
+
+    /// The mean of what a plan saves over a logistic distribution, by adding up its quantiles.
+    #[test]
+    fn gain_and_loss_are_means_of_a_distribution() {
+        for (ratio, error) in [(1.0, 0.05), (1.1, 0.05), (0.9, 0.2), (1.3, 0.02)] {
+            let expected = Expected { ratio, error };
+            let scale = error * 3.0_f64.sqrt() / std::f64::consts::PI;
+            let quantile = |at: u32| {
+                let share = (f64::from(at) + 0.5) / 1e5;
+                ratio + scale * (share / (1.0 - share)).ln()
+            };
+            let mean =
+                |of: fn(f64) -> f64| (0..100_000).map(|at| of(quantile(at))).sum::<f64>() / 1e5;
+            let [gain, loss] = [|r: f64| (1.0 - r).max(0.0), |r: f64| (r - 1.0).max(0.0)].map(mean);
+            assert!((expected.gain() - gain).abs() < 1e-5, "{expected:?} {gain}");
+            assert!((expected.loss() - loss).abs() < 1e-5, "{expected:?} {loss}");
+        }
+        let surely = Expected {
+            ratio: 0.75,
+            error: 0.0,
+        };
+        assert_eq!((surely.gain(), surely.loss()), (0.25, 0.0));
+        assert_eq!(surely.beside(0.5).ratio, 1.5);
+    }
+
+    #[test]
+    fn a_kernel_is_cut_in_every_way() {
+        let own = (Form::Own, vec![7]);
+        let of = |members: &[usize], form| {
+            let mut all = cut(&vec![own.clone(), (form, members.to_vec())]);
+            assert!(all.iter().all(|groups| groups.contains(&own)));
+            all.sort();
+            all.dedup();
+            all.len()
+        };
+        // Two parts of one: own or inline, and not both inline.
+        assert_eq!(of(&[1, 2], Form::Mixed), 3);
+        // One and two in three ways: mixed, binned or inline beside own; mixed or binned beside inline.
+        assert_eq!(of(&[1, 2, 4], Form::Binned), 3 * 5);
+        assert_eq!(of(&(0..=CUT).collect::<Vec<_>>(), Form::Binned), 0);
+        let inline = vec![(Form::Inline, vec![0]), (Form::Binned, vec![1, 2])];
+        assert_eq!(cut(&inline).len(), 1);
     }
 }

@@ -22,7 +22,7 @@ mod strategy;
 pub mod text;
 pub mod workload;
 
-pub use candidates::{candidates, in_wide_workgroups};
+pub use candidates::{Candidate, Expected, candidates, in_wide_workgroups};
 pub use error::PlanError;
 pub use form::Form;
 pub use inputs::PlanInputs;

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvError, SyncSender, TryRecvError, sync_channe
 use std::thread::{Builder, JoinHandle};
 use std::time::Instant;
 
-use impasto_compiler::partition::{Organisation, Plan, PlanKernel, Workload};
+use impasto_compiler::partition::{Expected, Organisation, Plan, PlanKernel, Workload};
 
 use super::Planner;
 use super::build::{BuiltPlan, CompositionInputs, build_all, build_step};
@@ -46,6 +46,8 @@ pub(super) struct Made {
     pub compile_seconds: f64,
     /// The plan, unless there is none.
     pub plan: Option<Plan>,
+    /// What is expected of it beside the first, of plans that are to be tried.
+    pub expected: Option<Expected>,
 }
 
 /// A plan and its kernels, or why they cannot take over.
@@ -119,13 +121,16 @@ impl Job {
                 return;
             }
         };
-        for plan in plans {
+        let first = std::iter::once((plans.first, None));
+        let others = plans.others.map(|other| (other.plan, Some(other.expected)));
+        for (plan, expected) in first.chain(others) {
             let begin = Instant::now();
             let built = self.gpu.guarded(|| self.compile(&plan));
             let made = Made {
                 planning_seconds: std::mem::take(&mut planning_seconds),
                 compile_seconds: begin.elapsed().as_secs_f64(),
                 plan: Some(plan),
+                expected,
             };
             let built = built.map_err(|error| error.to_string());
             if tell.send((made, built)).is_err() {

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::TryRecvError;
 use std::time::Duration;
 
-use impasto_compiler::partition::{Form, Plan, Workload};
+use impasto_compiler::partition::{Candidate, Form, Plan, Workload};
 
 use super::Renderer;
 use super::background::{Job, Jobbing, Made, Outcome};
@@ -25,8 +25,13 @@ use crate::world::MaterialSource;
 /// Makes plans for a workload, or says why there is none. It runs on a thread of its own.
 pub type Planner = Box<dyn FnOnce(&Workload) -> Result<Plans, String> + Send>;
 
-/// First the plan to go on with, then those that are worth a trial beside it. Each is asked for when the one before is built.
-pub type Plans = Box<dyn Iterator<Item = Plan>>;
+/// What a planner comes to.
+pub struct Plans {
+    /// The plan to go on with.
+    pub first: Plan,
+    /// Those that are worth a trial beside it, the most promising first. Each is asked for when the one before is built.
+    pub others: Box<dyn Iterator<Item = Candidate>>,
+}
 
 /// When and how to renew a plan.
 pub struct Replanning {
@@ -43,9 +48,10 @@ pub struct Replanning {
     pub least_hits: f64,
     /// A render that will be done sooner keeps its plan.
     pub worthwhile: Duration,
-    /// GPU time over which plans are timed that are tried beside each other, at least; also so many iterations as hits are
-    /// counted over.
+    /// GPU time over which plans are timed that are tried beside each other, at least.
     pub trial: Duration,
+    /// Iterations over which they are, at least.
+    pub trial_iterations: u64,
     /// Whether to wait for new plans instead of rendering on: for experiments that must not depend on
     /// how long they take.
     pub wait: bool,
@@ -53,7 +59,7 @@ pub struct Replanning {
 
 impl Replanning {
     /// With the defaults: after 16 iterations hits are counted over 16, at least 10,000 of them;
-    /// less than half a second of rendering is not worth a plan, and 30 ms tell plans apart.
+    /// less than half a second of rendering is not worth a plan, and 30 ms or 8 iterations tell plans apart.
     pub fn new(source: Arc<dyn MaterialSource + Send + Sync>, planner: Planner) -> Self {
         Self {
             source,
@@ -63,6 +69,7 @@ impl Replanning {
             least_hits: 10_000.0,
             worthwhile: Duration::from_millis(500),
             trial: Duration::from_millis(30),
+            trial_iterations: 8,
             wait: false,
         }
     }
@@ -84,7 +91,7 @@ struct Settings {
     counted: u64,
     least_hits: f64,
     worthwhile: f64,
-    trial: f64,
+    trial: Least,
     wait: bool,
 }
 
@@ -138,7 +145,10 @@ impl Renderer<'_> {
                 counted: replanning.counted_iterations.max(1),
                 least_hits: replanning.least_hits,
                 worthwhile: replanning.worthwhile.as_secs_f64(),
-                trial: replanning.trial.as_secs_f64(),
+                trial: Least {
+                    iterations: replanning.trial_iterations,
+                    seconds: replanning.trial.as_secs_f64(),
+                },
                 wait: replanning.wait,
             },
             stage: Stage::Warming(0),
@@ -309,7 +319,7 @@ impl Replan {
             Stage::Counting(mark) => self.count(mark, renderer, status, left),
             Stage::Working(job) => worked(job, false),
             Stage::Trying(mut trials) => {
-                let tried = trials.advance(status, &renderer.built.plan, left, settings.wait);
+                let tried = trials.advance(status, left, settings.wait);
                 self.stage = Stage::Trying(trials);
                 return tried;
             }
@@ -383,10 +393,7 @@ impl Replan {
     fn take(&mut self, status: &Status) -> Option<(Made, BuiltPlan)> {
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Made(made, job) => {
-                let least = Least {
-                    iterations: self.settings.counted,
-                    seconds: self.settings.trial,
-                };
+                let least = self.settings.trial;
                 self.stage = Stage::Trying(Trials::new(job, least, status));
                 Some(*made)
             }

@@ -323,6 +323,9 @@ pub struct ReplanReport {
 pub struct TrialReport {
     /// The plan.
     pub plan: String,
+    /// GPU time of an iteration that was expected of it, in times of one by the plan that `to` names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected: Option<f64>,
     /// Time that compiling its kernels took, while the GPU went on.
     pub compile_seconds: f64,
     /// GPU time of an iteration by it; absent if it could not run.
@@ -349,6 +352,7 @@ impl TrialReport {
         };
         Self {
             plan: plan.unwrap_or_default(),
+            expected: made.expected.map(|it| it.ratio),
             compile_seconds: made.compile_seconds,
             seconds: seconds.map(|[its, _]| its),
             seconds_before: seconds.map(|[_, before]| before),

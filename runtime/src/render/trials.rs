@@ -6,7 +6,7 @@
 
 use std::sync::mpsc::TryRecvError;
 
-use impasto_compiler::partition::Plan;
+use impasto_compiler::partition::Expected;
 
 use super::background::{Jobbing, Made, Outcome};
 use super::build::BuiltPlan;
@@ -15,11 +15,9 @@ use crate::render::status::Status;
 /// By how much another plan must be faster, as a share: less is noise.
 const NOTABLE: f64 = 0.005;
 
-/// A trial begins if so many times the time that it takes is left of the render: since no candidate is expected to take 1.25 times
-/// as long, each trial costs it at most 0.4 %.
-const LEFT: f64 = 64.0;
-/// The same of a plan that has the kernels of the one that runs, by other workgroups: it is not expected to take 1.06 times as long.
-const LEFT_OF_SAME: f64 = 16.0;
+/// A trial begins if what it is expected to gain over what is left of the render is so many times what it is expected to cost while
+/// it lasts: the best that is expected of several plans is less than the sum of them.
+const WORTH: f64 = 4.0;
 
 /// Plans that wait to be tried beside the one that runs.
 #[derive(Debug)]
@@ -28,6 +26,8 @@ pub(super) struct Trials {
     stage: Stage,
     least: Least,
     stopwatch: Stopwatch,
+    /// What an iteration takes by the fastest so far, in times of one by the first plan.
+    fastest: f64,
 }
 
 /// How long a plan is timed, at least.
@@ -79,12 +79,9 @@ pub(super) struct Tried {
     pub is_kept: bool,
 }
 
-impl Trial {
-    /// Whether it may gain more than it costs beside the `present` plan, where so many times its time is left.
-    fn is_worth(&self, present: &Plan, left: f64) -> bool {
-        let has_the_same = self.other.plan.groups() == present.groups();
-        left >= if has_the_same { LEFT_OF_SAME } else { LEFT }
-    }
+/// Whether a trial may gain more than it costs where so many times its time is left.
+fn is_worth(expected: Expected, left: f64) -> bool {
+    left * expected.gain() >= WORTH * expected.loss()
 }
 
 impl Trials {
@@ -95,6 +92,7 @@ impl Trials {
             least,
             stage: Stage::Timing,
             stopwatch: Stopwatch::new(status),
+            fastest: 1.0,
         }
     }
 
@@ -106,23 +104,16 @@ impl Trials {
         };
     }
 
-    /// Goes on beside the `present` plan, now that more is known and `left` seconds of the render are; with `wait` not before the
-    /// next plan is built. What became of a trial, if one ended.
-    pub(super) fn advance(
-        &mut self,
-        status: &Status,
-        present: &Plan,
-        left: f64,
-        wait: bool,
-    ) -> Option<Tried> {
+    /// Goes on, now that more is known and `left` seconds of the render are; with `wait` not before the next plan is built. What
+    /// became of a trial, if one ended.
+    pub(super) fn advance(&mut self, status: &Status, left: f64, wait: bool) -> Option<Tried> {
         let seconds = self.stopwatch.seconds(status, self.least)?;
         let (stage, tried) = match std::mem::replace(&mut self.stage, Stage::Over) {
             Stage::Timing => {
                 let trials_left = left / self.least.time(seconds);
-                let next = (trials_left >= LEFT_OF_SAME).then(|| self.next(seconds, wait));
-                match next {
-                    Some((Stage::Due(trial), _)) if !trial.is_worth(present, trials_left) => {
-                        (self.over(), None)
+                match (trials_left >= WORTH).then(|| self.next(seconds, wait)) {
+                    Some((Stage::Due(trial), _)) if !self.is_worth(&trial, trials_left) => {
+                        (Stage::Timing, None)
                     }
                     Some(next) => next,
                     None => (self.over(), None),
@@ -136,6 +127,7 @@ impl Trials {
                     is_kept,
                 };
                 let stage = if is_kept {
+                    self.fastest *= seconds / trial.least;
                     Stage::Timing
                 } else {
                     Stage::Back(Box::new(trial.other))
@@ -146,6 +138,12 @@ impl Trials {
         };
         self.stage = stage;
         tried
+    }
+
+    /// Whether a trial is worth its time beside the fastest so far, where so many times that is left.
+    fn is_worth(&self, trial: &Trial, left: f64) -> bool {
+        let expected = trial.made.expected;
+        expected.is_some_and(|it| is_worth(it.beside(self.fastest), left))
     }
 
     /// No further plan is made.
@@ -243,6 +241,22 @@ mod tests {
             gpu_seconds,
             ..Status::new(1)
         }
+    }
+
+    #[test]
+    fn the_more_is_left_the_less_must_be_promised() {
+        let least = |ratio, error| {
+            let expected = Expected { ratio, error };
+            let is_worth = |left: &i32| is_worth(expected, f64::from(*left));
+            assert!((1..1000).filter(is_worth).is_sorted_by(|a, b| a + 1 == *b));
+            (1..1000).find(is_worth)
+        };
+        // As fast as what runs for all that is known: as likely faster as slower.
+        assert_eq!(least(1.0, 0.1), Some(WORTH as i32));
+        assert_eq!(least(0.8, 0.0), Some(1));
+        assert!(least(1.02, 0.05) < least(1.1, 0.05));
+        assert!(least(1.1, 0.2) < least(1.1, 0.05));
+        assert_eq!(least(1.5, 0.02), None);
     }
 
     #[test]

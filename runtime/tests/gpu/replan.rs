@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use impasto_compiler::partition::{Form, Plan, Strategy, Workload};
+use impasto_compiler::partition::{Candidate, Expected, Form, Plan, Strategy, Workload};
 use impasto_runtime::film::file::{FilmFile, Range};
 use impasto_runtime::options::{Progress, RenderOptions};
 use impasto_runtime::render::passes::Keeping;
 use impasto_runtime::render::report::{KernelReport, Report};
 use impasto_runtime::render::until::Goals;
-use impasto_runtime::render::{Planner, Renderer, Rendering, Replanning};
+use impasto_runtime::render::{Planner, Plans, Renderer, Rendering, Replanning};
 
 use crate::gpu::plans::custom;
 use crate::gpu::stub::{Kind, Materials, Room, gpu, materials, plan, samples};
@@ -59,6 +59,7 @@ fn at_once(planner: Planner) -> Replanning {
         least_hits: 1.0,
         worthwhile: Duration::ZERO,
         trial: Duration::ZERO,
+        trial_iterations: 2,
         wait: true,
         ..Replanning::new(Arc::new(surfaces()), planner)
     }
@@ -68,9 +69,26 @@ fn always(plan: Plan) -> Planner {
     in_turn(vec![plan])
 }
 
-/// The first, and the others as trials.
+/// The first, and the others as trials that promise much.
 fn in_turn(plans: Vec<Plan>) -> Planner {
-    Box::new(move |_| Ok(Box::new(plans.into_iter())))
+    let much = Expected {
+        ratio: 0.01,
+        error: 0.01,
+    };
+    trying(plans.into_iter().map(|plan| (plan, much)).collect())
+}
+
+/// The first, and the others as trials of which something is expected.
+fn trying(plans: Vec<(Plan, Expected)>) -> Planner {
+    let mut plans = plans.into_iter();
+    let (first, _) = plans.next().expect("a plan to go on with");
+    let others = plans.map(|(plan, expected)| Candidate { plan, expected });
+    Box::new(move |_| {
+        Ok(Plans {
+            first,
+            others: Box::new(others),
+        })
+    })
 }
 
 fn go_on(_: &Progress) -> ControlFlow<()> {
@@ -259,6 +277,28 @@ fn inline_materials_may_be_tried() {
     }
 }
 
+/// A trial costs time: what promises too little for it does not run, and those that follow do.
+#[test]
+fn what_promises_little_is_not_tried() {
+    let expected = |ratio| Expected { ratio, error: 0.01 };
+    let slow = custom(&[(Form::Mixed, &[0, 1, 2, 3])]);
+    let fast = custom(&[(Form::Own, &[0]), (Form::Mixed, &[1, 2, 3])]);
+    let first = plan(Strategy::OWN, &surfaces());
+    let plans = vec![
+        (first, expected(1.0)),
+        (slow, expected(2.0)),
+        (fast, expected(0.01)),
+    ];
+    let rendering = replanned(&options(1500), at_once(trying(plans)));
+    let change = rendering.report.replanned.expect("a change");
+    let tried: Vec<_> = change
+        .trials
+        .iter()
+        .map(|it| (it.plan.as_str(), it.expected))
+        .collect();
+    assert_eq!(tried, [("own:m0|mixed:m1,m2,m3", Some(0.01))]);
+}
+
 /// If the plan is the one that runs, it goes on without counting.
 #[test]
 fn the_same_plan_goes_on_without_counting() {
@@ -317,8 +357,7 @@ fn planners_are_told_the_workload() {
     let (tell, told) = mpsc::channel();
     let planner: Planner = Box::new(move |workload: &Workload| {
         let _ = tell.send(workload.clone());
-        let plan = custom(&[(Form::Mixed, &[0, 1, 2, 3])]);
-        Ok(Box::new(std::iter::once(plan)))
+        always(custom(&[(Form::Mixed, &[0, 1, 2, 3])]))(workload)
     });
     let rendering = replanned(&options(16), at_once(planner));
     let workload = told.try_recv().expect("a workload");

@@ -20,7 +20,7 @@ use crate::measure::{Kernel, Measurement};
 pub enum Model {
     /// This project's, with the constants of a device.
     Profile(String, Box<DeviceProfile>),
-    /// The same, with trials of at most so many plans of either kind beside the one that it finds fastest.
+    /// The same, with trials of at most so many plans beside the one that it finds fastest.
     Tried(String, Box<DeviceProfile>, usize),
     /// This project's, with constants that are fitted to every second mix and scored on the others, and the other way round.
     Fitted,
@@ -96,7 +96,7 @@ impl Model {
                 stem.to_string_lossy().into_owned()
             }
             Self::Tried(name, _, trials) => {
-                format!("profile {name}, trials of {trials} + {trials}")
+                format!("profile {name}, {trials} trials")
             }
             Self::Fitted => "fitted to the other half".into(),
             Self::Constant => "constant".into(),
@@ -146,9 +146,9 @@ impl Model {
         };
         let plan = strategy.plan(&inputs);
         let plan = plan.map_err(|e| format!("`{}`: {e}", set.scene))?;
-        let mut plans = candidates(&inputs, &plan, trials);
-        plans.insert(0, plan);
-        Ok(plans)
+        let others = candidates(&inputs, &plan, trials).into_iter();
+        let others: Vec<Plan> = others.map(|candidate| candidate.plan).collect();
+        Ok([vec![plan], others].concat())
     }
 
     /// The seconds that it says of the kernels of a mix, in their order. Constants that a baseline has are fitted to

@@ -242,13 +242,13 @@ fn trials_lose_less_than_the_model() {
     other.weights.pressure = 8.0;
     other.weights.launch *= 5.0;
     let sets = all_measured_by(&other);
-    let names = ["h200", "h200+4", "own", "mixed", "binned", "inline"];
+    let names = ["h200", "h200+8", "own", "mixed", "binned", "inline"];
     let models = names.map(|name| Model::parse(name).expect("a model"));
     let scores = score(&sets, &models).expect("scored");
     let [alone, tried, strategies @ ..] = &scores[..] else {
         panic!("{scores:?}")
     };
-    assert_eq!(tried.model, "profile h200, trials of 4 + 4");
+    assert_eq!(tried.model, "profile h200, 8 trials");
     assert_eq!((tried.kernels, tried.without_plan), (0, 0));
     // Of material kernels alone: what takes the same in every plan would dilute it.
     let sum = |score: &Score| {
@@ -262,5 +262,5 @@ fn trials_lose_less_than_the_model() {
             assert!(ours.regret <= theirs.regret + 1e-9, "{ours:?} {theirs:?}");
         }
     }
-    assert!(Model::parse("h200+x").is_err() && Model::parse("+4").is_err());
+    assert!(Model::parse("h200+x").is_err() && Model::parse("+8").is_err());
 }
