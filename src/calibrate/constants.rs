@@ -27,7 +27,7 @@ const fn time(name: &'static str, meaning: &'static str) -> Constant {
 }
 
 /// Every constant of the model.
-pub const CONSTANTS: [Constant; 17] = [
+pub const CONSTANTS: [Constant; 18] = [
     time("launch", "s, a dispatch that finds nothing to do"),
     time("latency", "s, an operation that waits for the one before"),
     time("alu", "s, float arithmetic of a subgroup"),
@@ -82,6 +82,11 @@ pub const CONSTANTS: [Constant; 17] = [
         name: "inline_logic",
         bounds: [1e-3, 20.0],
         meaning: "slowdown of the logic kernel by any inline material, as a share",
+    },
+    Constant {
+        name: "binned",
+        bounds: [1e-3, 3.0],
+        meaning: "slowdown of the materials of a binned kernel, as a share",
     },
 ];
 

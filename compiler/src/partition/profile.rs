@@ -67,6 +67,9 @@ pub struct Weights {
     /// By how much any inline material slows the logic kernel down, as a share.
     #[serde(default)]
     pub inline_logic: f64,
+    /// By how much longer a binned kernel takes than its materials by themselves, as a share.
+    #[serde(default)]
+    pub binned: f64,
 }
 
 /// How well a model fits what was measured.
@@ -147,7 +150,7 @@ const MAX_SUBGROUP: u32 = 128;
 
 impl Weights {
     /// Every constant with its name in files.
-    pub fn named(&self) -> [(&'static str, f64); 17] {
+    pub fn named(&self) -> [(&'static str, f64); 18] {
         [
             ("launch", self.launch),
             ("latency", self.latency),
@@ -166,6 +169,7 @@ impl Weights {
             ("pressure", self.pressure),
             ("occupancy", self.occupancy),
             ("inline_logic", self.inline_logic),
+            ("binned", self.binned),
         ]
     }
 
