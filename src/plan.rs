@@ -24,8 +24,8 @@ use impasto_compiler::Program;
 use impasto_compiler::cost::Cost;
 use impasto_compiler::partition::explain::{Explanation, Subject, explain};
 use impasto_compiler::partition::{
-    Calibrated, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel, Requires,
-    Strategy, Workload, candidates, in_wide_workgroups,
+    Calibrated, Candidate, DeviceProfile, Organisation, Plan, PlanError, PlanInputs, PlanKernel,
+    Requires, Strategy, Workload, candidates, in_wide_workgroups,
 };
 use impasto_runtime::gpu::DeviceInfo;
 use impasto_runtime::render::{NOBODY, Planner, Plans, Watch, profile_workload};
@@ -150,13 +150,9 @@ impl Planning {
             let (chosen, workload) = (plan.clone(), workload.clone());
             // The first goes on while the others are searched.
             let others = std::iter::once_with(move || {
-                let trials = if is_doubted { self.trials } else { 0 };
                 let inputs = materials.inputs(&workload, &self.profile);
-                let wide = in_wide_workgroups(&inputs, &chosen).filter(|_| trials > 0);
-                let mut others = candidates(&inputs, &chosen, trials);
-                others.extend(wide);
-                others.sort_by(|a, b| a.expected.by_gain(&b.expected));
-                others
+                let trials = if is_doubted { self.trials } else { 0 };
+                tried(&inputs, &chosen, trials)
             });
             Ok(Plans {
                 first: plan,
@@ -164,6 +160,24 @@ impl Planning {
             })
         })
     }
+}
+
+/// What is tried beside the `chosen` plan. The render began with a kernel a material and has timed it: that comes first.
+fn tried(inputs: &PlanInputs<'_>, chosen: &Plan, trials: usize) -> Vec<Candidate> {
+    if trials == 0 {
+        return Vec::new();
+    }
+    let begun = Plan {
+        strategy: chosen.strategy.clone(),
+        ..Plan::few_kernels(inputs.names, inputs.unused)
+    };
+    let mut others = candidates(inputs, chosen, trials);
+    others.retain(|other| !other.plan.does_as(&begun));
+    others.extend(in_wide_workgroups(inputs, chosen));
+    others.sort_by(|a, b| a.expected.by_gain(&b.expected));
+    let begun = (!begun.does_as(chosen)).then_some(begun);
+    let begun = begun.and_then(|begun| Candidate::new(inputs, chosen, begun));
+    begun.into_iter().chain(others).collect()
 }
 
 /// Plans that are tried on a device where nothing else is asked for: none by a GPU in software, whose kernels

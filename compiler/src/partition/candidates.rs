@@ -37,6 +37,14 @@ pub struct Candidate {
     pub expected: Expected,
 }
 
+impl Candidate {
+    /// A plan beside the `chosen` one. `None` where costs, workload or profile are not known.
+    pub fn new(inputs: &PlanInputs<'_>, chosen: &Plan, plan: Plan) -> Option<Self> {
+        let expected = Present::new(inputs, chosen)?.expected(&plan.groups());
+        Some(Self { plan, expected })
+    }
+}
+
 /// What is expected of a plan beside another: the time of an iteration, in times of one by the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {

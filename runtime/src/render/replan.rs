@@ -14,7 +14,7 @@ use impasto_compiler::partition::{Candidate, Form, Plan, Workload};
 use super::Renderer;
 use super::background::{Job, Jobbing, Made, Outcome};
 use super::build::BuiltPlan;
-use super::trials::{Least, Trials, Tried};
+use super::trials::{Least, Timed, Trials, Tried};
 use crate::device::{DeviceRef, Work};
 use crate::kernels::dropped::Dropped;
 use crate::render::report::{Ran, ReplanReport, TrialReport, add_kernels, partition};
@@ -82,6 +82,8 @@ pub(super) struct Replan {
     settings: Settings,
     stage: Stage,
     workload: Option<Workload>,
+    /// Iterations and GPU seconds when the mixture of paths was steady, unless another pass has begun since.
+    steady: Option<(u64, f64)>,
 }
 
 /// The numbers of [`Replanning`].
@@ -153,6 +155,7 @@ impl Renderer<'_> {
             },
             stage: Stage::Warming(0),
             workload: None,
+            steady: None,
         });
     }
 
@@ -189,7 +192,7 @@ impl Renderer<'_> {
         let Some(mut replan) = self.replan.take() else {
             return;
         };
-        if let Some((made, built)) = replan.take(status) {
+        if let Some((made, built)) = replan.take(&self.built.plan, status) {
             self.replanned = Some(self.change(&made, status, elapsed));
             self.go_on_with(built, status);
         } else if let Stage::Trying(trials) = &mut replan.stage
@@ -302,6 +305,7 @@ impl Replan {
     /// Counts anew in a pass: at the end of the one before slots idle, and at its beginning paths
     /// begin together.
     pub(super) fn begin_pass(&mut self, iterations: u64) {
+        self.steady = None;
         match &mut self.stage {
             Stage::Warming(_) | Stage::Counting(_) => self.stage = Stage::Warming(iterations),
             Stage::Trying(trials) => trials.begin_pass(iterations, self.settings.warm),
@@ -314,6 +318,7 @@ impl Replan {
         let settings = self.settings;
         self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Warming(begin) if status.iterations >= begin + settings.warm => {
+                self.steady = Some((status.iterations, status.gpu_seconds));
                 Stage::Counting(Mark::of(status))
             }
             Stage::Counting(mark) => self.count(mark, renderer, status, left),
@@ -389,12 +394,17 @@ impl Replan {
         }
     }
 
-    /// The new plan, if it is there. Others may be tried beside it from now on.
-    fn take(&mut self, status: &Status) -> Option<(Made, BuiltPlan)> {
+    /// The new plan in the place of the `present` one, if it is there. Others may be tried beside it from now on.
+    fn take(&mut self, present: &Plan, status: &Status) -> Option<(Made, BuiltPlan)> {
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Made(made, job) => {
                 let least = self.settings.trial;
-                self.stage = Stage::Trying(Trials::new(job, least, status));
+                let begun = self.steady.take().map(|(iterations, seconds)| Timed {
+                    plan: present.clone(),
+                    seconds: (status.gpu_seconds - seconds)
+                        / (status.iterations - iterations).max(1) as f64,
+                });
+                self.stage = Stage::Trying(Trials::new(job, least, begun, status));
                 Some(*made)
             }
             other => {

@@ -323,7 +323,7 @@ pub struct ReplanReport {
 pub struct TrialReport {
     /// The plan.
     pub plan: String,
-    /// GPU time of an iteration that was expected of it, in times of one by the plan that `to` names.
+    /// GPU time of an iteration that was expected of it, in times of one by the plan that ran before.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected: Option<f64>,
     /// Time that compiling its kernels took, while the GPU went on.
@@ -352,7 +352,7 @@ impl TrialReport {
         };
         Self {
             plan: plan.unwrap_or_default(),
-            expected: made.expected.map(|it| it.ratio),
+            expected: tried.expected,
             compile_seconds: made.compile_seconds,
             seconds: seconds.map(|[its, _]| its),
             seconds_before: seconds.map(|[_, before]| before),

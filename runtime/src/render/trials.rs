@@ -6,7 +6,7 @@
 
 use std::sync::mpsc::TryRecvError;
 
-use impasto_compiler::partition::Expected;
+use impasto_compiler::partition::{Expected, Plan};
 
 use super::background::{Jobbing, Made, Outcome};
 use super::build::BuiltPlan;
@@ -14,6 +14,9 @@ use crate::render::status::Status;
 
 /// By how much another plan must be faster, as a share: less is noise.
 const NOTABLE: f64 = 0.005;
+
+/// By how much of an iteration a plan that was timed before may be slower or faster now.
+const TIMED: f64 = 0.005;
 
 /// A trial begins if what it is expected to gain over what is left of the render is so many times what it is expected to cost while
 /// it lasts: the best that is expected of several plans is less than the sum of them.
@@ -28,6 +31,16 @@ pub(super) struct Trials {
     stopwatch: Stopwatch,
     /// What an iteration takes by the fastest so far, in times of one by the first plan.
     fastest: f64,
+    /// What ran before the first plan, if it could be timed.
+    begun: Option<Timed>,
+}
+
+/// A plan that ran.
+#[derive(Debug)]
+pub(super) struct Timed {
+    pub plan: Plan,
+    /// What an iteration took, while it counted hits.
+    pub seconds: f64,
 }
 
 /// How long a plan is timed, at least.
@@ -62,6 +75,8 @@ enum Stage {
 #[derive(Debug)]
 struct Trial {
     made: Made,
+    /// What is expected of it beside the fastest so far.
+    expected: Expected,
     /// The plan that does not run meanwhile: before the trial the one to be tried, then the fastest so far.
     other: BuiltPlan,
     /// What an iteration took by the fastest so far, in seconds.
@@ -73,10 +88,22 @@ struct Trial {
 pub(super) struct Tried {
     /// The plan, and what it took to make.
     pub made: Made,
+    /// The time of an iteration that was expected of it, in times of one by the fastest until then.
+    pub expected: Option<f64>,
     /// Seconds of an iteration by it, and by the fastest until then; or why it could not run.
     pub outcome: Result<[f64; 2], String>,
     /// Whether it goes on.
     pub is_kept: bool,
+}
+
+impl Timed {
+    /// What is expected of a plan beside another, of which an iteration takes some `seconds`, if it is this one.
+    fn expected(&self, plan: &Plan, seconds: f64) -> Option<Expected> {
+        plan.does_as(&self.plan).then(|| Expected {
+            ratio: self.seconds / seconds,
+            error: TIMED,
+        })
+    }
 }
 
 /// Whether a trial may gain more than it costs where so many times its time is left.
@@ -85,14 +112,15 @@ fn is_worth(expected: Expected, left: f64) -> bool {
 }
 
 impl Trials {
-    /// Of what a job makes, beside a plan that begins to run now.
-    pub(super) fn new(job: Jobbing, least: Least, status: &Status) -> Self {
+    /// Of what a job makes, beside a plan that begins to run now in the place of what has `begun`.
+    pub(super) fn new(job: Jobbing, least: Least, begun: Option<Timed>, status: &Status) -> Self {
         Self {
             job,
             least,
             stage: Stage::Timing,
             stopwatch: Stopwatch::new(status),
             fastest: 1.0,
+            begun,
         }
     }
 
@@ -112,7 +140,7 @@ impl Trials {
             Stage::Timing => {
                 let trials_left = left / self.least.time(seconds);
                 match (trials_left >= WORTH).then(|| self.next(seconds, wait)) {
-                    Some((Stage::Due(trial), _)) if !self.is_worth(&trial, trials_left) => {
+                    Some((Stage::Due(trial), _)) if !is_worth(trial.expected, trials_left) => {
                         (Stage::Timing, None)
                     }
                     Some(next) => next,
@@ -123,6 +151,7 @@ impl Trials {
                 let is_kept = seconds < trial.least * (1.0 - NOTABLE);
                 let tried = Tried {
                     made: trial.made,
+                    expected: Some(trial.expected.ratio),
                     outcome: Ok([seconds, trial.least]),
                     is_kept,
                 };
@@ -140,10 +169,11 @@ impl Trials {
         tried
     }
 
-    /// Whether a trial is worth its time beside the fastest so far, where so many times that is left.
-    fn is_worth(&self, trial: &Trial, left: f64) -> bool {
-        let expected = trial.made.expected;
-        expected.is_some_and(|it| is_worth(it.beside(self.fastest), left))
+    /// What is expected of a plan beside the fastest so far, of which an iteration takes some `seconds`.
+    fn expected(&self, made: &Made, seconds: f64) -> Option<Expected> {
+        let timed = self.begun.as_ref().zip(made.plan.as_ref());
+        let timed = timed.and_then(|(begun, plan)| begun.expected(plan, seconds));
+        timed.or_else(|| made.expected.map(|it| it.beside(self.fastest)))
     }
 
     /// No further plan is made.
@@ -165,9 +195,21 @@ impl Trials {
             Err(TryRecvError::Disconnected) => return (Stage::Over, None),
         };
         match outcome {
-            (made, Ok(other)) => (Stage::Due(Box::new(Trial { made, other, least })), None),
+            (made, Ok(other)) => {
+                let Some(expected) = self.expected(&made, least) else {
+                    return (Stage::Timing, None);
+                };
+                let trial = Trial {
+                    made,
+                    expected,
+                    other,
+                    least,
+                };
+                (Stage::Due(Box::new(trial)), None)
+            }
             (made, Err(why)) => {
                 let tried = Tried {
+                    expected: self.expected(&made, least).map(|it| it.ratio),
                     made,
                     outcome: Err(why),
                     is_kept: false,
@@ -233,6 +275,8 @@ impl Stopwatch {
 
 #[cfg(test)]
 mod tests {
+    use impasto_compiler::partition::Form;
+
     use super::*;
 
     fn at(iterations: u64, gpu_seconds: f64) -> Status {
@@ -257,6 +301,23 @@ mod tests {
         assert!(least(1.02, 0.05) < least(1.1, 0.05));
         assert!(least(1.1, 0.2) < least(1.1, 0.05));
         assert_eq!(least(1.5, 0.02), None);
+    }
+
+    #[test]
+    fn what_was_timed_is_expected_to_take_that_again() {
+        let names = ["a", "b"].map(String::from);
+        let plan = |form| Plan::wavefront("auto", [(form, vec![0, 1])], Vec::new(), &names);
+        let begun = Timed {
+            plan: plan(Form::Mixed),
+            seconds: 0.03,
+        };
+        let expected = begun.expected(&plan(Form::Mixed), 0.04);
+        let expected = expected.expect("it is the same plan");
+        assert!(
+            expected.ratio == 0.75 && is_worth(expected, WORTH),
+            "{expected:?}"
+        );
+        assert_eq!(begun.expected(&plan(Form::Binned), 0.04), None);
     }
 
     #[test]

@@ -217,12 +217,13 @@ fn plans_that_are_tried_render_the_same_picture() {
     assert_same_work(report, &whole.report);
     let change = report.replanned.as_ref().expect("a change");
     let trials = &change.trials;
-    let tried: Vec<&str> = trials.iter().map(|trial| trial.plan.as_str()).collect();
+    let tried = trials.iter().map(|trial| trial.plan.as_str());
+    // The plan that the render began with was timed: whether it is tried again depends on that.
+    let tried: Vec<&str> = tried.filter(|plan| *plan != change.from).collect();
     assert_eq!(
         tried,
         [
             "own:m0|mixed:m1,m2,m3",
-            "own:m0|own:m1|own:m2|own:m3",
             "own/384:m0|own:m1|own/384:m2|own:m3",
             "own:m0",
             "binned:m1,m3|own:m0|own:m2"
@@ -264,8 +265,9 @@ fn inline_materials_may_be_tried() {
     let whole = render(&mut renderer(&options));
     let inline = || custom(&[(Form::Inline, &[0, 1, 2, 3])]);
     let partly = || custom(&[(Form::Inline, &[0, 2]), (Form::Binned, &[1, 3])]);
+    let mixed = || custom(&[(Form::Mixed, &[0, 1, 2, 3])]);
     for plans in [
-        vec![inline(), partly(), plan(Strategy::OWN, &surfaces())],
+        vec![inline(), partly(), mixed()],
         vec![plan(Strategy::OWN, &surfaces()), partly(), inline()],
     ] {
         let rendering = replanned(&options, at_once(in_turn(plans)));
