@@ -75,7 +75,8 @@ pub const CONSTANTS: [Constant; 18] = [
     },
     Constant {
         name: "occupancy",
-        bounds: [1e-3, 20.0],
+        // With 128 registers a thread, a quarter of the threads are in flight that are with 32.
+        bounds: [1e-3, 3.0],
         meaning: "slowdown of a kernel's memory by a hundred live numbers, as a share",
     },
     Constant {
@@ -84,9 +85,9 @@ pub const CONSTANTS: [Constant; 18] = [
         meaning: "slowdown of the logic kernel by any inline material, as a share",
     },
     Constant {
-        name: "binned",
+        name: "company",
         bounds: [1e-3, 3.0],
-        meaning: "slowdown of the materials of a binned kernel, as a share",
+        meaning: "slowdown of materials that share a kernel with queues, as a share",
     },
 ];
 

@@ -59,7 +59,7 @@ const WEIGHTS: Weights = Weights {
     pressure: 2.656_393,
     occupancy: 0.935_313,
     inline_logic: 0.0,
-    binned: 0.0,
+    company: 0.0,
 };
 
 impl Case {

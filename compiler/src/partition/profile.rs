@@ -67,9 +67,9 @@ pub struct Weights {
     /// By how much any inline material slows the logic kernel down, as a share.
     #[serde(default)]
     pub inline_logic: f64,
-    /// By how much longer a binned kernel takes than its materials by themselves, as a share.
+    /// By how much longer a kernel with queues of several materials takes for each of them, as a share.
     #[serde(default)]
-    pub binned: f64,
+    pub company: f64,
 }
 
 /// How well a model fits what was measured.
@@ -169,7 +169,7 @@ impl Weights {
             ("pressure", self.pressure),
             ("occupancy", self.occupancy),
             ("inline_logic", self.inline_logic),
-            ("binned", self.binned),
+            ("company", self.company),
         ]
     }
 
