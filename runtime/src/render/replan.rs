@@ -59,7 +59,7 @@ pub struct Replanning {
 
 impl Replanning {
     /// With the defaults: after 16 iterations hits are counted over 16, at least 10,000 of them;
-    /// less than half a second of rendering is not worth a plan, and 30 ms or 8 iterations tell plans apart.
+    /// less than half a second of rendering is not worth a plan, and 30 ms and 8 iterations tell plans apart.
     pub fn new(source: Arc<dyn MaterialSource + Send + Sync>, planner: Planner) -> Self {
         Self {
             source,
