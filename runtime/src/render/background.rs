@@ -46,7 +46,7 @@ pub(super) struct Made {
     pub compile_seconds: f64,
     /// The plan, unless there is none.
     pub plan: Option<Plan>,
-    /// What is expected of it beside the first, of plans that are to be tried.
+    /// What is expected of it beside the first, of plans that are to be tried; then, beside the fastest until it is tried.
     pub expected: Option<Expected>,
 }
 

@@ -352,7 +352,7 @@ impl TrialReport {
         };
         Self {
             plan: plan.unwrap_or_default(),
-            expected: tried.expected,
+            expected: made.expected.map(|it| it.ratio),
             compile_seconds: made.compile_seconds,
             seconds: seconds.map(|[its, _]| its),
             seconds_before: seconds.map(|[_, before]| before),

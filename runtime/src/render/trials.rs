@@ -75,8 +75,6 @@ enum Stage {
 #[derive(Debug)]
 struct Trial {
     made: Made,
-    /// What is expected of it beside the fastest so far.
-    expected: Expected,
     /// The plan that does not run meanwhile: before the trial the one to be tried, then the fastest so far.
     other: BuiltPlan,
     /// What an iteration took by the fastest so far, in seconds.
@@ -88,8 +86,6 @@ struct Trial {
 pub(super) struct Tried {
     /// The plan, and what it took to make.
     pub made: Made,
-    /// The time of an iteration that was expected of it, in times of one by the fastest until then.
-    pub expected: Option<f64>,
     /// Seconds of an iteration by it, and by the fastest until then; or why it could not run.
     pub outcome: Result<[f64; 2], String>,
     /// Whether it goes on.
@@ -109,6 +105,13 @@ impl Timed {
 /// Whether a trial may gain more than it costs where so many times its time is left.
 fn is_worth(expected: Expected, left: f64) -> bool {
     left * expected.gain() >= WORTH * expected.loss()
+}
+
+impl Trial {
+    /// Whether it may gain more than it costs where so many times its time is left.
+    fn is_worth(&self, left: f64) -> bool {
+        self.made.expected.is_some_and(|it| is_worth(it, left))
+    }
 }
 
 impl Trials {
@@ -140,7 +143,7 @@ impl Trials {
             Stage::Timing => {
                 let trials_left = left / self.least.time(seconds);
                 match (trials_left >= WORTH).then(|| self.next(seconds, wait)) {
-                    Some((Stage::Due(trial), _)) if !is_worth(trial.expected, trials_left) => {
+                    Some((Stage::Due(trial), _)) if !trial.is_worth(trials_left) => {
                         (Stage::Timing, None)
                     }
                     Some(next) => next,
@@ -151,7 +154,6 @@ impl Trials {
                 let is_kept = seconds < trial.least * (1.0 - NOTABLE);
                 let tried = Tried {
                     made: trial.made,
-                    expected: Some(trial.expected.ratio),
                     outcome: Ok([seconds, trial.least]),
                     is_kept,
                 };
@@ -194,22 +196,12 @@ impl Trials {
             Err(TryRecvError::Empty) => return (Stage::Timing, None),
             Err(TryRecvError::Disconnected) => return (Stage::Over, None),
         };
-        match outcome {
-            (made, Ok(other)) => {
-                let Some(expected) = self.expected(&made, least) else {
-                    return (Stage::Timing, None);
-                };
-                let trial = Trial {
-                    made,
-                    expected,
-                    other,
-                    least,
-                };
-                (Stage::Due(Box::new(trial)), None)
-            }
-            (made, Err(why)) => {
+        let (mut made, built) = outcome;
+        made.expected = self.expected(&made, least);
+        match built {
+            Ok(other) => (Stage::Due(Box::new(Trial { made, other, least })), None),
+            Err(why) => {
                 let tried = Tried {
-                    expected: self.expected(&made, least).map(|it| it.ratio),
                     made,
                     outcome: Err(why),
                     is_kept: false,
