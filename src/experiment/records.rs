@@ -235,22 +235,28 @@ fn refused(path: &Path, what: &str) -> String {
     )
 }
 
-/// A fingerprint of a scene: its file, every file that it names, and the materials beside those.
+/// A fingerprint of a scene: its file, every file that it names, and the materials beside those. It is the same wherever
+/// these lie, so that one machine knows what another measured.
 ///
 /// # Errors
 /// If the scene's file cannot be read.
 pub fn digest_of_scene(scene: &Path) -> Result<u64, String> {
     let text = input::read_to_string(scene);
-    let text = text.map_err(|e| format!("cannot read `{}`: {}", scene.display(), reason(&e)))?;
-    let mut all = vec![format!("{:016x}", fingerprint::of(text.as_bytes()))];
+    let mut text = text.map_err(|e| format!("cannot read `{}`: {}", scene.display(), reason(&e)))?;
     let base = scene.parent().unwrap_or(Path::new(""));
-    for path in super::named::files(base, &text) {
-        // What cannot be read is said by who renders it.
-        if let Ok(bytes) = std::fs::read(&path) {
-            all.push(format!("{:016x}", fingerprint::of(&bytes)));
+    let files = super::named::files(base, &text);
+    // What cannot be read is said by who renders it.
+    let contents = files.iter().filter_map(|path| std::fs::read(path).ok());
+    let mut all: Vec<u64> = contents.map(|bytes| fingerprint::of(&bytes)).collect();
+    all.sort_unstable();
+    for folder in files.iter().filter_map(|path| path.parent()) {
+        if folder.is_absolute() {
+            text = text.replace(&*folder.to_string_lossy(), "");
         }
     }
-    Ok(fingerprint::of(all.join(" ").as_bytes()))
+    all.push(fingerprint::of(text.as_bytes()));
+    let words: Vec<String> = all.iter().map(|one| format!("{one:016x}")).collect();
+    Ok(fingerprint::of(words.join(" ").as_bytes()))
 }
 
 /// Today, as in 2026-11-30 (UTC). Source: Hinnant 2013, "chrono-Compatible Low-Level Date Algorithms".
@@ -293,6 +299,34 @@ mod tests {
         assert_eq!(date(19_782), "2024-02-29");
         assert_eq!(date(20_787), "2026-11-30");
         assert_eq!(date(-1), "1969-12-31");
+    }
+
+    /// A scene in one folder, which names a material in another by its whole path.
+    fn scene_beside(folder: &Path, [scenes, materials]: [&str; 2], paint: &str) -> u64 {
+        let [scenes, materials] = [scenes, materials].map(|name| folder.join(name));
+        let paint_file = materials.join("paint.impasto");
+        let text = format!(
+            "geometry = [{{ obj = \"a.obj\" }}]\nmaterials.m.file = \"{}\"\n",
+            paint_file.display()
+        );
+        for (path, text) in [
+            (scenes.join("s.toml"), text.as_str()),
+            (scenes.join("a.obj"), "v 0 0 0"),
+            (paint_file, paint),
+        ] {
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            std::fs::write(path, text).expect("written");
+        }
+        digest_of_scene(&scenes.join("s.toml")).expect("it is there")
+    }
+
+    #[test]
+    fn a_scene_has_the_same_digest_wherever_it_lies() {
+        let [one, other] = [0, 1].map(|_| tempfile::tempdir().expect("a folder"));
+        let here = scene_beside(one.path(), ["a", "b"], "paint");
+        // The files come in another order there.
+        assert_eq!(scene_beside(other.path(), ["z", "b"], "paint"), here);
+        assert_ne!(scene_beside(other.path(), ["z", "b"], "glass"), here);
     }
 
     fn record() -> Record {
