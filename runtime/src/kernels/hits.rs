@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn small_pools_are_counted_whole_and_of_large_ones_an_eighth() {
         let all = |slots: u32, blocks: u32| Counted { slots, blocks };
-        for workgroup in [256, 384] {
+        for workgroup in [256, 384, 512] {
             assert_eq!(counted(sizes(1, 256), workgroup), all(1, 1));
             assert_eq!(counted(sizes(1000, 256), workgroup), all(1000, 32));
             let half = counted(sizes(1 << 19, 256), workgroup);
@@ -94,6 +94,7 @@ mod tests {
             (1 << 20, 256, 384),
             (1 << 23, 256, 256),
             (1 << 23, 256, 384),
+            (1 << 23, 256, 512),
             (1 << 23, 64, 64),
             (8_000_001, 96, 96),
         ] {

@@ -11,7 +11,7 @@ use impasto_compiler::partition::{Form, Organisation, Plan};
 use crate::kernels::compose::Binding;
 use crate::kernels::layout::PlanLayout;
 use crate::kernels::shells::SUBGROUP;
-use crate::kernels::stages::{STAGES, Stage};
+use crate::kernels::stages::Stage;
 use crate::technique::{Regeneration, Technique};
 use crate::wgsl;
 use crate::wgsl::template::template;
@@ -31,9 +31,9 @@ pub(crate) const RAYS: &str = "rays";
 /// Threads of a prepare kernel, which is one workgroup.
 const PREPARE_THREADS: u32 = 64;
 
-/// Threads of a workgroup of the megakernel, more than suit any other kernel (docs/measurements.md, "Workgroups that suit their
-/// kernels").
-pub(crate) const MEGA_WORKGROUP: u32 = 512;
+/// Threads of the largest workgroups that suit a kernel: the megakernel, kernels that fetch rays, and logic where all hits go
+/// into one queue (docs/measurements.md, "Workgroups that suit their kernels").
+pub(crate) const LARGEST_WORKGROUP: u32 = 512;
 
 /// Where the items come from that a kernel works on, which decides how many threads it gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,11 +187,10 @@ impl Sizes {
             .unwrap_or(self.workgroup)
     }
 
-    /// The most threads that a workgroup of a stage's kernel has.
+    /// The most threads that a workgroup of any kernel has.
     pub(crate) fn largest_workgroup(self) -> u32 {
-        let suited = STAGES.iter().filter_map(|stage| stage.workgroup);
-        let suited = suited.filter(|_| self.suited);
-        suited.fold(self.workgroup, u32::max)
+        let suited = if self.suited { LARGEST_WORKGROUP } else { 0 };
+        self.workgroup.max(suited)
     }
 
     /// Threads of a kernel that fetches the items of some queues: so many that each may fetch about twice its share. Items
@@ -347,7 +346,7 @@ impl Composer<'_> {
             role: MEGA,
             form: Some(Form::Inline),
             members: self.planned(),
-            workgroup: Some(MEGA_WORKGROUP),
+            workgroup: Some(LARGEST_WORKGROUP),
             ..KernelDesc::plain("mega", self.stages().collect(), source, shell)
         }
     }

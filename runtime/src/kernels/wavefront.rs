@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use impasto_compiler::partition::{Form, PlanKernel};
 
-use crate::kernels::modules::{Composer, DispatchSource, KernelDesc, RAYS, SCAN, SCATTER};
+use crate::kernels::modules::{
+    Composer, DispatchSource, KernelDesc, LARGEST_WORKGROUP, RAYS, SCAN, SCATTER,
+};
 use crate::kernels::order;
 use crate::kernels::shells::{Consumed, EntryPoint, Fetched, Shell};
 use crate::kernels::stages::{Part, Phase, Stage, Work};
@@ -88,13 +90,22 @@ impl Composer<'_> {
             ..Shell::default()
         });
         KernelDesc {
-            // Inline materials need registers, which most of them have by workgroups of the usual size.
-            workgroup: stage.workgroup.filter(|_| found.members.is_empty()),
+            workgroup: self.workgroup_over_pool(stage, &found),
             form: found.form,
             members: found.members,
             holds,
             ..KernelDesc::plain(stage.name, found.stages, DispatchSource::Pool, shell)
         }
+    }
+
+    /// Threads of a workgroup that suit a kernel over all slots. One that puts all hits into one queue counts few requests, however
+    /// many threads make them. Inline materials need registers, which most of them have by workgroups of the usual size.
+    fn workgroup_over_pool(&self, stage: &Stage, found: &Found) -> Option<u32> {
+        let suits = match self.layout.queues.materials {
+            1 => Some(LARGEST_WORKGROUP),
+            _ => stage.workgroup,
+        };
+        suits.filter(|_| found.members.is_empty())
     }
 
     /// The kernel that begins paths and casts their rays, and decides at once how those go on that hit something. A slot
@@ -242,6 +253,7 @@ impl Composer<'_> {
         };
         KernelDesc {
             role,
+            workgroup: Some(LARGEST_WORKGROUP),
             ..KernelDesc::plain(role, stages, source, shell)
         }
     }

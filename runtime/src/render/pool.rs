@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use crate::device::DeviceRef;
 use crate::error::RuntimeError;
 use crate::kernels::layout::PlanLayout;
-use crate::kernels::modules::{MEGA_WORKGROUP, Sizes};
+use crate::kernels::modules::{LARGEST_WORKGROUP, Sizes};
 use crate::options::{Progress, RenderOptions};
-use crate::technique::{RayKernels, Technique};
+use crate::technique::{RayKernels, Stack, Technique};
 use crate::world::World;
 
 /// Paths in flight by default, as in Laine et al. 2013. In a megakernel they are those of one
@@ -169,7 +169,9 @@ pub(crate) fn dispatch_sizes(
         workgroup: workgroup_size(device, technique.workgroup)?,
         suited: matches!(device, DeviceRef::Gpu(_))
             && technique.workgroup.is_none()
-            && limits.workgroup_threads >= MEGA_WORKGROUP,
+            // There is no memory for the stacks of more threads.
+            && technique.stack != Stack::Workgroup
+            && limits.workgroup_threads >= LARGEST_WORKGROUP,
         threads: technique.threads.unwrap_or(THREADS).min(items),
         fetch_limit,
         row_groups: limits.row_groups,
