@@ -242,7 +242,8 @@ fn refused(path: &Path, what: &str) -> String {
 /// If the scene's file cannot be read.
 pub fn digest_of_scene(scene: &Path) -> Result<u64, String> {
     let text = input::read_to_string(scene);
-    let mut text = text.map_err(|e| format!("cannot read `{}`: {}", scene.display(), reason(&e)))?;
+    let mut text =
+        text.map_err(|e| format!("cannot read `{}`: {}", scene.display(), reason(&e)))?;
     let base = scene.parent().unwrap_or(Path::new(""));
     let files = super::named::files(base, &text);
     // What cannot be read is said by who renders it.

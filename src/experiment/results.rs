@@ -190,6 +190,21 @@ impl Results {
         self
     }
 
+    /// Without the rows of measurements that a study does not have.
+    pub fn asked_for_by(mut self, study: &Study) -> Self {
+        let has = |part: &Part, row: &Row| {
+            let mut scenes = part.scenes.iter().map(|scene| &study.scenes[*scene]);
+            // Those of all scenes together name none.
+            let has_scene = row.scene.is_empty() || scenes.any(|scene| scene.name == row.scene);
+            has_scene && part.variants().contains(&row.variant)
+        };
+        self.rows.retain(|row| {
+            let part = study.part(Some(&row.part), |_| true);
+            part.is_some_and(|part| has(part, row))
+        });
+        self
+    }
+
     /// The rows of a part.
     pub fn of<'a>(&'a self, part: &'a Part) -> impl Iterator<Item = &'a Row> {
         self.rows.iter().filter(move |row| row.part == part.name)
@@ -304,5 +319,45 @@ mod tests {
         // What is written is read again.
         let again: Results = serde_json::from_str(&all.text().expect("text")).expect("JSON");
         assert_eq!(again.text(), all.text());
+    }
+
+    #[test]
+    fn rows_go_with_the_scenes_and_variants_of_the_study() {
+        let text = r#"
+            title = "Mine"
+            scenes = [{ name = "a", file = "a.toml" }, { name = "b", file = "b.toml" }]
+            [[studies]]
+            kind = "rates"
+            name = "speed"
+            scenes = ["a"]
+            strategies = ["own", "mega"]
+        "#;
+        let study = Study::parse(Path::new("mine.toml"), text).expect("it is sound");
+        let row = |part: &str, scene: &str, variant: &str| Row {
+            part: part.into(),
+            scene: scene.into(),
+            variant: variant.into(),
+            ..Row::default()
+        };
+        let kept = [("speed", "a", "own"), ("speed", "a", "mega")];
+        let gone = [
+            ("speed", "a", "mixed"),
+            ("speed", "b", "own"),
+            ("slow", "a", "own"),
+        ];
+        let all = Results {
+            rows: kept
+                .iter()
+                .chain(&gone)
+                .map(|(p, s, v)| row(p, s, v))
+                .collect(),
+            ..Results::new("mine")
+        };
+        let rows = all.asked_for_by(&study).rows;
+        let told: Vec<_> = rows
+            .iter()
+            .map(|r| (&*r.part, &*r.scene, &*r.variant))
+            .collect();
+        assert_eq!(told, kept);
     }
 }

@@ -31,7 +31,7 @@ pub fn results(
 }
 
 /// Puts what a run measured in the place of what the study has published of the same measurements, and writes the page:
-/// its path. What was not measured anew stays.
+/// its path. What was not measured anew stays, unless the study does not ask for it any more.
 ///
 /// # Errors
 /// If the study does not say where, what is there cannot be used, or something cannot be written.
@@ -65,7 +65,8 @@ pub fn publish(
     } else {
         Results::new(&study.name)
     };
-    write_whole(&path, before.with(results).text()?.as_bytes())?;
+    let all = before.with(results).asked_for_by(study);
+    write_whole(&path, all.text()?.as_bytes())?;
     for (part, _) in convergence::all(study, out)? {
         convergence::copy(part, out, base)?;
     }

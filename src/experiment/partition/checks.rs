@@ -62,7 +62,7 @@ pub fn held_out(note: &ModelNote) -> String {
         let _ = write!(
             out,
             "The constants of the profile `{}` were fitted to {} kernels. The median error is {}, and the rank correlation is \
-             {:.3}.\nA fit to half of the materials has a median error of {} on the other half.\n",
+             {:.3}.\nOf kernels that they were not fitted to, the median error is {}.\n",
             note.profile,
             fit.points,
             percent(fit.median_error),

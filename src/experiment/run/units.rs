@@ -73,11 +73,7 @@ impl Bench<'_> {
         let scene = unit
             .scene
             .map_or("", |scene| &self.study.scenes[scene].name);
-        let variant = match &part.kind {
-            Kind::Partition(of) => of.pools[unit.variant].to_string(),
-            Kind::Rates(of) => of.variants[unit.variant].label.clone(),
-            Kind::Rays(_) | Kind::Convergence(_) => String::new(),
-        };
+        let variant = part.variants().swap_remove(unit.variant);
         Id::new(&part.name, scene, &variant)
     }
 

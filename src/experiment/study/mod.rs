@@ -145,6 +145,17 @@ pub struct Variant {
     pub options: Options,
 }
 
+impl Part {
+    /// What tells the measurements of one of its scenes apart, in their order.
+    pub fn variants(&self) -> Vec<String> {
+        match &self.kind {
+            Kind::Partition(of) => of.pools.iter().map(u32::to_string).collect(),
+            Kind::Rates(of) => of.variants.iter().map(|v| v.label.clone()).collect(),
+            Kind::Rays(_) | Kind::Convergence(_) => vec![String::new()],
+        }
+    }
+}
+
 impl Study {
     /// The part called `name`, or the first for which `fits`.
     pub fn part(&self, name: Option<&str>, fits: impl Fn(&Part) -> bool) -> Option<&Part> {
