@@ -12,7 +12,7 @@ use super::layout::PlanLayout;
 use super::modules::{Composer, DispatchSource, Extent, Kernel, Sizes};
 use super::random::{self, Demand};
 use super::stages::{Entry, Part, Phase, Request, STAGES, Stage, Work};
-use crate::technique::{Append, RayData, Regeneration, Technique};
+use crate::technique::{Append, RayData, RayKernels, Regeneration, Technique};
 use crate::wgsl::BufferData;
 use crate::wgsl::template::Template;
 use crate::world::needs::ALWAYS;
@@ -284,6 +284,33 @@ fn a_stage_over_all_slots_needs_no_queue() {
     assert!(names(&kernels).starts_with(&["logic", "probe", "prepare", "new_path"]));
     let mega = room.kernels(stages, None, technique);
     assert!(text(&mega, "mega").contains("    logic(item);\n    probe(item);\n"));
+}
+
+#[test]
+fn workgroups_suit_where_hits_go() {
+    let technique = Technique {
+        ray_kernels: RayKernels::Each,
+        ..Technique::default()
+    };
+    let room = Room::new(&technique);
+    for (form, logic) in [
+        (Form::Own, Some(384)),
+        // One queue for all hits.
+        (Form::Mixed, Some(512)),
+        (Form::Inline, None),
+    ] {
+        let kernels = room.kernels(&STAGES, Some(form), technique);
+        let of = |role| {
+            let mut kernels = kernels.iter().filter(|k| k.desc.role == role);
+            kernels.next().expect("the stage's kernel").desc.workgroup
+        };
+        let roles = ["logic", "new_path", "shadow", "extension"];
+        assert_eq!(
+            roles.map(of),
+            [logic, Some(128), Some(512), Some(512)],
+            "{form:?}"
+        );
+    }
 }
 
 #[test]

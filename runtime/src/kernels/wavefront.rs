@@ -102,7 +102,7 @@ impl Composer<'_> {
     /// many threads make them. Inline materials need registers, which most of them have by workgroups of the usual size.
     fn workgroup_over_pool(&self, stage: &Stage, found: &Found) -> Option<u32> {
         let suits = match self.layout.queues.materials {
-            1 => Some(LARGEST_WORKGROUP),
+            1 if stage.decides() => Some(LARGEST_WORKGROUP),
             _ => stage.workgroup,
         };
         suits.filter(|_| found.members.is_empty())
