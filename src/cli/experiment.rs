@@ -44,7 +44,7 @@ pub(super) struct ExperimentArgs {
     /// Write results, page and plots where the study publishes them, too
     #[arg(long, conflicts_with_all = ["page", "farm", "measure"])]
     publish: bool,
-    /// Predict anew what was measured, by this device profile, and choose plans anew; needs no GPU
+    /// Predict anew what was measured, by this device profile, and choose anew among plans whose kernels were measured; needs no GPU
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["page", "farm", "measure"])]
     repredict: Option<String>,
     /// Fit the time model to the kernels of half of the materials, and report its errors on the other half

@@ -8,12 +8,13 @@ use impasto_compiler::partition::{DeviceProfile, Prediction};
 use impasto_runtime::render::report::Report;
 
 use super::measured::Measured;
+use super::plans::{Plan, Set, Times, kernel};
 use super::results::{CHOSEN, Render, Scene};
 use crate::calibrate::{self, Scored};
 use crate::experiment::process::{Failed, capture};
 use crate::experiment::records::{Record, Records};
 use crate::experiment::study::{self, Partition, Renders};
-use crate::measure::{ALL, Data};
+use crate::measure::{ALL, Data, Measurement};
 
 /// How to measure.
 pub struct Bench<'a> {
@@ -266,16 +267,42 @@ impl Record {
 }
 
 /// Replaces what was predicted and chosen by what the profile of that name says; what was measured stays, but for renders
-/// by a plan that is no longer chosen.
+/// by a plan that is no longer chosen. If a kernel of the profile's plan was not measured, it has to choose among plans whose
+/// kernels were.
 ///
 /// # Errors
 /// If the record has no kernels, or the profile has no plan for them.
 pub fn repredict(record: &mut Record, profile: (&str, &DeviceProfile)) -> Result<(), String> {
     let text = serde_json::to_string(record).map_err(|e| e.to_string())?;
     let sets = Data::parse(&text)?.sets;
-    let scored = calibrate::score(&sets, profile)?;
-    let scored = scored.first().ok_or("the record holds no kernels")?;
-    record.replace(scored)
+    let scored = calibrate::score(&sets, profile)?.into_iter().next();
+    let (set, mut scored) = sets
+        .first()
+        .zip(scored)
+        .ok_or("the record holds no kernels")?;
+    scored.auto = among_measured(set, &scored)?;
+    record.replace(&scored)
+}
+
+/// The plan that was chosen, or, where a kernel of it was not measured, the one of measured kernels that is predicted to be
+/// fastest.
+fn among_measured(set: &Measurement, scored: &Scored) -> Result<String, String> {
+    let names: Vec<String> = set.materials.iter().map(|m| m.name.clone()).collect();
+    let hits = set.workload.materials.iter().enumerate();
+    let (used, unused): (Vec<_>, Vec<_>) = hits.partition(|(_, hits)| hits.on_surface);
+    let unused: Vec<usize> = unused.into_iter().map(|(m, _)| m).collect();
+    let of = |members: &[usize]| members.iter().fold(0, |set: Set, m| set | 1 << m);
+    let predicted = set.kernels.iter().zip(&scored.kernels);
+    let predicted = Times::new(
+        predicted.map(|(k, score)| (kernel(k.form, of(&set.members(k))), score.predicted)),
+    );
+    let chosen = Plan::parse(&scored.auto, &names, &unused)?;
+    if predicted.sum(&chosen).is_some() {
+        return Ok(scored.auto.clone());
+    }
+    let used: Vec<usize> = used.into_iter().map(|(m, _)| m).collect();
+    let fastest = predicted.best(of(&used));
+    Ok(fastest.map_or_else(|| scored.auto.clone(), |(plan, _)| plan.text(&names)))
 }
 
 impl Record {
@@ -305,6 +332,8 @@ impl Record {
 
 #[cfg(test)]
 mod tests {
+    use impasto_compiler::partition::Form;
+
     use super::super::fixture;
     use super::*;
     use crate::calibrate::Scores;
@@ -352,6 +381,37 @@ mod tests {
         assert!(predicted.is_some_and(|p| (p / 5e-6 - 1.0).abs() < 1e-9));
         assert!((kernel.measured / 45e-6 - 1.0).abs() < 1e-9);
         assert_eq!(answer.auto, "mixed:a,b|inline:c");
+    }
+
+    #[test]
+    fn where_a_kernel_was_not_measured_another_plan_is_chosen() {
+        let mut set = fixture::answer().measurement;
+        let scored = |set: &Measurement| {
+            let score = |kernel: &Kernel| Scores {
+                form: kernel.form,
+                members: kernel.members.clone(),
+                predicted: kernel.predicted.map_or(0.0, |p| p.total),
+                measured: kernel.measured,
+            };
+            Scored {
+                scene: "tiny".into(),
+                pool: 1 << 20,
+                profile: "new".into(),
+                auto: "own:a|own:b|own:c".into(),
+                kernels: set.kernels.iter().map(score).collect(),
+            }
+        };
+        let all = among_measured(&set, &scored(&set)).expect("a plan");
+        assert_eq!(all, "own:a|own:b|own:c");
+        set.kernels
+            .retain(|k| k.form != Form::Own || k.members != ["b"]);
+        // 12 and 38 in the place of 12, 14 and 20; with b inline it would be 58.
+        let fewer = among_measured(&set, &scored(&set)).expect("a plan");
+        assert_eq!(fewer, "own:a|binned:b,c");
+        // None is left: what is missing is said by who uses it.
+        set.kernels.retain(|k| k.members.len() > 3);
+        let none = among_measured(&set, &scored(&set)).expect("the chosen plan");
+        assert_eq!(none, "own:a|own:b|own:c");
     }
 
     /// A record is also a file that `impasto calibrate --from` reads.
