@@ -8,7 +8,7 @@ use impasto_compiler::partition::{DeviceProfile, Prediction};
 use impasto_runtime::render::report::Report;
 
 use super::measured::Measured;
-use super::plans::{Plan, Set, Times, kernel};
+use super::plans::Sets;
 use super::results::{CHOSEN, Render, Scene};
 use crate::calibrate::{self, Scored};
 use crate::experiment::process::{Failed, capture};
@@ -287,22 +287,13 @@ pub fn repredict(record: &mut Record, profile: (&str, &DeviceProfile)) -> Result
 /// The plan that was chosen, or, where a kernel of it was not measured, the one of measured kernels that is predicted to be
 /// fastest.
 fn among_measured(set: &Measurement, scored: &Scored) -> Result<String, String> {
-    let names: Vec<String> = set.materials.iter().map(|m| m.name.clone()).collect();
-    let hits = set.workload.materials.iter().enumerate();
-    let (used, unused): (Vec<_>, Vec<_>) = hits.partition(|(_, hits)| hits.on_surface);
-    let unused: Vec<usize> = unused.into_iter().map(|(m, _)| m).collect();
-    let of = |members: &[usize]| members.iter().fold(0, |set: Set, m| set | 1 << m);
-    let predicted = set.kernels.iter().zip(&scored.kernels);
-    let predicted = Times::new(
-        predicted.map(|(k, score)| (kernel(k.form, of(&set.members(k))), score.predicted)),
-    );
-    let chosen = Plan::parse(&scored.auto, &names, &unused)?;
-    if predicted.sum(&chosen).is_some() {
+    let sets = Sets::of(set)?;
+    let predicted = sets.times(scored.kernels.iter().map(|score| Some(score.predicted)));
+    if predicted.sum(&sets.plan(&scored.auto)?).is_some() {
         return Ok(scored.auto.clone());
     }
-    let used: Vec<usize> = used.into_iter().map(|(m, _)| m).collect();
-    let fastest = predicted.best(of(&used));
-    Ok(fastest.map_or_else(|| scored.auto.clone(), |(plan, _)| plan.text(&names)))
+    let fastest = predicted.best(sets.used);
+    Ok(fastest.map_or_else(|| scored.auto.clone(), |(plan, _)| plan.text(&sets.names)))
 }
 
 impl Record {

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::Result;
+use crate::measure::Measurement;
 use impasto_compiler::partition::{Form, text};
 
 /// A set of materials: bit i is the i-th.
@@ -185,6 +186,57 @@ fn best_queued(n: usize, known: &[(Set, Kernel, f64)]) -> Vec<Fastest> {
         best[subset] = sums.min_by(|a, b| a.0.total_cmp(&b.0));
     }
     best
+}
+
+/// The materials and kernels of a measurement, as sets.
+pub struct Sets {
+    /// The materials' names.
+    pub names: Vec<String>,
+    /// Those on surfaces, which plans are about.
+    pub used: Set,
+    /// The kernels, in the order of the measurement.
+    kernels: Vec<Kernel>,
+}
+
+impl Sets {
+    /// # Errors
+    /// If there are more materials than a set can have.
+    pub fn of(measured: &Measurement) -> Result<Self> {
+        let names: Vec<String> = measured.materials.iter().map(|m| m.name.clone()).collect();
+        if names.len() > Set::BITS as usize {
+            let (scene, count) = (&measured.scene, names.len());
+            return Err(format!(
+                "`{scene}` has {count} materials: plans are added up of at most {}",
+                Set::BITS
+            ));
+        }
+        let set = |members: &[usize]| members.iter().fold(0, |set: Set, at| set | 1 << at);
+        let hits = measured.workload.materials.iter().enumerate();
+        let used = hits.filter(|(_, hits)| hits.on_surface);
+        let used: Vec<usize> = used.map(|(at, _)| at).collect();
+        let kernels = measured.kernels.iter();
+        let kernels = kernels.map(|k| kernel(k.form, set(&measured.members(k))));
+        Ok(Self {
+            used: set(&used),
+            kernels: kernels.collect(),
+            names,
+        })
+    }
+
+    /// Seconds of the kernels, in their order; of those that have any.
+    pub fn times(&self, seconds: impl IntoIterator<Item = Option<f64>>) -> Times {
+        let known = self.kernels.iter().zip(seconds);
+        Times::new(known.filter_map(|(kernel, seconds)| Some((*kernel, seconds?))))
+    }
+
+    /// The plan that a partition string describes.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub fn plan(&self, partition: &str) -> Result<Plan> {
+        let unused = (0..self.names.len()).filter(|at| self.used >> at & 1 == 0);
+        Plan::parse(partition, &self.names, &unused.collect::<Vec<_>>())
+    }
 }
 
 /// The bits of `set` at `places`, side by side.

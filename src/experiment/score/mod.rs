@@ -18,7 +18,7 @@ pub use data::{Dataset, read};
 pub use model::{BASELINES, Model};
 pub use table::{by_size, scores as table, text as scores_text};
 
-use super::partition::plans::{Kernel, Plan, Set, Times, kernel};
+use super::partition::plans::{Plan, Sets, Times};
 use super::partition::{Pair, correlation, median_error};
 use crate::measure::Measurement;
 
@@ -85,10 +85,7 @@ impl Score {
 /// A mix as scores need it.
 struct Subject<'a> {
     set: &'a Measurement,
-    names: Vec<String>,
-    used: Set,
-    /// The kernels in the order of the measurement.
-    kernels: Vec<Kernel>,
+    sets: Sets,
     measured: Times,
     best: f64,
 }
@@ -99,29 +96,15 @@ const MOST: u32 = 16;
 impl<'a> Subject<'a> {
     fn new(set: &'a Measurement) -> Result<Self, String> {
         let scene = &set.scene;
-        let names: Vec<String> = set.materials.iter().map(|m| m.name.clone()).collect();
-        let hits = set.workload.materials.iter().enumerate();
-        let used = hits.filter(|(_, hits)| hits.on_surface);
-        let used: Vec<usize> = used.map(|(at, _)| at).collect();
-        if names.len() > 64 || used.len() > MOST as usize {
+        let sets = Sets::of(set)?;
+        let used = sets.used.count_ones();
+        if used > MOST {
             return Err(format!(
-                "`{scene}` has {} materials: scores are of at most {MOST}",
-                used.len()
+                "`{scene}` has {used} materials: scores are of at most {MOST}"
             ));
         }
-        let used: Set = used.iter().fold(0, |set, at| set | 1 << at);
-        let set_of = |members: &[usize]| members.iter().fold(0, |set, at| set | 1 << at);
-        let kernels = set
-            .kernels
-            .iter()
-            .map(|k| kernel(k.form, set_of(&set.members(k))));
-        let kernels: Vec<Kernel> = kernels.collect();
-        let times = kernels
-            .iter()
-            .copied()
-            .zip(set.kernels.iter().map(|k| k.measured));
-        let measured = Times::new(times);
-        let best = measured.best(used).map(|(_, seconds)| seconds);
+        let measured = sets.times(set.kernels.iter().map(|k| Some(k.measured)));
+        let best = measured.best(sets.used).map(|(_, seconds)| seconds);
         let best = best.ok_or_else(|| {
             format!(
                 "the kernels of `{scene}` that were measured make no plan for all of its materials"
@@ -129,9 +112,7 @@ impl<'a> Subject<'a> {
         })?;
         Ok(Self {
             set,
-            names,
-            used,
-            kernels,
+            sets,
             measured,
             best,
         })
@@ -144,8 +125,8 @@ impl<'a> Subject<'a> {
         let rest = self.set.logic_seconds + self.set.other_seconds;
         Some(Lost {
             mix: self.set.scene.clone(),
-            materials: self.used.count_ones() as usize,
-            plan: plan.text(&self.names),
+            materials: self.sets.used.count_ones() as usize,
+            plan: plan.text(&self.sets.names),
             regret: (rest + seconds) / (rest + self.best),
             kernels_regret: (self.best > 0.0).then(|| seconds / self.best),
         })
@@ -153,11 +134,8 @@ impl<'a> Subject<'a> {
 
     /// What the best of some plans loses, of those that are made of measured kernels.
     fn least_lost(&self, plans: &[impasto_compiler::partition::Plan]) -> Option<Lost> {
-        let names = &self.names;
-        let unused = (0..names.len()).filter(|at| self.used >> at & 1 == 0);
-        let unused: Vec<usize> = unused.collect();
         let parsed = plans.iter().map(|plan| {
-            let plan = Plan::parse(&text::print(plan, names), names, &unused);
+            let plan = self.sets.plan(&text::print(plan, &self.sets.names));
             self.lost(plan.ok())
         });
         let all = parsed.flatten();
@@ -166,9 +144,8 @@ impl<'a> Subject<'a> {
 
     /// The plan of measured kernels whose predicted times add up to the least.
     fn chosen(&self, predicted: &[Option<f64>]) -> Option<Plan> {
-        let known = self.kernels.iter().zip(predicted);
-        let known = known.filter_map(|(kernel, seconds)| Some((*kernel, (*seconds)?)));
-        Times::new(known).best(self.used).map(|(plan, _)| plan)
+        let times = self.sets.times(predicted.iter().copied());
+        times.best(self.sets.used).map(|(plan, _)| plan)
     }
 
     /// What was predicted and what was measured of each kernel. Of inline materials, it is the logic kernel with them in it.
